@@ -68,6 +68,13 @@ def frozen(
     return array
 
 
+def frozen_copy(values: Array) -> Array:
+    """Copy an array that needs no check, and make the copy read-only."""
+    kept = np.array(values, dtype=np.float64)
+    kept.setflags(write=False)
+    return kept
+
+
 def real_array(value: ArrayLike, name: str) -> Array:
     """Copy a value into a new float array; strings and truth values are refused, not converted.
 

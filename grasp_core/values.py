@@ -5,9 +5,9 @@ vectors that point into the object. Arrays are copied, checked and made read-onl
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal, TypeAlias, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar, get_args
 
 import numpy as np
 
@@ -122,9 +122,30 @@ class Witness:
         return summary("Witness", *(vector(force) for force in self.forces))
 
 
+class Figures(Protocol):
+    """Computes the figures of a grasp that are put off until somebody asks for them."""
+
+    def critical_friction(self) -> float:
+        """Return the grasp's critical friction."""
+        ...
+
+    def ferrari_canny(self) -> tuple[float, float]:
+        """Return the bounds of the grasp's quality."""
+        ...
+
+
+PUT_OFF = ("critical_friction", "ferrari_canny")
+"""Fields of a grasp that may be computed when they are asked for."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Grasp:
-    """Four contacts in finger order, with a witness that shows why they hold the object."""
+    """Four contacts in finger order, with a witness that shows why they hold the object.
+
+    A planned grasp computes its `critical_friction` and its `ferrari_canny` when they are first
+    asked for, and keeps them: a plan of thousands of grasps would take several times as long with
+    both. Copies, pickles and files hold the computed figures.
+    """
 
     id: str
     family: Family
@@ -144,17 +165,21 @@ class Grasp:
     """theta*, the largest half-angle [rad] below which cones around the four normals positively
     span."""
     critical_friction: float
-    """Smallest Coulomb coefficient above which the contacts are in force closure."""
+    """Smallest Coulomb coefficient above which the contacts are in force closure; computed at
+    first use if the grasp was planned."""
     closure_margin: float
     """Proved margin of force closure at the planned friction (see `ClosureCertificate.margin`)."""
     ferrari_canny: tuple[float, float]
     """Proved lower and upper bound [N] of the `l1` quality at the planned friction, with torques
-    about the centre of mass and divided by the object's radius."""
+    about the centre of mass and divided by the object's radius; computed at first use if the grasp
+    was planned."""
     witness: Witness
     """Balanced forces whose four lines belong to the grasp's family."""
     approach_directions: Array | None = None
     """Unit vector along which each finger moves in to its contact on a free line, (4, 3); None if
     no free lines were asked for (`plan(finger=...)`)."""
+    _figures: Figures | None = field(default=None, init=False)
+    """Computes the figures that have no value yet; None where both have one."""
 
     def __post_init__(self) -> None:
         text(self.id, "id")
@@ -180,6 +205,16 @@ class Grasp:
                 f"ferrari_canny must be a pair, lower bound then upper bound, got {shown(bounds)}"
             )
         instance(self.witness, Witness, "witness")
+
+    if not TYPE_CHECKING:  # or any misspelt field would pass the type checker
+
+        def __getattr__(self, name: str) -> Any:
+            """Compute a figure that was put off, and keep it."""
+            figures = self._figures if name in PUT_OFF else None
+            if figures is None:
+                raise AttributeError(f"a Grasp has no attribute {shown(name)}", name=name, obj=self)
+            object.__setattr__(self, name, getattr(figures, name)())
+            return getattr(self, name)
 
     @property
     def positions(self) -> Array:
@@ -207,6 +242,21 @@ def _one_per_finger(value: Any, each: Callable[[Any], object], name: str, kind: 
     things = several(value, each, name, kind)
     if len(things) != FINGERS:
         raise InputError(f"a grasp needs {FINGERS} {name}, one per finger, got {len(things)}")
+
+
+def trusted(kind: type[Item], /, **fields: Any) -> Item:
+    """Make a frozen value without checking or copying its fields.
+
+    This is for thousands of values whose fields were computed and checked together.
+
+    Args:
+        kind: Class of the value.
+        fields: All fields by name; arrays have to be read-only floats of the right shape.
+    """
+    made, put = object.__new__(kind), object.__setattr__
+    for name in fields:
+        put(made, name, fields[name])
+    return made
 
 
 def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:

@@ -36,7 +36,7 @@ from grasp_core.closure.friction_interval import FRICTIONLESS, REPORTED_AS_ZERO,
 from grasp_core.closure.friction_search import FRICTION_ACCURACY, SHAVED, Ends, search_interval
 from grasp_core.closure.margin_program import CHECK_SLACK, deepest_forces
 from grasp_core.closure.proofs import RANK, proves_closure
-from grasp_core.closure.wrenches import WRENCH, normal_and_tangential
+from grasp_core.closure.wrenches import WRENCH, cross, normal_and_tangential
 from grasp_core.compiled import compiled
 from grasp_core.values import Grasp
 
@@ -184,7 +184,7 @@ def _separate(twists: Array, arms: Array, normals: Array, friction: Array) -> ND
     """
     with np.errstate(over="ignore", invalid="ignore"):
         sizes = np.linalg.norm(twists, axis=1)[:, None]
-        velocities = twists[:, None, :3] + np.cross(twists[:, None, 3:], arms)
+        velocities = twists[:, None, :3] + cross(twists[:, None, 3:], arms)
         along, across = normal_and_tangential(velocities, normals)
         departs = along + friction[:, None] * across <= CHECK_SLACK * np.hypot(along, across)
         still = np.hypot(along, across) <= CHECK_SLACK * sizes
@@ -196,7 +196,7 @@ def _close_without_friction(arms: Array, normals: Array) -> bool:
 
     Only the most even pushes are tried.
     """
-    along_normals = np.hstack([normals, np.cross(arms, normals)])
+    along_normals = np.hstack([normals, cross(arms, normals)])
     left, values, _ = np.linalg.svd(along_normals)
     # the projection of equal pushes onto those that balance
     free = left[:, int((values > RANK).sum()) :]

@@ -25,11 +25,7 @@ from grasp_core.closure.proofs import (
     without_giants,
 )
 from grasp_core.closure.wrench_sets import WrenchSet, nearest_wrench
-from grasp_core.closure.wrenches import (
-    WRENCH,
-    grasp_map,
-    normal_and_tangential,
-)
+from grasp_core.closure.wrenches import WRENCH, cross, grasp_map, normal_and_tangential
 from grasp_core.errors import SolverError
 
 DECIDED = 1e-9
@@ -125,7 +121,7 @@ def _touching_twist(twist: Array, arms: Array, normals: Array, friction: Array) 
     """
     twist = twist / max(float(np.linalg.norm(twist)), SMALLEST_NORMAL)
     for _ in range(NEWTON_STEPS):
-        velocities = twist[:3] + np.cross(twist[3:], arms)
+        velocities = twist[:3] + cross(twist[3:], arms)
         along, across = normal_and_tangential(velocities, normals)
         excess = along + friction * across
         touched = excess > -TOUCHING
@@ -134,7 +130,7 @@ def _touching_twist(twist: Array, arms: Array, normals: Array, friction: Array) 
             :, None
         ]
         forces = (normals + friction[:, None] * sideways)[touched]
-        slopes = np.hstack([forces, np.cross(arms[touched], forces)])
+        slopes = np.hstack([forces, cross(arms[touched], forces)])
         step, *_ = np.linalg.lstsq(slopes, excess[touched], rcond=RANK)
         twist = twist - np.asarray(step, dtype=np.float64)
     return twist

@@ -35,7 +35,7 @@ from grasp_core.arrays import SMALLEST_SIZE, Array, real_array
 from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions, unit_size
 from grasp_core.closure.decision import decide
 from grasp_core.closure.proofs import margin_ceiling, proved_margin
-from grasp_core.closure.wrenches import normal_and_tangential
+from grasp_core.closure.wrenches import cross, normal_and_tangential
 from grasp_core.errors import UndecidedError
 from grasp_core.fields import are_frictions, are_units, is_array, is_number
 from grasp_core.values import Grasp
@@ -140,7 +140,7 @@ class ClosureCertificate:
         if not is_array(wrench, 6):
             return math.inf
         # the twist of (4), moved from the frame's origin to the mean contact, at unit size
-        turned = np.asarray(np.cross(wrench[3:], center), dtype=np.float64)
+        turned = cross(wrench[3:], center)
         twist = np.concatenate([wrench[:3] + turned, wrench[3:] * size])
         ceiling = margin_ceiling(twist, arms, normals, self.friction, caution)
         return -math.inf if ceiling <= FAR_BELOW else ceiling
@@ -148,7 +148,7 @@ class ClosureCertificate:
 
 def _balance(forces: Array, arms: Array, normals: Array) -> bool:
     """Return whether forces balance at unit size, (1), and their normal parts sum to 1, (2)."""
-    wrench = np.concatenate([forces.sum(axis=0), np.cross(arms, forces).sum(axis=0)])
+    wrench = np.concatenate([forces.sum(axis=0), cross(arms, forces).sum(axis=0)])
     pushes = float(np.einsum("ki,ki->", forces, normals))
     return float(np.abs(wrench).max()) <= SUMMED and abs(pushes - 1.0) <= SUMMED
 
@@ -203,4 +203,4 @@ def _why_undecided(margin: float) -> str:
 
 def _about_origin(twist: Array, center: Array, size: Array) -> Array:
     turning = twist[3:] / size
-    return np.concatenate([twist[:3] - np.cross(turning, center), turning])
+    return np.concatenate([twist[:3] - cross(turning, center), turning])

@@ -18,7 +18,7 @@ from grasp_core.arrays import Array, real_array
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contact_arrays import FEWEST, unit_size
 from grasp_core.closure.rational_proofs import closes, separates
-from grasp_core.closure.wrenches import WRENCH
+from grasp_core.closure.wrenches import WRENCH, cross
 from grasp_core.fields import are_units, is_array, is_number
 
 FRICTIONLESS = 1e-6
@@ -107,5 +107,5 @@ def at_the_first(twist: Array, positions: Array) -> Array:
         positions: Contact points, (k, 3) [m].
     """
     arms, _, size = unit_size(positions)
-    velocity = twist[:3] + np.asarray(np.cross(twist[3:], arms[0]), dtype=np.float64)
+    velocity = twist[:3] + cross(twist[3:], arms[0])
     return np.concatenate([velocity, twist[3:] / size])

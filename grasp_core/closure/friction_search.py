@@ -22,7 +22,7 @@ from grasp_core.closure.friction_interval import FRICTIONLESS, FrictionInterval,
 from grasp_core.closure.margin_program import margin_program
 from grasp_core.closure.proofs import proves_closure
 from grasp_core.closure.rational_proofs import NEARLY_AT_REST, closes, closing_forces, separates
-from grasp_core.closure.wrenches import WRENCH, grasp_map, normal_and_tangential
+from grasp_core.closure.wrenches import WRENCH, cross, grasp_map, normal_and_tangential
 from grasp_core.errors import SolverError
 
 FRICTION_ACCURACY = 5e-8
@@ -293,7 +293,7 @@ def _between(lower: float, upper: float) -> float:
 
 def _slope(answer: Answer, arms: Array, normals: Array) -> float:
     """Return the slope of the margin over mu with respect to the logarithm of mu."""
-    velocities = answer.twist[:3] + np.cross(answer.twist[3:], arms)
+    velocities = answer.twist[:3] + cross(answer.twist[3:], arms)
     along = np.einsum("ki,ki->k", answer.forces, normals)
     slides = answer.forces - along[:, None] * normals
     return float(np.einsum("ki,ki->", velocities, slides))

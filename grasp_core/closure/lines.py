@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import SMALLEST_SIZE, Array, frozen
 from grasp_core.closure.contact_arrays import check_spread
+from grasp_core.closure.wrenches import cross
 from grasp_core.errors import InputError
 
 LineClass: TypeAlias = Literal["planar", "concurrent", "pencil", "regulus", "independent"]
@@ -36,13 +37,15 @@ ON_CLASS = 1e-7
 spread over a unit length: ten times what a linear program's answer may be off."""
 ONE_POINT = 1e-12
 """Points closer than this, relative to their coordinates, are one point."""
+DEPENDENT = 3
+"""Largest rank of four dependent lines."""
 REGULUS = 3
 """Rank of the reciprocal form on the span of four lines that lie on a regulus."""
 
 
 def plucker_vectors(points: Array, directions: Array) -> Array:
     """Return the Pluecker vectors (d, x x d) of lines, (k, 6)."""
-    return np.hstack([directions, np.cross(points, directions)])
+    return np.hstack([directions, cross(points, directions)])
 
 
 def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
@@ -89,3 +92,46 @@ def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
     # both have form zero: planar lines and their points span two dimensions
     flatness = np.linalg.svd(np.vstack([d, arms]), compute_uv=False)[2]
     return "planar" if flatness <= ON_CLASS else "concurrent"
+
+
+def classify_each(points: Array, directions: Array) -> list[LineClass]:
+    """Classify many sets of four lines, as `classify_lines` classifies one.
+
+    Args:
+        points: One point on each line, (g, 4, 3) [m].
+        directions: Non-zero vectors along the lines, of any length, (g, 4, 3).
+
+    Raises:
+        InputError: A direction is zero, or not finite.
+    """
+    found: list[LineClass | None] = [None] * len(points)
+    lengths = np.linalg.norm(directions, axis=-1, keepdims=True)
+    arms = points - points.mean(axis=1, keepdims=True)
+    spreads = np.linalg.norm(arms, axis=-1).max(axis=-1, initial=0.0)
+    usual = (lengths >= SMALLEST_SIZE).all(axis=(1, 2)) & (spreads >= SMALLEST_SIZE)
+    usual &= spreads > ONE_POINT * np.abs(points).max(axis=(1, 2), initial=0.0)
+    rows = np.flatnonzero(usual)
+    units, arms = directions[rows] / lengths[rows], arms[rows] / spreads[rows, None, None]
+    vectors = np.concatenate([units, cross(arms, units)], axis=-1)
+    _, sizes, basis = np.linalg.svd(vectors, full_matrices=False)
+    ranks = (sizes > ON_CLASS).sum(axis=-1)
+    # (1); sets of a smaller rank are rare, and left to `classify_lines`
+    for row in np.flatnonzero(ranks > DEPENDENT).tolist():
+        found[rows[row]] = "independent"
+    three = np.flatnonzero(ranks == DEPENDENT)
+    span = basis[three, :DEPENDENT]
+    # (2), on an orthonormal basis of the span
+    form = span[..., :3] @ span[..., 3:].swapaxes(-1, -2)
+    values = np.linalg.eigvalsh(form + form.swapaxes(-1, -2))
+    meeting = (np.abs(values) > ON_CLASS).sum(axis=-1)
+    flat = np.linalg.svd(np.concatenate([units[three], arms[three]], axis=1), compute_uv=False)
+    # both have form zero: planar lines and their points span two dimensions
+    planar = flat[:, 2] <= ON_CLASS
+    for row, count, plane in zip(three.tolist(), meeting.tolist(), planar.tolist(), strict=True):
+        together: LineClass = "planar" if plane else "concurrent"
+        crossing: LineClass = "regulus" if count >= REGULUS else "pencil"
+        found[rows[row]] = crossing if count else together
+    return [
+        known or classify_lines(at, along)
+        for known, at, along in zip(found, points, directions, strict=True)
+    ]

@@ -22,12 +22,14 @@ but for the rounding of their coordinates.
 
 import math
 from fractions import Fraction
+from typing import TypeVar
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.closure.wrenches import WRENCH, grasp_map, normal_and_tangential
 
+Number = TypeVar("Number", int, Fraction)
 Exact = list[Fraction]
 """A vector of rational numbers, without rounding."""
 
@@ -36,6 +38,7 @@ INDEPENDENT = (1e-6, 1e-9)
 tried in turn; the last one defines the rank that force closure asks for."""
 NEARLY_AT_REST = 1e-9
 """Speed below which a contact is meant to be at rest, for twists of unit size."""
+AXES = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 SAME = Fraction(1, 10**12)
 """Speed at which a contact that cannot be put to rest exactly still counts as at rest, for twists
 of unit size: moving it by this share of the contacts' size would put it to rest."""
@@ -66,21 +69,21 @@ def closing_forces(
     """
     if not (np.isfinite(forces).all() and 0.0 < friction < math.inf):
         return None
-    arms, size = _arms(positions)
+    arms, _ = _arms(positions)
     along, across = normal_and_tangential(forces, normals)
     # the depth of each force in its cone says how much of the imbalance it may take
     depths = np.maximum(friction * along - across, 0.0)
     columns = _columns(arms, np.argsort(-depths, kind="stable"))
     if columns is None:
         return None
-    nearly = _vectors(_nearly_balanced(forces, arms, depths))
-    balanced = _balanced(nearly, _exact_arms(positions, size), columns)
-    slope = Fraction(friction) ** 2
-    if balanced is None or not all(
-        _inside(f, n, slope) for f, n in zip(balanced, _vectors(normals), strict=True)
-    ):
+    balanced = _balanced(_nearly_balanced(forces, arms, depths), positions, columns)
+    if balanced is None:
         return None
-    return np.array([[float(x) for x in force] for force in balanced])
+    whole, unit = balanced
+    directions, _ = _whole(normals)
+    if not all(_inside(f, n, friction) for f, n in zip(whole, directions, strict=True)):
+        return None
+    return np.array([[x / unit for x in force] for force in whole])
 
 
 def separates(twist: Array, positions: Array, normals: Array, friction: float) -> bool:
@@ -160,22 +163,62 @@ def _independent(rows: Array, least: float) -> list[int]:
     return found
 
 
+def _whole(rows: Array) -> tuple[list[list[int]], int]:
+    """Return floats as whole numbers over one power of two, which is given last."""
+    ratios = [[x.as_integer_ratio() for x in row] for row in rows.tolist()]
+    unit = max(below for row in ratios for _, below in row)
+    return [[above * (unit // below) for above, below in row] for row in ratios], unit
+
+
 def _balanced(
-    forces: list[Exact], arms: list[Exact], columns: list[tuple[int, int]]
-) -> list[Exact] | None:
-    """Change some components of forces, listed as (contact, axis), until they balance exactly."""
-    total = [Fraction(0)] * WRENCH
-    for force, arm in zip(forces, arms, strict=True):
+    forces: Array, positions: Array, columns: list[tuple[int, int]]
+) -> tuple[list[list[int]], int] | None:
+    """Change some components of forces, listed as (contact, axis), until they balance exactly.
+
+    Returns:
+        The forces as whole numbers over one positive number, which is given last.
+    """
+    (whole, unit), (points, _) = _whole(forces), _whole(positions)
+    arms = [[x - o for x, o in zip(point, points[0], strict=True)] for point in points]
+    total = [0] * WRENCH
+    for force, arm in zip(whole, arms, strict=True):
         wrench = [*force, *_cross(arm, force)]
         total = [sofar + part for sofar, part in zip(total, wrench, strict=True)]
-    wrenches = [_wrench(axis, arms[contact]) for contact, axis in columns]
-    changes = _solution([list(row) for row in zip(*wrenches, strict=True)], total)
-    if changes is None:
+    wrenches = [[*AXES[axis], *_cross(arms[contact], AXES[axis])] for contact, axis in columns]
+    table = [[*row, missing] for *row, missing in zip(*wrenches, total, strict=True)]
+    determinant = _eliminated(table)
+    if not determinant:
         return None
-    balanced = [list(force) for force in forces]
-    for (contact, axis), change in zip(columns, changes, strict=True):
-        balanced[contact][axis] -= change
-    return balanced
+    side = 1 if determinant > 0 else -1
+    balanced = [[side * determinant * x for x in force] for force in whole]
+    for (contact, axis), row in zip(columns, table, strict=True):
+        balanced[contact][axis] -= side * row[WRENCH]
+    return balanced, side * determinant * unit
+
+
+def _eliminated(table: list[list[int]]) -> int:
+    """Solve six equations in whole numbers, rows of (coefficients, right side), in place.
+
+    By Bareiss's elimination, whose divisions leave no remainder.
+
+    Returns:
+        The determinant up to its sign, which is the last columns' denominator; 0 if singular.
+    """
+    before = 1
+    for k in range(WRENCH):
+        pivot = next((i for i in range(k, WRENCH) if table[i][k]), None)
+        if pivot is None:
+            return 0
+        table[k], table[pivot] = table[pivot], table[k]
+        lead = table[k]
+        for i, row in enumerate(table):
+            if i != k:
+                share = row[k]
+                table[i] = [
+                    (lead[k] * a - share * b) // before for a, b in zip(row, lead, strict=True)
+                ]
+        before = lead[k]
+    return before
 
 
 def _at_rest(twist: Exact, arms: list[Exact], resting: list[tuple[int, int]]) -> Exact | None:
@@ -219,10 +262,11 @@ def _solution(rows: list[Exact], right: Exact) -> Exact | None:
     return x
 
 
-def _inside(force: Exact, normal: Exact, slope: Fraction) -> bool:
-    """Return whether a force is inside its friction cone, (1); `slope` is mu^2."""
+def _inside(force: list[int], normal: list[int], friction: float) -> bool:
+    """Return whether a force is inside its friction cone, (1)."""
+    above, below = friction.as_integer_ratio()
     along, across = _squares(force, normal)
-    return _dot(force, normal) > 0 and across < slope * along
+    return _dot(force, normal) > 0 and across * below**2 < above**2 * along
 
 
 def _departs(velocity: Exact, normal: Exact, slope: Fraction | None) -> bool:
@@ -237,17 +281,17 @@ def _departs(velocity: Exact, normal: Exact, slope: Fraction | None) -> bool:
     return steep and _dot(velocity, normal) <= 0
 
 
-def _squares(vector: Exact, normal: Exact) -> tuple[Fraction, Fraction]:
+def _squares(vector: list[Number], normal: list[Number]) -> tuple[Number, Number]:
     """Return squares of a vector's parts along and across a normal, times the normal's square."""
     along = _dot(vector, normal) ** 2
     return along, _dot(vector, vector) * _dot(normal, normal) - along
 
 
-def _dot(a: Exact, b: Exact) -> Fraction:
+def _dot(a: list[Number], b: list[Number]) -> Number:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _cross(a: Exact, b: Exact) -> Exact:
+def _cross(a: list[Number], b: list[Number]) -> list[Number]:
     return [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],

@@ -21,13 +21,24 @@ def grasp_map(positions: Array, center: Array | None = None) -> Array:
         center: Point about which torques are taken, (3,) [m]; the origin when None.
     """
     arms = positions if center is None else positions - center
-    x, y, z = np.moveaxis(arms, -1, 0)
+    x, y, z = arms[..., 0], arms[..., 1], arms[..., 2]
     G = np.zeros((*arms.shape[:-2], WRENCH, arms.shape[-2], 3))
     G[..., 0, :, 0] = G[..., 1, :, 1] = G[..., 2, :, 2] = 1.0
     G[..., 3, :, 1], G[..., 3, :, 2] = -z, y
     G[..., 4, :, 0], G[..., 4, :, 2] = z, -x
     G[..., 5, :, 0], G[..., 5, :, 1] = -y, x
     return G.reshape(*arms.shape[:-2], WRENCH, 3 * arms.shape[-2])
+
+
+def cross(one: Array, other: Array) -> Array:
+    """Compute cross products of vectors (..., 3) that broadcast, (..., 3).
+
+    `numpy.cross` gives the same numbers, but takes ten times as long for a few vectors.
+    """
+    crossed = np.empty(np.broadcast_shapes(one.shape, other.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        crossed[..., i] = one[..., j] * other[..., k] - one[..., k] * other[..., j]
+    return crossed
 
 
 def in_frames(G: Array, frames: Array) -> Array:

@@ -170,7 +170,7 @@ def positively_span(vectors: Array) -> bool:
 
     They do if they span R^3 and some combination with positive weights vanishes.
     """
-    signed = _signed_determinants(vectors)
+    signed = signed_determinants(vectors)
     return bool(signed.min() > DEPENDENT or signed.max() < -DEPENDENT)
 
 
@@ -179,13 +179,13 @@ def balancing_weights(vectors: Array) -> Array:
 
     All are positive where the four vectors, (..., 4, 3), positively span R^3.
     """
-    signed = _signed_determinants(vectors)
+    signed = signed_determinants(vectors)
     total = np.maximum(np.abs(signed).sum(axis=-1, keepdims=True), _TINY)
     return signed / total * np.sign(signed.sum(axis=-1, keepdims=True))
 
 
-def _signed_determinants(vectors: Array) -> Array:
-    """Compute the weights of a vanishing combination by Cramer's rule, (..., 4)."""
+def signed_determinants(vectors: Array) -> Array:
+    """Return the weights of a vanishing combination by Cramer's rule, (..., 4)."""
     minors = np.stack([vectors[..., rest, :] for rest in OTHERS], axis=-3)
     determinants: Array = np.asarray(np.linalg.det(minors), dtype=np.float64)
     return determinants * (1.0, -1.0, 1.0, -1.0)

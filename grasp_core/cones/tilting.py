@@ -29,9 +29,8 @@ the same for any quadruple, in frames that turn with it, so that turned objects 
 Source: this project's; P3 with its closed form is explained in `spanning`.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 
@@ -158,15 +157,24 @@ def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
     # singular values: the third is the normals' spread across the plane they lie in most nearly
     sizes = np.linalg.svd(normals, compute_uv=False)
     flat = np.flatnonzero(sizes[:, 2] < FLAT * sizes[:, 1])
-    for axes in _bent(normals[flat], thetas[flat]):
-        reached = half_angle(axes, normals[flat], thetas[flat])
-        better = reached > half_angles[flat] + SLIGHT
-        best[flat[better]], half_angles[flat[better]] = axes[better], reached[better]
+    best[flat], half_angles[flat] = _bent(
+        best[flat], half_angles[flat], normals[flat], thetas[flat]
+    )
     return _improved(best, normals, thetas)
 
 
-def _bent(normals: Array, thetas: Array) -> Iterator[Array]:
-    """Yield axes bent out of a plane in which the normals nearly lie, two to either side."""
+def _bent(axes: Array, reached: Array, normals: Array, thetas: Array) -> tuple[Array, Array]:
+    """Bend axes out of a plane in which the normals nearly lie, two to either side.
+
+    Args:
+        axes: The best axes so far, (q, 4, 3).
+        reached: Their half-angles, (q,) [rad].
+        normals: Unit vectors, (q, 4, 3).
+        thetas: Half-angles of the friction cones, (q, 4) [rad].
+
+    Returns:
+        Axes and half-angles, with bent axes where they are better.
+    """
     _, _, directions = np.linalg.svd(normals)
     across = directions[:, 2]
     turns = np.cross(normals[:, :1], normals[:, 1:])
@@ -174,12 +182,11 @@ def _bent(normals: Array, thetas: Array) -> Iterator[Array]:
     # the side of the plane is tied to the normals, so that a turned object gets turned axes
     handed = np.einsum("qi,qi->q", turns[np.arange(len(turns)), which], across)
     across = across * np.where(handed < 0.0, -1.0, 1.0)[:, None]
-    for signs, cap in product(SIDES, CAPS[:-1]):
-        axes = [
-            _into_cap(sign * across, normals[:, finger], cap * thetas[:, finger])
-            for finger, sign in enumerate(signs)
-        ]
-        yield np.stack(axes, axis=1)
+    cones = np.array(axes, order="C"), np.array(reached)
+    given = map(np.ascontiguousarray, (normals, thetas, across))
+    pace = np.array([SLIGHT, *CAPS[:-1]])
+    compiled(KERNEL).bend(cones, *given, np.array(SIDES), pace)
+    return cones
 
 
 def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:

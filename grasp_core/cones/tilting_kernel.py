@@ -80,6 +80,49 @@ def balance(axes: Array, normals: Array, caps: Array, sweeps: int, slight: float
 
 
 @loop()
+def bend(
+    cones: tuple[Array, Array],
+    normals: Array,
+    thetas: Array,
+    across: Array,
+    signs: Array,
+    pace: Array,
+) -> None:
+    """Lean axes to either side of a plane, and keep those that allow the widest cones.
+
+    Args:
+        cones: Axes, (q, 4, 3), and half-angles, (q,) [rad]; replaced where others are better.
+        normals: Unit vectors, (q, 4, 3).
+        thetas: Half-angles of the friction cones, (q, 4) [rad].
+        across: Unit vector across each plane, (q, 3).
+        signs: The side to which each finger's axis leans, (s, 4).
+        pace: The least improvement that counts, and angles up to which axes may lean, in
+            friction angles.
+    """
+    (axes, reached), bent, way = cones, np.empty((FINGERS, 3)), np.empty(3)
+    for q in range(len(axes)):
+        for s in range(len(signs)):
+            for cap in pace[1:]:
+                for finger in range(FINGERS):
+                    for d in range(3):
+                        way[d] = signs[s, finger] * across[q, d]
+                    angle = cap * thetas[q, finger]
+                    _into_cap(
+                        way,
+                        normals[q, finger],
+                        np.cos(angle),
+                        np.sin(angle),
+                        pace[0],
+                        bent[finger],
+                    )
+                floor = reached[q] + pace[0]
+                now = _half_angle(bent, normals[q], thetas[q], floor)
+                if now > floor:
+                    axes[q] = bent
+                    reached[q] = now
+
+
+@loop()
 def improve(
     cones: tuple[Array, Array],
     normals: Array,

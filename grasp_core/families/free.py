@@ -31,6 +31,7 @@ from heapq import heappop, heappush
 
 import numpy as np
 
+from grasp_core.closure.batches.certificates import certificates
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.face_parts import (
@@ -114,6 +115,7 @@ def place_free(
     rng: np.random.Generator,
     cells: int = 1,
     restarts: int = RESTARTS,
+    whole: ClosureCertificate | None = None,
 ) -> Placement | Absence | Undecided:
     """Find a grasp of four convex pieces, or prove that there is none.
 
@@ -123,6 +125,8 @@ def place_free(
         rng: Source of the random restarts.
         cells: Largest number of parts of the pieces to examine; with 1 nothing is divided.
         restarts: Number of smaller random pieces to try before giving up or dividing.
+        whole: The certificate of contacts at all corners of the pieces, where it is known (see
+            `close_patches`).
 
     Raises:
         InputError: The friction is not positive.
@@ -136,7 +140,8 @@ def place_free(
     while waiting and examined < cells:
         _, path = heappop(waiting)
         part = part_at(pieces, path)
-        patch = close_patch(pieces, part, friction)
+        known = None if path else whole
+        patch = close_patch(pieces, part, friction) if known is None else known
         examined += 1
         # (1): this part holds no grasp
         if patch is not None and not patch.closed:
@@ -170,6 +175,29 @@ def close_patch(
         return force_closure(*corner_contacts(pieces, part), friction)
     except UndecidedError:
         return None
+
+
+def close_patches(
+    quadruples: Sequence[Sequence[FacePiece]], friction: float
+) -> list[ClosureCertificate | None]:
+    """Decide force closure of contacts at all corners of many sets of four pieces, at once.
+
+    Args:
+        quadruples: Four convex pieces each, in finger order.
+        friction: Coulomb coefficient at every contact, positive.
+
+    Returns:
+        A certificate for each, or None where `close_patch` has to decide.
+    """
+    contacts = [corner_contacts(pieces, part_at(pieces, ())) for pieces in quadruples]
+    sizes = np.array([len(points) for points, _ in contacts], dtype=np.int64)
+    found: list[ClosureCertificate | None] = [None] * len(quadruples)
+    for size in np.unique(sizes).tolist():
+        alike = np.flatnonzero(sizes == size).tolist()
+        points, normals = (np.array([contacts[i][each] for i in alike]) for each in (0, 1))
+        for place, known in zip(alike, certificates(points, normals, friction), strict=True):
+            found[place] = known
+    return found
 
 
 def _restarted(

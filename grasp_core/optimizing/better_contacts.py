@@ -29,7 +29,7 @@ from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_fac
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.ascent import ContactFaces
-from grasp_core.planning.certify import certify, to_grasp
+from grasp_core.planning.certify import Candidate, certify, to_grasp
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
 from grasp_core.solvers.ties import coarse, first_best, largest_first, on_grid, surpassing
 from grasp_core.values import FINGERS, ForceCone, Grasp
@@ -193,8 +193,9 @@ def _certified(
         return None
     theta = math.atan(faces.friction)
     cones = tuple(ForceCone(piece.normal, theta) for piece in faces.pieces)
-    found = certify(
-        f"o-{grasp.id}", grasp.faces, "regulus", faces.pieces, cones, placement,
-        faces.friction, regions_of(point_region, faces.pieces, cones, placement),
-    )  # fmt: skip
+    points = regions_of(point_region, faces.pieces, cones, placement)
+    candidate = Candidate(
+        f"o-{grasp.id}", grasp.faces, "regulus", faces.pieces, cones, placement, points
+    )
+    found = certify(candidate, faces.friction)
     return None if found is None else to_grasp(body, faces.friction, found)

@@ -9,24 +9,27 @@ closure and regions are preserved. A separating twist (a, b) becomes (D a, -D b)
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, frozen_copy
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.families.free import Absence
 from grasp_core.families.placements import Placement
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.objects.standard_order import FLIP, Standard
 from grasp_core.planning.certify import Certified
-from grasp_core.values import ContactRegion, FaceQuadruple, ForceCone, four
+from grasp_core.values import ContactRegion, FaceQuadruple, ForceCone, four, trusted
 
 PAIRED = ("p", "r")
 """Letters with which the ids of pencil and regulus grasps begin: their fingers (0, 1) and (2, 3)
 form pairs."""
 
 
+MANY_PIECES = 1024
+"""Number of mirrored pieces kept: grasps of one object share their pieces."""
 Place: TypeAlias = tuple[int, str]
 """The face on which a finger stands, by its number on the object as it was given, and the half of
 the face, `a` or `b`; empty for a whole face."""
@@ -92,10 +95,18 @@ def _mirrored_grasp(found: Certified) -> Certified:
     placement = found.placement
     return replace(
         found,
-        pieces=tuple(_mirrored_piece(piece) for piece in found.pieces),
-        cones=tuple(ForceCone(cone.axis * FLIP, cone.half_angle) for cone in found.cones),
+        pieces=tuple(_mirrored_once(piece) for piece in found.pieces),
+        cones=tuple(
+            trusted(ForceCone, axis=frozen_copy(cone.axis * FLIP), half_angle=cone.half_angle)
+            for cone in found.cones
+        ),
         regions=tuple(
-            ContactRegion(each.kind, (each.polygon * FLIP)[::-1], each.inscribed_radius)
+            trusted(
+                ContactRegion,
+                kind=each.kind,
+                polygon=frozen_copy(each.polygon[::-1] * FLIP),
+                inscribed_radius=each.inscribed_radius,
+            )
             for each in found.regions
         ),
         placement=replace(
@@ -117,6 +128,9 @@ def _mirrored_piece(piece: FacePiece) -> FacePiece:
         origin=piece.origin * FLIP,
         frame=piece.frame * FLIP[:, None],
     )
+
+
+_mirrored_once = lru_cache(maxsize=MANY_PIECES)(_mirrored_piece)
 
 
 def absence_as_given(proof: Absence, on: Standard) -> Absence:

@@ -4,17 +4,19 @@ The exact test decides force closure. The witness is four contact forces that ba
 friction cones and whose lines form the claimed family.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, frozen_copy
+from grasp_core.closure.batches.certificates import closing_margins
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.closure.lines import classify_lines
+from grasp_core.closure.lines import classify_each, classify_lines
 from grasp_core.closure.wrenches import grasp_map, normal_and_tangential
-from grasp_core.cones.spanning import span_angle
+from grasp_core.cones.many_quadruples import span_angles
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.placements import Placement
 from grasp_core.objects.face_pieces import FacePiece
@@ -30,6 +32,7 @@ from grasp_core.values import (
     Method,
     Witness,
     four,
+    trusted,
 )
 
 BALANCED = 1e-6
@@ -67,26 +70,52 @@ def named(letter: str, faces: FaceQuadruple) -> str:
     return f"{letter}-" + "-".join(str(face) for face in faces)
 
 
-def certify(  # noqa: PLR0913, PLR0917 - everything a grasp is made of
-    name: str,
-    faces: FaceQuadruple,
-    family: Family,
-    pieces: tuple[FacePiece, ...],
-    cones: tuple[ForceCone, ...],
-    placement: Placement,
-    friction: float,
-    regions: tuple[ContactRegion, ...],
-) -> Certified | None:
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """Contacts that a method placed on four faces, which are not certified yet."""
+
+    id: str
+    faces: FaceQuadruple
+    family: Family
+    pieces: tuple[FacePiece, ...]
+    cones: tuple[ForceCone, ...]
+    placement: Placement
+    regions: tuple[ContactRegion, ...]
+
+
+def certify(candidate: Candidate, friction: float) -> Certified | None:
     """Certify placed contacts; None if the witness or the exact closure test rejects them."""
-    normals = np.array([piece.normal for piece in pieces])
-    margin = closure_margin(pieces, placement, friction)
-    fault = witness_fault(placement.positions, normals, placement.forces, friction, family)
-    if margin is None or fault is not None:
-        return None
-    angle = span_angle(normals)
-    return Certified(
-        name, faces, family, angle, pieces, cones, regions, placement, margin, method=family
-    )
+    return certify_each([candidate], friction)[0]
+
+
+def certify_each(candidates: Sequence[Candidate], friction: float) -> list[Certified | None]:
+    """Certify many placements together; None for each that `certify` would reject."""
+    if not candidates:
+        return []
+    points = np.array([each.placement.positions for each in candidates])
+    normals = np.array([[piece.normal for piece in each.pieces] for each in candidates])
+    forces = np.array([each.placement.forces for each in candidates])
+    families: list[Family] = [each.family for each in candidates]
+    certified: list[Certified | None] = []
+    for each, fits, known, angle in zip(
+        candidates,
+        witnesses_fit(points, normals, forces, friction, families),
+        closing_margins(points, normals, friction).tolist(),
+        span_angles(normals).tolist(),
+        strict=True,
+    ):
+        # where arrays of contacts leave closure open, it is decided for these contacts alone
+        open_yet = fits and math.isnan(known)
+        margin = closure_margin(each.pieces, each.placement, friction) if open_yet else known
+        certified.append(
+            Certified(
+                each.id, each.faces, each.family, angle, each.pieces, each.cones, each.regions,
+                each.placement, margin, method=each.family,
+            )
+            if fits and margin is not None
+            else None
+        )  # fmt: skip
+    return certified
 
 
 def closure_margin(
@@ -124,6 +153,30 @@ def witness_fault(
     return None if found == family else f"the witness lines are {found}, not {family}"
 
 
+def witnesses_fit(
+    points: Array, normals: Array, forces: Array, friction: float, families: Sequence[Family]
+) -> list[bool]:
+    """Return for each of many sets of contacts whether `witness_fault` finds no fault.
+
+    Args:
+        points: Contacts on an object of size one, (g, 4, 3).
+        normals: Inward unit normals at the contacts, (g, 4, 3).
+        forces: Contact forces whose normal parts sum to one, (g, 4, 3).
+        friction: Coulomb coefficient.
+        families: The family to which the lines of force of each set should belong, (g,).
+    """
+    along, across = normal_and_tangential(forces, normals)
+    stacked = forces.reshape(len(forces), -1)
+    missed = np.linalg.norm(np.einsum("gwj,gj->gw", grasp_map(points), stacked), axis=-1)
+    fits = (np.abs(along.sum(axis=-1) - 1.0) <= BALANCED) & (along > 0.0).all(axis=-1)
+    fits &= (across <= friction * along + BALANCED).all(axis=-1) & (missed <= BALANCED)
+    places = np.flatnonzero(fits)
+    classes = classify_each(points[places], forces[places])
+    for place, found in zip(places.tolist(), classes, strict=True):
+        fits[place] = found == families[place]
+    return fits.tolist()
+
+
 def check_witness(body: Polyhedron, grasp: Grasp, friction: float) -> None:
     """Refuse a grasp read from elsewhere whose witness does not show what the grasp claims.
 
@@ -152,44 +205,70 @@ def _beside_foci(body: Polyhedron, grasp: Grasp) -> bool:
     return bool(np.linalg.norm(misses, axis=1).max() > BALANCED * body.radius)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class LateFigures:
+    """Computes the figures of a planned grasp from its contacts at unit object size."""
+
+    positions: Array
+    normals: Array
+    friction: float
+
+    def critical_friction(self) -> float:
+        """Return the least friction of closure, at most `friction`, which is proved enough."""
+        return min(critical_friction(self.positions, self.normals), self.friction)
+
+    def ferrari_canny(self) -> tuple[float, float]:
+        """Return the bounds of the quality at `friction`."""
+        found = ferrari_canny(self.positions, self.normals, self.friction, torque_scale=1.0)
+        return found.lower, found.upper
+
+
 def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:
-    """Convert a certified placement to a grasp in the object's frame, with critical friction."""
-    placement = found.placement
-    positions = _at(body, placement.positions)
-    normals = found.normals
-    return Grasp(
-        id=found.id,
-        family=found.family,
-        faces=found.faces,
-        contacts=four(Contact(p, n) for p, n in zip(positions, normals, strict=True)),
-        focus_points=_at(body, placement.foci),
-        force_cones=four(found.cones),
-        regions=four(
-            ContactRegion(
-                region.kind, _at(body, region.polygon), body.radius * region.inscribed_radius
-            )
-            for region in found.regions
-        ),
-        radius=body.radius * float(placement.radii.min()),
-        span_angle=found.span_angle,
-        critical_friction=_critical(placement, normals, friction),
-        closure_margin=found.margin,
-        ferrari_canny=_quality(placement, normals, friction),
-        witness=Witness(positions, placement.forces),
-        approach_directions=None if found.ways_out is None else -found.ways_out,
-    )
+    """Convert a certified placement to a grasp in the object's frame, which has late figures."""
+    return to_grasps(body, friction, [found])[0]
 
 
-def _at(body: Polyhedron, unit_points: Array) -> Array:
-    """Convert points from unit object size to the object's frame, (k, 3) [m]."""
-    return body.center_of_mass + body.radius * unit_points
-
-
-def _quality(placement: Placement, normals: Array, friction: float) -> tuple[float, float]:
-    found = ferrari_canny(placement.positions, normals, friction, torque_scale=1.0)
-    return found.lower, found.upper
-
-
-def _critical(placement: Placement, normals: Array, friction: float) -> float:
-    """Compute the least friction of force closure, at most `friction`, which is proved enough."""
-    return min(critical_friction(placement.positions, normals), friction)
+def to_grasps(body: Polyhedron, friction: float, found: Sequence[Certified]) -> list[Grasp]:
+    """Convert certified placements to grasps in the object's frame, which have late figures."""
+    if not found:
+        return []
+    normals = frozen_copy(np.array([each.normals for each in found]))
+    forces = frozen_copy(np.array([each.placement.forces for each in found]))
+    center, radius = body.center_of_mass, body.radius
+    positions = center + radius * np.array([each.placement.positions for each in found])
+    polygons = [region.polygon for each in found for region in each.regions]
+    corners = center + radius * np.concatenate(polygons)
+    for array in (positions, corners):
+        array.setflags(write=False)
+    ends = np.cumsum([len(polygon) for polygon in polygons]).tolist()
+    rings = iter(corners[start:end] for start, end in zip([0, *ends], ends, strict=False))
+    return [
+        trusted(
+            Grasp,
+            id=each.id,
+            family=each.family,
+            faces=each.faces,
+            contacts=four(
+                trusted(Contact, position=position, normal=normal)
+                for position, normal in zip(positions[i], normals[i], strict=True)
+            ),
+            focus_points=frozen_copy(center + radius * each.placement.foci),
+            force_cones=four(each.cones),
+            regions=four(
+                trusted(
+                    ContactRegion,
+                    kind=region.kind,
+                    polygon=next(rings),
+                    inscribed_radius=radius * region.inscribed_radius,
+                )
+                for region in each.regions
+            ),
+            radius=radius * float(each.placement.radii.min()),
+            span_angle=each.span_angle,
+            closure_margin=each.margin,
+            witness=trusted(Witness, points=positions[i], forces=forces[i]),
+            approach_directions=None if each.ways_out is None else frozen_copy(-each.ways_out),
+            _figures=LateFigures(each.placement.positions, normals[i], friction),
+        )
+        for i, each in enumerate(found)
+    ]

@@ -1,45 +1,42 @@
 """Searches one object's face quadruples with one construction, keeping its best grasps."""
 
 import math
-from bisect import insort
+from bisect import bisect
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-from itertools import takewhile
+from functools import cached_property
+from itertools import chain, islice, takewhile
 from typing import TypeAlias
 
 import numpy as np
 
-from grasp_core.cones.spanning import cones_positively_span
+from grasp_core.cones.many_quadruples import each_cones_positively_span
 from grasp_core.disc_bounds.program_bounds import AttemptBounds
-from grasp_core.errors import SolverError
-from grasp_core.families.constructions import Construction, regions_of
+from grasp_core.families.batches.settling import Attempt, Settling
+from grasp_core.families.constructions import Construction
 from grasp_core.families.free import Absence
-from grasp_core.families.placements import Placement
-from grasp_core.families.true_surface import on_true_surface
-from grasp_core.objects.face_pieces import FacePiece, FaceShape, Shapes, choices_near
+from grasp_core.objects.face_pieces import Shapes
 from grasp_core.planning.best_first import BestFirst
 from grasp_core.planning.blocks import Blocks
-from grasp_core.planning.certify import Certified, certify, named
-from grasp_core.planning.quadruples import Attempt, Cones
+from grasp_core.planning.certify import Candidate, Certified, certify_each, named
 from grasp_core.planning.reach import Reach
 from grasp_core.planning.result import MethodCounts, Tally
-from grasp_core.solvers.ties import graded, surpassing
-from grasp_core.values import ContactRegion, FaceQuadruple, Method, four
+from grasp_core.solvers.ties import graded
+from grasp_core.values import FaceQuadruple, Method, four
 
-Found: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement]
-"""Convex pieces of four faces, their force cones, and the contacts placed on them."""
-
-MOST_CHOICES = 8
-"""Most choices of pieces tried on faces that are not convex; the free method multiplies it by
-`max_face_parts`."""
 TOGETHER = 32
 """Number of blocks of quadruples searched at once: a million take some hundred megabytes."""
+MOST_ATTEMPTS = 512
+"""Number of attempts that are made together at most."""
 SAME_MERIT = 1e-5
 """Share by which a new grasp must beat the worst one kept: symmetric objects hold thousands of
 equal grasps."""
 SAME_CONTACTS = 1e-6
 """Distance between contacts below which two grasps count as one, in object radii."""
+
+
+SortKey: TypeAlias = tuple[float, FaceQuadruple, FaceQuadruple]
+"""Minus the graded merit of a grasp, its faces in rising order, and its faces by finger."""
 
 
 @dataclass(slots=True, eq=False)
@@ -52,6 +49,8 @@ class MethodSearch:
     """Function that returns how fingers reach the contacts of a grasp, or why they cannot."""
     best: list[Certified] = field(default_factory=list[Certified])
     """At most `limit` grasps, best first."""
+    _keys: list[SortKey] = field(default_factory=list[SortKey])
+    """What the grasps of `best` are sorted by."""
     held: set[FaceQuadruple] = field(default_factory=set[FaceQuadruple])
     """Ascending faces on which a grasp was found, whether it was kept or not."""
     tally: Tally = field(default_factory=Tally)
@@ -92,16 +91,20 @@ class MethodSearch:
             self.tally.count("unreachable")
             self.unreached[faces] = way.reason
             return []
-        found = replace(found, method=self.method, ways_out=way.directions)
+        if found.method != self.method or way.directions is not None:
+            found = replace(found, method=self.method, ways_out=way.directions)
         self.tally.count("found")
         self.held.add(faces)
-        insort(self.best, found, key=best_first)
+        key = best_first(found)
+        place = bisect(self._keys, key)
+        self._keys.insert(place, key)
+        self.best.insert(place, found)
         if self.limit is not None:
-            del self.best[self.limit :]
+            del self.best[self.limit :], self._keys[self.limit :]
         return [found]
 
 
-def best_first(found: Certified) -> tuple[float, FaceQuadruple, FaceQuadruple]:
+def best_first(found: Certified) -> SortKey:
     """Return a sort key: largest merit first, equal merits by faces, then by finger order."""
     return -graded(found.placement.merit), four(sorted(found.faces)), found.faces
 
@@ -118,21 +121,40 @@ def search_construction(
     With a limit the search ends when no upper bound exceeds the worst grasp kept. A construction
     without bounds ends as soon as the limit is reached.
     """
-    for attempts in _in_order(construction, AttemptBounds(shapes), blocks, search):
-        found: list[Certified] = []
-        for attempt in attempts:
-            # grasps kept meanwhile may have raised the threshold
-            if not search.may_gain(construction, attempt.bounds[0]):
-                continue
-            on_faces = chosen_shapes(shapes, attempt.faces)
-            one, tally = tried(
-                construction, attempt, on_faces, friction, search.least(construction)
+    tries = Tries(construction, shapes, friction)
+    quadruples = _in_order(construction, AttemptBounds(shapes), blocks, search)
+    while group := _next_few(quadruples, search):
+        # grasps kept meanwhile may have raised the threshold
+        worth = [
+            [each for each in attempts if search.may_gain(construction, each.bounds[0])]
+            for attempts in group
+        ]
+        found = iter(
+            tries.certified(
+                list(chain.from_iterable(worth)), search.least(construction), search.tally
             )
-            search.tally.add(tally)
-            found += [one] if one else []
-        kept = _without_duplicates(found)
-        search.tally.count("duplicates", len(found) - len(kept))
-        yield [one for each in kept for one in search.keep(each)]
+        )
+        for attempts in worth:
+            here = [one for one in islice(found, len(attempts)) if one is not None]
+            kept = _without_duplicates(here)
+            search.tally.count("duplicates", len(here) - len(kept))
+            yield [one for each in kept for one in search.keep(each)]
+
+
+def _next_few(
+    quadruples: Iterator[tuple[Attempt, ...]], search: MethodSearch
+) -> list[tuple[Attempt, ...]]:
+    """Take the next quadruples, as many as cannot raise the threshold before the last of them."""
+    left = MOST_ATTEMPTS
+    if search.limit is not None:
+        left = min(left, search.limit - len(search.best))
+    group: list[tuple[Attempt, ...]] = []
+    for attempts in quadruples:
+        group.append(attempts)
+        left -= len(attempts)
+        if left <= 0:
+            break
+    return group
 
 
 def _in_order(
@@ -157,116 +179,62 @@ def _in_order(
         yield from takewhile(lambda _: not search.full, some)
 
 
-def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]:
-    """Return the shapes of the faces that have room for a contact, in finger order."""
-    return tuple(shape for face in faces if (shape := shapes[face]) is not None)
+@dataclass(frozen=True, eq=False)
+class Tries:
+    """Tries one construction on many quadruples of faces together."""
 
+    construction: Construction
+    shapes: Shapes
+    friction: float
+    """Coulomb coefficient at every contact."""
 
-def tried(
-    construction: Construction,
-    attempt: Attempt,
-    shapes: Sequence[FaceShape],
-    friction: float,
-    least: float,
-) -> tuple[Certified | None, Tally]:
-    """Try to construct and certify a grasp on four faces in one order of the fingers.
+    def certified(
+        self, attempts: Sequence[Attempt], least: float, tally: Tally
+    ) -> list[Certified | None]:
+        """Construct and certify a grasp for each attempt; None where there is none.
 
-    Args:
-        construction: The construction to try.
-        attempt: Which of the faces each finger touches, and with which force cones.
-        shapes: Shapes of these faces, in finger order.
-        friction: Coulomb coefficient at every contact.
-        least: The merit that a placement must exceed.
+        Args:
+            attempts: Which faces each finger touches, and with which force cones.
+            least: The merit that placements must exceed.
+            tally: Counts what was tried.
+        """
+        ends = self._settling.of(attempts, least)
+        tally.count("tried", len(attempts))
+        tally.count("solved", sum(end.solved for end in ends))
+        tally.count("undecided", sum(end.failed for end in ends))
+        tally.count("infeasible", sum(not (end.settled or end.failed) for end in ends))
+        family = self.construction.family
+        candidates = [
+            Candidate(named(family[0], attempt.faces), attempt.faces, family, *end.settled)
+            for attempt, end in zip(attempts, ends, strict=True)
+            if end.settled is not None
+        ]
+        certified = iter(self._spanning(certify_each(candidates, self.friction), candidates))
+        found = [None if end.settled is None else next(certified) for end in ends]
+        tally.count("rejected", len(candidates) - sum(one is not None for one in found))
+        return found
 
-    Returns:
-        The certified grasp, or None, and what to count.
-    """
-    tally, family = Tally(), construction.family
-    tally.count("tried")
-    try:
-        settled = _settled(construction, shapes, attempt, tally, least)
-    except SolverError:
-        tally.count("undecided")
-        return None, tally
-    if settled is None:
-        tally.count("infeasible")
-        return None, tally
-    chosen, cones, placement, regions = settled
-    name = named(family[0], attempt.faces)
-    found = certify(name, attempt.faces, family, chosen, cones, placement, friction, regions)
-    if found is None or not cones_positively_span(
-        [cone.axis for cone in cones], [cone.half_angle for cone in cones]
-    ):
-        tally.count("rejected")
-        return None, tally
-    return found, tally
+    @cached_property
+    def _settling(self) -> Settling:
+        return Settling(self.construction, self.shapes)
 
-
-def _settled(
-    construction: Construction,
-    shapes: Sequence[FaceShape],
-    attempt: Attempt,
-    tally: Tally,
-    least: float,
-) -> tuple[tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...]] | None:
-    """Place contacts with the best choice of cones, add regions, move them to the true surface."""
-    placed = None
-    for cones, bound in zip(attempt.cones, attempt.bounds, strict=True):
-        # choices come with falling bounds: the later ones cannot be better either
-        if bound <= least:
-            break
-        if found := _best_placement(construction, cones, shapes, least, tally):
-            placed, least = found, surpassing(found[2].merit)
-    if placed is None:
-        return None
-    chosen, cones, planned = placed
-    regions = regions_of(construction.region, chosen, cones, planned)
-    found = on_true_surface(
-        shapes, chosen, cones, planned, regions, partial(_placed_on, construction, cones)
-    )
-    return None if found is None else (found[0], cones, found[1], regions)
-
-
-def _placed_on(
-    construction: Construction, cones: Cones, pieces: tuple[FacePiece, ...]
-) -> Placement | None:
-    """Place contacts on convex pieces, with discs however small; None if it is impossible."""
-    placed = construction.place(pieces, cones, 0.0 if construction.limits else -math.inf)
-    return placed if isinstance(placed, Placement) else None
-
-
-def _best_placement(
-    construction: Construction,
-    cones: Cones,
-    shapes: Sequence[FaceShape],
-    least: float,
-    tally: Tally,
-) -> Found | None:
-    """Place contacts on the best choice of one convex piece per face; None unless above `least`.
-
-    Where faces have several pieces, their hulls are tried first: a grasp that the hulls do not hold
-    no piece holds, and the contacts on the hulls show which pieces are likely to be best.
-    """
-    hulls = tuple(shape.hull for shape in shapes)
-    tally.count("solved")
-    whole = construction.place(hulls, cones, least)
-    if not (isinstance(whole, Placement) and whole.merit > least):
-        return None
-    if all(len(shape.pieces) == 1 for shape in shapes):
-        return hulls, cones, whole
-    best = None
-    for chosen in choices_near(shapes, whole.positions, MOST_CHOICES):
-        tally.count("solved")
-        if construction.limits is not None and min(piece.inradius for piece in chosen) < least:
-            continue
-        placed = construction.place(chosen, cones, least)
-        if isinstance(placed, Placement) and placed.merit > least:
-            best, least = (chosen, cones, placed), surpassing(placed.merit)
-    return best
+    @staticmethod
+    def _spanning(
+        certified: Sequence[Certified | None], candidates: Sequence[Candidate]
+    ) -> list[Certified | None]:
+        """Replace grasps whose force cones do not positively span by None."""
+        if not candidates:
+            return []
+        axes = np.array([[cone.axis for cone in each.cones] for each in candidates])
+        angles = np.array([[cone.half_angle for cone in each.cones] for each in candidates])
+        spans = each_cones_positively_span(axes, angles).tolist()
+        return [one if span else None for one, span in zip(certified, spans, strict=True)]
 
 
 def _without_duplicates(found: list[Certified]) -> list[Certified]:
     """Drop each grasp whose contacts are those of a better one; all are on the same faces."""
+    if len(found) < 2:  # noqa: PLR2004 - nothing to compare
+        return found
     kept: list[Certified] = []
     for one in sorted(found, key=best_first):
         here = one.placement.positions[np.argsort(one.faces)]

@@ -14,8 +14,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from grasp_core.cones.tilting import toward, widened
+from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.errors import SolverError
+from grasp_core.families.batches.settling import MOST_CHOICES, Attempt, Cones, chosen_shapes
 from grasp_core.families.constructions import (
     CONSTRUCTIONS,
     MIXED,
@@ -23,26 +24,20 @@ from grasp_core.families.constructions import (
     point_region,
     regions_of,
 )
-from grasp_core.families.free import RESTARTS, Absence, Undecided, place_free
+from grasp_core.families.free import RESTARTS, Absence, Undecided, close_patches, place_free
 from grasp_core.families.placements import Placement
 from grasp_core.families.true_surface import on_true_surface
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, choices_near
 from grasp_core.objects.standard_order import Standard
-from grasp_core.planning.certify import Certified, certify, named
-from grasp_core.planning.family_search import (
-    MOST_CHOICES,
-    MethodSearch,
-    best_first,
-    chosen_shapes,
-    tried,
-)
-from grasp_core.planning.planned_cones import BELOW_SPAN_ANGLE, LEAST_SPAN_ANGLE, usable_half_angles
-from grasp_core.planning.quadruples import Attempt, Cones
+from grasp_core.planning.certify import Candidate, Certified, certify, named
+from grasp_core.planning.family_search import MethodSearch, Tries, best_first
+from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, cones_around
 from grasp_core.planning.request import COMPLETE_PARTS, FAMILIES, PlanRequest
+from grasp_core.planning.result import Tally
 from grasp_core.values import FINGERS, FaceQuadruple, ForceCone, four
 
-BATCH = 64
-"""Number of face quadruples whose force cones are computed together."""
+BATCH, LIMITED_BATCH = 1024, 64
+"""Number of face quadruples that are decided together, and with a limit on the grasps."""
 
 Pieces: TypeAlias = tuple[FacePiece, ...]
 Answer: TypeAlias = tuple[Pieces, Placement | Absence | Undecided]
@@ -56,16 +51,19 @@ def search_free(
 ) -> Iterator[list[Certified]]:
     """Go through the quadruples that no family holds, until the limit is reached."""
     quadruples = _every_quadruple(on)
-    while batch := list(islice(quadruples, BATCH)):
+    while batch := list(islice(quadruples, BATCH if search.limit is None else LIMITED_BATCH)):
         if search.full:
             return
-        tried_now = [
-            faces not in held and len(chosen_shapes(on.shapes, faces)) == FINGERS for faces in batch
+        to_try = [
+            faces
+            for faces in batch
+            if faces not in held and len(chosen_shapes(on.shapes, faces)) == FINGERS
         ]
-        search.tally.count("tried", sum(tried_now))
+        search.tally.count("tried", len(to_try))
+        known = _patches(on, to_try, request)
         placed = [
-            _decide(on, faces, request, search) if now else None
-            for faces, now in zip(batch, tried_now, strict=True)
+            _decide(on, faces, request, search, known[faces]) if faces in known else None
+            for faces in batch
         ]
         choices = iter(_cone_choices([each for each in placed if each], request))
         for faces, each in zip(batch, placed, strict=True):
@@ -104,12 +102,36 @@ def _upgrades(request: PlanRequest) -> list[Construction]:
     return discs + [MIXED for each in discs if each.family == MIXED.family]
 
 
+def _patches(
+    on: Standard, quadruples: Sequence[FaceQuadruple], request: PlanRequest
+) -> dict[FaceQuadruple, ClosureCertificate | None]:
+    """Decide closure of contacts at all corners of hulls of faces, where that is known at once."""
+    hulls = {
+        faces: tuple(shape.hull for shape in chosen_shapes(on.shapes, faces))
+        for faces in quadruples
+    }
+    frictions = {faces: _friction(pieces, request) for faces, pieces in hulls.items()}
+    found: dict[FaceQuadruple, ClosureCertificate | None] = {}
+    for friction in sorted(set(frictions.values())):
+        alike = [faces for faces in quadruples if frictions[faces] == friction]
+        known = close_patches([hulls[faces] for faces in alike], friction)
+        found.update(zip(alike, known, strict=True))
+    return found
+
+
 def _decide(
-    on: Standard, faces: FaceQuadruple, request: PlanRequest, search: MethodSearch
+    on: Standard,
+    faces: FaceQuadruple,
+    request: PlanRequest,
+    search: MethodSearch,
+    known: ClosureCertificate | None = None,
 ) -> Placed | None:
-    """Find contacts on four faces; if there are none, record the proof or that it is undecided."""
+    """Find contacts on four faces; if there are none, record the proof or that it is undecided.
+
+    `known` is the certificate of contacts at all corners of the faces' hulls, if there is one.
+    """
     chosen = chosen_shapes(on.shapes, faces)
-    answers = _answers(faces, chosen, request, search)
+    answers = _answers(faces, chosen, request, search, known)
     pieces, last = answers[-1]
     if any(shape.facets is not None for shape in chosen):
         return _on_triangles(faces, chosen, pieces, last, request, search)
@@ -140,7 +162,11 @@ def _whole(
 
 
 def _answers(
-    faces: FaceQuadruple, shapes: Sequence[FaceShape], request: PlanRequest, search: MethodSearch
+    faces: FaceQuadruple,
+    shapes: Sequence[FaceShape],
+    request: PlanRequest,
+    search: MethodSearch,
+    known: ClosureCertificate | None,
 ) -> list[Answer]:
     """Collect answers for the convex pieces of four faces; a placement can only be the last.
 
@@ -151,7 +177,7 @@ def _answers(
     rng = np.random.default_rng([request.seed, *faces])
     hulls = tuple(shape.hull for shape in shapes)
     search.tally.count("solved")
-    whole = _place(hulls, request, rng)
+    whole = _place(hulls, request, rng, known=known)
     if isinstance(whole, Absence) or all(len(shape.pieces) == 1 for shape in shapes):
         return [(hulls, whole)]
     at = whole.positions if isinstance(whole, Placement) else np.array([h.origin for h in hulls])
@@ -198,43 +224,32 @@ def _on_triangles(
     return None
 
 
-def _place(
-    pieces: Pieces, request: PlanRequest, rng: np.random.Generator, restarts: int = RESTARTS
-) -> Placement | Absence | Undecided:
+def _friction(pieces: Pieces, request: PlanRequest) -> float:
+    """Return the friction coefficient to plan with on pieces that may be curved."""
     spread = max(piece.spread for piece in pieces)
-    theta = request.theta - spread if spread < request.theta else LEAST_SPAN_ANGLE
+    return math.tan(request.theta - spread if spread < request.theta else LEAST_SPAN_ANGLE)
+
+
+def _place(
+    pieces: Pieces,
+    request: PlanRequest,
+    rng: np.random.Generator,
+    restarts: int = RESTARTS,
+    known: ClosureCertificate | None = None,
+) -> Placement | Absence | Undecided:
     try:
         return place_free(
-            pieces, math.tan(theta), rng=rng, cells=request.max_face_parts, restarts=restarts
-        )
+            pieces, _friction(pieces, request), rng=rng, cells=request.max_face_parts,
+            restarts=restarts, whole=known,
+        )  # fmt: skip
     except SolverError:
         return Undecided(1, 1.0)
 
 
 def _cone_choices(placed: Sequence[Placed], request: PlanRequest) -> list[tuple[Cones, ...]]:
-    """Tilted force cones: towards the faces' or the object's middle, or around the forces."""
-    if not (placed and _upgrades(request)):
-        return [()] * len(placed)
-    normals = np.array([[piece.normal for piece in pieces] for pieces, _ in placed])
-    spreads = np.array([[piece.spread for piece in pieces] for pieces, _ in placed])
-    thetas = usable_half_angles(request.theta, spreads)
-    middles = np.array(
-        [[piece.point(piece.corners.mean(axis=0)) for piece in pieces] for pieces, _ in placed]
-    )
-    forces = np.array([at.forces if at.planned is None else at.planned for _, at in placed])
-    kinds = (
-        toward(middles.mean(axis=1), middles, normals, thetas),
-        toward(np.zeros((len(placed), 3)), middles, normals, thetas),
-        widened(forces, normals, thetas),
-    )
-    return [
-        tuple(
-            four(ForceCone(axis, angle) for axis in kind.axes[place])
-            for kind in kinds
-            if (angle := BELOW_SPAN_ANGLE * float(kind.half_angles[place])) > LEAST_SPAN_ANGLE
-        )
-        for place in range(len(placed))
-    ]
+    """Choose tilted force cones to try around placed contacts, if they are asked for."""
+    wanted = bool(placed and _upgrades(request))
+    return cones_around(placed, request.theta) if wanted else [()] * len(placed)
 
 
 def _certified(
@@ -250,10 +265,9 @@ def _certified(
         if better := _upgraded(faces, pieces, construction, cones, request.friction):
             return better
     cones = four(ForceCone(piece.normal, request.theta) for piece in pieces)
-    certified = certify(
-        named("f", faces), faces, "regulus", pieces, cones, placement, request.friction,
-        regions_of(point_region, pieces, cones, placement),
-    )  # fmt: skip
+    points = regions_of(point_region, pieces, cones, placement)
+    candidate = Candidate(named("f", faces), faces, "regulus", pieces, cones, placement, points)
+    certified = certify(candidate, request.friction)
     if certified is None:
         search.tally.count("rejected")
     return certified
@@ -263,11 +277,17 @@ def _upgraded(
     faces: FaceQuadruple, pieces: Pieces, construction: Construction, cones: Cones, friction: float
 ) -> Certified | None:
     """Find the best grasp of a construction on the same pieces with given cones, or None."""
-    found: list[Certified] = []
-    for order in construction.orders:
-        around = four(cones[finger] for finger in order)
-        shapes = [FaceShape((pieces[finger],), pieces[finger]) for finger in order]
-        attempt = Attempt(four(faces[finger] for finger in order), (around,), (math.inf,))
-        one, _ = tried(construction, attempt, shapes, friction, construction.least)
-        found += [one] if one else []
-    return min(found, key=best_first, default=None)
+    shapes: list[FaceShape | None] = [None] * (max(faces) + 1)
+    for face, piece in zip(faces, pieces, strict=True):
+        shapes[face] = FaceShape((piece,), piece)
+    attempts = [
+        Attempt(
+            four(faces[finger] for finger in order),
+            (four(cones[finger] for finger in order),),
+            (math.inf,),
+        )
+        for order in construction.orders
+    ]
+    tries = Tries(construction, shapes, friction)
+    found = tries.certified(attempts, construction.least, Tally())
+    return min((one for one in found if one), key=best_first, default=None)

@@ -9,6 +9,7 @@ the friction asked for. Tilted cones are an alternative, and for most quadruples
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,7 +17,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.cones.spanning import span_sines
-from grasp_core.cones.tilting import tilted_cones, widest_half_angles
+from grasp_core.cones.tilting import tilted_cones, toward, widened, widest_half_angles
 from grasp_core.disc_bounds.corner_bounds import (
     angle_limits,
     corners_of,
@@ -24,10 +25,13 @@ from grasp_core.disc_bounds.corner_bounds import (
     distances,
     widths_apart,
 )
+from grasp_core.families.batches.settling import Cones
 from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.families.kernel_tables import Corners
-from grasp_core.objects.face_pieces import Shapes
+from grasp_core.families.placements import Placement
+from grasp_core.objects.face_pieces import FacePiece, Shapes
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import ForceCone, four
 
 LEAST_SPAN_ANGLE = math.atan(LEAST_RADIUS)
 """Least half-angle to plan with [rad]: narrower cones hold no disc that counts at a depth of one
@@ -166,6 +170,37 @@ def usable_half_angles(theta: float, spreads: Array) -> Array:
         for any construction.
     """
     return np.maximum(INSIDE_FRICTION * theta - spreads, 0.5 * LEAST_SPAN_ANGLE)
+
+
+def cones_around(
+    placed: Sequence[tuple[Sequence[FacePiece], Placement]], theta: float
+) -> list[tuple[Cones, ...]]:
+    """Choose tilted force cones: towards the faces' or the object's middle, or around the forces.
+
+    Args:
+        placed: Four pieces each, and the contacts placed on them.
+        theta: Half-angle of the friction cones to plan with [rad].
+    """
+    normals = np.array([[piece.normal for piece in pieces] for pieces, _ in placed])
+    spreads = np.array([[piece.spread for piece in pieces] for pieces, _ in placed])
+    thetas = usable_half_angles(theta, spreads)
+    middles = np.array(
+        [[piece.point(piece.corners.mean(axis=0)) for piece in pieces] for pieces, _ in placed]
+    )
+    forces = np.array([at.forces if at.planned is None else at.planned for _, at in placed])
+    kinds = (
+        toward(middles.mean(axis=1), middles, normals, thetas),
+        toward(np.zeros((len(placed), 3)), middles, normals, thetas),
+        widened(forces, normals, thetas),
+    )
+    return [
+        tuple(
+            four(ForceCone(axis, angle) for axis in kind.axes[place])
+            for kind in kinds
+            if (angle := BELOW_SPAN_ANGLE * float(kind.half_angles[place])) > LEAST_SPAN_ANGLE
+        )
+        for place in range(len(placed))
+    ]
 
 
 def _around(sines: Array, thetas: Array) -> Array:

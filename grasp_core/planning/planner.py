@@ -9,6 +9,7 @@ and finds grasps on them or proves that there are none.
 
 import math
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial, wraps
 from typing import ParamSpec, TypeVar, cast
@@ -21,7 +22,7 @@ from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.as_given import absence_as_given, as_given, faces_as_given
-from grasp_core.planning.certify import to_grasp
+from grasp_core.planning.certify import to_grasp, to_grasps
 from grasp_core.planning.methods import Progress, Searches, outcomes, prepared, run, unreached
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
 from grasp_core.planning.reach import Finger
@@ -157,11 +158,12 @@ def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
 
 def _planned(body: Polyhedron, request: PlanRequest, on: Standard, searches: Searches) -> Plan:
     """Put together a plan from what the searches found, with the best grasps."""
-    grasps: list[Grasp] = []
-    for found in chosen(body, [search.best for search in searches.values()], request):
-        start = time.process_time()
-        grasps.append(to_grasp(body, request.friction, as_given(found, on)))
-        searches[found.method].seconds += time.process_time() - start
+    best = chosen(body, [search.best for search in searches.values()], request)
+    start = time.process_time()
+    grasps = to_grasps(body, request.friction, [as_given(found, on) for found in best])
+    each = (time.process_time() - start) / max(len(best), 1)
+    for method, count in Counter[Method](found.method for found in best).items():
+        searches[method].seconds += count * each
     counts = PlanCounts(
         len(body.faces),
         on.quadruples,

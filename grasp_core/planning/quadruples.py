@@ -6,31 +6,17 @@ upper bound on the radius of their discs, and rows that are not worth a linear p
 """
 
 from dataclasses import dataclass, fields
-from typing import TypeAlias
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array, Indices, frozen_copy
+from grasp_core.families.batches.settling import Attempt, Cones
 from grasp_core.families.constructions import LEAST_RADIUS, Construction
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
 from grasp_core.solvers.ties import graded
-from grasp_core.values import FaceQuadruple, ForceCone, four
-
-Cones: TypeAlias = tuple[ForceCone, ForceCone, ForceCone, ForceCone]
-
-
-@dataclass(frozen=True, slots=True)
-class Attempt:
-    """One order of the fingers on four faces, with the force cones to try in a construction."""
-
-    faces: FaceQuadruple
-    """The face that each finger touches."""
-    cones: tuple[Cones, ...]
-    """Choices of force cones in finger order, the choice with the largest bound first."""
-    bounds: tuple[float, ...]
-    """Upper bound on the discs of each choice [object radii]; infinite for constructions without
-    discs."""
+from grasp_core.values import ForceCone, four, trusted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,19 +87,22 @@ class ConedQuadruples:
                 with a bound of minus infinity are left out.
         """
         found: list[Attempt] = []
+        made = cache(partial(self._cones, row))
         for column, order in enumerate(construction.orders):
             kinds = np.argsort(-graded(bounds[:, column]), kind="stable").tolist()
             kinds = [kind for kind in kinds if bounds[kind, column] > -np.inf]
             if kinds:
                 faces = four(int(self.faces[row, finger]) for finger in order)
-                cones = tuple(self._cones(row, kind, order) for kind in kinds)
+                cones = tuple(four(made(kind)[finger] for finger in order) for kind in kinds)
                 attempt = Attempt(faces, cones, tuple(float(bounds[k, column]) for k in kinds))
                 found.append(attempt)
         return tuple(found)
 
-    def _cones(self, row: int, kind: int, order: tuple[int, ...]) -> Cones:
+    def _cones(self, row: int, kind: int) -> Cones:
+        """Return one choice of force cones, in the order of the faces."""
         half_angle = float(self.half_angles[row, kind])
-        return four(ForceCone(self.axes[row, kind, finger], half_angle) for finger in order)
+        axes = frozen_copy(self.axes[row, kind])
+        return four(trusted(ForceCone, axis=axis, half_angle=half_angle) for axis in axes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -152,7 +152,7 @@ class Plan:
     unreached: Mapping[FaceQuadruple, str] = field(default_factory=dict[FaceQuadruple, str])
     """Face quadruples whose grasps the fingers cannot reach, with the reason."""
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
-    """Processor time of each method [s], from its first program to the last critical friction."""
+    """Processor time of each method [s], from its first program to its last grasp."""
 
     def __repr__(self) -> str:
         """Return a summary: number of grasps, largest radius, and outcomes of all quadruples."""

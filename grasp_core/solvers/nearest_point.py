@@ -3,8 +3,9 @@
 Solved: minimise |x| subject to C x <= d, for every row d of D.
 
 A point x is nearest iff C x <= d and x = -C'u for some u >= 0 that vanishes off the active rows,
-where equality holds. A compiled dual active-set method finds x and u. Where it fails, or its x and
-u miss these conditions, least squares find u (Lawson & Hanson): with the residual (y, s) of
+where equality holds. A compiled dual active-set method finds x and u, or v >= 0 with C'v = 0 and
+d.v < 0, which proves that nothing is feasible. Where it fails, or its answer misses these
+conditions, least squares find u (Lawson & Hanson): with the residual (y, s) of
 
     minimise |C'v|^2 + (1 + d.v)^2  over  v >= 0
 
@@ -29,6 +30,9 @@ KERNEL = "grasp_core.solvers.nearest_point_kernel"
 EXACT = 1e-11
 """Accepted violation of the conditions, relative to x: some thousand rounding errors, and a
 hundredth of any difference that matters."""
+FARTHEST = 1e4
+"""Largest |x| that a proof of an empty polyhedron must exclude, where the largest distance of a
+violated row from the origin is 1."""
 TRIED = 200
 """Number of right-hand sides on which known active rows are tried: this takes about twice as long
 as finding new ones."""
@@ -52,15 +56,24 @@ def least_distance(C: Array, D: Array, *, accuracy: float = EXACT) -> Array:
     outside = np.flatnonzero(D.min(axis=1) < 0.0)
     sizes = -D[outside].min(axis=1)[:, None]
     alike = D[outside] / sizes
-    near, proved = _by_kernel(C, alike, accuracy)
-    if not proved.all():
-        near[~proved] = _by_least_squares(C, alike[~proved])
+    near, proved, empty = _by_kernel(C, alike, accuracy)
+    near[empty] = np.nan
+    left = ~(proved | empty)
+    if left.any():
+        near[left] = _by_least_squares(C, alike[left])
     X[outside] = sizes * near
     return X
 
 
-def _by_kernel(C: Array, D: Array, accuracy: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Find points by the compiled method, (n, v), and return which of them are proved."""
+def _by_kernel(
+    C: Array, D: Array, accuracy: float
+) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Find points by the compiled method, (n, v).
+
+    Returns:
+        The points; which of them are proved, (n,); and which polyhedra are proved to be empty or
+        farther than `FARTHEST` from the origin, (n,).
+    """
     X, U = np.zeros((len(D), C.shape[1])), np.zeros(D.shape)
     compiled(KERNEL).solve(np.array(C, order="C"), np.array(D, order="C"), X, U)
     slack = D - X @ C.T
@@ -68,7 +81,12 @@ def _by_kernel(C: Array, D: Array, accuracy: float) -> tuple[Array, NDArray[np.b
     np.maximum(unmet, -slack.min(axis=1), out=unmet)
     np.maximum(unmet, np.where(U != 0.0, slack, 0.0).max(axis=1), out=unmet)
     np.maximum(unmet, -U.min(axis=1), out=unmet)
-    return X, unmet <= accuracy * np.abs(X).max(axis=1, initial=1.0)
+    proved = unmet <= accuracy * np.abs(X).max(axis=1, initial=1.0)
+    # with v >= 0, v.(C x - d) >= -d.v - |C'v| |x|: positive for all |x| that come into question,
+    # by more than rows may be off together
+    gaps = -(D * U).sum(axis=1)
+    allowed = FARTHEST * (np.linalg.norm(U @ C, axis=1) + EXACT * U.sum(axis=1))
+    return X, proved, ~proved & (U.min(axis=1) >= 0.0) & (gaps > allowed)
 
 
 def _by_least_squares(C: Array, D: Array) -> Array:

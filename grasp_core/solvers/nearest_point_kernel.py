@@ -63,7 +63,8 @@ def solve(C: Array, D: Array, X: Array, U: Array) -> None:
         C: Normals, (m, v), contiguous like all of these arrays.
         D: Right-hand sides, (n, m).
         X: Filled with the points, (n, v); with zeros where none was found.
-        U: Zeros, filled with the points' multipliers, (n, m).
+        U: Zeros, filled with the points' multipliers, (n, m); where none was found, with weights of
+            rows that contradict each other, if some do.
     """
     m, v = C.shape
     norms = np.empty(m)
@@ -77,6 +78,7 @@ def solve(C: Array, D: Array, X: Array, U: Array) -> None:
         count = _solve(C, D[i], norms, active, X[i])
         if count < 0:
             X[i].fill(0.0)
+            _contradiction(active, -1 - count, U[i])
             continue
         _recompute(D[i], active, count, X[i])
         for j in range(count):
@@ -85,7 +87,10 @@ def solve(C: Array, D: Array, X: Array, U: Array) -> None:
 
 @loop()
 def _solve(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
-    """Find one nearest point; return how many rows are active there, -1 if none was found."""
+    """Find one nearest point; return how many rows are active there.
+
+    Where none was found, -1 less the number of rows that were active last is returned, or -1.
+    """
     count = 0
     x.fill(0.0)
     active.inside.fill(False)
@@ -96,15 +101,30 @@ def _solve(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
         active.rows[count], active.u[count] = entering, 0.0
         count = _enter(C, active, count, excess, DEPENDENT * norms[entering], x)
         if count < 0:
-            break
+            return count
     return -1
 
 
 @loop()
-def _enter(C: Array, active: Active, count: int, excess: float, least: float, x: Array) -> int:
-    """Step until the entering row is active; return the number of active rows, -1 on failure.
+def _contradiction(active: Active, count: int, weights: Array) -> None:
+    """Fill in weights with which the entering row and active rows sum to nothing.
 
-    `least` is the length up to which a remainder counts as zero.
+    They prove that no point meets these rows, if they are not negative and the sum of their
+    right-hand sides is below zero; whoever uses them checks that.
+    """
+    if count == 0:
+        return
+    weights[active.rows[count]] = 1.0
+    for j in range(count):
+        weights[active.rows[j]] = max(-active.r[j], 0.0)
+
+
+@loop()
+def _enter(C: Array, active: Active, count: int, excess: float, least: float, x: Array) -> int:
+    """Step until the entering row is active; return the number of active rows.
+
+    On failure, -1 less that number is returned. `least` is the length up to which a remainder
+    counts as zero.
     """
     entering, z = active.rows[count], active.z
     for _ in range(count + 1):
@@ -124,7 +144,7 @@ def _enter(C: Array, active: Active, count: int, excess: float, least: float, x:
             active.inside[entering] = True
             return count + 1
         count = _drop(C, active, count, leaving)
-    return -1
+    return -1 - count
 
 
 @loop()

@@ -68,4 +68,4 @@ def of_grasp(**more):
 
 def fields_of(kind, value):
     """The arguments that make such a value again."""
-    return {each.name: getattr(value, each.name) for each in fields(kind)}
+    return {each.name: getattr(value, each.name) for each in fields(kind) if each.init}

@@ -7,6 +7,7 @@ import grasp_core as gc
 from grasp_core.disc_bounds.program_bounds import AttemptBounds
 from grasp_core.errors import SolverError
 from grasp_core.families import discs as largest_discs
+from grasp_core.families.batches.placing import ManyPlacements
 from grasp_core.families.constructions import CONSTRUCTIONS
 from grasp_core.planning import best_first as promising_module
 from grasp_core.planning.best_first import BestFirst
@@ -119,6 +120,7 @@ def test_a_program_that_fails_leaves_its_attempt_to_the_search(monkeypatch):
         return solve(program, cutoff)
 
     expected = gc.plan(body, 0.4, families="concurrent", limit=5).grasps
+    monkeypatch.setattr(ManyPlacements, "of", lambda _, __, asked: [None] * len(asked))
     monkeypatch.setattr(AttemptBounds, "of", lambda *args: np.full(len(args[2].faces), np.inf))
     monkeypatch.setattr(largest_discs, "maximize_above", sometimes)
     plan = gc.plan(body, 0.4, families="concurrent", limit=5)

@@ -7,6 +7,7 @@ from scipy.optimize import linprog
 import grasp_core as gc
 from grasp_core.compiled import compiled
 from grasp_core.errors import SolverError
+from grasp_core.families.batches.placing import ManyPlacements
 from grasp_core.solvers import lp
 from grasp_core.solvers.lp import (
     Below,
@@ -104,6 +105,8 @@ def recorded(monkeypatch, name, friction):
     compiled = lp._by_simplex
     with monkeypatch.context() as patch:
         patch.setattr(lp, "_by_simplex", record)
+        # compiled code solves these programs itself, unless it leaves them
+        patch.setattr(ManyPlacements, "of", lambda _, __, asked: [None] * len(asked))
         gc.plan(example_object(name), friction, limit=60)
     return asked
 

@@ -44,7 +44,8 @@ def unmet(C, d, x):
 
 
 def nothing_proved(C, D, _):
-    return np.zeros((len(D), C.shape[1])), np.zeros(len(D), dtype=bool)
+    nothing = np.zeros(len(D), dtype=bool)
+    return np.zeros((len(D), C.shape[1])), nothing, nothing
 
 
 def without_kernel(monkeypatch, run):
@@ -96,11 +97,33 @@ def test_where_nothing_is_feasible_no_point_is_found(monkeypatch):
         C[1] = 0.0 if trial % 2 else -C[0]
         D = rng.uniform(0.5, 1.0, size=(3, 12))
         D[1, 0], D[1, 1] = -1.0, -0.5
-        found = least_distance(C, D)
         expected = without_kernel(monkeypatch, lambda C=C, D=D: least_distance(C, D))
+        with monkeypatch.context() as patch:
+            if trial % 2 == 0:  # a row of zeros contradicts itself, not others
+                forbid_least_squares(patch)
+            found = least_distance(C, D)
         assert np.isnan(found[1]).all()
         assert not np.isnan(found[[0, 2]]).any()
         np.testing.assert_array_equal(np.isnan(found), np.isnan(expected))
+
+
+def test_a_contradiction_that_is_none_is_left_to_least_squares(monkeypatch):
+    """Weights of rows that do not cancel, or only for near points, prove nothing."""
+    tested = 0
+    for C, D, _ in polyhedra(12):
+        expected = without_kernel(monkeypatch, lambda C=C, D=D: least_distance(C, D))
+        for weights in (1.0, 1e6):
+
+            def contradict(X, U, weights=weights):
+                X[:], U[:] = 0.0, weights
+
+            with monkeypatch.context() as patch:
+                patch.setattr(module, "compiled", lambda _, c=contradict: spoiled(c))
+                found = least_distance(C, D)
+            near = NEAR * np.abs(expected).max()
+            np.testing.assert_allclose(found, expected, rtol=0.0, atol=near)
+            tested += len(found)
+    assert tested == 240
 
 
 def test_no_variables_and_no_polyhedra_leave_nothing_to_find():

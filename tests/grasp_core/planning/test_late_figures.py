@@ -1,0 +1,130 @@
+"""Figures that a planned grasp computes when they are asked for, and certificates of many."""
+
+import copy
+import pickle
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.planning import certify as module
+from grasp_core.planning.certify import Candidate, certify_each, witness_fault
+from grasp_core.planning.methods import prepared, run
+from grasp_core.planning.request import PlanRequest
+from grasp_core.values import PUT_OFF
+from scenes.example_objects import example_object
+
+FRICTION = 0.4
+
+
+def planned():
+    body = example_object("random-10-1")
+    return body, gc.plan(body, FRICTION).grasps
+
+
+def test_nothing_is_computed_before_it_is_asked_for_and_then_once(monkeypatch):
+    asked = []
+    for name in PUT_OFF:
+        figure = getattr(module, name)
+
+        def counted(*given, figure=figure, **options):
+            asked.append(figure.__name__)
+            return figure(*given, **options)
+
+        monkeypatch.setattr(module, name, counted)
+    _, grasps = planned()
+    assert len(grasps) > 100
+    assert not asked
+    first = [getattr(grasps[0], name) for name in PUT_OFF]
+    assert sorted(asked) == sorted(PUT_OFF)
+    assert [getattr(grasps[0], name) for name in PUT_OFF] == first
+    assert len(asked) == len(PUT_OFF)
+    repr(grasps[1])
+    assert len(asked) == 2 * len(PUT_OFF)
+
+
+def test_late_figures_are_those_of_the_public_functions():
+    body, grasps = planned()
+    for grasp in grasps[::5]:
+        friction = min(gc.critical_friction(grasp), FRICTION)
+        assert grasp.critical_friction == pytest.approx(friction, abs=2e-7)
+        quality = gc.ferrari_canny(
+            grasp, friction=FRICTION, center=body.center_of_mass, torque_scale=body.radius
+        )
+        assert grasp.ferrari_canny == pytest.approx((quality.lower, quality.upper), rel=1e-3)
+    assert len(grasps[::5]) >= 20
+
+
+def _pickled(grasp):
+    return pickle.loads(pickle.dumps(grasp))  # noqa: S301 - written here
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, replace, _pickled])
+def test_copies_have_the_figures_of_the_original(copied):
+    _, grasps = planned()
+    for grasp in grasps[:5]:
+        other = copied(grasp)
+        for name in PUT_OFF:
+            assert getattr(other, name) == getattr(grasp, name)
+        assert other.id == grasp.id
+        np.testing.assert_array_equal(other.positions, grasp.positions)
+
+
+def test_a_changed_copy_keeps_the_change():
+    _, grasps = planned()
+    changed = replace(grasps[0], critical_friction=0.25, ferrari_canny=(0.1, 0.2))
+    assert changed.critical_friction == 0.25
+    assert changed.ferrari_canny == (0.1, 0.2)
+
+
+def test_planned_values_pass_the_checks_of_values_that_users_make():
+    """They are made without checks, so here they are made once more with them."""
+    _, grasps = planned()
+    for grasp in grasps:
+        for value in (grasp, grasp.witness, *grasp.contacts, *grasp.regions, *grasp.force_cones):
+            checked = replace(value)
+            for each in fields(value):
+                one = getattr(value, each.name)
+                if isinstance(one, np.ndarray):
+                    assert not one.flags.writeable
+                    assert one.dtype == np.float64
+                    np.testing.assert_array_equal(one, getattr(checked, each.name))
+
+
+def test_an_unknown_field_is_an_error():
+    _, grasps = planned()
+    with pytest.raises(AttributeError, match="a Grasp has no attribute 'quality'"):
+        grasps[0].quality  # noqa: B018
+
+
+def spoilt(one, kind):
+    """Forces of a grasp as they are, too large, out of balance, or one outside its cone."""
+    forces, normals = one.placement.forces.copy(), one.normals
+    if kind == 1:
+        return 2.0 * forces
+    if kind == 2:
+        forces += 1e-4 * normals[0]
+    if kind == 3:
+        forces[0] += np.linalg.norm(forces[0]) * np.cross(normals[0], [0.36, 0.48, 0.8])
+    return forces / np.einsum("ki,ki->", forces, normals)
+
+
+def test_many_candidates_are_rejected_for_the_faults_of_one():
+    """Among them are lines of another family."""
+    body = example_object("random-10-1")
+    request = PlanRequest(FRICTION, ("concurrent", "pencil"))
+    found = list(run(*prepared(body, request)[:1], request, prepared(body, request)[1], None))
+    candidates, faults = [], []
+    for place, one in enumerate(found):
+        placement = replace(one.placement, forces=spoilt(one, place % 4))
+        family = one.family if place % 7 else "regulus"
+        candidates.append(
+            Candidate(one.id, one.faces, family, one.pieces, one.cones, placement, one.regions)
+        )
+        contacts = placement.positions, one.normals, placement.forces
+        faults.append(witness_fault(*contacts, FRICTION, family))
+    certified = certify_each(candidates, FRICTION)
+    assert [each is None for each in certified] == [fault is not None for fault in faults]
+    assert len(set(faults)) >= 6
+    assert sum(each is not None for each in certified) >= 20
