@@ -29,14 +29,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, cross
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contact_arrays import contact_arrays, unit_size
 from grasp_core.closure.friction_interval import FRICTIONLESS, REPORTED_AS_ZERO, FrictionInterval
 from grasp_core.closure.friction_search import FRICTION_ACCURACY, SHAVED, Ends, search_interval
 from grasp_core.closure.margin_program import CHECK_SLACK, deepest_forces
 from grasp_core.closure.proofs import RANK, proves_closure
-from grasp_core.closure.wrenches import WRENCH, cross, normal_and_tangential
+from grasp_core.closure.wrenches import WRENCH, normal_and_tangential
 from grasp_core.compiled import compiled
 from grasp_core.values import Grasp
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, cross
 from grasp_core.closure.margin_program import (
     SMALLEST_NORMAL,
     deepest_forces,
@@ -25,7 +25,7 @@ from grasp_core.closure.proofs import (
     without_giants,
 )
 from grasp_core.closure.wrench_sets import WrenchSet, nearest_wrench
-from grasp_core.closure.wrenches import WRENCH, cross, grasp_map, normal_and_tangential
+from grasp_core.closure.wrenches import WRENCH, grasp_map, normal_and_tangential
 from grasp_core.errors import SolverError
 
 DECIDED = 1e-9

@@ -31,11 +31,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import SMALLEST_SIZE, Array, real_array
+from grasp_core.arrays import SMALLEST_SIZE, Array, cross, real_array
 from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions, unit_size
 from grasp_core.closure.decision import decide
 from grasp_core.closure.proofs import margin_ceiling, proved_margin
-from grasp_core.closure.wrenches import cross, normal_and_tangential
+from grasp_core.closure.wrenches import normal_and_tangential
 from grasp_core.errors import UndecidedError
 from grasp_core.fields import are_frictions, are_units, is_array, is_number
 from grasp_core.values import Grasp

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, cross
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contact_arrays import unit_size
 from grasp_core.closure.decision import Answer, decide
@@ -22,7 +22,7 @@ from grasp_core.closure.friction_interval import FRICTIONLESS, FrictionInterval,
 from grasp_core.closure.margin_program import margin_program
 from grasp_core.closure.proofs import proves_closure
 from grasp_core.closure.rational_proofs import NEARLY_AT_REST, closes, closing_forces, separates
-from grasp_core.closure.wrenches import WRENCH, cross, grasp_map, normal_and_tangential
+from grasp_core.closure.wrenches import WRENCH, grasp_map, normal_and_tangential
 from grasp_core.errors import SolverError
 
 FRICTION_ACCURACY = 5e-8

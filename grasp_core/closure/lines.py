@@ -25,9 +25,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import SMALLEST_SIZE, Array, frozen
+from grasp_core.arrays import SMALLEST_SIZE, Array, cross, frozen
 from grasp_core.closure.contact_arrays import check_spread
-from grasp_core.closure.wrenches import cross
 from grasp_core.errors import InputError
 
 LineClass: TypeAlias = Literal["planar", "concurrent", "pencil", "regulus", "independent"]

@@ -36,7 +36,6 @@ from grasp_core.closure.margin_program import (
 from grasp_core.closure.wrenches import (
     WRENCH,
     contact_frames,
-    cross,
     grasp_map,
     in_frames,
     normal_and_tangential,

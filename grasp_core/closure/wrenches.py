@@ -30,17 +30,6 @@ def grasp_map(positions: Array, center: Array | None = None) -> Array:
     return G.reshape(*arms.shape[:-2], WRENCH, 3 * arms.shape[-2])
 
 
-def cross(one: Array, other: Array) -> Array:
-    """Compute cross products of vectors (..., 3) that broadcast, (..., 3).
-
-    `numpy.cross` gives the same numbers, but takes ten times as long for a few vectors.
-    """
-    crossed = np.empty(np.broadcast_shapes(one.shape, other.shape))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        crossed[..., i] = one[..., j] * other[..., k] - one[..., k] * other[..., j]
-    return crossed
-
-
 def in_frames(G: Array, frames: Array) -> Array:
     """Rewrite a matrix on stacked forces (m, 3k) for coordinates in contact frames (k, 3, 3)."""
     m, k = len(G), len(frames)

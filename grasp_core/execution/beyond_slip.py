@@ -165,8 +165,10 @@ def _balanced(
     for _ in range(MOST_STEPS):
         tried = forces + ((motion - start) @ rows.T).reshape(forces.shape)
         after, slope = _returned(tried, grip.friction)
-        left = (after - rest).reshape(len(loads), -1) @ columns.T - motion @ softening.T + loads
-        found = (np.abs(left * scale) <= most).all(axis=1)
+        left: Array = (
+            (after - rest).reshape(len(loads), -1) @ columns.T - motion @ softening.T + loads
+        )
+        found = np.abs(left * scale).max(axis=1) <= most
         if found.all():
             break
         tangent = (maps @ slope @ stiff).sum(axis=1) - softening

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, cross
 from grasp_core.closure.wrenches import WRENCH, grasp_map
 from grasp_core.errors import SolverError
 from grasp_core.execution.grips import Grip
@@ -87,7 +87,7 @@ def stepped(held: Held, start: Grip, step: Array) -> Held:
     # a tip's centre is at r - rho n from the centre of mass, and rolls by rho (t x n) on the face
     half = rotation(0.5 * turn)
     centers = (grip.arms - radii * grip.normals) @ R.T
-    centers += radii * np.cross(turn, grip.normals @ half.T)
+    centers += radii * cross(turn, grip.normals @ half.T)
     normals = grip.normals @ R.T
     arms = centers + radii * normals
     moved = held.moved + shift

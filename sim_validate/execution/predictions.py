@@ -37,7 +37,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, cross
 from grasp_core.closure.wrenches import cross_matrix, grasp_map
 from grasp_core.execution.beyond_slip import loss_multiples
 from grasp_core.execution.first_slip import slip_steps
@@ -183,7 +183,7 @@ def _load(dynamics: HeldDynamics, drive: Drive) -> tuple[Array, Array]:
     bases = _bases(layout, drive.accelerations)
     rates = _rates(drive.accelerations)
     load -= drive.accelerations @ dynamics.own.T
-    load[:, 3:] -= np.cross(rates, rates @ layout.inertia_kg_m2)
+    load[:, 3:] -= cross(rates, rates @ layout.inertia_kg_m2)
     load -= layout.tip_mass_kg * np.einsum("kij,nkj->ni", dynamics.maps, bases)
     return load, bases
 
@@ -193,15 +193,15 @@ def _turned_back(vectors: Array, angles: Array) -> Array:
     size = np.linalg.norm(angles, axis=1, keepdims=True)
     axis = angles / np.where(size > 0.0, size, 1.0)
     along = np.einsum("ni,ni->n", axis, vectors)[:, None] * axis
-    turned = np.cos(size) * (vectors - along) - np.sin(size) * np.cross(axis, vectors) + along
+    turned = np.cos(size) * (vectors - along) - np.sin(size) * cross(axis, vectors) + along
     return np.where(size > 0.0, turned, vectors)
 
 
 def _bases(layout: HeldLayout, accelerations: Array) -> Array:
     """Return the accelerations b_i of the fingers' bases in (2), (n, k, 3) [m/s^2]."""
-    turning = np.cross(accelerations[:, None, 3:], layout.tip_centers)
+    turning = cross(accelerations[:, None, 3:], layout.tip_centers)
     rates = _rates(accelerations)[:, None]
-    inwards = np.cross(rates, np.cross(rates, layout.tip_centers))
+    inwards = cross(rates, cross(rates, layout.tip_centers))
     return accelerations[:, None, :3] + turning + inwards
 
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array, Indices, cross
 from grasp_core.execution.first_slip import slip_steps
 from scenes.execution.held import HeldLayout
 from sim_validate.execution.bench import HeldMotion
@@ -137,7 +137,7 @@ def _slid(found: Seen, layout: HeldLayout, begun: int) -> Array:
         [change[:, 2, 1] - change[:, 1, 2], change[:, 0, 2] - change[:, 2, 0],
          change[:, 1, 0] - change[:, 0, 1]], axis=1,
     )  # fmt: skip
-    rolled = layout.tip_radius_m[:, None] * np.cross(turns[:, None], normals)
+    rolled = layout.tip_radius_m[:, None] * cross(turns[:, None], normals)
     slid = steps - rolled
     slid -= np.einsum("nki,ki->nk", slid, normals)[..., None] * normals
     return np.concatenate([np.zeros((1, *slid.shape[1:])), np.cumsum(slid, axis=0)])

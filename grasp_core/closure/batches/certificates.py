@@ -10,14 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import UNIT_SLACK, Array
+from grasp_core.arrays import UNIT_SLACK, Array, cross
 from grasp_core.closure.batches.margins import margin_ceilings, proved_margins
 from grasp_core.closure.contact_arrays import unit_size
 from grasp_core.closure.decision import DECIDED, FAR, PRECISE
 from grasp_core.closure.force_closure import CAUTION, FAR_BELOW, SUMMED, ClosureCertificate
 from grasp_core.closure.margin_program import deepest_forces
 from grasp_core.closure.proofs import proves_closure, refutes_closure, without_giants
-from grasp_core.closure.wrenches import cross
 from grasp_core.values import trusted
 
 

@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, cross
 from grasp_core.closure.margin_program import CHECK_SLACK
 from grasp_core.closure.proofs import RANK, refutes_closure, supports
-from grasp_core.closure.wrenches import WRENCH, cross, grasp_map, normal_and_tangential
+from grasp_core.closure.wrenches import WRENCH, grasp_map, normal_and_tangential
 
 
 def proved_margins(
