@@ -7,6 +7,7 @@ from pathlib import Path
 import grasp_core as gc
 import scenes
 from scenes.drawing.canvas import Around, entitle, figure_with_panels, in_style, write_figure
+from scenes.drawing.palette import FINGERS
 from scenes.drawing.pictures import draw_grasp, grasp_figure
 from scenes.drawing.views import best_view
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
@@ -23,6 +24,8 @@ from sim_validate.reports.wrench_charts import wrench_figure
 from sim_validate.simulation.setup import Agenda, Setup
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
+BENCHMARKS = FOLDER.parent / "benchmarks.md"
+AXES = Around(left=0.11, right=0.03, below=0.16, above=0.05, between=0.0)
 TEN_DEGREES = math.tan(math.radians(10.0))
 FAMILIES = (
     ("dodecahedron", "concurrent", TEN_DEGREES, "normal"),
@@ -110,9 +113,33 @@ def survival():
     )
 
 
+@in_style
+def misplaced():
+    """Share of misplaced objects that are kept, from the table of the benchmarks' page."""
+    header, _, *rows = kept_by_distance()
+    distances = [float(cell) for cell in header[1:]]
+    figure, (axes,) = figure_with_panels(6.4, 3.6, 1, around=AXES)
+    for colour, (family, *cells) in zip(FINGERS, rows, strict=True):
+        counts = [[int(part) for part in cell.split(" of ")] for cell in cells]
+        shares = [kept / count for kept, count in counts]
+        axes.plot(distances, shares, "o-", color=colour, label=family)
+    axes.set(xlabel="distance from the expected place [mm]", ylabel="share kept", ylim=(0.0, 1.02))
+    axes.set_xticks(distances)
+    axes.legend(loc="lower left", frameon=False)
+    return figure
+
+
+def kept_by_distance():
+    """Read the table on misplaced objects, cell by cell."""
+    lines = [*BENCHMARKS.read_text(encoding="utf-8").splitlines(), ""]
+    first = next(place for place, line in enumerate(lines) if line.startswith("| kept, by mm"))
+    end = next(place for place in range(first, len(lines)) if not lines[place].startswith("|"))
+    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[first:end]]
+
+
 PICTURES: dict[str, Callable[[], object]] = {
     make.__name__: make
-    for make in (families, grasp, regions, wrenches, margins, motion, fidelity, survival)
+    for make in (families, grasp, regions, wrenches, margins, motion, fidelity, survival, misplaced)
 }
 
 
