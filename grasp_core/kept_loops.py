@@ -4,7 +4,8 @@ Numba by itself keeps compiled code beside the installed module. A new environme
 everything again, and a change of one kernel would not be seen by others that call it. Here the
 folder's name holds a hash of the kernel's text, of the texts it takes functions and constants from,
 and of numba's version: what is found there was compiled from these very texts, whatever environment
-compiled it. Numba itself looks at the processor.
+compiled it. Constants that a kernel takes from a module that is no kernel must be literals there,
+as what that module itself imports is not looked at. Numba itself looks at the processor.
 """
 
 import hashlib

@@ -179,7 +179,7 @@ class Grasp:
     """Unit vector along which each finger moves in to its contact on a free line, (4, 3); None if
     no free lines were asked for (`plan(finger=...)`)."""
     _figures: Figures | None = field(default=None, init=False)
-    """Computes the figures that have no value yet; None where both have one."""
+    """Computes the figures at first use; None where they were given."""
 
     def __post_init__(self) -> None:
         text(self.id, "id")

@@ -6,18 +6,24 @@ x = (d, t) and the contact forces g_i along the axes of their contacts follow
 
     g'_i = g_i + D_i dx,   D_i = F_i' (-K_i W_i' + [0, [f_i x]]),                         (1)
 
-as in `grips` (6), where the contact sticks. Outside its cone g'_i is brought back along the
-tangent, to |t| = mu n, and a normal force below zero to none. The object is in balance where
+as in `grips` (6), where the contact sticks; g_i are the forces at the last balance, dx is the
+motion since, and f_i in [f_i x] is along the world's axes. Outside its cone g'_i is brought back
+along the tangent, to |t| = mu n, and a normal force below zero to none. The object is in balance
+where
 
     sum_i W_i F_i (g_i - f_i) - C x + s w = 0,   C = K_g + sum_i W_i [0, [f_i x]],        (2)
 
 with g and f both along the contacts' axes; if nothing slips, this is (4) of `grips`. Newton's
-method solves (2) with the exact derivative of (1), at multiples in equal ratios, from that of first
-slip to that at which the object without any slip would leave its place. The object is *lost* where
-its motion passes what is allowed, or where balance ends; halving the ratio shows where.
+method solves (2) with the exact derivative of (1), at multiples in equal ratios, from just below
+that of first slip (or a hundredth of the last, if that is larger) to that at which the object
+without any slip would leave its place. The object is *lost* where its motion passes what is
+allowed, or where no balance is found. Halving the interval of multiples, and then taking the motion
+in it as linear, shows where.
 
-The load comes once. One that keeps turning makes contacts slip a little in each round, which adds
-up; for it the first slip is the safer answer.
+The load comes once. A load that keeps turning makes contacts slip a little in each round, which
+adds up; for it the first slip is the safer answer. The multiple is an estimate, not a proof:
+whether a balance past the first slip is stable is not checked, and a contact that opened pushes
+again as soon as the object moves back.
 
 Source of the return to the cone: Simo and Hughes, "Computational Inelasticity", 1998, section 3.3.
 Following a structure until it yields everywhere is the pushover analysis of earthquake engineers.
@@ -39,13 +45,17 @@ with more."""
 BEFORE = 0.98
 """Where the first multiple is, in first slips."""
 FARTHEST = 100.0
-"""Largest ratio of the farthest load to the first slip: slips at less are told from none there."""
+"""Largest ratio of the farthest load to the first slip; smaller first slips are followed from that
+ratio on."""
 HALVINGS = 4
+"""Number of halvings of the last ratio: paths in such steps are no finer than a sixteenth of it."""
 MOST_STEPS = 12
+"""Most steps of Newton's method: where balance exists, fewer are taken."""
 MET = 1e-7
 """Wrench that is left of (2), relative to the largest force at rest."""
 SINGULAR = 1e-9
-"""Stiffness added to (2) where everything slips, relative to the largest."""
+"""Stiffness that is always added to the matrix of Newton's method, relative to its largest entry:
+it can be solved where everything slips."""
 
 
 def loss_multiples(grip: Grip, loads: Array, most_m: float, most_rad: float) -> Array:
@@ -59,7 +69,7 @@ def loss_multiples(grip: Grip, loads: Array, most_m: float, most_rad: float) -> 
 
     Returns:
         The multiples, (m,): at most those at which the object without slip would be lost; zero if
-        the grip is unstable at rest.
+        the grip is unstable at rest, infinite for a load of zero.
     """
     if not grip.stable or not len(loads):
         return np.zeros(len(loads))

@@ -6,8 +6,8 @@ before all of w has come, but an object that turns far may be held longer than s
 `gc.first_slip` follows the large motions of the weaker grip, to a multiple s of w, and the load is
 the larger of w and a quarter more than s w.
 
-A finger j that does not push, p_j, leaves its share to the springs of all: by (3) of `grips`, in
-small motions,
+Where finger j leaves out its push p_j, the springs of all fingers share it. By (3) of `grips`, in
+small motions and with the elastic stiffness K alone,
 
     f'_i = f_i - K_i W_i' x - [i = j] p_j,   K x = -W_j p_j.                              (1)
 
@@ -57,6 +57,8 @@ class Weaker:
     """Share of its command that each finger pushes with, (k,)."""
     load: Array
     """Load under which a contact must slip, (6,) [N, N m]."""
+    idle: bool = False
+    """Whether a finger does not push, so that a slide while the others close counts as well."""
 
 
 def run_controls(
@@ -90,11 +92,12 @@ def _driven(closing: Drive, loading: Drive, weaker: Weaker) -> Drive:
 def _judged(
     weaker: Weaker, motion: HeldMotion, layout: HeldLayout, drive: Drive, begun: int
 ) -> ExecutionControl:
-    """Say whether a contact slipped, under the load or while the fingers closed."""
+    """Say whether a contact slipped under the load, or while fingers closed and one was idle."""
     found = outcome(motion, layout, drive, weaker.friction, begun)
-    closing = slides(seen(motion, layout), layout)[: begun + 1]
-    if float(closing.max()) > SLID * layout.radius_m:
-        return ExecutionControl(weaker.name, let_go=True, first_slip=0.0)
+    if weaker.idle:
+        closing = slides(seen(motion, layout), layout)[: begun + 1]
+        if float(closing.max()) > SLID * layout.radius_m:
+            return ExecutionControl(weaker.name, let_go=True, first_slip=0.0)
     return ExecutionControl(weaker.name, found.slipped, found.first_slip)
 
 
@@ -115,14 +118,15 @@ def weaker_grips(best: BestSqueeze, layout: HeldLayout) -> Iterator[Weaker]:
     others_push[strongest] = 0.0
     left = idle(grip, strongest, layout.axes[strongest] @ layout.pushes[strongest])
     yield Weaker(
-        "a finger that does not push", grip.friction, others_push, _sure(left, load) * load
+        "a finger that does not push", grip.friction, others_push, _sure(left, load) * load, True
     )
 
 
 def _sure(weaker: Grip, load: Array) -> float:
     """Return the multiple of a load, at least one, that makes a weaker grip slip by analysis.
 
-    It is one where the grip slips at rest already, or cannot be followed.
+    It is one where the grip slips at rest already, is unstable, never slips by analysis, or cannot
+    be followed; then nothing shows that the load suffices.
     """
     try:
         found = first_slip(weaker, load)

@@ -94,21 +94,11 @@ class Expected:
     first_slip: float
     """Least multiple of the load at which a contact slips; infinite where none ever does."""
     slipping: Array
-    """Motion x in the sample of the first slip, under the load once, (6,) [m, rad]."""
+    """Motion x in the sample of the first slip, under the load at multiple one, (6,) [m, rad]."""
     moved_m: float
-    """Largest displacement under the load once [m]."""
+    """Largest displacement under the load at multiple one [m]."""
     turn_rad: float
-    """Largest turn under the load once [rad]."""
-
-
-def predicted_slips(dynamics: HeldDynamics, drives: Sequence[Drive]) -> Array:
-    """Return the least multiple of each drive's load at which a contact slips, (drives,).
-
-    Infinite where none ever does; zero where the grip is unstable at rest.
-    """
-    if not dynamics.grip.stable:
-        return np.zeros(len(drives))
-    return np.array([each.first_slip for each in expected(dynamics, drives)])
+    """Largest turn under the load at multiple one [rad]."""
 
 
 def predicted_losses(

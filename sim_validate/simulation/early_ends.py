@@ -1,8 +1,8 @@
 """Tells when the answer of a trial is known, so that it need not run to its full length.
 
-Lost. A trial asks whether displacements stay below a threshold. The first sample in which one does
-not answers it: nothing that comes later can make that sample undone. That is certain loss, and it
-is the same sample by which the trial is judged.
+Lost. A trial asks whether displacements and gaps stay below thresholds. The first sample in which a
+displacement does not answers it: nothing that comes later can make that sample undone. That is
+certain loss, and it is the same sample by which the trial is judged.
 
 Settled. A trial is answered as held where what is still to come is bounded. From some sample on,
 load, forces of the servos and friction are constant. Let x be the motion of object and fingertips.
@@ -15,7 +15,8 @@ directions, so G = (g / s) K for dampers g and springs s. A constant load has a 
 
 never grows about the equilibrium x*, and the equation of motion M x'' + G x' + K e = 0 gives e from
 what is measured. With w0^2 = k s / (object's mass + masses of k fingertips), the least square of a
-natural frequency (levers about an axis are at least the grasp size, so turning is no slower),
+natural frequency (about any axis the contacts' root mean square lever is at least the grasp size,
+and the object's inertia a quarter of its mass times the square of that, so turning is no slower),
 
     |e|_K <= |x''|_M / w0 + (g / s) |x'|_K.                                              (2)
 
@@ -37,7 +38,8 @@ together, then no contact ever slips or opens, so (1) to (5) hold to the end. Bo
 doubled for what the linear model leaves out (forces that turn with the object weaken springs by up
 to a fifth; the acceleration is a mean over the last sample), and they may use up half of a
 threshold. Contacts near the border of their cones never meet this: their trials run on. Rigid
-fingertips have no springs, so their trials end early only by loss.
+fingertips have no springs, and contacts nearly on one line have levers shorter than the grasp size
+that scenes take, so there trials end early only by loss.
 
 The same bound tells when an object has settled at high friction before it is lowered.
 """
@@ -50,7 +52,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, cross
 from grasp_core.closure.wrenches import cross_matrix
-from scenes.layout import Layout
+from scenes.layout import Layout, grasp_size
 from sim_validate.simulation.schedules import Schedule
 from sim_validate.simulation.simulate import Mask
 from sim_validate.simulation.traces import rotated
@@ -66,6 +68,8 @@ normal forces, which is less than thresholds let pass."""
 WATCHED = 3
 """Least number of samples for which an object is watched after friction was lowered. A contact that
 must slip begins to in the first step."""
+SAME = 1e-6
+"""Difference of two sizes that is rounding, relative to them."""
 PLANNED = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 """Planned pose of the object's frame: its position and its quaternion."""
 
@@ -77,7 +81,7 @@ class Thresholds:
     watched_m: float
     """Displacement since friction was lowered."""
     total_m: float = math.inf
-    """Displacement from the planned pose."""
+    """Displacement from the planned pose to the start, and that since then."""
 
 
 class EarlyEnds:
@@ -106,7 +110,8 @@ class EarlyEnds:
         self.commands = np.einsum("kij,nki->nkj", layout.frames, pushes).reshape(len(trials), -1)
         self.starts = np.tile(PLANNED if start is None else start[:7], (len(trials), 1))
         self.began_m = displaced(self.starts, np.tile(PLANNED, (len(trials), 1)), layout)
-        self.springs = None if layout.drive.rigid else _Springs(layout)
+        bounded = not layout.drive.rigid and _wide(layout)
+        self.springs = _Springs(layout) if bounded else None
         self.momenta: Array | None = None
         # a turn is at most 2.25 times the length of the difference of two quaternions
         self.lever = 2.25 * (float(np.linalg.norm(layout.center)) + layout.grasp_size_m)
@@ -181,9 +186,11 @@ class EarlyEnds:
         away = joints[:, :7] - starts
         most = _lengths(away[:, :3]) + self.lever * _lengths(away[:, 3:])
         lost = np.zeros(len(places), dtype=np.bool_)
-        if not (np.maximum(most / limits.watched_m, (began + most) / limits.total_m) < 1.0).all():
-            most = displaced(joints[:, :7], starts, self.layout)
-            lost = (most >= limits.watched_m) | (began + most >= limits.total_m)
+        # alone and beside others a trial must end alike, so only what may be lost is measured
+        near = ~(np.maximum(most / limits.watched_m, (began + most) / limits.total_m) < 1.0)
+        if near.any():
+            moved = displaced(joints[near, :7], starts[near], self.layout)
+            lost[near] = (moved >= limits.watched_m) | (began[near] + moved >= limits.total_m)
         seen = samples - self.watched[places] + 1 >= WATCHED
         if springs is None or reach is None or not seen.any():
             return lost
@@ -257,6 +264,11 @@ class _Springs:
         inside = slope * normal - across > (1.0 + slope) * change
         good: Mask = inside & (normal > change) & (normal < self.largest - change)
         return np.logical_and.reduce(good, axis=1)
+
+
+def _wide(layout: Layout) -> bool:
+    """Return whether contacts are as far from their closest axis as the layout's grasp size."""
+    return grasp_size(layout.contacts) >= layout.grasp_size_m * (1.0 - SAME)
 
 
 def _lengths(vectors: Array) -> Array:

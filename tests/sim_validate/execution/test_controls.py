@@ -50,7 +50,8 @@ def test_loads_of_controls_slip_by_analysis_with_a_quarter_to_spare(name):
             share = np.linalg.norm(weaker.load) / np.linalg.norm(least)
             assert share >= 1.0 - 1e-12
             assert weaker.load == pytest.approx(share * least, rel=1e-12)
-            if weaker.pushing.min() > 0.0:
+            assert weaker.idle == (weaker.pushing.min() == 0.0)
+            if not weaker.idle:
                 squeeze = weaker.pushing[:, None] * best.grip.squeeze
                 grip = replace(best.grip, squeeze=squeeze, friction=weaker.friction)
                 slip = gc.first_slip(grip, least)

@@ -17,13 +17,17 @@ from sim_validate.execution.predictions import (
     expected,
     held_dynamics,
     predicted_losses,
-    predicted_slips,
 )
 from tests.grasp_core.execution.held import planned_grips
 from tests.sim_validate.execution.held_rigs import MASS, G, box_dynamics
 
 DOWN = np.array([0.0, 0.0, -G])
 LONG_S = 6.0
+
+
+def predicted_slips(dynamics, drives):
+    """The first slips alone."""
+    return predicted_losses(dynamics, drives, [False] * len(drives), 1.0, 1.0)[0]
 
 
 def dynamics_of(name, push=8.0):

@@ -100,6 +100,30 @@ def test_held_objects_move_no_farther_than_the_bound_to_the_end(held):
     assert ended >= 30
 
 
+def test_a_trial_ends_in_the_same_sample_alone_and_beside_one_that_is_lost(held):
+    body, grasp, rig = held
+    limits = limiting_loads(body, grasp, 0.5, 6)
+    held_loads = [part(rig.idle, limit, share) for limit in limits for share in (0.3, 0.7, 0.9)]
+    lost = [part(rig.idle, limits[0], 1.3)]
+    beside = rig.hold(held_loads + lost)
+    assert len(beside[-1].times_s) < 40
+    for load, together in zip(held_loads, beside[:-1], strict=True):
+        (alone,) = rig.hold([load])
+        assert len(alone.times_s) == len(together.times_s)
+        np.testing.assert_array_equal(alone.displacements_m, together.displacements_m)
+
+
+def test_contacts_nearly_on_a_line_end_only_when_lost(looking):
+    """Their levers are shorter than the size that the bound is told with."""
+    layout = looking.layout
+    wide = replace(layout, grasp_size_m=1.01 * layout.grasp_size_m)
+    trial = hold(Load(np.zeros(6), np.zeros((4, 3))), Load(np.zeros(6), np.zeros((4, 3))),
+                 (1.5, 0.5), CLOCK, HoldProtocol())  # fmt: skip
+    limits = Thresholds(layout.grasp_size_m, layout.grasp_size_m)
+    assert EarlyEnds(layout, [trial], CLOCK.sample_s, limits).springs is not None
+    assert EarlyEnds(wide, [trial], CLOCK.sample_s, limits).springs is None
+
+
 def test_controls_end_in_the_sample_in_which_they_let_go():
     body, (grasp, *_) = grasps("wedge", 0.5, 1)
     grasp = replace(grasp, critical_friction=gc.critical_friction(grasp))
