@@ -17,7 +17,7 @@ from functools import cache
 from typing import Any, Literal, TypeVar, cast
 
 from grasp_core.errors import InputError
-from grasp_core.kept_loops import keep
+from grasp_core.kept_loops import NUMBA_FAILS, keep
 
 _AWAITED: dict[str, Callable[[], object]] = {}
 """Functions that return when a kernel is compiled elsewhere, by the kernel's name."""
@@ -68,7 +68,7 @@ def compiled(name: str) -> Any:
         wait()
     try:
         return importlib.import_module(name)
-    except (ImportError, RuntimeError, OSError, ValueError) as error:
+    except NUMBA_FAILS as error:
         if str(getattr(error, "name", "")).startswith("grasp_core"):
             raise
         raise InputError(

@@ -19,6 +19,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+NUMBA_FAILS = (ImportError, RuntimeError, OSError, ValueError)
+"""What numba raises when it is imported with settings that it refuses, or cannot be."""
 IMPORTED = re.compile(r"^from (grasp_core(?:\.\w+)+) import", re.MULTILINE)
 """Pattern of the imports in a kernel's text."""
 KERNEL = "_kernel"
@@ -45,13 +47,16 @@ def keep(loop: Any, function: Callable[..., Any]) -> None:
 
 
 def is_kept(module: str) -> bool:
-    """Return whether loops of a kernel are kept already, or can be kept nowhere.
+    """Return whether loops of a kernel are kept already, or cannot be kept or compiled at all.
 
     Args:
         module: The kernel's full name.
     """
     found = importlib.util.find_spec(module)
-    folder = None if found is None else folder_for(module, str(found.origin))
+    try:
+        folder = None if found is None else folder_for(module, str(found.origin))
+    except NUMBA_FAILS:  # whoever needs the kernel is told so
+        return True
     return folder is None or any(folder.glob("*.nbi"))
 
 

@@ -57,18 +57,18 @@ class Symmetries:
 
 @dataclass(frozen=True, slots=True)
 class Copies:
-    """Places of grasps in a list of which symmetries of the object make one from the other."""
+    """Places, in a list, of grasps that symmetries of the object map to one another."""
 
     first: int
     """Place of the grasp that stands for all of them, the first in the list."""
     rotated: tuple[int, ...] = ()
-    """Places of those that a rotation of the object maps the first to."""
+    """Places of the grasps that a rotation of the object maps the first to."""
     mirrored: tuple[int, ...] = ()
-    """Places of those that only a reflection of the object maps the first to."""
+    """Places of the grasps that only a reflection of the object maps the first to."""
 
     @property
     def places(self) -> tuple[int, ...]:
-        """Places of all of them in ascending order."""
+        """Return the places of all these grasps in ascending order."""
         return tuple(sorted((self.first, *self.rotated, *self.mirrored)))
 
 

@@ -89,7 +89,7 @@ def certify(candidate: Candidate, friction: float) -> Certified | None:
 
 
 def certify_each(candidates: Sequence[Candidate], friction: float) -> list[Certified | None]:
-    """Certify many placements together; None for each that `certify` would reject."""
+    """Certify placements together; None for each that the witness or the closure test rejects."""
     if not candidates:
         return []
     points = np.array([each.placement.positions for each in candidates])

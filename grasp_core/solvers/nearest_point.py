@@ -42,7 +42,10 @@ often."""
 
 
 def least_distance(C: Array, D: Array, *, accuracy: float = EXACT) -> Array:
-    """Find the nearest points, (n, v), as rows; a row is NaN where none was proved.
+    """Find the nearest points, (n, v), as rows; a row is NaN where none was proved to be near.
+
+    Polyhedra that are proved to be empty, or to be farther than `FARTHEST` times the largest
+    violation, have NaN as well.
 
     A row of the answer does not depend on the other rows of D, except for rounding.
 

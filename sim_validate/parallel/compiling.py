@@ -24,8 +24,8 @@ from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.nearest_point import least_distance
 from scenes.example_objects import example_object
 
-CONTACTS = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
-"""Contacts in the middles of a tetrahedron's faces, (4, 3) [m]."""
+OUTWARD = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
+"""Outward directions of a tetrahedron's faces, (4, 3); a third of each is its face's middle [m]."""
 FRICTION = 0.5
 
 
@@ -93,5 +93,5 @@ def _compile(pipe: Any, names: Iterable[str]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt ends it through its parent
     with suppress(BrokenPipeError):
         for name in names:
-            BESIDE[name](CONTACTS / 3.0, -CONTACTS / np.sqrt(3.0))
+            BESIDE[name](OUTWARD / 3.0, -OUTWARD / np.sqrt(3.0))
             pipe.send(name)

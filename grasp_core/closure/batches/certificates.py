@@ -39,7 +39,7 @@ class _Decided:
 def closing_margins(positions: Array, normals: Array, friction: float) -> Array:
     """Compute the margins of certificates of force closure for many sets of contacts, (g,).
 
-    Each is the margin of the certificate that `force_closure` gives.
+    Each is, up to rounding, the margin of the certificate that `force_closure` gives.
 
     Args:
         positions: Contact points, (g, k, 3) [m].
@@ -65,8 +65,8 @@ def certificates(
         friction: Coulomb coefficient of all contacts.
 
     Returns:
-        A certificate for each set, as `ClosureCertificate.verify` accepts it; None where compiled
-        code proves nothing, which tells nothing.
+        A certificate for each set, as `ClosureCertificate.verify` accepts it; None leaves the set
+        undecided.
     """
     decided = _decided(positions, normals, friction)
     points, units, forces, wrenches = (

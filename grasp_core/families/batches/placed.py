@@ -41,7 +41,7 @@ class Footprints(NamedTuple):
 
 
 def room_for(count: int) -> Placed:
-    """Make room for so many attempts."""
+    """Return placements of a number of attempts, all zero."""
     return Placed(
         np.zeros(count, dtype=np.int64),
         np.zeros((count, FINGERS, 3)),

@@ -20,7 +20,7 @@ from sim_validate.parallel import compiling
 compiling.BESIDE = {"%s": compiling.BESIDE["%s"]}
 if __name__ == "__main__":
     with compiling.compiled_beside(int(sys.argv[1])):
-        compiling.BESIDE["%s"](compiling.CONTACTS, compiling.CONTACTS)
+        compiling.BESIDE["%s"](compiling.OUTWARD, compiling.OUTWARD)
     stats = loops.compiled("%s").solve.stats
     print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 """.replace("%s", FIRST)
@@ -58,7 +58,7 @@ def test_every_kernel_has_a_call_that_uses_it(waiting):
         asked = []
         loops.compiled.cache_clear()
         waiting.wait_for({name: lambda asked=asked: asked.append(1)})
-        call(compiling.CONTACTS / 3.0, -compiling.CONTACTS / 3.0**0.5)
+        call(compiling.OUTWARD / 3.0, -compiling.OUTWARD / 3.0**0.5)
         assert asked == [1], name
 
 
