@@ -12,7 +12,8 @@ failure of the simulator counts as the largest error.
     python -m tests.benchmarks.first_slips [--quick] [--meshes FOLDER] [--jobs N] [--worst N]
 
 With `--meshes` the mesh files of a folder are planned and squeezed instead, at the contacts where
-fingertips at the planned places meet their triangles.
+fingertips at the planned places meet their triangles. The faces that may be left are then the
+triangles' own planes: the way to an edge ends at the nearest triangle with another normal.
 """
 
 import argparse
@@ -25,7 +26,7 @@ from pathlib import Path
 import numpy as np
 
 import grasp_core as gc
-from grasp_core.geometry.nearest_points import nearest_on_surface
+from grasp_core.geometry.nearest_points import nearest_on_surface, nearest_on_triangles
 from sim_validate.parallel.processes import each
 from tests.benchmarks import held_grasps as held
 
@@ -38,6 +39,8 @@ LEVER = 0.5
 """Torque of a unit force, in object radii."""
 TURNED = 0.5
 """Turn [rad] above which directions are listed apart."""
+SAME_PLANE = 1e-3
+"""Angle between normals of triangles below which a fingertip rolls on as on one plane [rad]."""
 BEYOND = 1.15
 """Largest multiple that is tried, of the predicted one."""
 MEDIAN, MOST = 0.01, 0.03
@@ -93,7 +96,10 @@ def measure(unit):
     ratios = np.array(list(held.first_slips(bench, best.grip, drives)))
     predicted = np.array([slip.multiple for slip, _ in ends])
     turns = np.array([slip.turn_rad for slip, _ in ends])
-    ways_out = [np.inf] if Path(case.source).suffix else edge_distances(body, case.grasp)
+    if Path(case.source).suffix:
+        ways_out = flat_distances(body, best.grip)
+    else:
+        ways_out = edge_distances(body, case.grasp)
     rolls = turns * float((best.grip.tip_radius_m / ways_out).max())
     return Found(name, case.family, stiffness, mass, predicted, predicted * ratios, turns, rolls)
 
@@ -104,6 +110,19 @@ def edge_distances(body, grasp):
         max(edge_distance(piece, one.position, one.normal) for piece in body.faces[face].pieces)
         for face, one in zip(grasp.faces, grasp.contacts, strict=True)
     ])  # fmt: skip
+
+
+def flat_distances(body, grip):
+    """Return how far each contact is from triangles that turn away from its plane, (4,) [m]."""
+    corners = body.vertices[body.triangles]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    found = []
+    for point, normal in zip(body.center_of_mass + grip.arms, grip.normals, strict=True):
+        other = corners[np.abs(normals @ normal) < np.cos(SAME_PLANE)]
+        gaps = np.linalg.norm(nearest_on_triangles(other, point) - point, axis=-1)
+        found.append(max(float(gaps.min()), 1e-9))
+    return np.array(found)
 
 
 def edge_distance(polygon, point, normal):
