@@ -89,13 +89,12 @@ def measure(unit):
     ends = [(slip, way) for slip, way in zip(slips, ways, strict=True) if slip.event == "slip"]
     if not ends:
         return nothing(name, case, stiffness, mass, "no direction ends in a slip")
-    moved = max(slip.displacement_m + body.radius * slip.turn_rad for slip, _ in ends)
-    bench = held.bench_of(body, best.grip, mass, moved)
+    turns = np.array([slip.turn_rad for slip, _ in ends])
+    bench = held.bench_of(body, best.grip, mass, float(turns.max()))
     time_s = held.slowness(bench, best.grip)
     drives = [held.ramp(slip.multiple * way, BEYOND, time_s) for slip, way in ends]
     ratios = np.array(list(held.first_slips(bench, best.grip, drives)))
     predicted = np.array([slip.multiple for slip, _ in ends])
-    turns = np.array([slip.turn_rad for slip, _ in ends])
     if Path(case.source).suffix:
         ways_out = flat_distances(body, best.grip)
     else:

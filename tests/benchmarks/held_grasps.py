@@ -115,15 +115,16 @@ def squeezed(
 
 
 def bench_of(
-    body: gc.Polyhedron, grip: gc.Grip, mass_kg: float, moved_m: float | None = None
+    body: gc.Polyhedron, grip: gc.Grip, mass_kg: float, turn_rad: float | None = None
 ) -> HeldBench:
     """Compile the scene of a squeezed object.
 
-    A curved surface is there where fingertips come if no point of it moves by more than a distance.
+    A curved surface is there where fingertips come if nothing slips while the object turns by no
+    more than an angle: they move along with the object, and roll by their radius times the angle.
     """
     reach = None
-    if moved_m is not None and body.patches is not None:
-        reach = min(moved_m + SPARE * body.radius, body.radius) + float(grip.tip_radius_m.max())
+    if turn_rad is not None and body.patches is not None:
+        reach = SPARE * body.radius + (1.0 + turn_rad) * float(grip.tip_radius_m.max())
     scene = build_held_scene(body, grip, mass_kg, reach_m=reach)
     return HeldBench(scene, lost_m=LOST * body.radius)
 
