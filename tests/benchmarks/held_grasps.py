@@ -36,8 +36,8 @@ RADIANS = 180.0
 object lags behind the load by the inverse of that, times twice the damping ratio, and grips become
 softer as they turn: with a third of the time soft fingertips seem to hold 5 to 15 % more."""
 HELD_S = 0.1
-SPARE = 0.1
-"""How much farther a curved surface is there than fingertips come, in its radii."""
+SPARE = 1.0
+"""How much farther a curved surface is there than fingertips come, in their radii."""
 LOST = 3.0
 """Distance at which an object is lost and its trial ends, in its radii."""
 
@@ -124,7 +124,7 @@ def bench_of(
     """
     reach = None
     if turn_rad is not None and body.patches is not None:
-        reach = SPARE * body.radius + (1.0 + turn_rad) * float(grip.tip_radius_m.max())
+        reach = (1.0 + turn_rad + SPARE) * float(grip.tip_radius_m.max())
     scene = build_held_scene(body, grip, mass_kg, reach_m=reach)
     return HeldBench(scene, lost_m=LOST * body.radius)
 
