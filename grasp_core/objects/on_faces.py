@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, cross
 from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.objects.face import Face
@@ -90,6 +90,6 @@ def within(point: Array, polygon: Array, normal: Array, slack: float) -> bool:
         normal: Unit normal of the plane, (3,).
         slack: Allowed distance outside [m].
     """
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    inward = np.cross(normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)
+    edges = np.concatenate((polygon[1:], polygon[:1])) - polygon
+    inward = cross(normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)
     return bool((np.einsum("ki,ki->k", inward, point - polygon) >= -slack).all())
