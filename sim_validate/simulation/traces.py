@@ -122,6 +122,47 @@ def _moved(joints: Array, start: Array, layout: Layout) -> tuple[Array, Array]:
     return shifts, rotation_angles(joints[:, 3:7], start[3:7])
 
 
+def lengths(vectors: Array) -> Array:
+    """Measure vectors (n, d), (n,); a length does not depend on the other rows."""
+    return np.sqrt(np.einsum("ni,ni->n", vectors, vectors))
+
+
+def displaced(poses: Array, starts: Array, layout: Layout) -> Array:
+    """Measure displacements as in `trace`, of n poses from a start each, (n,) [m].
+
+    Args:
+        poses: Positions and quaternions of the object's frame, (n, 7).
+        starts: The poses from which displacements count, (n, 7).
+        layout: The simulated layout.
+    """
+    now, then = poses[:, 3:], starts[:, 3:]
+    shifts = poses[:, :3] + rotated(now, layout.center)
+    shifts = shifts - starts[:, :3] - rotated(then, layout.center)
+    across = then[:, :1] * now[:, 1:] - now[:, :1] * then[:, 1:] - cross(now[:, 1:], then[:, 1:])
+    along = np.abs(np.einsum("ni,ni->n", now, then))
+    return _path(shifts, across, along, layout)
+
+
+def strayed(poses: Array, layout: Layout) -> Array:
+    """Measure displacements of n poses from the planned one, (n,) [m]: as `displaced`, but faster.
+
+    Args:
+        poses: Positions and quaternions of the object's frame, (n, 7).
+        layout: The simulated layout.
+    """
+    shifts = poses[:, :3] + rotated(poses[:, 3:], layout.center) - layout.center
+    return _path(shifts, poses[:, 4:], np.abs(poses[:, 3]), layout)
+
+
+def _path(shifts: Array, across: Array, along: Array, layout: Layout) -> Array:
+    """Add the length of shifts (n, 3) and the grasp size times turns, (n,) [m].
+
+    The sines (n, 3) and cosines (n,) of half the turns may have a common positive factor.
+    """
+    turns = 2.0 * np.arctan2(lengths(across), along)
+    return lengths(shifts) + layout.grasp_size_m * turns
+
+
 def _tips(joints: Array, layout: Layout) -> Array:
     """Compute fingertip centres in the object's frame, (n, k, 3)."""
     slides = joints[:, 7:].reshape(len(joints), (joints.shape[1] - 7) // 3, 3)
@@ -137,7 +178,8 @@ def _tips(joints: Array, layout: Layout) -> Array:
 def rotated(quaternions: Array, vectors: Array) -> Array:
     """Turn vectors (..., 3) by quaternions (..., 4) wxyz of any length but zero."""
     w, v = quaternions[..., :1], quaternions[..., 1:]
-    twice = 2.0 * cross(v, vectors) / np.sum(quaternions**2, axis=-1, keepdims=True)
+    squares = np.add.reduce(quaternions**2, axis=-1, keepdims=True)
+    twice = 2.0 * cross(v, vectors) / squares
     return vectors + w * twice + cross(v, twice)
 
 
