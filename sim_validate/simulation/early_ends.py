@@ -56,7 +56,7 @@ from grasp_core.closure.wrenches import cross_matrix
 from scenes.layout import Layout, grasp_size
 from sim_validate.simulation.schedules import Schedule
 from sim_validate.simulation.simulate import Mask
-from sim_validate.simulation.traces import displaced, lengths, strayed
+from sim_validate.simulation.traces import displaced, strayed
 
 SAFETY = 2.0
 """Factor on bounds of motions and forces, for what the linear model leaves out."""
@@ -159,9 +159,9 @@ class EarlyEnds:
             self.momenta = np.full((len(self.watched), speeds.shape[1]), np.nan)
             self.momenta[places] = momenta
             return None
-        gained = lengths(momenta - self.momenta[places]) / self.sample_s
+        gained = _lengths(momenta - self.momenta[places]) / self.sample_s
         self.momenta[places] = momenta
-        return self.springs.reach(lengths(momenta), gained, lengths(speeds[:, 6:]))
+        return self.springs.reach(_lengths(momenta), gained, _lengths(speeds[:, 6:]))
 
     def _settled(
         self, places: Indices, samples: Indices, joints: Array, speeds: Array, reach: Array | None
@@ -185,7 +185,7 @@ class EarlyEnds:
             self.began_m[places] = strayed(starts, self.layout)
         began = self.began_m[places]
         away = joints[:, :7] - starts
-        most = lengths(away[:, :3]) + self.lever * lengths(away[:, 3:])
+        most = _lengths(away[:, :3]) + self.lever * _lengths(away[:, 3:])
         lost = np.zeros(len(places), dtype=np.bool_)
         # alone and beside others a trial must end alike, so only what may be lost is measured
         near = ~(np.maximum(most / limits.watched_m, (began + most) / limits.total_m) < 1.0)
@@ -239,7 +239,7 @@ class _Springs:
     def creep(self, speeds: Array, reach: Array) -> Array:
         """Bound the speed with which the object creeps, (5), (n,) [m/s]."""
         moving = np.einsum("ni,ij->nj", speeds[:, :6], self.arms)
-        measured = lengths(moving[:, :3]) + lengths(moving[:, 3:])
+        measured = _lengths(moving[:, :3]) + _lengths(moving[:, 3:])
         return measured + self.share * self.fastest * reach
 
     def stuck(
@@ -258,7 +258,7 @@ class _Springs:
         """
         pushes = commands - self.spring * joints[:, 7:] - self.damper * speeds[:, 6:]
         pushes = pushes.reshape(len(pushes), -1, 3)
-        crept = left_s * (lengths(speeds[:, 6:]) + self.fastest * reach)
+        crept = left_s * (_lengths(speeds[:, 6:]) + self.fastest * reach)
         change = (SAFETY * self.spring * (2.0 * self.forces * reach + crept))[:, None]
         normal, across = pushes[..., 0], np.hypot(pushes[..., 1], pushes[..., 2])
         slope = friction[:, None]
@@ -276,3 +276,7 @@ def _springs(layout: Layout) -> _Springs | None:
     if layout.drive.rigid or grasp_size(layout.contacts) < layout.grasp_size_m * (1.0 - SAME):
         return None
     return _Springs(layout)
+
+
+def _lengths(vectors: Array) -> Array:
+    return np.sqrt(np.einsum("ni,ni->n", vectors, vectors))
