@@ -11,7 +11,7 @@ Fingers are spheres on three slides along (normal, tangent, tangent), each with 
 limited to the largest normal force. Rigid fingers have neither slides nor servos.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -149,9 +149,7 @@ def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads")
     return document(root)
 
 
-def _object(
-    world: Element, layout: Layout, contact: Mapping[str, object], surface: Surface
-) -> None:
+def _object(world: Element, layout: Layout, contact: dict[str, str], surface: Surface) -> None:
     body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
     add_element(body, "freejoint", {"name": "object"})
     inertia = layout.inertia_kg_m2[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
@@ -187,7 +185,7 @@ def _object(
         add_element(body, "geom", pad | contact)
 
 
-def _finger(world: Element, layout: Layout, contact: Mapping[str, object], finger: int) -> None:
+def _finger(world: Element, layout: Layout, contact: dict[str, str], finger: int) -> None:
     drive = layout.drive
     pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.frames[finger])}
     body = add_element(world, "body", {"name": f"finger{finger}", "gravcomp": 1.0} | pose)

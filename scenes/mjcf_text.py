@@ -99,9 +99,10 @@ def as_text(value: object) -> str:
         return value if value.isalnum() else escape(value, QUOTE)
     if type(value) in (float, int):  # the most frequent ones, and an array would take longer
         return repr(value)
-    if isinstance(value, np.ndarray) and value.size > MANY:
-        return _many(value.tobytes(), value.dtype.str)
-    return _separated(np.asarray(value))
+    numbers: Array | Indices = np.asarray(value)
+    if numbers.size > MANY:
+        return _many(numbers.tobytes(), numbers.dtype.str)
+    return _separated(numbers)
 
 
 @lru_cache(maxsize=8)
