@@ -21,7 +21,7 @@ SHIFT = 0.5 * (math.sqrt(5.0) - 1.0)
 """Offset, in cells, of the grids on which numbers are rounded or compared: the golden section is
 the number that fractions approximate worst, so the numbers of regular objects are far from the
 borders of cells."""
-NEXT, AFTER_NEXT = [1, 2, 0], [2, 0, 1]
+NEXT, AFTER_NEXT = np.array([1, 2, 0]), np.array([2, 0, 1])
 """For each axis, the one after it and the one after that."""
 ASIDE = 0.05
 """Shift of the decimal logarithm that keeps round numbers, such as the 1.0 of a unit vector, away
@@ -126,7 +126,8 @@ def frozen_indices(value: Any, shape: tuple[int | None, ...], name: str) -> Indi
 
 def cross(a: Array, b: Array) -> Array:
     """Multiply vectors, (..., 3), as `np.cross` does, which takes longer where they are few."""
-    return a[..., NEXT] * b[..., AFTER_NEXT] - a[..., AFTER_NEXT] * b[..., NEXT]
+    ahead = a.take(NEXT, -1) * b.take(AFTER_NEXT, -1)
+    return ahead - a.take(AFTER_NEXT, -1) * b.take(NEXT, -1)
 
 
 def to_digits(values: Array, size: float = 0.0) -> Array:

@@ -5,6 +5,7 @@ Results of different processors, or of compiled and interpreted loops, differ in
 
 import hashlib
 import platform
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -24,6 +25,12 @@ SIZES = (3, 6, 12, 24, 64)
 
 def versions() -> dict[str, str]:
     """Look up the version of everything that can change a number, without importing any of it."""
+    return dict(_installed())
+
+
+@cache
+def _installed() -> Mapping[str, str]:
+    """Read the versions once per process: reading them takes as long as a tenth of a validation."""
     found = {"python": platform.python_version(), "machine": platform.machine()}
     for package in PACKAGES:
         try:

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Literal, get_args
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -30,7 +29,17 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
-from scenes.mjcf_text import COMPILER, add_comment, add_element, printable, quaternion
+from scenes.mjcf_text import (
+    COMPILER,
+    Element,
+    add_comment,
+    add_element,
+    as_texts,
+    document,
+    element,
+    printable,
+    quaternion,
+)
 from scenes.physics import PhysicsSettings
 
 Surface = Literal["pads", "mesh"]
@@ -114,7 +123,7 @@ def write_scene(scene: Scene, path: str | Path) -> Path:
 
 def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads") -> str:
     """Write the MJCF text of a layout; equal layouts give equal texts."""
-    root = ElementTree.Element("mujoco", model=printable(layout.name))
+    root = element("mujoco", {"model": printable(layout.name)})
     add_comment(root, SCALED)
     add_element(root, "compiler", COMPILER)
     option = add_element(root, "option", physics.options())
@@ -128,21 +137,19 @@ def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads")
     world = add_element(root, "worldbody", {})
     light = {"pos": (0.0, 0.0, 8.0 * layout.radius_m), "dir": (0.0, 0.0, -1.0)}
     add_element(world, "light", light | {"type": "directional"})
-    _object(world, layout, physics, surface)
+    contact = as_texts(physics.contact())
+    _object(world, layout, contact, surface)
     for finger in range(len(layout.contacts)):
-        _finger(world, layout, physics, finger)
+        _finger(world, layout, contact, finger)
     if not layout.drive.rigid:
         actuators = add_element(root, "actuator", {})
         for finger in range(len(layout.contacts)):
             _servos(actuators, layout, finger)
         _keyframes(root, layout)
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode") + "\n"
+    return document(root)
 
 
-def _object(
-    world: ElementTree.Element, layout: Layout, physics: PhysicsSettings, surface: Surface
-) -> None:
+def _object(world: Element, layout: Layout, contact: dict[str, str], surface: Surface) -> None:
     body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
     add_element(body, "freejoint", {"name": "object"})
     inertia = layout.inertia_kg_m2[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
@@ -156,7 +163,7 @@ def _object(
     if surface == "mesh":
         touched = {"contype": (1 << len(layout.contacts)) - 1}
         friction = {"friction": (layout.friction, 0.0, 0.0)}
-        add_element(body, "geom", hull | touched | friction | physics.contact())
+        add_element(body, "geom", hull | touched | friction | contact)
         return
     add_element(body, "geom", hull | {"contype": 0})
     width, depth = PAD_HALF_WIDTH * layout.radius_m, PAD_DEPTH * layout.radius_m
@@ -175,12 +182,10 @@ def _object(
             "group": 3,
             "rgba": (0.9, 0.6, 0.2, 0.3),
         }
-        add_element(body, "geom", pad | physics.contact())
+        add_element(body, "geom", pad | contact)
 
 
-def _finger(
-    world: ElementTree.Element, layout: Layout, physics: PhysicsSettings, finger: int
-) -> None:
+def _finger(world: Element, layout: Layout, contact: dict[str, str], finger: int) -> None:
     drive = layout.drive
     pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.frames[finger])}
     body = add_element(world, "body", {"name": f"finger{finger}", "gravcomp": 1.0} | pose)
@@ -210,10 +215,10 @@ def _finger(
         "group": 0,
         "rgba": (0.8, 0.25, 0.2, 1.0),
     }
-    add_element(body, "geom", tip | physics.contact())
+    add_element(body, "geom", tip | contact)
 
 
-def _servos(actuators: ElementTree.Element, layout: Layout, finger: int) -> None:
+def _servos(actuators: Element, layout: Layout, finger: int) -> None:
     drive = layout.drive
     for axis in AXES:
         name = f"finger{finger}_{axis}"
@@ -230,7 +235,7 @@ def _servos(actuators: ElementTree.Element, layout: Layout, finger: int) -> None
         add_element(actuators, "position", servo)
 
 
-def _keyframes(root: ElementTree.Element, layout: Layout) -> None:
+def _keyframes(root: Element, layout: Layout) -> None:
     """Add keyframes: positions of the fingers, and commands of their servos.
 
     In `pregrasp` the fingers stay away from the object. In `approach` they start at the same place

@@ -7,7 +7,7 @@ otherwise creep), hard and constant contact impedance, and a dense Jacobian (the
 solver of MuJoCo 4.0.0 has a bug).
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 
 from grasp_core.arrays import frozen
 from grasp_core.checked import LARGEST, SMALLEST, number, one_of, switch, whole
@@ -80,7 +80,8 @@ class PhysicsSettings:
     def options(self) -> dict[str, float | int | str | tuple[float, ...]]:
         """Return the attributes of MJCF's `option` element."""
         elsewhere = (*CONTACT_SETTINGS, *CHOSEN_FLAGS)
-        return {name: value for name, value in asdict(self).items() if name not in elsewhere}
+        names = (each.name for each in fields(self))
+        return {name: getattr(self, name) for name in names if name not in elsewhere}
 
     def flags(self) -> dict[str, str]:
         """Return all flags of MJCF's `flag` element, so that no default matters."""

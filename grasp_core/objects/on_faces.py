@@ -1,8 +1,10 @@
 """Finds the face, or the triangle of a curved patch, under each contact on an object."""
 
+from functools import lru_cache
+
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, cross
 from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.objects.face import Face
@@ -50,8 +52,12 @@ def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
             )
 
 
+@lru_cache(maxsize=32)
 def face_under(body: Polyhedron, contact: Contact) -> Face | None:
-    """Find the face on which a contact lies with the surface's normal; None if there is none."""
+    """Find the face on which a contact lies with the surface's normal; None if there is none.
+
+    What was found last is kept, as the controls of a grasp have many of its contacts.
+    """
     slack = ON_FACE * body.radius
     # planar faces that lean otherwise are left out at once; patches have many normals
     turned = np.abs(body.normals - contact.normal).max(axis=1)
@@ -90,6 +96,6 @@ def within(point: Array, polygon: Array, normal: Array, slack: float) -> bool:
         normal: Unit normal of the plane, (3,).
         slack: Allowed distance outside [m].
     """
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    inward = np.cross(normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)
+    edges = np.concatenate((polygon[1:], polygon[:1])) - polygon
+    inward = cross(normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)
     return bool((np.einsum("ki,ki->k", inward, point - polygon) >= -slack).all())

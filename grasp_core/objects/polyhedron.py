@@ -2,7 +2,7 @@
 
 import hashlib
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Self, TypeVar
 
@@ -109,7 +109,7 @@ class Polyhedron:
     @property
     def radius(self) -> float:
         """Return the largest distance of a vertex from the centre of mass [m]."""
-        return float(np.linalg.norm(self.vertices - self.center_of_mass, axis=1).max())
+        return _radius(self)
 
     def mass_at(self, density_kg_m3: float) -> float:
         """Return the mass of the object at a uniform density [kg], to nine digits.
@@ -133,6 +133,12 @@ class Polyhedron:
         sizes = [(self.vertices, "vertex"), (self.triangles, "triangle"), (self.faces, kind)]
         parts = [counted(len(things), name) for things, name in sizes]
         return summary("Polyhedron", shown(self.name), *parts, radius=self.radius)
+
+
+@lru_cache(maxsize=8)
+def _radius(body: Polyhedron) -> float:
+    """Measure a radius once: it is the unit of most lengths, and asked for very often."""
+    return float(np.linalg.norm(body.vertices - body.center_of_mass, axis=1).max())
 
 
 AnyPolyhedron = TypeVar("AnyPolyhedron", bound=Polyhedron)

@@ -14,7 +14,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -25,7 +24,16 @@ from grasp_core.execution.grips import Grip
 from grasp_core.files.whole_files import write_parts
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.execution.held import HeldLayout, HeldSettings, held_layout
-from scenes.mjcf_text import COMPILER, add_comment, add_element, printable, quaternion
+from scenes.mjcf_text import (
+    COMPILER,
+    Element,
+    add_comment,
+    add_element,
+    document,
+    element,
+    printable,
+    quaternion,
+)
 from scenes.physics import PhysicsSettings
 
 PALM_ARMATURE = 1e7
@@ -147,7 +155,7 @@ def write_held_scene(scene: HeldScene, path: str | Path) -> Path:
 
 def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
     """Write the MJCF text of a held object; equal layouts give equal texts."""
-    root = ElementTree.Element("mujoco", model=printable(layout.name))
+    root = element("mujoco", {"model": printable(layout.name)})
     add_comment(root, TRUE_MASS)
     add_element(root, "compiler", COMPILER)
     option = add_element(root, "option", physics.options())
@@ -176,11 +184,10 @@ def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
     keys = add_element(root, "keyframe", {})
     commands = (layout.pushes / layout.stiffness).ravel()
     add_element(keys, "key", {"name": "squeeze", "qpos": rest, "ctrl": commands})
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode") + "\n"
+    return document(root)
 
 
-def _object(world: ElementTree.Element, layout: HeldLayout, physics: PhysicsSettings) -> None:
+def _object(world: Element, layout: HeldLayout, physics: PhysicsSettings) -> None:
     body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
     add_element(body, "freejoint", {"name": "object"})
     inertia = layout.inertia_kg_m2[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
@@ -201,7 +208,7 @@ def _smooth(physics: PhysicsSettings) -> Mapping[str, object]:
     return {"conaffinity": 0, "friction": (0.0, 0.0, 0.0), "mass": 0.0, **physics.contact()}
 
 
-def _table(world: ElementTree.Element, layout: HeldLayout, physics: PhysicsSettings) -> None:
+def _table(world: Element, layout: HeldLayout, physics: PhysicsSettings) -> None:
     away = AWAY * layout.radius_m * np.array([0.0, 0.0, -1.0])
     body = add_element(world, "body", {"name": "table", "mocap": "true", "pos": away})
     plane = {"name": "table", "type": "plane", "size": (10.0 * layout.radius_m,) * 2 + (0.01,),
@@ -217,7 +224,7 @@ def palm_armature(layout: HeldLayout) -> Array:
     return np.repeat([slides, slides * layout.radius_m**2], 3)
 
 
-def _palm(world: ElementTree.Element, layout: HeldLayout) -> ElementTree.Element:
+def _palm(world: Element, layout: HeldLayout) -> Element:
     body = add_element(world, "body", {"name": "palm", "pos": (0.0, 0.0, 0.0), "gravcomp": 1.0})
     for place, (name, armature) in enumerate(zip(PALM, palm_armature(layout), strict=True)):
         kind, axis = ("slide", "hinge")[place // 3], np.eye(3)[place % 3]
@@ -229,15 +236,13 @@ def _palm(world: ElementTree.Element, layout: HeldLayout) -> ElementTree.Element
     return body
 
 
-def _joint(body: ElementTree.Element, attributes: dict[str, object]) -> None:
+def _joint(body: Element, attributes: dict[str, object]) -> None:
     plain = {"pos": (0.0, 0.0, 0.0), "limited": "false", "damping": 0.0, "stiffness": 0.0,
              "armature": 0.0, "frictionloss": 0.0}  # fmt: skip
     add_element(body, "joint", plain | attributes)
 
 
-def _finger(
-    palm: ElementTree.Element, layout: HeldLayout, physics: PhysicsSettings, finger: int
-) -> None:
+def _finger(palm: Element, layout: HeldLayout, physics: PhysicsSettings, finger: int) -> None:
     name, radius = f"finger{finger}", layout.tip_radius_m[finger]
     pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.axes[finger])}
     body = add_element(palm, "body", {"name": name, "gravcomp": 1.0} | pose)
@@ -252,7 +257,7 @@ def _finger(
     add_element(body, "geom", tip | physics.contact())
 
 
-def _springs(actuators: ElementTree.Element, layout: HeldLayout, finger: int) -> None:
+def _springs(actuators: Element, layout: HeldLayout, finger: int) -> None:
     for place, spring in enumerate(SPRINGS):
         name = f"finger{finger}_{spring}"
         own = {"kp": layout.stiffness[finger, place], "kv": layout.damping[finger, place]}

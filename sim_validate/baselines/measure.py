@@ -18,7 +18,7 @@ from sim_validate.execution.jobs import ExecutedGrasp, ExecutionJob
 from sim_validate.parallel.processes import each
 from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.jobs import Job, verdict_of, with_threads
+from sim_validate.validation.jobs import Job, prepared, verdict_of
 
 Report = Callable[[int, int], None]
 """Function that is called with (done, total) after each grasp."""
@@ -63,7 +63,7 @@ def measured(
     total = len(jobs) + len(executing)
     verdicts, refused = dict[str, Verdict](), dict[str, str]()
     for grasp, answer in zip(
-        chosen, each(_try, with_threads(jobs, processors), jobs=processors), strict=True
+        chosen, each(_try, prepared(jobs, processors), jobs=processors), strict=True
     ):
         if isinstance(answer, Verdict):
             verdicts[grasp.id] = answer

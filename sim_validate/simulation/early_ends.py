@@ -47,15 +47,16 @@ The same bound tells when an object has settled at high friction before it is lo
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, cross
+from grasp_core.arrays import Array, Indices
 from grasp_core.closure.wrenches import cross_matrix
 from scenes.layout import Layout, grasp_size
 from sim_validate.simulation.schedules import Schedule
 from sim_validate.simulation.simulate import Mask
-from sim_validate.simulation.traces import rotated
+from sim_validate.simulation.traces import displaced, strayed
 
 SAFETY = 2.0
 """Factor on bounds of motions and forces, for what the linear model leaves out."""
@@ -108,10 +109,11 @@ class EarlyEnds:
         self.frictions = np.array([trial.friction for trial in trials])
         pushes = np.array([trial.forces[-1] for trial in trials])
         self.commands = np.einsum("kij,nki->nkj", layout.frames, pushes).reshape(len(trials), -1)
-        self.starts = np.tile(PLANNED if start is None else start[:7], (len(trials), 1))
-        self.began_m = displaced(self.starts, np.tile(PLANNED, (len(trials), 1)), layout)
-        bounded = not layout.drive.rigid and _wide(layout)
-        self.springs = _Springs(layout) if bounded else None
+        at = PLANNED if start is None else start[:7]
+        self.starts = np.tile(at, (len(trials), 1))
+        self.began_m = np.full(len(trials), strayed(at[None], layout)[0])
+        self.springs = _springs(layout)
+        # |x'|_M of the look before; there is none before the first
         self.momenta: Array | None = None
         # a turn is at most 2.25 times the length of the difference of two quaternions
         self.lever = 2.25 * (float(np.linalg.norm(layout.center)) + layout.grasp_size_m)
@@ -153,12 +155,12 @@ class EarlyEnds:
             return None
         # not by BLAS, whose last digits depend on how many trials there are
         momenta = np.einsum("ni,ij->nj", speeds, self.springs.roots)
-        before = self.momenta
-        self.momenta = np.full((len(self.watched), speeds.shape[1]), np.nan)
-        self.momenta[places] = momenta
-        if before is None:
+        if self.momenta is None:
+            self.momenta = np.full((len(self.watched), speeds.shape[1]), np.nan)
+            self.momenta[places] = momenta
             return None
-        gained = _lengths(momenta - before[places]) / self.sample_s
+        gained = _lengths(momenta - self.momenta[places]) / self.sample_s
+        self.momenta[places] = momenta
         return self.springs.reach(_lengths(momenta), gained, _lengths(speeds[:, 6:]))
 
     def _settled(
@@ -180,8 +182,7 @@ class EarlyEnds:
         """Tell whether trials are lost, or held whatever is still to come, (n,)."""
         limits, springs, starts = self.thresholds, self.springs, self.starts[places]
         if np.isnan(self.began_m[places]).any():
-            planned = np.tile(PLANNED, (len(places), 1))
-            self.began_m[places] = displaced(starts, planned, self.layout)
+            self.began_m[places] = strayed(starts, self.layout)
         began = self.began_m[places]
         away = joints[:, :7] - starts
         most = _lengths(away[:, :3]) + self.lever * _lengths(away[:, 3:])
@@ -266,27 +267,16 @@ class _Springs:
         return np.logical_and.reduce(good, axis=1)
 
 
-def _wide(layout: Layout) -> bool:
-    """Return whether contacts are as far from their closest axis as the layout's grasp size."""
-    return grasp_size(layout.contacts) >= layout.grasp_size_m * (1.0 - SAME)
+@lru_cache(maxsize=4)
+def _springs(layout: Layout) -> _Springs | None:
+    """Return the linear model of a layout; None where it would not bound the motion.
+
+    Contacts must be as far from their closest axis as the layout's grasp size.
+    """
+    if layout.drive.rigid or grasp_size(layout.contacts) < layout.grasp_size_m * (1.0 - SAME):
+        return None
+    return _Springs(layout)
 
 
 def _lengths(vectors: Array) -> Array:
     return np.sqrt(np.einsum("ni,ni->n", vectors, vectors))
-
-
-def displaced(poses: Array, starts: Array, layout: Layout) -> Array:
-    """Measure displacements as `traces` does, of n poses from a start each, (n,) [m].
-
-    Args:
-        poses: Positions and quaternions of the object's frame, (n, 7).
-        starts: The poses from which displacements count, (n, 7).
-        layout: The simulated layout.
-    """
-    now, then = poses[:, 3:], starts[:, 3:]
-    shifts = poses[:, :3] + rotated(now, layout.center)
-    shifts = shifts - starts[:, :3] - rotated(then, layout.center)
-    across = then[:, :1] * now[:, 1:] - now[:, :1] * then[:, 1:] - cross(now[:, 1:], then[:, 1:])
-    along = np.abs(np.einsum("ni,ni->n", now, then))
-    turns = 2.0 * np.arctan2(_lengths(across), along)
-    return _lengths(shifts) + layout.grasp_size_m * turns

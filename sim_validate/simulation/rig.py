@@ -12,7 +12,7 @@ from sim_validate.simulation.early_ends import EarlyEnds, Thresholds
 from sim_validate.simulation.schedules import Load, Schedule
 from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.simulate import Bench, Motion
-from sim_validate.simulation.traces import Trace, trace
+from sim_validate.simulation.traces import Trace, traces
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,14 +160,12 @@ class Rig:
         return self._traced(trials, bench.run(trials, closed and closed.state, ends))
 
     def _traced(self, trials: Sequence[Schedule], motions: Sequence[Motion]) -> tuple[Trace, ...]:
-        layout, closed = self.bench.scene.layout, self.closed
-        return tuple(
-            trace(
-                motion.after(closed) if closed else motion, layout,
-                trial.watched - motion.skipped, closed if self.settled else None,
-            )
-            for motion, trial in zip(motions, trials, strict=True)
-        )  # fmt: skip
+        closed, layout = self.closed, self.bench.scene.layout
+        whole = motions if closed is None else [motion.after(closed) for motion in motions]
+        watched = [
+            trial.watched - motion.skipped for trial, motion in zip(trials, motions, strict=True)
+        ]
+        return traces(whole, layout, watched, closed if self.settled else None)
 
 
 def pushes(planned: Array, joints: Array, layout: Layout) -> Array:

@@ -17,7 +17,7 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, Indices, to_digits
+from grasp_core.arrays import Array, Indices, cross, to_digits
 from scenes.mjcf import Scene
 from sim_validate.simulation.engine import (
     batch,
@@ -210,7 +210,7 @@ class Bench:
         """
         layout = self.scene.layout
         wrenches = np.array([schedule.wrenches for schedule in schedules])
-        wrenches[..., 3:] -= np.cross(layout.center, wrenches[..., :3])
+        wrenches[..., 3:] -= cross(layout.center, wrenches[..., :3])
         forces = np.array([schedule.forces for schedule in schedules])
         pushes = np.einsum("kij,mnki->mnkj", layout.frames, forces)
         # rounded like the scene's numbers (see `layout.arrange`)

@@ -5,6 +5,7 @@ to stay; the number of contacts plays no part. A rotation counts as the path of 
 size away.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,55 +72,102 @@ class Trace:
         return None if self.fault else bool((self.displacements_m < threshold_m).all())
 
 
-def trace(motion: Motion, layout: Layout, watched: int, earlier: Motion | None = None) -> Trace:
-    """Measure displacements, slips and gaps in a motion.
+def traces(
+    motions: Sequence[Motion], layout: Layout, watched: Sequence[int],
+    earlier: Motion | None = None,
+) -> tuple[Trace, ...]:  # fmt: skip
+    """Measure displacements, slips and gaps in motions, all together, which takes less time.
 
     Args:
-        motion: Motion of one trial.
+        motions: Motion of each trial.
         layout: The simulated layout.
-        watched: Index of the first sample in which the object had to stay where it was.
-        earlier: The motion from whose end this one started; None for the planned pose.
+        watched: For each trial, the index of the first sample in which the object had to stay where
+            it was.
+        earlier: The motion from whose end these started; None for the planned pose.
     """
-    before = min(watched, len(motion.joints)) - 1
-    planned = np.concatenate([np.zeros(3), [1.0, 0.0, 0.0, 0.0]])
-    at_start = planned
-    if before >= 0:
-        at_start = motion.joints[before]
-    elif earlier is not None and len(earlier.joints):
-        at_start = earlier.joints[-1]
-    joints = motion.joints[before + 1 :]
-    shifts, rotations = _moved(joints, at_start, layout)
-    start_shift, start_turn = _moved(at_start[None], planned, layout)
-    # the pose at the start first, then all others
-    rows = np.zeros((1 + len(joints), joints.shape[1]))
-    rows[0, : len(at_start)], rows[1:] = at_start, joints
-    normals, tips = layout.frames[:, :, 0], _tips(rows, layout)
-    _, slips = normal_and_tangential(tips[1:] - tips[:1], normals)
-    tips = tips[1:]
-    heights = np.einsum("ki,nki->nk", normals, layout.contacts - tips)
-    size = layout.grasp_size_m
-    return Trace(
-        times_s=motion.times_s[: len(shifts)],
-        displacements_m=shifts + size * rotations,
-        shifts_m=shifts,
-        rotations_rad=rotations,
-        slips_m=slips,
-        gaps_m=heights - layout.drive.radius_m,
-        touched_m=tips + layout.drive.radius_m * normals,
-        start_m=float(start_shift[0] + size * start_turn[0]),
-        finite=motion.finite,
-        warnings=motion.warnings,
-        clock_error_s=motion.clock_error_s,
-        error=motion.error,
-        timed_out=motion.timed_out,
+    firsts = [
+        min(first, len(motion.joints)) for motion, first in zip(motions, watched, strict=True)
+    ]
+    starts = np.array(
+        [_start(motion, first, earlier) for motion, first in zip(motions, firsts, strict=True)]
     )
+    parts = [motion.joints[first:] for motion, first in zip(motions, firsts, strict=True)]
+    of = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    joints, ends = np.concatenate(parts), np.cumsum([len(part) for part in parts])[:-1]
+    size, normals = layout.grasp_size_m, layout.frames[:, :, 0]
+    shifts, rotations = moved(joints[:, :7], starts[of, :7], layout)
+    tips, began = _tips(joints, layout), _tips(starts, layout)
+    _, slips = normal_and_tangential(tips - began[of], normals)
+    heights = np.einsum("ki,nki->nk", normals, layout.contacts - tips)
+    each = [
+        np.split(measured, ends)
+        for measured in (
+            shifts + size * rotations, shifts, rotations, slips, heights - layout.drive.radius_m,
+            tips + layout.drive.radius_m * normals,
+        )
+    ]  # fmt: skip
+    return tuple(
+        Trace(
+            motion.times_s[: len(measured[0])], *measured,
+            start_m=start_m,
+            finite=motion.finite,
+            warnings=motion.warnings,
+            clock_error_s=motion.clock_error_s,
+            error=motion.error,
+            timed_out=motion.timed_out,
+        )
+        for motion, start_m, *measured in zip(
+            motions, strayed(starts[:, :7], layout).tolist(), *each, strict=True
+        )
+    )  # fmt: skip
 
 
-def _moved(joints: Array, start: Array, layout: Layout) -> tuple[Array, Array]:
-    """Measure motion of the point between the contacts [m] and rotation [rad], (n,) each."""
-    ahead = joints[:, :3] + rotated(joints[:, 3:7], layout.center)
-    shifts = np.linalg.norm(ahead - start[:3] - rotated(start[None, 3:7], layout.center), axis=1)
-    return shifts, rotation_angles(joints[:, 3:7], start[3:7])
+def _start(motion: Motion, first: int, earlier: Motion | None) -> Array:
+    """Return the joint positions from which the object must not move, (7 + 3k,)."""
+    if first > 0:
+        return motion.joints[first - 1]
+    if earlier is not None and len(earlier.joints):
+        return earlier.joints[-1]
+    planned = np.zeros(motion.joints.shape[1])
+    planned[3] = 1.0
+    return planned
+
+
+def displaced(poses: Array, starts: Array, layout: Layout) -> Array:
+    """Measure displacements of n poses from a start each, (n,) [m].
+
+    Args:
+        poses: Positions and quaternions of the object's frame, (n, 7).
+        starts: The poses from which displacements count, (n, 7).
+        layout: The simulated layout.
+    """
+    shifts, turns = moved(poses, starts, layout)
+    return shifts + layout.grasp_size_m * turns
+
+
+def strayed(poses: Array, layout: Layout) -> Array:
+    """Measure displacements of n poses from the planned one, (n,) [m]: as `displaced`, but faster.
+
+    Args:
+        poses: Positions and quaternions of the object's frame, (n, 7).
+        layout: The simulated layout.
+    """
+    shifts = poses[:, :3] + rotated(poses[:, 3:], layout.center) - layout.center
+    turns = 2.0 * np.arctan2(_lengths(poses[:, 4:]), np.abs(poses[:, 3]))
+    return _lengths(shifts) + layout.grasp_size_m * turns
+
+
+def moved(poses: Array, starts: Array, layout: Layout) -> tuple[Array, Array]:
+    """Measure motion of the point between the contacts [m] and rotation [rad], (n,) each.
+
+    Args:
+        poses: Positions and quaternions of the object's frame, (n, 7).
+        starts: The poses from which motion counts, (n, 7).
+        layout: The simulated layout.
+    """
+    ahead = poses[:, :3] + rotated(poses[:, 3:], layout.center)
+    shifts = _lengths(ahead - starts[:, :3] - rotated(starts[:, 3:], layout.center))
+    return shifts, rotation_angles(poses[:, 3:], starts[:, 3:])
 
 
 def _tips(joints: Array, layout: Layout) -> Array:
@@ -137,13 +185,18 @@ def _tips(joints: Array, layout: Layout) -> Array:
 def rotated(quaternions: Array, vectors: Array) -> Array:
     """Turn vectors (..., 3) by quaternions (..., 4) wxyz of any length but zero."""
     w, v = quaternions[..., :1], quaternions[..., 1:]
-    twice = 2.0 * cross(v, vectors) / np.sum(quaternions**2, axis=-1, keepdims=True)
+    squares = np.add.reduce(quaternions**2, axis=-1, keepdims=True)
+    twice = 2.0 * cross(v, vectors) / squares
     return vectors + w * twice + cross(v, twice)
 
 
-def rotation_angles(quaternions: Array, start: Array) -> Array:
-    """Compute angles between orientations (n, 4) and one (4,), exact when small, (n,) [rad]."""
-    w, v = quaternions[:, 0], quaternions[:, 1:]
-    along = np.abs(quaternions @ start)
-    across = start[0] * v - w[:, None] * start[1:] - cross(v, start[1:])
-    return 2.0 * np.arctan2(np.linalg.norm(across, axis=1), along)
+def rotation_angles(quaternions: Array, starts: Array) -> Array:
+    """Compute angles between n orientations and one each (n, 4), exact when small, (n,) [rad]."""
+    now, then = quaternions, starts
+    across = then[:, :1] * now[:, 1:] - now[:, :1] * then[:, 1:] - cross(now[:, 1:], then[:, 1:])
+    along = np.abs(np.einsum("ni,ni->n", now, then))
+    return 2.0 * np.arctan2(_lengths(across), along)
+
+
+def _lengths(vectors: Array) -> Array:
+    return np.linalg.norm(vectors, axis=1)

@@ -13,7 +13,7 @@ from itertools import combinations
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array, Indices, cross
 from grasp_core.closure.contact_arrays import stacked, unit_size
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
@@ -50,7 +50,7 @@ class Control:
         """The wrench that the contacts provably cannot resist, (6,), with torque about `center`."""
         wrench = self.certificate.separating_wrench
         assert wrench is not None  # noqa: S101 - controls are refuted by construction
-        return np.concatenate([wrench[:3] + np.cross(wrench[3:], center), wrench[3:]])
+        return np.concatenate([wrench[:3] + cross(wrench[3:], center), wrench[3:]])
 
 
 def negative_controls(

@@ -1,11 +1,14 @@
 """Validates several grasps of one object, in one process or in several, with results in order."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from sim_validate.parallel.processes import each, processes
+from sim_validate.parallel.shared import Shared
+from sim_validate.simulation.gate.gate import Gate, measured_gate, remember_gate
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.validation.grasp_verdict import Verdict
 from sim_validate.validation.validation import validate
@@ -20,6 +23,17 @@ class Job:
     friction: float
     agenda: Agenda
     setup: Setup
+    gate: Gate | None = None
+    """How the simulator did on the known cases, so that worker processes need not ask again."""
+
+    def __reduce__(self) -> tuple[Callable[..., "Job"], tuple[object, ...]]:
+        """Send the object so that all grasps of a worker process have the same one."""
+        rest = (self.grasp, self.friction, self.agenda, self.setup, self.gate)
+        return _arrived, (Shared(self.body), *rest)
+
+
+def _arrived(body: Shared[Polyhedron], *rest: Any) -> Job:
+    return Job(body.value, *rest)
 
 
 def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
@@ -34,13 +48,19 @@ def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
         InputError: A grasp is refused.
         UnfaithfulError: The simulator fails its checks on cases with known answers.
     """
-    return each(verdict_of, with_threads(jobs, processors), jobs=processors)
+    return each(verdict_of, prepared(jobs, processors), jobs=processors)
 
 
-def with_threads(jobs: Sequence[Job], processors: int) -> list[Job]:
-    """Give each job an equal share of the processors that remain when there are fewer jobs."""
+def prepared(jobs: Sequence[Job], processors: int) -> list[Job]:
+    """Check the simulator for each job, and give each an equal share of processors that remain."""
     threads = max(1, processors // processes(len(jobs), processors))
-    return [replace(job, setup=replace(job.setup, threads=threads)) for job in jobs]
+    return [
+        replace(
+            job, setup=replace(job.setup, threads=threads),
+            gate=measured_gate(job.setup, job.friction, job.body.radius),
+        )
+        for job in jobs
+    ]  # fmt: skip
 
 
 def verdict_of(job: Job) -> Verdict:
@@ -50,4 +70,6 @@ def verdict_of(job: Job) -> Verdict:
         InputError: The grasp is refused.
         UnfaithfulError: The simulator fails its checks on cases with known answers.
     """
+    if job.gate is not None:
+        remember_gate(job.gate, job.setup, job.friction, job.body.radius)
     return validate(job.body, job.grasp, job.friction, agenda=job.agenda, setup=job.setup)

@@ -25,7 +25,7 @@ KINDS = {
         ("contact_forces.py", "least_friction_forces"),
         ("critical_friction.py", "forces_just_above"),
     ],
-    "reading motions": [("traces.py", "trace"), ("hold_verdict.py", "judge")],
+    "reading motions": [("traces.py", "traces"), ("hold_verdict.py", "judge")],
 }
 
 

@@ -6,7 +6,15 @@ import mujoco
 import numpy as np
 import pytest
 
-from scenes.mjcf_text import add_element, as_text, printable, quaternion
+from scenes.mjcf_text import (
+    add_comment,
+    add_element,
+    as_text,
+    document,
+    element,
+    printable,
+    quaternion,
+)
 from tests.judges import random_rotation
 
 
@@ -35,9 +43,31 @@ def test_numbers_are_written_in_full():
 
 
 def test_elements_have_their_attributes():
-    root = ElementTree.Element("a")
+    root = element("a", {})
     add_element(root, "b", {"pos": np.zeros(2), "name": "n"})
-    assert ElementTree.tostring(root) == b'<a><b pos="0.0 0.0" name="n" /></a>'
+    assert document(root) == '<a>\n  <b pos="0.0 0.0" name="n" />\n</a>\n'
+
+
+def test_the_text_is_that_of_xml_etree():
+    root, judge = element("a", {"name": 'x&y<z>"'}), ElementTree.Element("a", name='x&y<z>"')
+    for parent, other in (
+        (root, judge),
+        (add_element(root, "b", {}), ElementTree.SubElement(judge, "b")),
+    ):
+        add_comment(parent, "for people")
+        other.append(ElementTree.Comment(" for people "))
+        add_element(parent, "c", {"size": 0.1, "axis": (1.0, 0.0, 0.0)})
+        ElementTree.SubElement(other, "c", size="0.1", axis="1.0 0.0 0.0")
+    ElementTree.indent(judge)
+    assert document(root) == ElementTree.tostring(judge, encoding="unicode") + "\n"
+
+
+def test_many_numbers_are_written_like_few():
+    numbers = np.random.default_rng(0).normal(size=(60, 3))
+    rows = [as_text(row) for row in numbers]
+    for _ in range(2):
+        assert as_text(numbers) == as_text(numbers.T.copy().T) == " ".join(rows)
+    assert as_text(np.arange(90)) == " ".join(map(str, range(90)))
 
 
 def test_names_can_be_printed():

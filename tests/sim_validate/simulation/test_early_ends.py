@@ -11,7 +11,7 @@ from sim_validate.simulation.hold_verdict import Outcome, judge
 from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol
 from sim_validate.simulation.schedules import Clock, Load, hold, release
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.traces import trace
+from sim_validate.simulation.traces import traces
 from sim_validate.simulation.wrench_limits import part
 from sim_validate.validation.control_trials import control_case
 from sim_validate.validation.controls import negative_controls
@@ -257,7 +257,7 @@ def test_displacements_are_those_that_trials_are_judged_by(held):
     for row in rows:
         row[3:7] += 0.1 * rng.normal(size=4)
         row[3:7] /= np.linalg.norm(row[3:7])
-    found = trace(motion(rows), layout, 1)
+    (found,) = traces([motion(rows)], layout, [1])
     poses = np.array(rows)[1:, :7]
     starts = np.tile(rows[0][:7], (8, 1))
     np.testing.assert_allclose(displaced(poses, starts, layout), found.displacements_m, rtol=1e-12)
