@@ -17,7 +17,7 @@ from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.objects.face import PatchLimits
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
-from grasp_core.planning.certify import check_witness
+from grasp_core.planning.certify import check_witness, find_critical_frictions
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import versions
@@ -67,6 +67,7 @@ class Moved:
 
 def plan_to_json(body: Polyhedron, plan: Plan, moves: Sequence[Moved] = ()) -> str:
     """Write a plan as the text of a `grasps.json`; equal plans give equal text."""
+    find_critical_frictions(plan.grasps)
     document: dict[str, object] = {
         "schema": SCHEMA,
         "object": {
