@@ -27,16 +27,17 @@ def cache_in(function: Callable[..., Any], folder: Path) -> Any:
         function: The function, as Python knows it.
         folder: A folder that holds nothing but what was compiled from the function's module.
     """
-    kept: Any = type("Kept", (_kept(),), {"_locator_classes": (_locator(function, folder),)})
-    functions: Any = type("KeptFunctions", (_functions(),), {"_impl_class": kept})
-    return functions(function)
+    return _functions(folder)(function)
 
 
-def _locator(function: Callable[..., Any], folder: Path) -> Any:
-    """Make the class that tells numba where the code of a function is, and what it is made of."""
+def _locator(folder: Path) -> Any:
+    """Make the class that tells numba where code is kept, and what it was made of."""
     caching: Any = importlib.import_module("numba.core.caching")
 
     class Here(caching._CacheLocator):
+        def __init__(self, function: Any, _file: str) -> None:
+            self._line = str(function.__code__.co_firstlineno)
+
         def get_cache_path(self) -> str:
             return str(folder)
 
@@ -44,21 +45,22 @@ def _locator(function: Callable[..., Any], folder: Path) -> Any:
             return folder.name
 
         def get_disambiguator(self) -> str:
-            return str(function.__code__.co_firstlineno)
+            return self._line
 
         @classmethod
-        def from_function(cls, _function: Any, _file: str) -> Any:
-            return cls()
+        def from_function(cls, function: Any, file: str) -> Any:
+            return cls(function, file)
 
     return Here
 
 
-@cache
-def _kept() -> Any:
+def _kept(folder: Path) -> Any:
     """Make the class that turns a compiled loop into what is kept, and back."""
     whole: Any = importlib.import_module("numba.core.caching").CompileResultCacheImpl
 
     class Kept(whole):
+        _locator_classes = (_locator(folder),)
+
         def reduce(self, cres: Any) -> Any:
             return _reduced(whole.reduce(self, cres))
 
@@ -69,12 +71,14 @@ def _kept() -> Any:
 
 
 @cache
-def _functions() -> Any:
+def _functions(folder: Path) -> Any:
     """Make the class that loads loops without declaring all that numba can compile."""
     caching: Any = importlib.import_module("numba.core.caching")
     runtime: Any = importlib.import_module("numba.core.runtime").rtsys
 
     class KeptFunctions(caching.FunctionCache):
+        _impl_class = _kept(folder)
+
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             runtime.initialize(target_context)  # which declaring would have done
             guard: Any = self._guard_against_spurious_io_errors
@@ -85,17 +89,12 @@ def _functions() -> Any:
 
 
 def _reduced(payload: Any) -> Any:
-    """Leave out what numba keeps for functions of its own that use no constants of Python.
+    """Leave out functions' environments that hold no constants of Python.
 
-    That would be their modules' globals, which machine code never looks into.
+    They would only hold the globals of the functions' modules, which machine code never looks into.
     """
     *code, environments = payload
-    used = [each for each in environments if each.consts or not _of_numba(each)]
-    return (*code, tuple(used))
-
-
-def _of_numba(environment: Any) -> bool:
-    return str(environment.globals.get("__name__")).startswith("numba.")
+    return (*code, tuple(each for each in environments if each.consts))
 
 
 def _rebuilt(rebuild: Callable[[Any, Any], Any], target_context: Any, payload: Any) -> Any:
