@@ -1,5 +1,6 @@
 """Writes console output: results on standard output, everything else on standard error."""
 
+import importlib
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -8,14 +9,6 @@ from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 from rich.table import Table
 from rich.text import Text
 
@@ -107,12 +100,13 @@ class Steps:
 
     def __enter__(self) -> "Steps":
         if self.shown and self.console.is_terminal:
-            self.bar = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                MofNCompleteColumn(),
-                TimeElapsedColumn(),
-                TimeRemainingColumn(),
+            bars: Any = importlib.import_module("rich.progress")  # for terminals only
+            self.bar = bars.Progress(
+                bars.TextColumn("{task.description}"),
+                bars.BarColumn(),
+                bars.MofNCompleteColumn(),
+                bars.TimeElapsedColumn(),
+                bars.TimeRemainingColumn(),
                 console=self.console,
                 transient=True,
             )
