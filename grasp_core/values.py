@@ -244,6 +244,34 @@ def _one_per_finger(value: Any, each: Callable[[Any], object], name: str, kind: 
         raise InputError(f"a grasp needs {FINGERS} {name}, one per finger, got {len(things)}")
 
 
+def fill_in(
+    grasps: Iterable[Grasp], name: str, computed: Callable[[list[Figures]], Iterable[Any]]
+) -> None:
+    """Compute a figure that some grasps have put off, for all of them at once, and keep it.
+
+    Args:
+        grasps: Grasps; those that have the figure are left as they are.
+        name: One of `PUT_OFF`.
+        computed: Computes the figure of many grasps, in order, from what each would compute it by.
+    """
+    late, figures = list[Grasp](), list[Figures]()
+    for grasp in grasps:
+        way = grasp._figures  # pyright: ignore[reportPrivateUsage] - of this module
+        if way is not None and not _is_known(grasp, name):
+            late.append(grasp)
+            figures.append(way)
+    for grasp, value in zip(late, computed(figures), strict=True):
+        object.__setattr__(grasp, name, value)
+
+
+def _is_known(grasp: Grasp, name: str) -> bool:
+    try:
+        object.__getattribute__(grasp, name)  # which computes nothing
+    except AttributeError:
+        return False
+    return True
+
+
 def trusted(kind: type[Item], /, **fields: Any) -> Item:
     """Make a frozen value without checking or copying its fields.
 

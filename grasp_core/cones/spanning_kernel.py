@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
+from grasp_core.geometry.vectors_kernel import dotted
 
 WORD = 64
 DEPENDENT = 1e-12
@@ -36,13 +37,14 @@ def extend(table: NDArray[np.uint64], units: Array, start: int, end: int, least:
         least: Smallest sine that counts.
     """
     for k in range(start, end):
-        to_k = units @ units[k]
+        to_k = np.empty(k)
+        for i in range(k):
+            to_k[i] = dotted(units[i], units[k])
         for j in range(k):
-            to_j = units @ units[j]
             x, y, z = _crossed(units[j], units[k])
             for i in range(j):
                 determinant = x * units[i, 0] + y * units[i, 1] + z * units[i, 2]
-                longest = _longest_squared(to_j[i], to_j[k], to_k[i])
+                longest = _longest_squared(dotted(units[i], units[j]), to_k[j], to_k[i])
                 if determinant * determinant <= least * least * longest:
                     continue
                 if determinant > DEPENDENT:
@@ -142,7 +144,7 @@ def _sine(u: Array, v: Array, w: Array) -> float:
     determinant = abs(x * u[0] + y * u[1] + z * u[2])
     if determinant <= DEPENDENT:
         return 0.0
-    return determinant / np.sqrt(_longest_squared(_dotted(u, v), _dotted(v, w), _dotted(w, u)))
+    return determinant / np.sqrt(_longest_squared(dotted(u, v), dotted(v, w), dotted(w, u)))
 
 
 @loop()
@@ -151,11 +153,6 @@ def _longest_squared(g: float, h: float, k: float) -> float:
     a, b, c = h * k - g, g * k - h, g * h - k
     most = max(max(a + b + c, a - b - c), max(b - a - c, c - a - b))
     return 3.0 - g * g - h * h - k * k + 2.0 * most
-
-
-@loop()
-def _dotted(u: Array, v: Array) -> float:
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
 @loop()

@@ -1,7 +1,7 @@
 """Links points that are close to each other, and finds the sets that links connect.
 
-Scipy finds connected sets; importing its graphs takes 20 ms. Importing its search tree takes
-another 60 ms, so numpy finds close points, and the tree is used only where points are dense.
+Both are done with numpy, since importing scipy's graphs takes a sixth of the time in which a plan
+of a small object is found and written. Its search tree is used only where points are dense.
 """
 
 import importlib
@@ -67,13 +67,25 @@ def _pairs_of_tree(points: Array, reach: float) -> Indices:
 def components(count: int, links: Indices) -> Indices:
     """Return for each item the least index among the items connected with it, (count,).
 
+    Items point to items of their set, in the end to the least one. In each round the item that a
+    linked one points to is made to point to the least one at the other ends, and then every item
+    to the end of its way. Rounds grow as the square of the logarithm of `count` at most, and there
+    are fifteen for a million items in a row of any order.
+
     Args:
         count: Number of items.
         links: Pairs of indices of linked items, (k, 2).
+
+    Source:
+        Liu and Tarjan, "Simple concurrent labeling algorithms for connected components", SOSA 2019.
     """
-    sparse: Any = importlib.import_module("scipy.sparse")
-    csgraph: Any = importlib.import_module("scipy.sparse.csgraph")
-    graph = sparse.coo_array((np.ones(len(links)), links.T), shape=(count, count))
-    label = csgraph.connected_components(graph, directed=False)[1]
-    _, first, place = np.unique(label, return_index=True, return_inverse=True)
-    return first[place]
+    least = np.arange(count)
+    apart = links
+    while len(apart):
+        low, high = np.sort(apart, axis=1).T
+        np.minimum.at(least, high, low)
+        while not np.array_equal(further := least[least], least):
+            least = further
+        apart = least[apart]
+        apart = apart[apart[:, 0] != apart[:, 1]]
+    return least

@@ -5,14 +5,15 @@ friction cones and whose lines form the claimed family.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
 from grasp_core.arrays import Array, frozen_copy
 from grasp_core.closure.batches.certificates import closing_margins
-from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.closure.critical_friction import critical_friction, critical_frictions
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.closure.lines import classify_each, classify_lines
 from grasp_core.closure.wrenches import grasp_map, normal_and_tangential
@@ -27,10 +28,12 @@ from grasp_core.values import (
     ContactRegion,
     FaceQuadruple,
     Family,
+    Figures,
     ForceCone,
     Grasp,
     Method,
     Witness,
+    fill_in,
     four,
     trusted,
 )
@@ -221,6 +224,22 @@ class LateFigures:
         """Return the bounds of the quality at `friction`."""
         found = ferrari_canny(self.positions, self.normals, self.friction, torque_scale=1.0)
         return found.lower, found.upper
+
+
+def find_critical_frictions(grasps: Iterable[Grasp]) -> None:
+    """Find the critical friction of planned grasps that lack it, together, which takes a third."""
+    fill_in(grasps, "critical_friction", _frictions)
+
+
+def _frictions(late: Sequence[Figures]) -> Sequence[float]:
+    if not all(isinstance(each, LateFigures) for each in late):
+        return [each.critical_friction() for each in late]
+    planned = cast("Sequence[LateFigures]", late)
+    sets = (
+        np.array([getattr(each, name) for each in planned]) for name in ("positions", "normals")
+    )
+    found = critical_frictions(*sets) if planned else np.empty(0)
+    return np.minimum(found, [each.friction for each in planned]).tolist()
 
 
 def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:

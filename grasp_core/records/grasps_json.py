@@ -4,7 +4,6 @@ The file holds the object's mesh, so that grasps can be validated from it alone.
 imported only where a file is read: plans are written without it.
 """
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -13,11 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from grasp_core.errors import InputError
+from grasp_core.files.json_text import text_of
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.objects.face import PatchLimits
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
-from grasp_core.planning.certify import check_witness
+from grasp_core.planning.certify import check_witness, find_critical_frictions
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import versions
@@ -67,6 +67,7 @@ class Moved:
 
 def plan_to_json(body: Polyhedron, plan: Plan, moves: Sequence[Moved] = ()) -> str:
     """Write a plan as the text of a `grasps.json`; equal plans give equal text."""
+    find_critical_frictions(plan.grasps)
     document: dict[str, object] = {
         "schema": SCHEMA,
         "object": {
@@ -100,7 +101,7 @@ def plan_to_json(body: Polyhedron, plan: Plan, moves: Sequence[Moved] = ()) -> s
         ],
         "grasps": [_grasp_to_record(grasp) for grasp in plan.grasps],
     }
-    return json.dumps(document, allow_nan=False, indent=1) + "\n"
+    return text_of(document)
 
 
 def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:

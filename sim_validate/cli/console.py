@@ -1,25 +1,18 @@
 """Writes console output: results on standard output, everything else on standard error."""
 
-import json
+import importlib
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 from rich.table import Table
 from rich.text import Text
 
+from grasp_core.files.json_text import text_of
 from sim_validate.parallel import interrupts
 
 PLAIN_EVERY_S = 5.0
@@ -62,10 +55,10 @@ class Reporter:
         """Print a line on standard error, even when quiet."""
         self.err.print(Text(printable(text)), soft_wrap=True)
 
-    def document(self, value: object) -> None:
+    def document(self, value: Mapping[str, object]) -> None:
         """Print the one JSON document of a command run with --json."""
         if self.json_only:
-            self.text(json.dumps(value, allow_nan=False, indent=1) + "\n")
+            self.text(text_of(value))
 
     def text(self, text: str) -> None:
         """Print the text of the one JSON document of a command run with --json."""
@@ -107,12 +100,13 @@ class Steps:
 
     def __enter__(self) -> "Steps":
         if self.shown and self.console.is_terminal:
-            self.bar = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                MofNCompleteColumn(),
-                TimeElapsedColumn(),
-                TimeRemainingColumn(),
+            bars: Any = importlib.import_module("rich.progress")  # for terminals only
+            self.bar = bars.Progress(
+                bars.TextColumn("{task.description}"),
+                bars.BarColumn(),
+                bars.MofNCompleteColumn(),
+                bars.TimeElapsedColumn(),
+                bars.TimeRemainingColumn(),
                 console=self.console,
                 transient=True,
             )

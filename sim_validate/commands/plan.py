@@ -1,4 +1,7 @@
-"""Runs the command `plan`, which finds certified grasps of an object and writes them to a file."""
+"""Runs the command `plan`, which finds certified grasps of an object and writes them to a file.
+
+What only --optimize and --regions need is imported where they ask for it.
+"""
 
 import math
 import re
@@ -6,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,10 +27,10 @@ from sim_validate.commands.asked.objects import asked_finger, object_to_plan
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.reading import write_text
 from sim_validate.files.stale_results import remove_results
-from sim_validate.parallel.certifying import Asked, Found, certified, wider
 from sim_validate.parallel.compiling import compiled_beside
-from sim_validate.parallel.improving import improved
-from sim_validate.records.regions import write_regions
+
+if TYPE_CHECKING:
+    from sim_validate.parallel.certifying import Found
 
 CARRIED = {"payload": "payload kg", "first-slip": "first slip"}
 """Column of what grasps carry, by the rank that orders them."""
@@ -59,6 +63,8 @@ def plan_object(
         )
     moves: tuple[Moved, ...] = ()
     if planning.optimize and found.grasps:
+        from sim_validate.parallel.improving import improved
+
         with reporter.progress("optimising") as steps:
             found, moves = improved(
                 body, found, finger_radius=planning.finger_radius_m, parts=planning.ceiling,
@@ -76,10 +82,13 @@ def with_regions(
     """Certify regions around a plan's contacts if asked for, and write the proofs to a folder."""
     if not (planning.regions and found.grasps):
         return found
+    from sim_validate.parallel.certifying import Asked, certified, wider
+    from sim_validate.records.regions import write_regions
+
     asked = Asked(found.friction, clearance=planning.edge_clearance_m)
     grasps = list[Grasp]()
 
-    def kept(each: Iterator[Found]) -> Iterator[Found]:
+    def kept(each: "Iterator[Found]") -> "Iterator[Found]":
         for grasp, proved in each:
             grasps.append(wider(grasp, proved))
             yield grasp, proved

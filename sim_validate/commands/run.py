@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 from grasp_core.errors import GraspError
+from grasp_core.files.json_text import text_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.records.grasps_json import SavedGrasps, plan_to_json
 from sim_validate.cli import command_flags
@@ -100,7 +101,7 @@ def _write_scenes(folder: Path, saved: SavedGrasps, setup: Setup) -> None:
 def _together(verdicts: str, executions: str) -> str:
     """Put executions into the document of verdicts, under the key `executions`."""
     document = json.loads(verdicts) | {"executions": json.loads(executions)}
-    return json.dumps(document, allow_nan=False, indent=1) + "\n"
+    return text_of(document)
 
 
 def _report(command: command_flags.Run, folder: Path, reporter: Reporter) -> None:

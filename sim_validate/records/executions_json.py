@@ -3,7 +3,6 @@
 Numbers that JSON lacks are null: a first slip that never comes is infinite.
 """
 
-import json
 import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
@@ -14,6 +13,7 @@ from grasp_core.arrays import frozen
 from grasp_core.checked import path_of
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of, settings_of
+from grasp_core.files.json_text import text_of
 from grasp_core.files.strict_json import place
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
@@ -91,7 +91,7 @@ def executions_to_json(
         "executions": [_record(grasp) for grasp in listed],
         "versions": {**versions()},
     }
-    return json.dumps(finite(document), allow_nan=False, indent=1) + "\n"
+    return text_of(finite(document))
 
 
 def executions_summary(grasps: Iterable[ExecutedGrasp]) -> ExecutionsSummary:

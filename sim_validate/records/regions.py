@@ -1,7 +1,6 @@
 """Writes and reads certified regions: one proof file per grasp, and one `regions.json`."""
 
 import hashlib
-import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
 from grasp_core.checked import path_of
 from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import InputError, SolverError
+from grasp_core.files.json_text import text_of
 from grasp_core.geometry.flat_polygons import FEWEST_CORNERS
 from grasp_core.objects.face_pieces import inscribed_disc_radius_of
 from grasp_core.objects.polyhedron import Polyhedron
@@ -81,7 +81,7 @@ def write_regions(
         "grasps": records,
     }
     if folder is not None:
-        write_text(folder / REGIONS, json.dumps(document, allow_nan=False, indent=1) + "\n")
+        write_text(folder / REGIONS, text_of(document))
     return document
 
 

@@ -1,6 +1,5 @@
 """Writes verdicts as `verdicts.json`, with units in the keys and all settings that were used."""
 
-import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
@@ -8,6 +7,7 @@ from typing import Any, cast
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.files.json_text import text_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from sim_validate.records.setup_toml import OF_USERS
@@ -55,7 +55,7 @@ def verdicts_to_json(
         "summary": summary(listed),
         "verdicts": [_verdict_record(body, verdict) for verdict in listed],
     }
-    return json.dumps(finite(document), allow_nan=False, indent=1) + "\n"
+    return text_of(finite(document))
 
 
 def object_record(body: Polyhedron) -> ObjectRecord:

@@ -56,6 +56,28 @@ def test_late_figures_are_those_of_the_public_functions():
     assert len(grasps[::5]) >= 20
 
 
+def test_critical_frictions_found_together_are_those_found_one_by_one(monkeypatch):
+    _, grasps = planned()
+    alone = [grasp.critical_friction for grasp in grasps]
+    assert len(set(alone)) > 20
+    _, together = planned()
+    together[0].critical_friction  # noqa: B018 - it stays as it is
+    asked = []
+
+    def counted(positions, normals):
+        asked.append(len(positions))
+        return gc.critical_frictions(positions, normals)
+
+    monkeypatch.setattr(module, "critical_frictions", counted)
+    monkeypatch.delattr(module, "critical_friction")
+    module.find_critical_frictions(together)
+    assert asked == [len(grasps) - 1]
+    assert [grasp.critical_friction for grasp in together] == alone
+    module.find_critical_frictions(together)
+    module.find_critical_frictions([replace(grasps[0], critical_friction=0.25)])
+    assert len(asked) == 1
+
+
 def _pickled(grasp):
     return pickle.loads(pickle.dumps(grasp))  # noqa: S301 - written here
 
