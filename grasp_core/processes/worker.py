@@ -1,12 +1,12 @@
 """Does tasks that another process sends through a pipe, one after the other, until it ends."""
 
+import gc
 import os
-import pickle
 import signal
 import sys
 from typing import IO
 
-from grasp_core.processes.messages import receive, send
+from grasp_core.processes.messages import receive, send, unpacked
 
 
 def main() -> None:
@@ -15,6 +15,7 @@ def main() -> None:
     Errors of a task are answers, too. The end of the pipe ends this process.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt ends it through its parent
+    gc.disable()  # results are freed as soon as they are sent
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what code prints is no answer
     try:
@@ -24,10 +25,10 @@ def main() -> None:
 
 
 def _answer(tasks: IO[bytes], answers: IO[bytes]) -> None:
-    make, arguments = pickle.loads(receive(tasks))  # noqa: S301 - from our own parent
+    make, arguments = unpacked(receive(tasks))
     do = make(*arguments)
     while True:
-        task = pickle.loads(receive(tasks))  # noqa: S301 - from our own parent
+        task = unpacked(receive(tasks))
         try:
             answer = (do(task), None)
         except Exception as error:

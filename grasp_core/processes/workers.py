@@ -9,7 +9,6 @@ The processes are programs of their own and not copies of the caller's, as those
 """
 
 import os
-import pickle
 import subprocess
 import sys
 from collections import deque
@@ -20,7 +19,7 @@ from pathlib import Path
 from threading import Condition, Thread
 from typing import IO, Any, TypeVar
 
-from grasp_core.processes.messages import receive, send
+from grasp_core.processes.messages import receive, send, unpacked
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -46,7 +45,7 @@ class _Place:
 
     def result(self) -> Any:
         """Return the result, or raise the error in its place."""
-        result, error = self.ended or pickle.loads(self.answer)  # noqa: S301 - our own process
+        result, error = self.ended or unpacked(self.answer)
         if error is not None:
             raise error
         return result
