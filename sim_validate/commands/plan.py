@@ -56,6 +56,7 @@ def plan_object(
             clearance=planning.edge_clearance_m,
             share_faces=planning.share_faces_m,
             progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
+            jobs=jobs,
         )
     moves: tuple[Moved, ...] = ()
     if planning.optimize and found.grasps:
