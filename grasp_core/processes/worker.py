@@ -4,31 +4,43 @@ import gc
 import os
 import signal
 import sys
+from queue import SimpleQueue
+from threading import Thread
 from typing import IO
 
 from grasp_core.processes.messages import receive, send, unpacked
+
+Messages = SimpleQueue[bytes]
 
 
 def main() -> None:
     """Receive a function and its arguments, which make the function for all tasks; then do tasks.
 
-    Errors of a task are answers, too. The end of the pipe ends this process.
+    Errors of a task are answers, too. The end of the pipe ends this process, whatever it does.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt ends it through its parent
     gc.disable()  # results are freed as soon as they are sent
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what code prints is no answer
+    messages = Messages()
+    Thread(target=_listen, args=(sys.stdin.buffer, messages), daemon=True).start()
+    _answer(messages, answers)
+
+
+def _listen(pipe: IO[bytes], messages: Messages) -> None:
+    """Receive messages while tasks are done, and end the process when nobody sends any more."""
     try:
-        _answer(sys.stdin.buffer, answers)
-    except (EOFError, BrokenPipeError):
-        os._exit(0)  # nobody listens; closing `answers` would fail, too
+        while True:
+            messages.put(receive(pipe))
+    except (EOFError, OSError):
+        os._exit(0)
 
 
-def _answer(tasks: IO[bytes], answers: IO[bytes]) -> None:
-    make, arguments = unpacked(receive(tasks))
+def _answer(messages: Messages, answers: IO[bytes]) -> None:
+    make, arguments = unpacked(messages.get())
     do = make(*arguments)
     while True:
-        task = unpacked(receive(tasks))
+        task = unpacked(messages.get())
         try:
             answer = (do(task), None)
         except Exception as error:

@@ -191,7 +191,9 @@ def working(
 
 
 def _started(count: int) -> list[_Process]:
-    """Start processes, as many as the system allows."""
+    """Start processes, as many as the system allows; none where Python is part of a program."""
+    if not sys.executable:
+        return []
     # not -m alone: the current folder must not come before the installed packages
     command = [sys.executable, "-P", "-m", "grasp_core.processes.worker"]
     paths = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)

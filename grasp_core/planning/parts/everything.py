@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator
 from collections.abc import Set as AbstractSet
 from itertools import tee
 
-from grasp_core.kept_loops import is_kept
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.certify import Certified
 from grasp_core.planning.family_search import MethodSearch
@@ -18,8 +17,6 @@ from grasp_core.values import FINGERS, FaceQuadruple, Family
 QUADRUPLES_PER_PROCESS = 5_000
 """Number of face quadruples for which one more process is worth starting: the start takes a second,
 and so do a thousand to two thousand quadruples."""
-NEEDED = ("grasp_core.families.batches.pencil_kernel", "grasp_core.solvers.nearest_point_kernel")
-"""Kernels by which to tell whether loops are compiled; if not, every process would compile them."""
 
 
 def worth_starting(body: Polyhedron, request: PlanRequest, jobs: int) -> int:
@@ -30,8 +27,7 @@ def worth_starting(body: Polyhedron, request: PlanRequest, jobs: int) -> int:
     if jobs < 2 or request.searched is not None:  # noqa: PLR2004 - nobody beside this one
         return 0
     worth = math.comb(len(body.faces), FINGERS) // QUADRUPLES_PER_PROCESS
-    count = min(jobs - 1, worth)
-    return count if count and all(map(is_kept, NEEDED)) else 0
+    return min(jobs - 1, worth)
 
 
 def each_found(work: Object, parts: Iterable[Part], workers: Workers | None) -> Iterator[Found]:

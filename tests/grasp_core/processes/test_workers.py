@@ -2,6 +2,7 @@
 
 import io
 import os
+import time
 from threading import enumerate as threads
 
 import numpy as np
@@ -11,6 +12,7 @@ from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.processes import workers
 from grasp_core.processes.messages import receive, send, unpacked
 from tests.grasp_core.processes.tasks_to_do import doing
+from tests.patience import HANGING_S
 
 
 @pytest.fixture
@@ -71,6 +73,21 @@ def test_the_end_of_the_block_ends_processes_and_threads():
         assert next(done) == 4
     assert len(threads()) == before
     assert all(each.program.returncode is not None for each in found._processes)
+
+
+def test_a_process_ends_with_the_one_that_asks_whatever_it_does(tmp_path):
+    """It waits for another that never comes; the end of its input ends it all the same."""
+    with workers.working(1, doing, os.getpid()) as found:
+        (process,) = found._processes
+        alone = str(tmp_path / "alone")
+        place = workers._Place(("meet", alone, str(tmp_path / "never")))
+        with found._changed:
+            found._open.append(place)
+            found._changed.notify_all()
+        while not (tmp_path / "alone").exists():
+            time.sleep(0.01)
+        process.tasks.close()
+        assert process.program.wait(HANGING_S) == 0
 
 
 def test_arrays_keep_their_bits_and_stay_read_only():
