@@ -40,6 +40,23 @@ SortKey: TypeAlias = tuple[float, FaceQuadruple, FaceQuadruple]
 
 
 @dataclass(slots=True, eq=False)
+class Gathered:
+    """The proofs and counts of a search, or of a part of one."""
+
+    tally: Tally = field(default_factory=Tally)
+    absences: dict[FaceQuadruple, tuple[Absence, ...]] = field(
+        default_factory=dict[FaceQuadruple, tuple[Absence, ...]]
+    )
+    undecided: dict[FaceQuadruple, float] = field(default_factory=dict[FaceQuadruple, float])
+
+    def add(self, other: "Gathered") -> None:
+        """Add what the next part of the search gathered."""
+        self.tally.add(other.tally)
+        self.absences.update(other.absences)
+        self.undecided.update(other.undecided)
+
+
+@dataclass(slots=True, eq=False)
 class MethodSearch:
     """The grasps, proofs and counts that one method has gathered so far."""
 
@@ -53,19 +70,15 @@ class MethodSearch:
     """What the grasps of `best` are sorted by."""
     held: set[FaceQuadruple] = field(default_factory=set[FaceQuadruple])
     """Ascending faces on which a grasp was found, whether it was kept or not."""
-    tally: Tally = field(default_factory=Tally)
-    absences: dict[FaceQuadruple, tuple[Absence, ...]] = field(
-        default_factory=dict[FaceQuadruple, tuple[Absence, ...]]
-    )
-    undecided: dict[FaceQuadruple, float] = field(default_factory=dict[FaceQuadruple, float])
+    gathered: Gathered = field(default_factory=Gathered)
     unreached: dict[FaceQuadruple, str] = field(default_factory=dict[FaceQuadruple, str])
     seconds: float = 0.0
 
     @property
     def counts(self) -> MethodCounts:
         """Return the counts so far, with the quadruples that are still undecided."""
-        counts = self.tally.counts
-        return replace(counts, undecided=counts.undecided + len(self.undecided))
+        counts = self.gathered.tally.counts
+        return replace(counts, undecided=counts.undecided + len(self.gathered.undecided))
 
     @property
     def full(self) -> bool:
@@ -83,17 +96,26 @@ class MethodSearch:
         """Return whether a grasp with discs of radius `room` could enter the best ones."""
         return room > self.least(construction)
 
+    def take(self, gathered: Gathered, seconds: float) -> None:
+        """Add the proofs and counts of a part, and the time that another process took [s]."""
+        self.gathered.add(gathered)
+        self.seconds += seconds
+
+    def keep_each(self, found: Sequence[Certified]) -> list[Certified]:
+        """Keep grasps on one quadruple; return the ones that fingers reach."""
+        return [one for each in found for one in self.keep(each)]
+
     def keep(self, found: Certified) -> list[Certified]:
         """Count a grasp and keep it if fingers reach it; return it in a list, or an empty list."""
         faces = four(sorted(found.faces))
         way = self.reach(found)
         if way.reason:
-            self.tally.count("unreachable")
+            self.gathered.tally.count("unreachable")
             self.unreached[faces] = way.reason
             return []
         if found.method != self.method or way.directions is not None:
             found = replace(found, method=self.method, ways_out=way.directions)
-        self.tally.count("found")
+        self.gathered.tally.count("found")
         self.held.add(faces)
         key = best_first(found)
         place = bisect(self._keys, key)
@@ -121,24 +143,38 @@ def search_construction(
     With a limit the search ends when no upper bound exceeds the worst grasp kept. A construction
     without bounds ends as soon as the limit is reached.
     """
-    tries = Tries(construction, shapes, friction)
-    quadruples = _in_order(construction, AttemptBounds(shapes), blocks, search)
+    places = range(len(blocks[0]))
+    for found in found_in(construction, shapes, friction, blocks, places, search):
+        yield search.keep_each(found)
+
+
+def found_in(
+    construction: Construction,
+    shapes: Shapes,
+    friction: float,
+    blocks: Blocks,
+    places: range,
+    search: MethodSearch,
+) -> Iterator[list[Certified]]:
+    """Try a construction on some of the blocks; yield the grasps found on each quadruple.
+
+    Whoever keeps them in `search` does so before asking for the next: that raises the threshold.
+    """
+    tries, tally = Tries(construction, shapes, friction), search.gathered.tally
+    quadruples = _in_order(construction, AttemptBounds(shapes), blocks, places, search)
     while group := _next_few(quadruples, search):
         # grasps kept meanwhile may have raised the threshold
         worth = [
             [each for each in attempts if search.may_gain(construction, each.bounds[0])]
             for attempts in group
         ]
-        found = iter(
-            tries.certified(
-                list(chain.from_iterable(worth)), search.least(construction), search.tally
-            )
-        )
+        every = list(chain.from_iterable(worth))
+        found = iter(tries.certified(every, search.least(construction), tally))
         for attempts in worth:
             here = [one for one in islice(found, len(attempts)) if one is not None]
             kept = _without_duplicates(here)
-            search.tally.count("duplicates", len(here) - len(kept))
-            yield [one for each in kept for one in search.keep(each)]
+            tally.count("duplicates", len(here) - len(kept))
+            yield kept
 
 
 def _next_few(
@@ -158,15 +194,18 @@ def _next_few(
 
 
 def _in_order(
-    construction: Construction, bounded: AttemptBounds, blocks: Blocks, search: MethodSearch
+    construction: Construction,
+    bounded: AttemptBounds,
+    blocks: Blocks,
+    places: range,
+    search: MethodSearch,
 ) -> Iterator[tuple[Attempt, ...]]:
     """Yield the attempts on each quadruple: over many blocks with a limit, else block by block."""
-    best_first = BestFirst(construction, bounded, search.tally)
+    best_first = BestFirst(construction, bounded, search.gathered.tally)
     rooms, make = blocks
-    places = range(len(rooms))
     if construction.limits is not None:
         size = 1 if search.limit is None else TOGETHER
-        for start in places[::size]:
+        for start in range(0, len(places), size):
             some = places[start : start + size]
             if search.may_gain(construction, float(rooms[some].max())):
                 yield from best_first.over(blocks, some, search.least)

@@ -7,9 +7,8 @@ cones are good axes for tilted force cones, so the constructions are tried once 
 
 import math
 from collections.abc import Iterator, Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import replace
-from itertools import combinations, islice, product
+from itertools import product
 from typing import TypeAlias
 
 import numpy as np
@@ -30,14 +29,11 @@ from grasp_core.families.true_surface import on_true_surface
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, choices_near
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Candidate, Certified, certify, named
-from grasp_core.planning.family_search import MethodSearch, Tries, best_first
+from grasp_core.planning.family_search import Gathered, Tries, best_first
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, cones_around
 from grasp_core.planning.request import COMPLETE_PARTS, FAMILIES, PlanRequest
 from grasp_core.planning.result import Tally
-from grasp_core.values import FINGERS, FaceQuadruple, ForceCone, four
-
-BATCH, LIMITED_BATCH = 1024, 64
-"""Number of face quadruples that are decided together, and with a limit on the grasps."""
+from grasp_core.values import FaceQuadruple, ForceCone, four
 
 Pieces: TypeAlias = tuple[FacePiece, ...]
 Answer: TypeAlias = tuple[Pieces, Placement | Absence | Undecided]
@@ -46,51 +42,28 @@ Placed: TypeAlias = tuple[Pieces, Placement]
 """Convex pieces of four faces, and contacts on them."""
 
 
-def search_free(
-    on: Standard, request: PlanRequest, search: MethodSearch, held: AbstractSet[FaceQuadruple]
-) -> Iterator[list[Certified]]:
-    """Go through the quadruples that no family holds, until the limit is reached."""
-    quadruples = _every_quadruple(on)
-    while batch := list(islice(quadruples, BATCH if search.limit is None else LIMITED_BATCH)):
-        if search.full:
-            return
-        to_try = [
-            faces
-            for faces in batch
-            if faces not in held and len(chosen_shapes(on.shapes, faces)) == FINGERS
-        ]
-        search.tally.count("tried", len(to_try))
-        known = _patches(on, to_try, request)
-        placed = [
-            _decide(on, faces, request, search, known[faces]) if faces in known else None
-            for faces in batch
-        ]
-        choices = iter(_cone_choices([each for each in placed if each], request))
-        for faces, each in zip(batch, placed, strict=True):
-            found = _certified(faces, each, next(choices), request, search) if each else None
-            yield search.keep(found) if found else []
+def found_on(
+    on: Standard, to_try: Sequence[FaceQuadruple], request: PlanRequest, gathered: Gathered
+) -> Iterator[Certified | None]:
+    """Decide quadruples together; yield the grasp found on each, or None."""
+    gathered.tally.count("tried", len(to_try))
+    known = _patches(on, to_try, request)
+    placed = [_decide(on, faces, request, gathered, known[faces]) for faces in to_try]
+    choices = iter(_cone_choices([each for each in placed if each], request))
+    for faces, each in zip(to_try, placed, strict=True):
+        yield _certified(faces, each, next(choices), request, gathered) if each else None
 
 
-def search_undecided(
-    on: Standard, request: PlanRequest, search: MethodSearch
-) -> Iterator[list[Certified]]:
-    """Go once more, with more parts, through the quadruples that were left undecided."""
+def found_with_more_parts(
+    on: Standard, faces: FaceQuadruple, request: PlanRequest, gathered: Gathered
+) -> Certified | None:
+    """Decide a quadruple that was left undecided once more, with more parts."""
     request = replace(request, max_face_parts=COMPLETE_PARTS)
-    for faces in tuple(search.undecided):
-        del search.undecided[faces]
-        placed = _decide(on, faces, request, search)
-        found = None
-        if placed is not None:
-            (choices,) = _cone_choices([placed], request)
-            found = _certified(faces, placed, choices, request, search)
-        yield search.keep(found) if found else []
-
-
-def _every_quadruple(on: Standard) -> Iterator[FaceQuadruple]:
-    """All quadruples of faces; the ones with two halves of a face come last."""
-    yield from combinations(range(len(on.faces)), FINGERS)
-    for faces in on.shared.tolist():
-        yield four(faces)
+    placed = _decide(on, faces, request, gathered)
+    if placed is None:
+        return None
+    (choices,) = _cone_choices([placed], request)
+    return _certified(faces, placed, choices, request, gathered)
 
 
 def _upgrades(request: PlanRequest) -> list[Construction]:
@@ -123,7 +96,7 @@ def _decide(
     on: Standard,
     faces: FaceQuadruple,
     request: PlanRequest,
-    search: MethodSearch,
+    gathered: Gathered,
     known: ClosureCertificate | None = None,
 ) -> Placed | None:
     """Find contacts on four faces; if there are none, record the proof or that it is undecided.
@@ -131,32 +104,30 @@ def _decide(
     `known` is the certificate of contacts at all corners of the faces' hulls, if there is one.
     """
     chosen = chosen_shapes(on.shapes, faces)
-    answers = _answers(faces, chosen, request, search, known)
+    answers = _answers(faces, chosen, request, gathered, known)
     pieces, last = answers[-1]
     if any(shape.facets is not None for shape in chosen):
-        return _on_triangles(faces, chosen, pieces, last, request, search)
+        return _on_triangles(faces, chosen, pieces, last, request, gathered)
     if isinstance(last, Placement):
         return pieces, last
     if any(on.owners[face] != face for face in faces):
-        answers = [_whole(on, faces, request, search)]
+        answers = [_whole(on, faces, request, gathered)]
     proofs = tuple(proof for _, proof in answers if isinstance(proof, Absence))
     if len(proofs) == len(answers):
-        search.tally.count("infeasible")
-        search.absences[faces] = proofs
+        gathered.tally.count("infeasible")
+        gathered.absences[faces] = proofs
     else:
-        search.undecided[faces] = max(
+        gathered.undecided[faces] = max(
             answer.open_share for _, answer in answers if isinstance(answer, Undecided)
         )
     return None
 
 
-def _whole(
-    on: Standard, faces: FaceQuadruple, request: PlanRequest, search: MethodSearch
-) -> Answer:
+def _whole(on: Standard, faces: FaceQuadruple, request: PlanRequest, gathered: Gathered) -> Answer:
     """Ask whether whole faces hold no grasp, where choices of their halves gave none."""
     whole = four(on.owners[face] for face in faces)
     hulls = tuple(shape.hull for shape in chosen_shapes(on.shapes, whole))
-    search.tally.count("solved")
+    gathered.tally.count("solved")
     answer = _place(hulls, request, np.random.default_rng([request.seed, *faces]), restarts=0)
     return hulls, answer if isinstance(answer, Absence) else Undecided(1, 1.0)
 
@@ -165,7 +136,7 @@ def _answers(
     faces: FaceQuadruple,
     shapes: Sequence[FaceShape],
     request: PlanRequest,
-    search: MethodSearch,
+    gathered: Gathered,
     known: ClosureCertificate | None,
 ) -> list[Answer]:
     """Collect answers for the convex pieces of four faces; a placement can only be the last.
@@ -176,7 +147,7 @@ def _answers(
     """
     rng = np.random.default_rng([request.seed, *faces])
     hulls = tuple(shape.hull for shape in shapes)
-    search.tally.count("solved")
+    gathered.tally.count("solved")
     whole = _place(hulls, request, rng, known=known)
     if isinstance(whole, Absence) or all(len(shape.pieces) == 1 for shape in shapes):
         return [(hulls, whole)]
@@ -184,7 +155,7 @@ def _answers(
     most = MOST_CHOICES * request.max_face_parts
     answers: list[Answer] = []
     for pieces in choices_near(shapes, at, most):
-        search.tally.count("solved")
+        gathered.tally.count("solved")
         answers.append((pieces, _place(pieces, request, rng, restarts=0)))
         if isinstance(answers[-1][1], Placement):
             return answers
@@ -205,7 +176,7 @@ def _on_triangles(
     pieces: Pieces,
     answer: Placement | Absence | Undecided,
     request: PlanRequest,
-    search: MethodSearch,
+    gathered: Gathered,
 ) -> Placed | None:
     """Contacts on the triangles of curved patches; planes without a grasp prove nothing here."""
     if isinstance(answer, Placement):
@@ -220,7 +191,7 @@ def _on_triangles(
         settled = on_true_surface(shapes, pieces, cones, answer, points, place)
         if settled is not None:
             return settled
-    search.undecided[faces] = 1.0
+    gathered.undecided[faces] = 1.0
     return None
 
 
@@ -257,7 +228,7 @@ def _certified(
     placed: Placed,
     choices: tuple[Cones, ...],
     request: PlanRequest,
-    search: MethodSearch,
+    gathered: Gathered,
 ) -> Certified | None:
     """Certify contacts, with regions if a construction offers them around these forces."""
     pieces, placement = placed
@@ -269,7 +240,7 @@ def _certified(
     candidate = Candidate(named("f", faces), faces, "regulus", pieces, cones, placement, points)
     certified = certify(candidate, request.friction)
     if certified is None:
-        search.tally.count("rejected")
+        gathered.tally.count("rejected")
     return certified
 
 

@@ -3,26 +3,30 @@
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
+from itertools import chain, islice
 from typing import TypeAlias
 
 from grasp_core.families.constructions import CONSTRUCTIONS
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.standard_order import Standard, standard
-from grasp_core.objects.trimmed_faces import clear_of_edges, with_halves
-from grasp_core.planning.blocks import Blocks, all_blocks, kept, spanning_blocks
+from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Certified
 from grasp_core.planning.family_search import MethodSearch, search_construction
-from grasp_core.planning.free_search import search_free, search_undecided
-from grasp_core.planning.planned_cones import PlannedCones
+from grasp_core.planning.parts.batches import search_free
+from grasp_core.planning.parts.everything import (
+    blocks_of,
+    each_found,
+    search_batches,
+    search_blocks,
+    search_undecided,
+)
+from grasp_core.planning.parts.tasks import Object, in_standard_order
 from grasp_core.planning.reach import Finger, Reach, reach
 from grasp_core.planning.request import FAMILIES, METHODS, PlanRequest
 from grasp_core.planning.result import Outcomes
+from grasp_core.processes.workers import Workers
 from grasp_core.values import FINGERS, FaceQuadruple, Family, Method
 
-KEPT_BLOCKS = 8
-"""Number of blocks of face quadruples kept for all families: some hundred megabytes."""
 Progress: TypeAlias = Callable[[int, int, int], None]
 """Called with (quadruples finished, all quadruples, grasps so far) after each quadruple tried."""
 Searches: TypeAlias = dict[Method, MethodSearch]
@@ -31,12 +35,7 @@ Searches: TypeAlias = dict[Method, MethodSearch]
 
 def prepared(body: Polyhedron, request: PlanRequest) -> tuple[Standard, Searches]:
     """Put an object into standard order, with faces cut as requested, and set up its searches."""
-    on = standard(body)
-    if request.clearance:
-        on = replace(on, body=clear_of_edges(on.body, request.clearance))
-    if request.share_faces is not None:
-        halved, owners = with_halves(on.body, request.share_faces)
-        on = replace(on, body=halved, owners=owners)
+    on = in_standard_order(body, request)
     reached = partial(_reach, on.body, request.finger)
     methods: list[Method] = [method for method in METHODS if method in request.families]
     return on, {method: MethodSearch(method, request.searched, reached) for method in methods}
@@ -51,11 +50,26 @@ def _reach(body: Polyhedron, finger: Finger | None, found: Certified) -> Reach:
 
 
 def run(
-    on: Standard, request: PlanRequest, searches: Searches, progress: Progress | None
+    on: Standard,
+    request: PlanRequest,
+    searches: Searches,
+    progress: Progress | None,
+    workers: Workers | None = None,
 ) -> Iterator[Certified]:
-    """Yield each certified grasp in the order of the searches, on the standard object."""
+    """Yield each certified grasp in the order of the searches, on the standard object.
+
+    Args:
+        on: The object in standard order.
+        request: What is to be planned.
+        searches: The search of each method, which gathers what is found.
+        progress: Called after each quadruple that is tried.
+        workers: Processes that search parts for all grasps, made with `finder`.
+    """
     total, found = len(searches) * on.quadruples, 0
-    for done, grasps in _steps(on, request, searches):
+    work = Object(on, request)
+    everything = request.searched is None
+    steps = _every_step(work, searches, workers) if everything else _limited(work, searches)
+    for done, grasps in steps:
         found += len(grasps)
         if progress is not None:
             progress(done, total, found)
@@ -64,46 +78,62 @@ def run(
         progress(total, total, found)
 
 
-def _steps(
-    on: Standard, request: PlanRequest, searches: Searches
+def _every_step(
+    work: Object, searches: Searches, workers: Workers | None
 ) -> Iterator[tuple[int, list[Certified]]]:
-    """Yield, for each quadruple tried, how many are finished at least, and its grasps."""
+    """Yield, for each quadruple tried, how many are finished at least, and all its grasps."""
+    on, dealt_with = work.on, 0
     families: list[Family] = [family for family in FAMILIES if family in searches]
-    around_normals, every = _blocks(on, request)
-    dealt_with, limit = 0, request.searched
-    kept_so_far: list[int] = []
+    parts = {family: blocks_of(work, family) for family in families}
+    found = each_found(work, chain.from_iterable(parts.values()), workers)
     for family in families:
-        construction, search = CONSTRUCTIONS[family], searches[family]
-        search.limit = None if limit is None else _share(limit, kept_so_far)
-        # without bounds on discs, only cones around the normals are used
-        blocks = around_normals if construction.limits is None else every
-        steps = search_construction(construction, on.shapes, request.friction, blocks, search)
+        search = searches[family]
+        steps = search_blocks(islice(found, len(parts[family])), search)
         yield from enumerate(_timed(steps, search), start=dealt_with + 1)
-        # each quadruple counts once per order of the fingers
-        search.tally.prune(on.quadruples * len(construction.orders))
+        _prune(family, search, on.quadruples)
+        dealt_with += on.quadruples
+    if "free" in searches:
+        search, held = searches["free"], _held(searches)
+        steps = search_batches(work, search, held, workers)
+        yield from enumerate(_timed(steps, search), start=dealt_with + 1)
+        _prune("free", search, on.quadruples)
+        if work.request.complete:
+            for grasps in _timed(search_undecided(work, search, workers), search):
+                yield dealt_with + on.quadruples, grasps
+
+
+def _limited(work: Object, searches: Searches) -> Iterator[tuple[int, list[Certified]]]:
+    """Yield as `_every_step`, but only grasps that are among the best when they are found."""
+    on, request, limit = work.on, work.request, work.request.searched or 0
+    families: list[Family] = [family for family in FAMILIES if family in searches]
+    dealt_with, kept_so_far = 0, list[int]()
+    for family in families:
+        search = searches[family]
+        search.limit = _share(limit, kept_so_far)
+        steps = search_construction(
+            CONSTRUCTIONS[family], on.shapes, request.friction, work.blocks(family), search
+        )
+        yield from enumerate(_timed(steps, search), start=dealt_with + 1)
+        _prune(family, search, on.quadruples)
         kept_so_far.append(len(search.best))
         dealt_with += on.quadruples
     if "free" in searches:
         search = searches["free"]
-        search.limit = None if limit is None else max(limit - sum(kept_so_far), 0)
-        held = set[FaceQuadruple]().union(*(each.held for each in searches.values()))
-        steps = search_free(on, request, search, held)
+        search.limit = max(limit - sum(kept_so_far), 0)
+        steps = search_free(on, request, search, _held(searches))
         yield from enumerate(_timed(steps, search), start=dealt_with + 1)
-        search.tally.prune(on.quadruples)
-        if request.complete:
-            for grasps in _timed(search_undecided(on, request, search), search):
-                yield dealt_with + on.quadruples, grasps
+        _prune("free", search, on.quadruples)
 
 
-def _blocks(on: Standard, request: PlanRequest) -> tuple[Blocks, Blocks]:
-    """Blocks with cones around the normals, and blocks with all cones that may be used."""
-    whole = len(on.faces)
-    cones = PlannedCones(on.body, on.shapes, request.theta, tilted=False)
-    around_normals = kept(spanning_blocks(cones, whole), KEPT_BLOCKS)
-    if request.cones == "normal":
-        return around_normals, around_normals
-    cones = replace(cones, tilted=True)
-    return around_normals, kept(all_blocks(cones, whole, on.shared), KEPT_BLOCKS)
+def _held(searches: Searches) -> set[FaceQuadruple]:
+    """Quadruples on which a grasp was found."""
+    return set[FaceQuadruple]().union(*(search.held for search in searches.values()))
+
+
+def _prune(method: Method, search: MethodSearch, quadruples: int) -> None:
+    """Count what was not tried; each quadruple counts once per order of the fingers."""
+    orders = 1 if method == "free" else len(CONSTRUCTIONS[method].orders)
+    search.gathered.tally.prune(quadruples * orders)
 
 
 def _share(limit: int, before: Sequence[int]) -> int:
@@ -119,8 +149,10 @@ def _share(limit: int, before: Sequence[int]) -> int:
 
 def outcomes(on: Standard, searches: Searches) -> Outcomes:
     """Counts of how the quadruples ended: held, absent, open or out of reach."""
-    held = set[FaceQuadruple]().union(*(search.held for search in searches.values()))
-    absences = set[FaceQuadruple]().union(*(search.absences for search in searches.values()))
+    held = _held(searches)
+    absences = set[FaceQuadruple]().union(
+        *(search.gathered.absences for search in searches.values())
+    )
     # patches leave parts of the surface out, so a patch without room proves nothing
     absent = len(absences) + (0 if on.body.patches else _without_room(on))
     out_of_reach = len(unreached(searches))
@@ -131,8 +163,7 @@ def outcomes(on: Standard, searches: Searches) -> Outcomes:
 def unreached(searches: Searches) -> dict[FaceQuadruple, str]:
     """Quadruples with contacts, none of which fingers reach, and why not the last ones."""
     every = searches.values()
-    known = set[FaceQuadruple]().union(*(search.held for search in every))
-    known = known.union(*(search.absences for search in every))
+    known = _held(searches).union(*(search.gathered.absences for search in every))
     return {
         faces: why
         for search in every

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial, wraps
 from typing import ParamSpec, TypeVar, cast
 
-from grasp_core.checked import function, several, text
+from grasp_core.checked import function, several, text, whole
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.errors import InputError
 from grasp_core.families.constructions import LEAST_RADIUS
@@ -24,11 +24,14 @@ from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.as_given import absence_as_given, as_given, faces_as_given
 from grasp_core.planning.certify import to_grasp, to_grasps
 from grasp_core.planning.methods import Progress, Searches, outcomes, prepared, run, unreached
+from grasp_core.planning.parts.everything import worth_starting
+from grasp_core.planning.parts.tasks import finder
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.request import METHODS, ConeKind, PlanRequest, RankBy, check_request
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.planning.selection import chosen
+from grasp_core.processes.workers import working
 from grasp_core.values import Grasp, Method
 
 Given = ParamSpec("Given")
@@ -66,6 +69,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     clearance: float = 0.0,
     share_faces: float | None = None,
     progress: Progress | None = None,
+    jobs: int = 1,
 ) -> Plan:
     """Find the four-finger force-closure grasps of an object.
 
@@ -98,6 +102,8 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         share_faces: Let two fingers stand on one face, at least this far apart [m]; each face is
             cut once for that, across its longest direction.
         progress: Called after each quadruple that is tried.
+        jobs: Largest number of processes. Only searches for all grasps of objects with many faces
+            use more than one; the plan does not depend on it, except for `Plan.seconds`.
 
     Returns:
         The certified grasps, the best first, or a sentence why there are none, with counts.
@@ -113,9 +119,11 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     check_request(body, request)
     if progress is not None:
         function(progress, "progress")
-    on, searches = prepared(body, request)
-    for _ in run(on, request, searches, progress):
-        pass
+    count = worth_starting(body, request, whole(jobs, "jobs", least=1))
+    with working(count, finder, body, request) as workers:
+        on, searches = prepared(body, request)
+        for _ in run(on, request, searches, progress, workers):
+            pass
     return _planned(body, request, on, searches)
 
 
@@ -183,10 +191,12 @@ def _planned(body: Polyhedron, request: PlanRequest, on: Standard, searches: Sea
         absences={
             given(faces): tuple(absence_as_given(proof, on) for proof in proofs)
             for s in every
-            for faces, proofs in s.absences.items()
+            for faces, proofs in s.gathered.absences.items()
         },
         finger=request.finger,
-        undecided={given(faces): share for s in every for faces, share in s.undecided.items()},
+        undecided={
+            given(faces): share for s in every for faces, share in s.gathered.undecided.items()
+        },
         unreached={given(faces): why for faces, why in unreached(searches).items()},
         seconds={method: search.seconds for method, search in searches.items()},
     )

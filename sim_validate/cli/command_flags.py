@@ -67,7 +67,7 @@ class Plan:
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
     planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
     jobs: Count = field(default_factory=available_cores)
-    """Largest number of processes for --optimize and --regions; results do not depend on it."""
+    """Largest number of processes; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for grasps.json; if not given, no file is written."""

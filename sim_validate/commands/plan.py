@@ -44,7 +44,7 @@ def plan_object(
     Raises:
         InputError: A setting is refused.
     """
-    with reporter.progress("planning") as steps, compiled_beside(jobs):
+    with reporter.progress("planning") as steps, compiled_beside(jobs) as left:
         found = plan(
             body,
             planning.friction,
@@ -60,6 +60,7 @@ def plan_object(
             clearance=planning.edge_clearance_m,
             share_faces=planning.share_faces_m,
             progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
+            jobs=left,
         )
     moves: tuple[Moved, ...] = ()
     if planning.optimize and found.grasps:

@@ -53,17 +53,20 @@ compiles it."""
 
 
 @contextmanager
-def compiled_beside(jobs: int) -> Generator[None]:
+def compiled_beside(jobs: int) -> Generator[int]:
     """Compile loops in another process during a `with` block, if they are not kept.
 
     The first use of such a loop in the block waits until that process has compiled it.
 
     Args:
         jobs: Largest number of processes; below two, nothing is compiled beside the block.
+
+    Yields:
+        The number of processes that are left for the block.
     """
     missing = [name for name in BESIDE if jobs > 1 and not is_kept(name)]
     if not missing:
-        yield
+        yield jobs
         return
     context: Any = importlib.import_module("multiprocessing").get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
@@ -73,7 +76,7 @@ def compiled_beside(jobs: int) -> Generator[None]:
     done = set[str]()
     wait_for({name: partial(_wait, ours, name, done) for name in missing})
     try:
-        yield
+        yield jobs - 1
     finally:
         wait_for({})
         process.terminate()  # what it has written is whole

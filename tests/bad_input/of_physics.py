@@ -26,6 +26,7 @@ FLAGS = {
     "run box --trials": ("-1", "1e6", "99999999"),
     "run box --trials 2 --noise-friction": (*NUMBERS, "9"),
     "run box --weight-n": (*NUMBERS, "0"),
+    "plan box --jobs": ("0", "-1", "1.5"),
     "run box --jobs": ("0", "-1", "1.5"),
 }
 """Each value is to be refused, and the flag named."""

@@ -65,6 +65,7 @@ CALLS = [
         "rank_by": WORD,
         "complete": SWITCH,
         "progress": {"number": 3, "text": "a"},
+        "jobs": AT_LEAST_ONE,
     }),
     Call("gc.iter_grasps", lambda: {"body": body()}, PLANNED),
     Call("gc.force_closure", two_arrays(friction=0.5), contacts() | {

@@ -1,0 +1,1 @@
+"""Other processes of this machine that do parts of one computation, with results in order."""

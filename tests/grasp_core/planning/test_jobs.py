@@ -1,0 +1,144 @@
+"""Plans of several processes: the same for any number, bit for bit."""
+
+import io
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+import grasp_core as gc
+from grasp_core.planning import methods
+from grasp_core.planning.parts import everything
+from grasp_core.planning.parts.tasks import Block, Object, finder
+from grasp_core.processes.messages import receive, send, unpacked
+from scenes.example_objects import example_object
+from tests.marks import MORE
+from tests.patience import HANGING_S
+
+PLANS = {
+    "every method": ("random-9-7", {}),
+    "complete": ("prism", {"complete": True, "friction": 0.3}),
+    "two fingers on one face": ("tetrahedron", {"share_faces": 0.005}),
+    "fingers of a size": ("wedge", {"finger": gc.Finger(0.004, 0.03)}),
+    "the most different": ("octahedron", {"limit": 5, "rank_by": "diverse"}),
+}
+"""Objects, and keywords of `plan`, for searches that do not end early."""
+SEVERAL_BLOCKS = "random-15-1"
+"""An object with more quadruples than the first block holds."""
+
+
+def bits(plan):
+    """All of a plan but the time it took, with the exact bits of its arrays."""
+    grasps = [
+        (
+            grasp.id, grasp.family, grasp.faces, grasp.radius, grasp.span_angle,
+            grasp.closure_margin, grasp.positions.tobytes(), grasp.normals.tobytes(),
+            grasp.focus_points.tobytes(), grasp.witness.forces.tobytes(),
+            [(r.kind, r.inscribed_radius, r.polygon.tobytes()) for r in grasp.regions],
+            [(cone.half_angle, cone.axis.tobytes()) for cone in grasp.force_cones],
+            None if (ways := grasp.approach_directions) is None else ways.tobytes(),
+        )
+        for grasp in plan.grasps
+    ]  # fmt: skip
+    proofs = [
+        (faces, [
+            (path, leaf.margin, leaf.positions.tobytes(), leaf.separating_wrench.tobytes())
+            for proof in each for path, leaf in proof.leaves
+        ])
+        for faces, each in plan.absences.items()
+    ]  # fmt: skip
+    others = (plan.counts, plan.outcomes, plan.absence, plan.undecided, plan.unreached)
+    return grasps, proofs, others
+
+
+@pytest.mark.parametrize("what", PLANS)
+def test_any_number_of_processes_gives_the_same_plan(what, monkeypatch):
+    monkeypatch.setattr(everything, "QUADRUPLES_PER_PROCESS", 1)
+    name, keywords = PLANS[what]
+    body = example_object(name)
+    one, two, three = (gc.plan(body, **keywords, jobs=jobs) for jobs in (1, 2, 3))
+    assert one.grasps
+    assert bits(one) == bits(two) == bits(three)
+
+
+@pytest.mark.parametrize("name", ["random-9-7", "box", pytest.param(SEVERAL_BLOCKS, marks=MORE)])
+def test_parts_that_another_process_finds_are_the_same(name, monkeypatch):
+    """Every part is searched on another copy of the object, and sent as between processes."""
+    body, seen = example_object(name), []
+
+    def sent(value):
+        pipe = io.BytesIO()
+        send(pipe, value)
+        pipe.seek(0)
+        return unpacked(receive(pipe))
+
+    def elsewhere(work, parts, _):
+        find = finder(*sent((body, work.request)))
+        for part in parts:
+            seen.append(part)
+            yield sent(find(sent(part)))
+
+    here = gc.plan(body, 0.3)
+    for module in (methods, everything):
+        monkeypatch.setattr(module, "each_found", elsewhere)
+    assert bits(gc.plan(body, 0.3)) == bits(here)
+    assert {type(part).__name__ for part in seen} == {"Block", "Batch"}
+    places = [part.place for part in seen if isinstance(part, Block)]
+    assert (max(places) > 0) == (name == SEVERAL_BLOCKS)
+
+
+@pytest.mark.parametrize("jobs", [0, -1, 1.5, True, "2", None])
+def test_a_number_of_processes_that_is_none_is_refused(jobs):
+    with pytest.raises(gc.InputError, match="jobs must be a whole number from 1"):
+        gc.plan(example_object("tetrahedron"), jobs=jobs)
+
+
+def test_an_error_of_a_part_reaches_the_caller_with_its_own_type(monkeypatch):
+    monkeypatch.setattr(everything, "QUADRUPLES_PER_PROCESS", 1)
+
+    def fails(_, part):  # in this process, which takes the first part or one after it
+        raise gc.SolverError(f"no answer on {part}")
+
+    monkeypatch.setattr(Object, "found_at_once", fails)
+    with pytest.raises(gc.SolverError, match="no answer on"):
+        gc.plan(example_object("random-14-7"), jobs=2)
+
+
+def test_few_quadruples_and_searches_that_end_early_start_no_process():
+    request = methods.PlanRequest(0.5, ("pencil",))
+    assert everything.worth_starting(example_object("box"), request, 8) == 0
+    large = example_object("random-24-1")
+    limited = methods.PlanRequest(0.5, ("pencil",), limit=5)
+    assert everything.worth_starting(large, limited, 8) == 0
+    assert everything.worth_starting(large, request, 1) == 0
+    assert everything.worth_starting(large, request, 8) <= 2
+
+
+INTERRUPTED = """
+import grasp_core as gc
+from grasp_core.planning.parts import everything
+from scenes.example_objects import example_object
+
+everything.QUADRUPLES_PER_PROCESS = 1
+seen = []
+def told(*numbers):
+    seen or print("planning", flush=True)
+    seen.append(numbers)
+gc.plan(example_object("random-24-1"), 0.3, jobs=2, progress=told)
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="interrupts are sent in another way on Windows")
+def test_an_interrupt_ends_a_plan_and_its_processes():
+    """The test ends only when the process has: it waits for the other one and for all threads."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stdout.readline() == "planning\n"
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=HANGING_S)
+    assert process.returncode == -signal.SIGINT
+    assert "KeyboardInterrupt" in told
