@@ -2,10 +2,10 @@
 
 A kept loop is machine code, and bitcode that the compiler puts into other loops that call it. Numba
 parses the bitcode of each loop that it loads, declares all that it could compile before the first
-of them, and imports its own modules whose functions a loop calls. All this takes ten times as long
-as loading the machine code. Here bitcode is parsed when a loop that calls the kept one is compiled,
-numba declares what it can compile when it compiles, and the modules are not kept with the loop.
-Otherwise numba's own format and steps are used.
+of them, and imports its own modules whose functions a loop calls. All this takes several times as
+long as loading the machine code. Here bitcode is parsed when a loop that calls the kept one is
+compiled, numba declares what it can compile when it compiles, and the modules are not kept with the
+loop. Otherwise numba's own format and steps are used.
 """
 
 import importlib

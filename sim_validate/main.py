@@ -55,7 +55,7 @@ a simulator is imported."""
 
 COLLECTED_AFTER = 50_000
 """Number of new objects after which Python looks for unused circles of objects among them. It is
-700 otherwise, and a tenth of the time of importing and planning goes into looking in vain."""
+700 otherwise, and some per cent of the time of a plan would go into looking in vain."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -1,7 +1,7 @@
 """Links points that are close to each other, and finds the sets that links connect.
 
-Both are done with numpy, since importing scipy's graphs takes a sixth of the time in which a plan
-of a small object is found and written. Its search tree is used only where points are dense.
+Both are done with numpy, since importing scipy's graphs takes longer than planning a small object
+does. Its search tree is used only where points are dense.
 """
 
 import importlib
