@@ -17,8 +17,8 @@ with g and f both along the contacts' axes; if nothing slips, this is (4) of `gr
 method solves (2) with the exact derivative of (1), at multiples in equal ratios, from just below
 that of first slip (or a hundredth of the last, if that is larger) to that at which the object
 without any slip would leave its place. The object is *lost* where its motion passes what is
-allowed, or where no balance is found. Halving the interval of multiples, and then taking the motion
-in it as linear, shows where.
+allowed, or where no balance is found, not even when the way there is gone in small parts. Halving
+the interval of multiples, and then taking the motion in it as linear, shows where.
 
 The load comes once. A load that keeps turning makes contacts slip a little in each round, which
 adds up; for it the first slip is the safer answer. The multiple is an estimate, not a proof:
@@ -50,7 +50,10 @@ ratio on."""
 HALVINGS = 4
 """Number of halvings of the last ratio: paths in such steps are no finer than a sixteenth of it."""
 MOST_STEPS = 12
-"""Most steps of Newton's method: where balance exists, fewer are taken."""
+"""Most steps of Newton's method: where it finds a balance, it mostly takes fewer."""
+PARTS = 8
+"""Number of parts in which a way is gone again on which Newton's method found no balance. It may
+swing between contacts that stick and slip, and then the last digits would decide what is lost."""
 MET = 1e-7
 """Wrench that is left of (2), relative to the largest force at rest."""
 SINGULAR = 1e-9
@@ -143,15 +146,37 @@ def _try(
         return
     tried = multiples[own]
     reach = np.array([most_m, most_m, most_m, most_rad, most_rad, most_rad])
-    forces, motion, met = _balanced(
-        grip, way.forces[own], way.motion[own], tried[:, None] * loads[own], reach
-    )
+    begun = way.forces[own], way.motion[own]
+    forces, motion, met = _balanced(grip, *begun, tried[:, None] * loads[own], reach)
+    again = np.flatnonzero(~met)
+    if len(again):
+        ends = np.linspace(way.multiples[own[again]], tried[again], PARTS + 1)[1:, :, None]
+        forces[again], motion[again], met[again] = _in_parts(
+            grip, begun[0][again], begun[1][again], ends * loads[own[again]], reach
+        )
     share = np.where(met, _moved(motion, most_m, most_rad), np.inf)
     kept = share < 1.0
     held, gone = own[kept], own[~kept]
     way.multiples[held], way.share[held] = tried[kept], share[kept]
     way.forces[held], way.motion[held] = forces[kept], motion[kept]
     way.lost[gone], way.beyond[gone] = tried[~kept], share[~kept]
+
+
+def _in_parts(
+    grip: Grip, forces: Array, motion: Array, loads: Array, reach: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Solve (2) for one load after the other, (PARTS, m, 6), each from the balance before.
+
+    Returns:
+        The forces and motions of the last, and for which each balance was found, (m,).
+    """
+    found = np.ones(len(forces), dtype=bool)
+    for load in loads:
+        forces, motion, met = _balanced(grip, forces, motion, load, reach)
+        found &= met
+        if not found.any():
+            break
+    return forces, motion, found
 
 
 def _balanced(

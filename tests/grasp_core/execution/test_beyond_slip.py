@@ -100,6 +100,16 @@ def test_planned_grips_lose_their_object_where_many_small_steps_do():
     assert np.quantile(np.abs(np.log(ratios)), 0.9) < 0.15
 
 
+def test_last_digits_of_a_load_do_not_decide_its_loss():
+    rng, changes = np.random.default_rng(7), np.random.default_rng(1)
+    for grip in planned_grips(limit=3, push=5.0, tip_radius_m=0.01):
+        loads = directions(40, rng, 6) * np.repeat([1.0, grip.size], 3)
+        found = loss_multiples(grip, loads, 1e-3, FAR)
+        for size in (1e-12, 1e-9):
+            changed = loads * (1.0 + size * changes.normal(size=loads.shape))
+            assert loss_multiples(grip, changed, 1e-3, FAR) == pytest.approx(found, rel=0.02)
+
+
 def test_losses_are_after_the_slip_and_before_the_limit_without_slip():
     rng, count = np.random.default_rng(7), 0
     for grip in planned_grips(limit=3, push=5.0, tip_radius_m=0.01):
@@ -113,7 +123,7 @@ def test_losses_are_after_the_slip_and_before_the_limit_without_slip():
         assert (found >= 0.97 * np.minimum(slips, sticking)).all()
         assert loss_multiples(grip, 3.0 * loads, 1e-3, FAR) == pytest.approx(found / 3.0, rel=1e-6)
         wider = loss_multiples(grip, loads, 2e-3, FAR)
-        assert (wider >= 0.9 * found).all()  # paths in large steps differ a little
+        assert (wider >= 0.98 * found).all()  # paths in large steps differ a little
         assert (wider > 1.05 * found).any()
         count += int((np.array(slips) < found).sum())
     assert count >= 30
