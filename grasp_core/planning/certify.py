@@ -227,7 +227,7 @@ class LateFigures:
 
 
 def find_critical_frictions(grasps: Iterable[Grasp]) -> None:
-    """Find the critical friction of planned grasps that lack it, together, which takes a third."""
+    """Find the critical friction of planned grasps that lack it, all in one batch."""
     fill_in(grasps, "critical_friction", _frictions)
 
 

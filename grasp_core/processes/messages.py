@@ -12,7 +12,7 @@ LENGTH = struct.Struct("<Q")
 def send(pipe: IO[bytes], value: Any) -> None:
     """Send one value, which the other process gets as a copy.
 
-    Arrays keep their bits and stay read-only, as protocol 5 writes their memory as it is.
+    Contiguous arrays keep their bits and stay read-only: protocol 5 writes their memory as it is.
     """
     message = pickle.dumps(value, protocol=5)
     pipe.write(LENGTH.pack(len(message)))
@@ -33,7 +33,7 @@ def receive(pipe: IO[bytes]) -> bytes:
 def unpacked(message: bytes) -> Any:
     """Return the value of a message, which came from a process of our own.
 
-    All objects made here live on, so that looking for unused ones would take longer than the rest.
+    Nearly all objects made here live on: looking for unused ones would take longer than the rest.
     """
     collects = gc.isenabled()
     gc.disable()

@@ -24,7 +24,10 @@ def main() -> None:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what code prints is no answer
     messages = Messages()
     Thread(target=_listen, args=(sys.stdin.buffer, messages), daemon=True).start()
-    _answer(messages, answers)
+    try:
+        _answer(messages, answers)
+    finally:
+        os._exit(1)  # Python cannot end in order while a thread reads its input
 
 
 def _listen(pipe: IO[bytes], messages: Messages) -> None:

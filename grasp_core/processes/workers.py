@@ -82,8 +82,14 @@ class Workers:
         self._threads = [
             Thread(target=self._serve, args=(process, start), daemon=True) for process in processes
         ]
-        for thread in self._threads:
-            thread.start()
+        self._serving = list[Thread]()
+
+    def begin(self) -> None:
+        """Start as many of the threads as the system allows."""
+        with suppress(RuntimeError):
+            for thread in self._threads:
+                thread.start()
+                self._serving.append(thread)
 
     def in_order(self, tasks: Iterable[Task], here: Callable[[Task], Result]) -> Generator[Result]:
         """Yield the result of each task, in their order.
@@ -142,7 +148,7 @@ class Workers:
                 with self._changed:
                     place.answer = answer
                     self._changed.notify_all()
-        except (OSError, EOFError, ValueError):  # it ended, or its pipes are closed
+        except Exception:  # it ended, its pipes are closed, or a value cannot be sent or held
             with self._changed:
                 if place is not None:
                     self._open.appendleft(place)
@@ -162,7 +168,7 @@ class Workers:
             self._changed.notify_all()
         for process in self._processes:
             process.end()
-        for thread in self._threads:
+        for thread in self._serving:
             thread.join()
         for process in self._processes:
             process.close()
@@ -185,6 +191,7 @@ def working(
         return
     workers = Workers(processes, (make, arguments))
     try:
+        workers.begin()
         yield workers
     finally:
         workers.close()
@@ -192,13 +199,13 @@ def working(
 
 def _started(count: int) -> list[_Process]:
     """Start processes, as many as the system allows; none where Python is part of a program."""
-    if not sys.executable:
+    if not sys.executable or getattr(sys, "frozen", False):
         return []
     # not -m alone: the current folder must not come before the installed packages
     command = [sys.executable, "-P", "-m", "grasp_core.processes.worker"]
-    paths = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)
     processes = list[_Process]()
     with suppress(OSError):
+        paths = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)
         for _ in range(count):
             program = subprocess.Popen(  # noqa: S603 - our own program
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,

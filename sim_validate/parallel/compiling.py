@@ -62,7 +62,8 @@ def compiled_beside(jobs: int) -> Generator[int]:
         jobs: Largest number of processes; below two, nothing is compiled beside the block.
 
     Yields:
-        The number of processes that are left for the block.
+        The number of processes that the block may use: one while loops are compiled, as others
+        would compile the same loops.
     """
     missing = [name for name in BESIDE if jobs > 1 and not is_kept(name)]
     if not missing:
@@ -76,7 +77,7 @@ def compiled_beside(jobs: int) -> Generator[int]:
     done = set[str]()
     wait_for({name: partial(_wait, ours, name, done) for name in missing})
     try:
-        yield jobs - 1
+        yield 1
     finally:
         wait_for({})
         process.terminate()  # what it has written is whole

@@ -155,12 +155,13 @@ class EarlyEnds:
             return None
         # not by BLAS, whose last digits depend on how many trials there are
         momenta = np.einsum("ni,ij->nj", speeds, self.springs.roots)
-        if self.momenta is None:
-            self.momenta = np.full((len(self.watched), speeds.shape[1]), np.nan)
-            self.momenta[places] = momenta
-            return None
-        gained = _lengths(momenta - self.momenta[places]) / self.sample_s
+        before = self.momenta
+        # NaN where a trial was not looked at, which ends nothing
+        self.momenta = np.full((len(self.watched), speeds.shape[1]), np.nan)
         self.momenta[places] = momenta
+        if before is None:
+            return None
+        gained = _lengths(momenta - before[places]) / self.sample_s
         return self.springs.reach(_lengths(momenta), gained, _lengths(speeds[:, 6:]))
 
     def _settled(

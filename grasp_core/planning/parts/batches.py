@@ -38,7 +38,7 @@ def kept_on(
     these, grasps = set(tried), iter(found)
     for faces in batch:
         yield search.keep_each(next(grasps)) if faces in these else []
-    next(grasps, None)  # to its end, where counts are complete
+    next(grasps, None)  # runs the search to its end, where its counts are complete
 
 
 def batches(on: Standard, size: int) -> Iterator[Sequence[FaceQuadruple]]:
@@ -60,7 +60,7 @@ def without_grasp(
 
 
 def _every_quadruple(on: Standard) -> Iterator[FaceQuadruple]:
-    """All quadruples of faces, in the order of `batches`."""
+    """Yield all quadruples of faces, in the order of `batches`."""
     yield from combinations(range(len(on.faces)), FINGERS)
     for faces in on.shared.tolist():
         yield four(faces)

@@ -59,6 +59,19 @@ def test_what_a_process_leaves_behind_is_done_here(two):
     assert set(two.in_order(tasks, doing(os.getpid()))) == {"done here"}
 
 
+@pytest.mark.timeout(HANGING_S)
+def test_a_task_that_cannot_be_sent_is_done_here(two):
+    tasks = [("square", 2), ("take", lambda: None)] * 20
+    results = list(two.in_order(tasks, lambda task: "done here" if task[0] == "take" else 4))
+    assert results == [4, "done here"] * 20
+
+
+def test_a_program_that_holds_python_is_not_started_again(monkeypatch):
+    monkeypatch.setattr(workers.sys, "frozen", True, raising=False)
+    with workers.working(2, doing, os.getpid()) as found:
+        assert found is None
+
+
 def test_where_no_process_starts_there_are_no_workers(monkeypatch):
     monkeypatch.setattr(workers.sys, "executable", "/no/such/program")
     with workers.working(2, doing, os.getpid()) as found:
