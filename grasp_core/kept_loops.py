@@ -3,10 +3,9 @@
 Numba by itself keeps compiled code beside the installed module. A new environment would compile
 everything again, and a change of one kernel would not be seen by others that call it. Here the
 folder's name holds a hash of the kernel's text, of the texts it takes functions and constants from,
-of the text of `numba_cache`, and of numba's version: what is found there was compiled from these
-very texts, whatever environment compiled it. Constants that a kernel takes from a module that is no
-kernel must be literals there, as what that module itself imports is not looked at. Numba itself
-looks at the processor.
+and of numba's version: what is found there was compiled from these very texts, whatever environment
+compiled it. Constants that a kernel takes from a module that is no kernel must be literals there,
+as what that module itself imports is not looked at. Numba itself looks at the processor.
 """
 
 import hashlib
@@ -19,8 +18,6 @@ from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
-
-from grasp_core import numba_cache
 
 NUMBA_FAILS = (ImportError, RuntimeError, OSError, ValueError)
 """What numba raises when it is imported with settings that it refuses, or cannot be."""
@@ -46,7 +43,7 @@ def keep(loop: Any, function: Callable[..., Any]) -> None:
     folder = folder_for(function.__module__, function.__code__.co_filename)
     if folder is not None:
         # numba has no public way to give one function a folder of its own
-        loop._cache = numba_cache.cache_in(function, folder)
+        loop._cache = _kinds()(function, folder)
 
 
 def is_kept(module: str) -> bool:
@@ -98,9 +95,8 @@ def folders(path: Path) -> Iterable[Path]:
 
 
 def _stamp(module: str, path: Path) -> str:
-    """Hash the text of a module, those of the modules it takes from, and all that keeps it."""
+    """Hash the text of a module, those of the modules it takes from, and numba's version."""
     digest = hashlib.sha256(importlib.import_module("numba").__version__.encode())
-    digest.update(_text(numba_cache.__name__).encode())
     for name, text in sorted(_texts(module, path).items()):
         digest.update(f"\0{name}\0{text}".encode())
     return digest.hexdigest()[:DIGITS]
@@ -124,3 +120,34 @@ def _text(module: str) -> str:
     """Read a module's text; of the modules, only the folders above it are imported."""
     found = importlib.util.find_spec(module)
     return Path(str(found and found.origin)).read_text(encoding="utf-8")
+
+
+@cache
+def _kinds() -> Callable[[Callable[..., Any], Path], Any]:
+    """Make numba's cache look into a given folder, where the folder's name says what is current."""
+    caching: Any = importlib.import_module("numba.core.caching")
+
+    def cache_in(function: Callable[..., Any], folder: Path) -> Any:
+        class Here(caching._CacheLocator):
+            def get_cache_path(self) -> str:
+                return str(folder)
+
+            def get_source_stamp(self) -> str:
+                return folder.name
+
+            def get_disambiguator(self) -> str:
+                return str(function.__code__.co_firstlineno)
+
+            @classmethod
+            def from_function(cls, _function: Any, _file: str) -> Any:
+                return cls()
+
+        class Kept(caching.CompileResultCacheImpl):
+            _locator_classes = (Here,)
+
+        class KeptFunctions(caching.FunctionCache):
+            _impl_class = Kept
+
+        return KeptFunctions(function)
+
+    return cache_in

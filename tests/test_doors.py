@@ -18,8 +18,7 @@ ROOT = Path(__file__).parent.parent
 DOORS = {
     "manifold3d": "grasp_core/objects/booleans.py",
     "trimesh": "grasp_core/objects/conversion.py",
-    "numba": ("grasp_core/compiled.py", "grasp_core/kept_loops.py", "grasp_core/numba_cache.py"),
-    "llvmlite": "grasp_core/numba_cache.py",
+    "numba": ("grasp_core/compiled.py", "grasp_core/kept_loops.py"),
     "highspy": "grasp_core/solvers/lp.py",
     "clarabel": "grasp_core/solvers/conic.py",
     "qpsolvers": "grasp_core/solvers/qp.py",
@@ -74,9 +73,8 @@ NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "pydantic", "scipy.spatial", "s
 
 NOT_TO_PLAN_AGAIN = (
     *NOT_TO_PLAN, "highspy", "clarabel", "matplotlib", "PIL", "pyarrow", "jinja2",
-    "scipy.sparse", "scipy.linalg", "scipy.stats", "multiprocessing.process", "numba.np.arrayobj",
-    "numba.np.linalg", "grasp_core.regions", "grasp_core.optimizing", "sim_validate.simulation",
-    "sim_validate.reports",
+    "scipy.sparse", "scipy.stats", "grasp_core.regions",
+    "grasp_core.optimizing", "sim_validate.simulation", "sim_validate.reports",
 )  # fmt: skip
 """What planning the wedge does not need where its loops are kept already."""
 

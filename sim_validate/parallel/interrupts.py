@@ -19,7 +19,12 @@ _noted = threading.Event()
 
 @contextmanager
 def noted() -> Generator[None, None, None]:
-    """Record interrupts, besides raising them, while the context is open."""
+    """Record interrupts, besides raising them, while the context is open.
+
+    Raises:
+        KeyboardInterrupt: The context ends with an error after an interrupt. A library that
+            swallows an interrupt half-way may fail later because of that.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield  # Python handles signals in its main thread only
         return
@@ -28,6 +33,10 @@ def noted() -> Generator[None, None, None]:
     told, sys.unraisablehook = sys.unraisablehook, _but_interrupts(sys.unraisablehook)
     try:
         yield
+    except Exception as error:
+        if _noted.is_set():
+            raise KeyboardInterrupt from error
+        raise
     finally:
         sys.unraisablehook = told
         for number, handler in before.items():

@@ -50,3 +50,11 @@ def test_a_request_to_end_is_an_interrupt_and_where_it_is_swallowed_says_nothing
             interrupts.check()
     assert capsys.readouterr().err == ""
     assert (signal.getsignal(signal.SIGTERM), sys.unraisablehook) == before
+
+
+def test_an_error_after_a_swallowed_interrupt_is_that_interrupt():
+    with pytest.raises(KeyboardInterrupt), interrupts.noted():
+        swallow()
+        raise RuntimeError("what was swallowed is missing")
+    with pytest.raises(RuntimeError), interrupts.noted():
+        raise RuntimeError("nothing was swallowed")
