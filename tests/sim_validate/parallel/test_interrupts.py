@@ -52,9 +52,13 @@ def test_a_request_to_end_is_an_interrupt_and_where_it_is_swallowed_says_nothing
     assert (signal.getsignal(signal.SIGTERM), sys.unraisablehook) == before
 
 
+def fail_without_what_was_swallowed():
+    swallow()
+    raise RuntimeError("what was swallowed is missing")
+
+
 def test_an_error_after_a_swallowed_interrupt_is_that_interrupt():
     with pytest.raises(KeyboardInterrupt), interrupts.noted():
-        swallow()
-        raise RuntimeError("what was swallowed is missing")
+        fail_without_what_was_swallowed()
     with pytest.raises(RuntimeError), interrupts.noted():
         raise RuntimeError("nothing was swallowed")
