@@ -121,6 +121,8 @@ import grasp_core as gc
 from grasp_core.planning.parts import everything
 from scenes.example_objects import example_object
 
+# loops are loaded before: where numba calls Python meanwhile, an interrupt is swallowed
+gc.plan(example_object("random-11-1"), 0.3)
 everything.QUADRUPLES_PER_PROCESS = 1
 seen = []
 def told(*numbers):
