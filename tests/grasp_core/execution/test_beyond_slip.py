@@ -101,13 +101,15 @@ def test_planned_grips_lose_their_object_where_many_small_steps_do():
 
 
 def test_last_digits_of_a_load_do_not_decide_its_loss():
-    rng, changes = np.random.default_rng(7), np.random.default_rng(1)
+    rng, changes, count = np.random.default_rng(7), np.random.default_rng(1), 0
     for grip in planned_grips(limit=3, push=5.0, tip_radius_m=0.01):
         loads = directions(40, rng, 6) * np.repeat([1.0, grip.size], 3)
         found = loss_multiples(grip, loads, 1e-3, FAR)
         for size in (1e-12, 1e-9):
             changed = loads * (1.0 + size * changes.normal(size=loads.shape))
             assert loss_multiples(grip, changed, 1e-3, FAR) == pytest.approx(found, rel=0.02)
+        count += len(loads)
+    assert count >= 300
 
 
 def test_losses_are_after_the_slip_and_before_the_limit_without_slip():
