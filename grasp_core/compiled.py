@@ -59,7 +59,7 @@ def compiled(name: str) -> Any:
     """Load a kernel module.
 
     Args:
-        name: The module's full name, `grasp_core.ROOM.NAME_kernel`.
+        name: The module's full name, such as `grasp_core.ROOM.NAME_kernel`.
 
     Raises:
         InputError: Numba refuses its settings or cannot be loaded.
