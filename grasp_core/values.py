@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar, ge
 import numpy as np
 
 from grasp_core.arrays import Array, frozen, frozen_units
+from grasp_core.by_value import ByValue
 from grasp_core.checked import (
     LARGEST,
     instance,
@@ -23,6 +24,7 @@ from grasp_core.checked import (
     whole,
 )
 from grasp_core.errors import InputError
+from grasp_core.frames import poses_along
 from grasp_core.short_text import counted, summary, vector
 
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
@@ -41,7 +43,7 @@ RIGHT_ANGLE = np.pi / 2
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ForceCone:
+class ForceCone(ByValue):
     """A circular cone of force directions inside a friction cone.
 
     In the paper its axis is the contact normal and its half-angle the friction angle.
@@ -61,7 +63,7 @@ class ForceCone:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Contact:
+class Contact(ByValue):
     """A point where one fingertip touches the object, with the direction in which it can push."""
 
     position: Array
@@ -78,7 +80,7 @@ class Contact:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ContactRegion:
+class ContactRegion(ByValue):
     """A region where one finger may stand while the others stay anywhere in their own regions."""
 
     kind: RegionKind
@@ -101,7 +103,7 @@ class ContactRegion:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Witness:
+class Witness(ByValue):
     """Balanced contact forces, whose four lines show to which family a grasp belongs."""
 
     points: Array
@@ -139,7 +141,7 @@ PUT_OFF = ("critical_friction", "ferrari_canny")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Grasp:
+class Grasp(ByValue):
     """Four contacts in finger order, with a witness that shows why they hold the object.
 
     A planned grasp computes its `critical_friction` and its `ferrari_canny` when they are first
@@ -178,7 +180,7 @@ class Grasp:
     approach_directions: Array | None = None
     """Unit vector along which each finger moves in to its contact on a free line, (4, 3); None if
     no free lines were asked for (`plan(finger=...)`)."""
-    _figures: Figures | None = field(default=None, init=False)
+    _figures: Figures | None = field(default=None, init=False, compare=False)
     """Computes the figures at first use; None where they were given."""
 
     def __post_init__(self) -> None:
@@ -226,6 +228,30 @@ class Grasp:
         """Return the inward normals in finger order, (4, 3)."""
         return np.array([contact.normal for contact in self.contacts])
 
+    def contact_frames(self) -> Array:
+        """Return a pose at each contact in finger order, (4, 4, 4) [m].
+
+        The origin is the contact, z is the inward normal, and x and y lie in the face (see
+        `grasp_core.frames.plane_tangents`). Each pose maps its own coordinates to the object's.
+        """
+        return poses_along(self.positions, self.normals)
+
+    def approach_poses(self, standoff_m: float = 0.0) -> Array:
+        """Return a pose from which each finger moves in along its z axis, (4, 4, 4) [m].
+
+        The z axis is the approach direction, or the inward normal where none was planned. x and y
+        are as in `contact_frames`.
+
+        Args:
+            standoff_m: Distance of the origins before the contacts [m].
+
+        Raises:
+            InputError: The distance is not a number from 0 up.
+        """
+        number(standoff_m, "standoff_m", least=0.0, most=LARGEST)
+        ways = self.normals if self.approach_directions is None else self.approach_directions
+        return poses_along(self.positions - standoff_m * ways, ways)
+
     def __repr__(self) -> str:
         return summary(
             "Grasp", shown(self.id), self.family, faces=self.faces, radius=self.radius,
@@ -270,21 +296,6 @@ def _is_known(grasp: Grasp, name: str) -> bool:
     except AttributeError:
         return False
     return True
-
-
-def trusted(kind: type[Item], /, **fields: Any) -> Item:
-    """Make a frozen value without checking or copying its fields.
-
-    This is for thousands of values whose fields were computed and checked together.
-
-    Args:
-        kind: Class of the value.
-        fields: All fields by name; arrays have to be read-only floats of the right shape.
-    """
-    made, put = object.__new__(kind), object.__setattr__
-    for name in fields:
-        put(made, name, fields[name])
-    return made
 
 
 def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:

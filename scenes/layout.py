@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, to_digits
+from grasp_core.by_value import ByValue
 from grasp_core.checked import coefficient, number
 from grasp_core.closure.contact_arrays import unit_size
 from grasp_core.closure.force_closure import force_closure
@@ -58,7 +59,7 @@ too fast."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FingerDrive:
+class FingerDrive(ByValue):
     """How one fingertip is built and driven."""
 
     radius_m: float
@@ -73,7 +74,7 @@ class FingerDrive:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Layout:
+class Layout(ByValue):
     """Positions, masses and drives of everything in a scene, in the world frame."""
 
     name: str

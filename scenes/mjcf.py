@@ -20,6 +20,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from grasp_core.arrays import to_digits
+from grasp_core.by_value import ByValue
 from grasp_core.checked import instance, one_of, path_of, several
 from grasp_core.errors import InputError
 from grasp_core.files.whole_files import write_parts
@@ -54,7 +55,7 @@ AXES = ("normal", "tangent1", "tangent2")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class Scene(ByValue):
     """A grasp as the text of a MuJoCo model, with the settings and numbers it was made from."""
 
     xml: str

@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import SMALLEST_SIZE, Array, cross, real_array
+from grasp_core.by_value import ByValue
 from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions, unit_size
 from grasp_core.closure.decision import decide
 from grasp_core.closure.proofs import margin_ceiling, proved_margin
@@ -53,7 +54,7 @@ FAR_BELOW = -1e6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ClosureCertificate:
+class ClosureCertificate(ByValue):
     """A verdict on force closure, with the forces or the wrench that prove it."""
 
     closed: bool

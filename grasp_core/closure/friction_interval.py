@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, cross, real_array
+from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contact_arrays import FEWEST, unit_size
 from grasp_core.closure.rational_proofs import closes, separates
@@ -30,7 +31,7 @@ need slightly more than `FRICTIONLESS` on one machine and not on another."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FrictionInterval:
+class FrictionInterval(ByValue):
     """Friction up to `lower`, without force closure, and from `upper` on, with force closure.
 
     Open means not in force closure. Where wrenches are dependent except for rounding, the proof

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
+from grasp_core.by_value import ByValue
 from grasp_core.checked import one_of, positive, shown
 from grasp_core.closure.contact_arrays import check_spread, contact_arrays, contact_frictions
 from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
@@ -74,7 +75,7 @@ def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WrenchSet:
+class WrenchSet(ByValue):
     """The set of wrenches that contacts can apply with bounded normal forces.
 
     Contact forces are local here: components (normal, tangent, tangent) of each contact in turn.

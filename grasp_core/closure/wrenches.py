@@ -7,7 +7,7 @@ the finger applies to the object, in the object's frame.
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.geometry.polygons import plane_tangents
+from grasp_core.frames import plane_tangents
 
 WRENCH = 6
 """Number of components of a wrench."""

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
+from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, number, one_of
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.equilibrium import Held, at_rest, rotation, under
@@ -48,7 +49,7 @@ AT_REST = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FirstSlip:
+class FirstSlip(ByValue):
     """Where the growth of a load ends."""
 
     multiple: float

@@ -47,6 +47,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen, frozen_each
+from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, instance, several
 from grasp_core.closure.contact_arrays import FEWEST, contact_arrays, contact_frictions, stacked
 from grasp_core.closure.wrenches import WRENCH, contact_frames, cross_matrix, grasp_map
@@ -68,7 +69,7 @@ BALANCED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Grip:
+class Grip(ByValue):
     """Contacts on an object, held by fingertips on springs with a squeeze that is never replanned.
 
     Everything is along the world's axes and about the object's centre of mass.

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
+from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, number, positive
 from grasp_core.closure.wrenches import WRENCH
 from grasp_core.errors import InputError
@@ -23,7 +24,7 @@ GRAVITY_M_PER_S2 = 9.80665
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LoadSet:
+class LoadSet(ByValue):
     """Loads offset + E z with |z| <= 1, the torques about the centre of mass."""
 
     offset: Array

@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.by_value import ByValue
 from grasp_core.checked import positive
 from grasp_core.closure.wrenches import WRENCH
 from grasp_core.execution.best_squeeze import searched
@@ -58,7 +59,7 @@ FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FreeMass:
+class FreeMass(ByValue):
     """Bounds of the mass that forces chosen anew for each orientation hold."""
 
     lower: float
@@ -73,7 +74,7 @@ class FreeMass:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Payload:
+class Payload(ByValue):
     """The largest mass held in every orientation, with forces chosen beforehand and chosen anew."""
 
     fixed: BestSqueeze

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST
 from grasp_core.closure.wrenches import WRENCH
 from grasp_core.execution.grips import Grip
@@ -26,7 +27,7 @@ NONE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BestSqueeze:
+class BestSqueeze(ByValue):
     """A squeeze, the loads that it survives without replanning, and a bound on what others survive.
 
     All of this is about the linear model of small motions. The upper bound is for squeezes under

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.by_value import ByValue
 from grasp_core.closure.wrenches import grasp_map, in_frames
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet
@@ -38,7 +39,7 @@ BOUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Cuts:
+class Cuts(ByValue):
     """Angles and cases of some rows (1)."""
 
     angles: Array

@@ -31,6 +31,7 @@ from heapq import heappop, heappush
 
 import numpy as np
 
+from grasp_core.by_value import ByValue
 from grasp_core.closure.batches.certificates import certificates
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.errors import InputError, UndecidedError
@@ -57,7 +58,7 @@ SAME_CORNERS = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Absence:
+class Absence(ByValue):
     """A proof that no four contacts on four convex pieces are in force closure."""
 
     pieces: tuple[FacePiece, ...]

@@ -4,12 +4,10 @@ A polygon is a (k, 2) array of corners, counter-clockwise unless it is a hole. A
 polygon is also the set {y : E y <= b}, with the rows of E unit outward edge normals.
 """
 
-import math
-from typing import TypeAlias
-
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.frames import plane_tangents
 from grasp_core.solvers.ties import first_best
 
 MERGE_ORDERS = 16
@@ -29,8 +27,6 @@ errors. Without it, a cut through a corner leaves a second corner beside it on s
 TRIMMED = 1e-3
 """Share of a polygon's area that is given up to have fewer corners."""
 
-Row: TypeAlias = tuple[float, float, float]
-
 
 def plane_frame(normal: Array) -> Array:
     """Return two orthonormal columns spanning the plane with this normal, (3, 2).
@@ -39,20 +35,6 @@ def plane_frame(normal: Array) -> Array:
     depends on the normal only, so that all figures on one face share it.
     """
     return np.array(plane_tangents(*normal.tolist())).T
-
-
-def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:
-    """Return the columns of `plane_frame` for the normal (x, y, z)."""
-    smallest = min(abs(x), abs(y), abs(z))
-    if abs(x) == smallest:
-        u, v, w = 0.0, -z, y
-    elif abs(y) == smallest:
-        u, v, w = z, 0.0, -x
-    else:
-        u, v, w = -y, x, 0.0
-    length = math.sqrt(u * u + v * v + w * w)
-    u, v, w = u / length, v / length, w / length
-    return (u, v, w), (y * w - z * v, z * u - x * w, x * v - y * u)
 
 
 def signed_area(polygon: Array) -> float:

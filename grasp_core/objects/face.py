@@ -7,6 +7,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices, frozen_units
+from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, number, several, whole
 from grasp_core.short_text import counted, summary
 from grasp_core.values import FINGERS, RIGHT_ANGLE
@@ -16,7 +17,7 @@ FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Face:
+class Face(ByValue):
     """A planar face: one outer border, perhaps holes, and a split into convex pieces."""
 
     normal: Array

@@ -11,6 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.by_value import ByValue
 from grasp_core.fields import are_units, is_array, is_number
 from grasp_core.geometry.flat_polygons import (
     FEWEST_CORNERS,
@@ -35,7 +36,7 @@ LARGEST_INSET = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FacePiece:
+class FacePiece(ByValue):
     """One convex piece of a face: the points origin + frame @ y for all y with E y <= b."""
 
     face: int

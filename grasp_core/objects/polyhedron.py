@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices, to_digits
+from grasp_core.by_value import ByValue
 from grasp_core.checked import (
     LARGEST,
     instance,
@@ -33,7 +34,7 @@ UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Polyhedron:
+class Polyhedron(ByValue):
     """A solid bounded by planar faces, with the mass properties of uniform density 1 kg/m^3."""
 
     name: str
@@ -127,6 +128,10 @@ class Polyhedron:
     def normals(self) -> Array:
         """Return the unit normals of the faces, into the object, (faces, 3)."""
         return np.array([face.normal for face in self.faces]).reshape(-1, 3)
+
+    def __hash__(self) -> int:
+        """Return the hash of the mesh: caches ask for it very often."""
+        return hash(self.content_sha256)
 
     def __repr__(self) -> str:
         kind = "face" if self.patches is None else "patch"

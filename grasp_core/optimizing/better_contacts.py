@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.by_value import ByValue
 from grasp_core.checked import SMALLEST, coefficient, number, seed_of
 from grasp_core.errors import InputError
 from grasp_core.families.constructions import point_region, regions_of
@@ -48,7 +49,7 @@ ROUGH = 2e-2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Improvement:
+class Improvement(ByValue):
     """A grasp moved on its faces, with the proved bounds of its quality before and after."""
 
     grasp: Grasp

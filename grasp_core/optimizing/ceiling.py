@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen_each
+from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, coefficient, number, several, whole
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.closure.wrenches import WRENCH
@@ -57,7 +58,7 @@ BOUND_SLACK = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Leaf:
+class Leaf(ByValue):
     """A part of the faces that is not divided, with the direction that bounds its quality."""
 
     choice: int
@@ -69,7 +70,7 @@ class Leaf:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class QualityCeiling:
+class QualityCeiling(ByValue):
     """A proved bound `upper` on the quality of all contacts on four faces, clear of the edges."""
 
     upper: float

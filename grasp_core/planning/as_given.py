@@ -15,13 +15,14 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, frozen_copy
+from grasp_core.by_value import trusted
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.families.free import Absence
 from grasp_core.families.placements import Placement
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.objects.standard_order import FLIP, Standard
 from grasp_core.planning.certify import Certified
-from grasp_core.values import ContactRegion, FaceQuadruple, ForceCone, four, trusted
+from grasp_core.values import ContactRegion, FaceQuadruple, ForceCone, four
 
 PAIRED = ("p", "r")
 """Letters with which the ids of pencil and regulus grasps begin: their fingers (0, 1) and (2, 3)

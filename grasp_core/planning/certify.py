@@ -12,6 +12,7 @@ from typing import cast
 import numpy as np
 
 from grasp_core.arrays import Array, frozen_copy
+from grasp_core.by_value import trusted
 from grasp_core.closure.batches.certificates import closing_margins
 from grasp_core.closure.critical_friction import critical_friction, critical_frictions
 from grasp_core.closure.force_closure import force_closure
@@ -35,7 +36,6 @@ from grasp_core.values import (
     Witness,
     fill_in,
     four,
-    trusted,
 )
 
 BALANCED = 1e-6

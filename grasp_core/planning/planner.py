@@ -181,6 +181,7 @@ def _planned(body: Polyhedron, request: PlanRequest, on: Standard, searches: Sea
     known, every = outcomes(on, searches), searches.values()
     given = partial(faces_as_given, on=on)
     return Plan(
+        body=body,
         grasps=tuple(grasps),
         friction=request.friction,
         theta=request.theta,

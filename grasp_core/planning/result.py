@@ -1,14 +1,17 @@
 """Holds a plan: the grasps found on one object, what was tried, and what was ruled out."""
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from textwrap import shorten
-from typing import Literal, Protocol, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias, overload
 
+from grasp_core.by_value import ByValue
+from grasp_core.grasp_tables import Demands, data_frame, grasp_named
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.short_text import counted, summary
-from grasp_core.values import FaceQuadruple, Grasp
+from grasp_core.values import FaceQuadruple, Family, Grasp
 
 LONGEST_REASON = 160
 """Most characters of a reason in the `repr` of a plan, so that it takes two lines at most."""
@@ -125,9 +128,16 @@ class PlanCounts:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Plan:
-    """The grasps found on one object, the best first, and what was tried."""
+class Plan(ByValue):
+    """The grasps found on one object, the best first, and what was tried.
 
+    A plan is a sequence of its grasps: `len(plan)`, `for grasp in plan`, `plan[0]`, and also
+    `plan["c-0-1-2-7"]` by id. A slice and `filter` give a plan with fewer grasps, whose counts are
+    still those of the whole search. Plans are equal if everything but `seconds` is.
+    """
+
+    body: Polyhedron
+    """The object."""
     grasps: tuple[Grasp, ...]
     friction: float
     theta: float
@@ -151,8 +161,82 @@ class Plan:
     the choices of contacts that is open, where each cut counts for half."""
     unreached: Mapping[FaceQuadruple, str] = field(default_factory=dict[FaceQuadruple, str])
     """Face quadruples whose grasps the fingers cannot reach, with the reason."""
-    seconds: Mapping[str, float] = field(default_factory=dict[str, float])
+    seconds: Mapping[str, float] = field(default_factory=dict[str, float], compare=False)
     """Processor time of each method [s], from its first program to its last grasp."""
+
+    def __len__(self) -> int:
+        """Return the number of grasps."""
+        return len(self.grasps)
+
+    def __bool__(self) -> bool:
+        """Return True for any plan, also for one without grasps: its proofs are a result, too."""
+        return True
+
+    def __iter__(self) -> Iterator[Grasp]:
+        """Iterate over the grasps, the best first."""
+        return iter(self.grasps)
+
+    def __contains__(self, wanted: object) -> bool:
+        """Return whether the plan has a grasp, or a grasp with an id."""
+        if isinstance(wanted, str):
+            return any(grasp.id == wanted for grasp in self.grasps)
+        return wanted in self.grasps
+
+    @overload
+    def __getitem__(self, key: int | str) -> Grasp: ...
+
+    @overload
+    def __getitem__(self, key: slice) -> "Plan": ...
+
+    def __getitem__(self, key: int | str | slice) -> "Grasp | Plan":
+        """Return a grasp by its place or its id, or a plan with some of the grasps.
+
+        Raises:
+            KeyError: No grasp has this id.
+            IndexError: There is no grasp at this place.
+        """
+        if isinstance(key, slice):
+            return replace(self, grasps=self.grasps[key])
+        return grasp_named(self.grasps, key) if isinstance(key, str) else self.grasps[key]
+
+    def filter(
+        self,
+        where: Callable[[Grasp], bool] | None = None,
+        *,
+        family: Family | None = None,
+        min_radius_m: float | None = None,
+        min_closure_margin: float | None = None,
+        max_critical_friction: float | None = None,
+        min_ferrari_canny_n: float | None = None,
+    ) -> "Plan":
+        """Return a plan with the grasps that meet all demands, in the same order.
+
+        Args:
+            where: A function that says of a grasp whether it is kept.
+            family: The family of the grasps that are kept.
+            min_radius_m: Least radius of the discs in which fingers may stand [m].
+            min_closure_margin: Least proved margin of force closure.
+            max_critical_friction: Largest critical friction.
+            min_ferrari_canny_n: Least proved Ferrari-Canny quality [N].
+
+        Raises:
+            InputError: A demand is not a number, or there is no such family.
+        """
+        demands = Demands(
+            family, min_radius_m, min_closure_margin, max_critical_friction, min_ferrari_canny_n,
+            where,
+        )  # fmt: skip
+        return replace(self, grasps=tuple(filter(demands.are_met_by, self.grasps)))
+
+    def to_dataframe(self) -> Any:
+        """Return a `pandas.DataFrame` with a row for each grasp, indexed by id.
+
+        Columns have the names and units of `grasps.json`, see `grasp_core.grasp_tables.data_frame`.
+
+        Raises:
+            InputError: The library pandas is not installed.
+        """
+        return data_frame(self.grasps)
 
     def __repr__(self) -> str:
         """Return a summary: number of grasps, largest radius, and outcomes of all quadruples."""

@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
+from grasp_core.by_value import ByValue
 from grasp_core.checked import number
 from grasp_core.closure.wrench_sets import Norm, WrenchSet, nearest_wrench
 from grasp_core.closure.wrenches import WRENCH
@@ -58,7 +59,7 @@ KERNEL = "grasp_core.quality.ferrari_canny_kernel"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FerrariCanny:
+class FerrariCanny(ByValue):
     """Bounds of a quality, with the direction and the polytope, or forces, that prove them."""
 
     lower: float

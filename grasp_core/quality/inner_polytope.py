@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.by_value import ByValue
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.closure.wrenches import WRENCH
 from grasp_core.fields import are_units, is_array, is_indices
@@ -36,7 +37,7 @@ LARGEST_KEY = 2**62
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class InnerPolytope:
+class InnerPolytope(ByValue):
     """A polytope inside a wrench set whose planes bound the quality from below."""
 
     forces: Array

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
+from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, positive
 from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions
 from grasp_core.closure.wrench_sets import WrenchSet
@@ -40,7 +41,7 @@ LAST_DIGITS = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WrenchLimit:
+class WrenchLimit(ByValue):
     """The largest multiple of an external wrench that contacts resist, proved from both sides."""
 
     wrench: Array

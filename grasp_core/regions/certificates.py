@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from grasp_core.arrays import Array, frozen
+from grasp_core.by_value import ByValue
 from grasp_core.checked import SMALLEST, instance, number, positive, several
 from grasp_core.closure.contact_arrays import contact_frictions
 from grasp_core.closure.force_closure import ClosureCertificate
@@ -30,7 +31,7 @@ to `scale`: files that keep ten digits stay within it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CertifiedRegions:
+class CertifiedRegions(ByValue):
     """Regions in which each finger may stand while the others stand anywhere in theirs."""
 
     regions: tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]

@@ -48,6 +48,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices
+from grasp_core.by_value import ByValue
 from grasp_core.errors import InputError
 from grasp_core.fields import are_frictions, are_units, is_a, is_array
 
@@ -64,7 +65,7 @@ between its inverse and it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TwistCover:
+class TwistCover(ByValue):
     """Cones that fill the space of twists, each with contact forces that resist all its twists.
 
     The rays of a cone are whole numbers in the coordinates of `axes`, so that dividing cones is

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.by_value import ByValue
 from grasp_core.checked import instance, path_of
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
@@ -101,7 +102,7 @@ def held_physics(layout: HeldLayout) -> PhysicsSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HeldScene:
+class HeldScene(ByValue):
     """A held object as the text of a MuJoCo model, with the numbers it was made from."""
 
     xml: str

@@ -45,12 +45,13 @@ SPARE = 0.05
 """How much farther a curved surface is there than fingertips come, in object radii."""
 
 
-def execute(
+def execute(  # noqa: PLR0913 - `mass_kg` is the one setting that has no default
     body: Polyhedron,
     grasp: Grasp | Iterable[Contact],
     friction: ArrayLike,
-    settings: ExecutionSettings,
+    settings: ExecutionSettings | None = None,
     *,
+    mass_kg: float | None = None,
     threads: int = 1,
     physics: PhysicsSettings | None = None,
 ) -> Execution:
@@ -60,7 +61,8 @@ def execute(
         body: The object.
         grasp: A grasp, or contacts, at least two.
         friction: Coulomb coefficient, one for all contacts or one each.
-        settings: Mass, springs, trials and thresholds.
+        settings: Mass, springs, trials and thresholds; None for the usual ones with `mass_kg`.
+        mass_kg: Mass of the object, in place of that of the settings [kg].
         threads: Number of the simulator's threads; results do not depend on it.
         physics: Settings of the simulator; None for those that suit springs and masses. Gravity
             must be that of the settings.
@@ -70,7 +72,7 @@ def execute(
         NoForcesError: No squeeze carries the weight, or the grip is unstable under the best one.
         UnfaithfulError: The simulator fails on a case with a known answer, or failed in a trial.
     """
-    instance(settings, ExecutionSettings, "settings")
+    settings = _settings(settings, mass_kg)
     whole(threads, "threads", least=1, most=MOST_THREADS)
     best = chosen_squeeze(body, grasp, friction, settings)
     scene = held_scene(body, best.grip, settings, physics)
@@ -97,6 +99,15 @@ def execute(
         skipped=skipped,
         physics=scene.physics,
     )
+
+
+def _settings(settings: ExecutionSettings | None, mass_kg: float | None) -> ExecutionSettings:
+    if settings is not None:
+        instance(settings, ExecutionSettings, "settings")
+        return settings if mass_kg is None else replace(settings, mass_kg=mass_kg)
+    if mass_kg is None:
+        raise InputError("execute: expected mass_kg or settings, got neither; give mass_kg=0.3")
+    return ExecutionSettings(mass_kg=mass_kg)
 
 
 def chosen_squeeze(

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from grasp_core.by_value import ByValue
 from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import NoForcesError
 from grasp_core.objects.polyhedron import Polyhedron
@@ -28,7 +29,7 @@ class ExecutionJob:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ExecutedGrasp:
+class ExecutedGrasp(ByValue):
     """A grasp with what its execution found, or with the reason why no squeeze holds the object."""
 
     id: str

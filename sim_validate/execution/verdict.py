@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from grasp_core.arrays import Array
+from grasp_core.by_value import ByValue
 from scenes.physics import PhysicsSettings
 from sim_validate.execution.settings import TrialKind
 from sim_validate.execution.trials import Skipped
@@ -62,7 +63,7 @@ class ExecutionControl:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Execution:
+class Execution(ByValue):
     """The trials of one grasp, executed with one squeeze that was never replanned."""
 
     mass_kg: float

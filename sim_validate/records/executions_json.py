@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from grasp_core.arrays import frozen
+from grasp_core.by_value import ByValue
 from grasp_core.checked import path_of
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of, settings_of
@@ -40,7 +41,7 @@ Settings = TypeVar("Settings", ExecutionSettings, PhysicsSettings)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Executions:
+class Executions(ByValue):
     """The executions of an object's grasps, as a file holds them."""
 
     object_sha256: str

@@ -10,6 +10,7 @@ from enum import StrEnum
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.by_value import ByValue
 from grasp_core.objects.on_faces import within
 from scenes.layout import Layout
 from sim_validate.simulation.protocol import HoldProtocol
@@ -34,7 +35,7 @@ it is held."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HoldVerdict:
+class HoldVerdict(ByValue):
     """The outcome of a trial, with the figures that led to it."""
 
     outcome: Outcome

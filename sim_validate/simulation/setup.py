@@ -10,6 +10,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 
 from grasp_core.arrays import Array, frozen, to_digits
+from grasp_core.by_value import ByValue
 from grasp_core.checked import (
     LARGEST,
     MOST_RANDOM_WRENCHES,
@@ -110,7 +111,7 @@ def _check_model(physics: PhysicsSettings) -> None:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NamedWrench:
+class NamedWrench(ByValue):
     """An external wrench with a name that the user gives it."""
 
     name: str

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
+from grasp_core.by_value import ByValue
 from grasp_core.forces.contact_forces import closest_forces, least_friction_forces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_limits import axis_wrenches
@@ -43,7 +44,7 @@ class ControlLoad:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ControlTrial:
+class ControlTrial(ByValue):
     """One simulated trial of a negative control under one load."""
 
     name: str
@@ -57,7 +58,7 @@ class ControlTrial:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ControlVerdict:
+class ControlVerdict(ByValue):
     """How a negative control, a contact set proved not to be force-closed, ended in simulation."""
 
     control: Control

@@ -14,6 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, cross
+from grasp_core.by_value import ByValue
 from grasp_core.closure.contact_arrays import stacked, unit_size
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
@@ -38,7 +39,7 @@ TOWARD_CORNER = 0.95
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Control:
+class Control(ByValue):
     """A negative control: contacts that must not hold, with the proof that they cannot."""
 
     name: str

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from grasp_core.by_value import ByValue
 from grasp_core.values import Contact
 from scenes.mjcf import Scene
 from sim_validate.simulation.critical_friction import CriticalFriction
@@ -16,7 +17,7 @@ from sim_validate.validation.wrench_verdict import AGREEMENT, WrenchVerdict
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Verdict:
+class Verdict(ByValue):
     """The result of simulating a grasp: what it held, and whether that fits the analysis."""
 
     id: str

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from grasp_core.arrays import Array
+from grasp_core.by_value import ByValue
 from sim_validate.simulation.hold_verdict import LET_GO, HoldVerdict, Outcome
 from sim_validate.simulation.traces import Trace
 from sim_validate.simulation.wrench_limits import SimulatedLimit
@@ -13,7 +14,7 @@ measured."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WrenchVerdict:
+class WrenchVerdict(ByValue):
     """One wrench on a grasp, predicted and simulated."""
 
     name: str

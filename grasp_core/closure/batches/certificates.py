@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import UNIT_SLACK, Array, cross
+from grasp_core.by_value import trusted
 from grasp_core.closure.batches.margins import margin_ceilings, proved_margins
 from grasp_core.closure.contact_arrays import unit_size
 from grasp_core.closure.decision import DECIDED, FAR, PRECISE
 from grasp_core.closure.force_closure import CAUTION, FAR_BELOW, SUMMED, ClosureCertificate
 from grasp_core.closure.margin_program import deepest_forces
 from grasp_core.closure.proofs import proves_closure, refutes_closure, without_giants
-from grasp_core.values import trusted
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,6 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.by_value import trusted
 from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
 from grasp_core.families.batches.placed import LEFT, PLACED, Footprints, Placed, room_for
@@ -28,7 +29,6 @@ from grasp_core.values import (
     ForceCone,
     RegionKind,
     four,
-    trusted,
 )
 
 ROOM = "grasp_core.families.batches"

@@ -1,0 +1,90 @@
+"""Gives frozen values an equality by their fields, and makes trusted ones without checks.
+
+Two values are equal if they are of one class and all their fields are equal: arrays of the same
+shape entry by entry, tuples and mappings item by item, numbers exactly. Two NaN count as equal, so
+that a copy equals its original. Fields that are declared with `compare=False` do not count.
+"""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+HASHED = (str, int, bool)
+"""Classes of the fields that a hash is made from."""
+Item = TypeVar("Item")
+
+
+class ByValue:
+    """Base of frozen dataclasses that are compared by their fields, also where these are arrays."""
+
+    __slots__ = ()
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether another value is of the same class and has the same fields."""
+        if self is other:
+            return True
+        if type(self) is not type(other):
+            return NotImplemented
+        compared = (field.name for field in fields(cast("Any", self)) if field.compare)
+        return all(_same(getattr(self, name), getattr(other, name)) for name in compared)
+
+    def __hash__(self) -> int:
+        """Return a hash of the texts, whole numbers and shapes of arrays among the fields."""
+        named = (field for field in fields(cast("Any", self)) if field.compare)
+        kinds = (_hashed(self, field.name) for field in named)
+        return hash((type(self).__name__, *kinds))
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Return whether two fields are equal."""
+    if one is other:
+        return True
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return _same_arrays(one, other)
+    if isinstance(one, tuple | list) and isinstance(other, tuple | list):
+        ours, theirs = cast("tuple[Any, ...]", one), cast("tuple[Any, ...]", other)
+        return len(ours) == len(theirs) and all(map(_same, ours, theirs))
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        mine, its = cast("Mapping[Any, Any]", one), cast("Mapping[Any, Any]", other)
+        return mine.keys() == its.keys() and all(_same(mine[key], its[key]) for key in mine)
+    return bool(one == other) or (_is_nan(one) and _is_nan(other))
+
+
+def _same_arrays(one: Any, other: Any) -> bool:
+    if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
+        return False
+    ours, theirs = cast("NDArray[Any]", one), cast("NDArray[Any]", other)
+    return np.array_equal(ours, theirs, equal_nan="f" in ours.dtype.kind + theirs.dtype.kind)
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and value != value  # noqa: PLR0124 - only NaN differs from itself
+
+
+def _hashed(value: object, name: str) -> object:
+    """Return what a hash takes of a field: nothing where it would have to be computed."""
+    try:
+        kept = object.__getattribute__(value, name)
+    except AttributeError:
+        return None
+    if isinstance(kept, np.ndarray):
+        return cast("NDArray[Any]", kept).shape
+    return kept if isinstance(kept, HASHED) else None
+
+
+def trusted(kind: type[Item], /, **given: Any) -> Item:
+    """Make a frozen value without checking or copying its fields.
+
+    This is for thousands of values whose fields were computed and checked together.
+
+    Args:
+        kind: Class of the value.
+        given: All fields by name; arrays have to be read-only floats of the right shape.
+    """
+    made, put = object.__new__(kind), object.__setattr__
+    for name in given:
+        put(made, name, given[name])
+    return made

@@ -1,0 +1,44 @@
+"""Completes a direction to a right-handed frame, always in the same way, and a point to a pose."""
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Array
+
+Row: TypeAlias = tuple[float, float, float]
+POSE = 4
+"""Rows and columns of a homogeneous transform."""
+
+
+def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:
+    """Return two unit vectors that are orthogonal to each other and to the unit vector (x, y, z).
+
+    The first is orthogonal also to the axis of the smallest component, the first such axis. With
+    (x, y, z) in front, or behind, the three are right-handed.
+    """
+    smallest = min(abs(x), abs(y), abs(z))
+    if abs(x) == smallest:
+        u, v, w = 0.0, -z, y
+    elif abs(y) == smallest:
+        u, v, w = z, 0.0, -x
+    else:
+        u, v, w = -y, x, 0.0
+    length = math.sqrt(u * u + v * v + w * w)
+    u, v, w = u / length, v / length, w / length
+    return (u, v, w), (y * w - z * v, z * u - x * w, x * v - y * u)
+
+
+def poses_along(origins: Array, directions: Array) -> Array:
+    """Return poses whose z axes run along given directions, (k, 4, 4).
+
+    Args:
+        origins: Origins of the frames, (k, 3) [m].
+        directions: Unit vectors, (k, 3).
+    """
+    poses = np.tile(np.eye(POSE), (len(origins), 1, 1))
+    for pose, (x, y, z) in zip(poses, directions.tolist(), strict=True):
+        pose[:3, :3] = np.array([*plane_tangents(x, y, z), (x, y, z)]).T
+    poses[:, :3, 3] = origins
+    return poses
