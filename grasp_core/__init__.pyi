@@ -30,11 +30,10 @@ from grasp_core.execution.payload import payload as payload
 from grasp_core.execution.squeeze_certificate import BestSqueeze as BestSqueeze
 from grasp_core.forces.contact_forces import contact_forces as contact_forces
 from grasp_core.mesh_files.limits import MeshLimits as MeshLimits
-from grasp_core.objects.conversion import from_trimesh as from_trimesh
-from grasp_core.objects.conversion import to_trimesh as to_trimesh
 from grasp_core.objects.face import Face as Face
 from grasp_core.objects.face import PatchLimits as PatchLimits
 from grasp_core.objects.polyhedron import Polyhedron as Polyhedron
+from grasp_core.objects.polyhedron import from_trimesh as from_trimesh
 from grasp_core.objects.polyhedron import load_polyhedron as load_polyhedron
 from grasp_core.optimizing.better_contacts import Improvement as Improvement
 from grasp_core.optimizing.better_contacts import optimize_contacts as optimize_contacts
@@ -53,6 +52,8 @@ from grasp_core.quality.metrics import smallest_singular_value as smallest_singu
 from grasp_core.quality.wrench_limits import WrenchLimit as WrenchLimit
 from grasp_core.quality.wrench_limits import max_resisted_wrench as max_resisted_wrench
 from grasp_core.quality.wrench_limits import wrench_limits as wrench_limits
+from grasp_core.records.grasps_files import load_grasps as load_grasps
+from grasp_core.records.grasps_files import save_grasps as save_grasps
 from grasp_core.regions.certificates import CertifiedRegions as CertifiedRegions
 from grasp_core.regions.certify_regions import certify_regions as certify_regions
 from grasp_core.values import Contact as Contact

@@ -5,8 +5,11 @@ from sim_validate.execution.settings import ExecutionSettings as ExecutionSettin
 from sim_validate.execution.verdict import Execution as Execution
 from sim_validate.execution.verdict import ExecutionTrial as ExecutionTrial
 from sim_validate.records.executions_json import Executions as Executions
-from sim_validate.records.executions_json import read_executions as read_executions
-from sim_validate.records.regions import read_regions as read_regions
+from sim_validate.records.executions_json import load_executions as load_executions
+from sim_validate.records.regions import load_regions as load_regions
+from sim_validate.records.saved_verdicts import SavedVerdict as SavedVerdict
+from sim_validate.records.saved_verdicts import SavedVerdicts as SavedVerdicts
+from sim_validate.records.saved_verdicts import load_verdicts as load_verdicts
 from sim_validate.reports.margin_charts import margin_figure as margin_figure
 from sim_validate.reports.report import write_report as write_report
 from sim_validate.reports.wrench_charts import wrench_figure as wrench_figure

@@ -4,7 +4,7 @@ import hashlib
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +26,7 @@ from grasp_core.errors import InputError, MeshError
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.objects.build import DEFAULT_FLATNESS, DEFAULT_LIMITS, build, check_choices
+from grasp_core.objects.conversion import mesh_of, triangles_of
 from grasp_core.objects.face import Face, FaceKind, PatchLimits
 from grasp_core.objects.planar_faces import FlatnessLimits
 from grasp_core.short_text import counted, summary
@@ -107,6 +108,10 @@ class Polyhedron(ByValue):
             center_of_mass=center_of_mass, kind=cls,
         )  # fmt: skip
 
+    def to_trimesh(self) -> Any:
+        """Return the surface as a `trimesh.Trimesh` with the same vertices and triangles [m]."""
+        return mesh_of(self.vertices, self.triangles, self.name)
+
     @property
     def radius(self) -> float:
         """Return the largest distance of a vertex from the centre of mass [m]."""
@@ -144,6 +149,25 @@ class Polyhedron(ByValue):
 def _radius(body: Polyhedron) -> float:
     """Measure a radius once: it is the unit of most lengths, and asked for very often."""
     return float(np.linalg.norm(body.vertices - body.center_of_mass, axis=1).max())
+
+
+def from_trimesh(
+    mesh: Any, *, name: str = "object", faces: FaceKind = "auto", patches: PatchLimits | None = None
+) -> Polyhedron:
+    """Build a polyhedron from a `trimesh.Trimesh`, with the same checks as for a mesh file.
+
+    Args:
+        mesh: Any value with `vertices`, (n, 3) [m], and triangles `faces`, (t, 3).
+        name: What to call the object.
+        faces: See `load_polyhedron`.
+        patches: See `load_polyhedron`.
+
+    Raises:
+        InputError: The value is not a mesh, or an option is refused.
+        MeshError: The mesh is not a solid; its `reason` says why.
+    """
+    vertices, triangles = triangles_of(mesh)
+    return Polyhedron.from_mesh(vertices, triangles, name=name, faces=faces, patches=patches)
 
 
 AnyPolyhedron = TypeVar("AnyPolyhedron", bound=Polyhedron)

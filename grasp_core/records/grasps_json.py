@@ -19,12 +19,12 @@ from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.planning.certify import check_witness, find_critical_frictions
 from grasp_core.planning.reach import Finger
-from grasp_core.planning.result import Plan
+from grasp_core.planning.result import MethodCounts, Outcomes, Plan, PlanCounts
 from grasp_core.provenance import versions
 from grasp_core.values import Contact, ContactRegion, ForceCone, Grasp, Witness, four
 
 if TYPE_CHECKING:
-    from grasp_core.records.grasps_schema import GraspRecord
+    from grasp_core.records.grasps_schema import GraspRecord, GraspsRecord
 
 SCHEMA = 1
 SAME_DIRECTION = 1e-6
@@ -149,10 +149,51 @@ def grasps_from_json(text: str) -> SavedGrasps:
         InputError: The text is not a `grasps.json`; the message names the field.
         MeshError: The mesh in it is not a solid.
     """
+    record = _record_of(text)
+    body = _body_of(record)
+    return SavedGrasps(
+        body, record.friction, record.seed, _grasps_of(body, record), _finger_of(record)
+    )
+
+
+def plan_from_json(text: str) -> Plan:
+    """Read the text of a `grasps.json` as the plan that was written.
+
+    A file keeps neither proofs of absence nor times, and keeps angles in degrees: these may differ
+    from the plan's in the last digit.
+
+    Raises:
+        InputError: The text is not a `grasps.json`; the message names the field.
+        MeshError: The mesh in it is not a solid.
+    """
+    record = _record_of(text)
+    body, counts = _body_of(record), record.counts
+    return Plan(
+        body=body,
+        grasps=_grasps_of(body, record),
+        friction=record.friction,
+        theta=math.radians(record.theta_deg),
+        seed=record.seed,
+        counts=PlanCounts(
+            counts.faces,
+            counts.quadruples,
+            counts.spanning,
+            {name: MethodCounts(**each.model_dump()) for name, each in counts.families.items()},
+        ),
+        outcomes=Outcomes(**record.outcomes.model_dump()),
+        absence=record.absence,
+        finger=_finger_of(record),
+    )
+
+
+def _record_of(text: str) -> "GraspsRecord":
     from grasp_core.files.complaints import record_of
     from grasp_core.records.grasps_schema import GraspsRecord
 
-    record = record_of(GraspsRecord, text, "grasps.json", schema=SCHEMA)
+    return record_of(GraspsRecord, text, "grasps.json", schema=SCHEMA)
+
+
+def _body_of(record: "GraspsRecord") -> Polyhedron:
     mesh, patches = record.object.mesh, record.object.patches
     body = polyhedron_from_mesh(
         mesh.vertices_m,
@@ -168,13 +209,20 @@ def grasps_from_json(text: str) -> SavedGrasps:
         raise InputError(
             "object.content_sha256: the hash does not fit the mesh in the file; plan again"
         )
+    return body
+
+
+def _finger_of(record: "GraspsRecord") -> Finger | None:
+    return None if record.finger is None else Finger(**record.finger.model_dump())
+
+
+def _grasps_of(body: Polyhedron, record: "GraspsRecord") -> tuple[Grasp, ...]:
     grasps = tuple(
         _named_grasp(body, grasp, record.friction, i) for i, grasp in enumerate(record.grasps)
     )
     if len({grasp.id for grasp in grasps}) < len(grasps):
         raise InputError("grasps: two grasps have the same id; ids must differ")
-    finger = None if record.finger is None else Finger(**record.finger.model_dump())
-    return SavedGrasps(body, record.friction, record.seed, grasps, finger)
+    return grasps
 
 
 def _named_grasp(body: Polyhedron, record: "GraspRecord", friction: float, number: int) -> Grasp:

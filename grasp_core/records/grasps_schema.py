@@ -1,11 +1,11 @@
 """Lists the fields of a `grasps.json`, with their units, types and bounds."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from grasp_core.checked import LARGEST_FRICTION, MOST_SEED, SMALLEST
-from grasp_core.values import Family, RegionKind
+from grasp_core.values import Family, Method, RegionKind
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Triple = tuple[Finite, Finite, Finite]
@@ -112,6 +112,41 @@ class FingerRecord(_Record):
     approach_m: Annotated[Finite, Field(gt=0.0)]
 
 
+Count = Annotated[int, Field(ge=0)]
+
+
+class MethodCountsRecord(_Record):
+    """How the candidates of one planning method ended; see `MethodCounts`."""
+
+    tried: Count
+    pruned: Count
+    solved: Count
+    infeasible: Count
+    undecided: Count
+    duplicates: Count
+    found: Count
+    unreachable: Count
+    rejected: Count
+
+
+class CountsRecord(_Record):
+    """What the planner tried; see `PlanCounts`."""
+
+    faces: Count
+    quadruples: Count
+    spanning: Count | None
+    families: dict[Method, MethodCountsRecord]
+
+
+class OutcomesRecord(_Record):
+    """How many sets of four faces hold a grasp, hold none, are open or out of reach."""
+
+    held: Count
+    absent: Count
+    open: Count
+    out_of_reach: Count
+
+
 class GraspsRecord(_Record):
     """The contents of a whole `grasps.json`."""
 
@@ -123,8 +158,8 @@ class GraspsRecord(_Record):
     finger: FingerRecord | None = None
     """The finger whose free approach lines were planned; None if none were planned."""
     versions: dict[str, str]
-    counts: dict[str, Any]
-    outcomes: dict[str, int] = Field(default_factory=dict)
+    counts: CountsRecord
+    outcomes: OutcomesRecord
     absence: str | None
     optimization: list[MovedRecord] = []
     grasps: list[GraspRecord]

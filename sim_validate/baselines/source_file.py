@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grasp_core.errors import InputError, MeshError
+from grasp_core.files.text_files import read_bytes
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.records.grasps_json import RECORDED, SavedGrasps
-from sim_validate.files.reading import read_bytes
 
 
 class ChangedPartError(InputError):

@@ -8,12 +8,12 @@ import numpy as np
 from grasp_core.arrays import Array, to_digits
 from grasp_core.closure.friction_interval import FrictionInterval
 from grasp_core.errors import InputError
+from grasp_core.files.text_files import read_text
 from grasp_core.records.contacts_json import ContactSet, Overrides, contact_sets_from_json
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.contact_analysis import Analysis, Bounds, Outcome, Question, analyze, check_edges
-from sim_validate.files.reading import read_text
 from sim_validate.parallel.processes import each
 from sim_validate.records.analysis_json import analyses_to_document, summary
 

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
+from grasp_core.files.text_files import write_text
 from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import Checked, check
 from sim_validate.baselines.compare import Finding, Status, failing
@@ -16,7 +17,6 @@ from sim_validate.cli import baseline_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.trials import noise_of
-from sim_validate.files.reading import write_text
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.setup_toml import setup_from_file
 from sim_validate.records.wrenches import wrenches_from_file

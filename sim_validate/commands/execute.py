@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli import execution_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
@@ -19,7 +20,6 @@ from sim_validate.execution.verdict import (
     losses_in_words,
 )
 from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.reading import write_text
 from sim_validate.files.stale_results import remove_executions
 from sim_validate.records.executions_json import (
     EXECUTIONS,

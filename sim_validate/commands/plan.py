@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.planning.request import RankBy, methods_for
@@ -25,7 +26,6 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.objects import asked_finger, object_to_plan
 from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.reading import write_text
 from sim_validate.files.stale_results import remove_results
 from sim_validate.parallel.compiling import compiled_beside
 

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
+from grasp_core.files.text_files import write_text
 from scenes.drawing.clips import RATE, GraphicsError, magnified, write_clip
 from scenes.mjcf import write_scene
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.files.reading import write_text
 from sim_validate.records.verdicts_json import finite
 from sim_validate.replaying.recorded import Recorded, Wanted
 from sim_validate.replaying.replay import Replayed, replayed

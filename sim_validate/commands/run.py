@@ -6,6 +6,7 @@ from pathlib import Path
 
 from grasp_core.errors import GraspError
 from grasp_core.files.json_text import text_of
+from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.records.grasps_json import SavedGrasps, plan_to_json
 from sim_validate.cli import command_flags
@@ -20,7 +21,6 @@ from sim_validate.commands.plan import plan_object, say_counts, show_gains, with
 from sim_validate.commands.report import shown_report
 from sim_validate.commands.validate import simulate_grasps
 from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.reading import write_text
 from sim_validate.files.stale_results import REPORT, remove_results, require_report_folder
 from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.setup import Agenda, Setup

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from grasp_core.errors import InputError, NoForcesError
+from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
 from scenes.mjcf import build_scene
@@ -16,7 +17,6 @@ from sim_validate.commands.asked.executions import check_mass, holding
 from sim_validate.commands.asked.trials import finger_settings
 from sim_validate.execution.execute import chosen_squeeze, held_scene
 from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.reading import write_text
 from sim_validate.records.grasps import grasp_with_id, read_grasps
 from sim_validate.simulation.setup import with_planned_radius
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
 from sim_validate.cli import command_flags
@@ -13,8 +14,8 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
 from sim_validate.commands.asked.trials import prepared
 from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.reading import write_arrays, write_text
 from sim_validate.files.stale_results import remove_verdicts
+from sim_validate.files.writing import write_arrays
 from sim_validate.records.verdicts_json import summary, trace_arrays, verdicts_to_json
 from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.hold_verdict import Outcome

@@ -10,6 +10,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
+from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, has_display, write_clip
@@ -20,7 +21,6 @@ from scenes.mjcf import Scene, build_scene
 from sim_validate.cli import showing_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.files.reading import write_text
 from sim_validate.records.grasps import grasp_with_id, read_grasps
 from sim_validate.reports.run_folder import GRASPS
 from sim_validate.reports.turntable import turntable_page

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
 from grasp_core.files.strict_json import value_of
+from grasp_core.files.text_files import read_bytes, text_of
 from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
 from grasp_core.values import FINGERS
 from sim_validate.files.npz import arrays_of
-from sim_validate.files.reading import read_bytes, text_of
 
 POINTS, NORMALS, NAMES = "contact_points_m", "contact_normals", "grasp_id"
 """Names of the arrays of an npz file: points (n, 4, 3) [m], normals (n, 4, 3), optionally names

@@ -17,9 +17,9 @@ from pydantic.dataclasses import dataclass
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import complaint
 from grasp_core.files.strict_json import object_of, place
+from grasp_core.files.text_files import read_text, write_text
 from sim_validate.datasets.columns import Name, Tables, dataset_tables
 from sim_validate.files.paths import require_inside
-from sim_validate.files.reading import read_text, write_text
 
 SCHEMA = 1
 MANIFEST = "manifest.json"

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict
 
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
-from sim_validate.files.reading import read_text
+from grasp_core.files.text_files import read_text
 
 
 class LeftOut(BaseModel):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
 from grasp_core.files.strict_json import shown
-from sim_validate.files.reading import read_bytes
+from grasp_core.files.text_files import read_bytes
 
 MOST_BYTES = 256 * 2**20
 """Largest total size of the arrays in a file."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from grasp_core.errors import InputError
 from grasp_core.files.strict_json import DEEPEST, check_values
-from sim_validate.files.reading import read_text
+from grasp_core.files.text_files import read_text
 
 MOST_LETTERS = 2**20
 """Largest number of characters of a settings file, which is usually short."""

@@ -16,6 +16,7 @@ from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of, settings_of
 from grasp_core.files.json_text import text_of
 from grasp_core.files.strict_json import place
+from grasp_core.files.text_files import read_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from scenes.physics import PhysicsSettings
@@ -23,7 +24,6 @@ from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import Skipped
 from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
-from sim_validate.files.reading import read_text
 from sim_validate.records.executions_schema import (
     SCHEMA,
     ExecutionRecord,
@@ -149,7 +149,7 @@ def _trial_record(trial: ExecutionTrial) -> ExecutionTrialRecord:
     }
 
 
-def read_executions(path: str | Path) -> Executions:
+def load_executions(path: str | Path) -> Executions:
     """Read executions, as `graspproof execute` and `graspproof run --execute` write them.
 
     Args:

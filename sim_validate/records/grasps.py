@@ -4,9 +4,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from grasp_core.errors import InputError
+from grasp_core.files.text_files import read_text
 from grasp_core.records.grasps_json import SavedGrasps, grasps_from_json
 from grasp_core.values import Grasp
-from sim_validate.files.reading import read_text
 
 NAMED = 5
 """Largest number of names that a message lists."""

@@ -13,6 +13,7 @@ from grasp_core.checked import path_of
 from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import InputError, SolverError
 from grasp_core.files.json_text import text_of
+from grasp_core.files.text_files import write_text
 from grasp_core.geometry.flat_polygons import FEWEST_CORNERS
 from grasp_core.objects.face_pieces import inscribed_disc_radius_of
 from grasp_core.objects.polyhedron import Polyhedron
@@ -21,7 +22,7 @@ from grasp_core.regions.certificates import CertifiedRegions
 from grasp_core.regions.proof import TwistCover
 from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.files.npz import read_arrays
-from sim_validate.files.reading import write_arrays, write_text
+from sim_validate.files.writing import write_arrays
 from sim_validate.parallel.certifying import Asked, Found
 
 if TYPE_CHECKING:  # planning needs no schema
@@ -159,7 +160,7 @@ def proof_arrays(
     }
 
 
-def read_regions(path: str | Path) -> CertifiedRegions:
+def load_regions(path: str | Path) -> CertifiedRegions:
     """Read regions and their proof, as `graspproof regions` writes them; nothing is verified yet.
 
     Raises:

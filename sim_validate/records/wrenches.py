@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
 from grasp_core.files.strict_json import place, shown
-from sim_validate.files.reading import read_text
+from grasp_core.files.text_files import read_text
 from sim_validate.simulation.setup import NamedWrench
 
 MOST_WRENCHES = 10_000

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 from grasp_core.checked import function, path_of, switch, whole
+from grasp_core.files.text_files import write_text
 from scenes.drawing.canvas import write_figure
-from sim_validate.files.reading import write_text
 from sim_validate.files.stale_results import (
     FIDELITY,
     GRASPS,

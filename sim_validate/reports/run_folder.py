@@ -7,10 +7,10 @@ from pathlib import Path
 from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
+from grasp_core.files.text_files import read_text
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.execution.jobs import ExecutedGrasp
-from sim_validate.files.reading import read_text
-from sim_validate.records.executions_json import EXECUTIONS, Executions, read_executions
+from sim_validate.records.executions_json import EXECUTIONS, Executions, load_executions
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.regions import REGIONS
 from sim_validate.records.regions import SCHEMA as REGIONS_SCHEMA
@@ -161,7 +161,7 @@ def _executions(path: Path, saved: SavedGrasps) -> Executions | None:
     """Read executions of the grasps; return None if the file does not exist."""
     if not path.is_file():
         return None
-    found = read_executions(path)
+    found = load_executions(path)
     _check_object(path, found.object_sha256, saved)
     _check_contacts(path, [(each.id, each.contacts_sha256) for each in found.grasps], saved)
     return found

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from grasp_core.files.text_files import write_text
 from sim_validate.baselines.explain import number
-from sim_validate.files.reading import write_text
 from sim_validate.reports.pages import asset, page
 
 Line: TypeAlias = Mapping[str, Any]

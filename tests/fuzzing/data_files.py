@@ -10,6 +10,7 @@ from pydantic_core import to_jsonable_python
 
 import grasp_core as gc
 from grasp_core.files.complaints import record_of
+from grasp_core.files.text_files import text_of
 from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
 from grasp_core.records.grasps_json import SavedGrasps, grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
@@ -22,7 +23,6 @@ from sim_validate.datasets.config import DatasetConfig, config_from_settings, co
 from sim_validate.datasets.given_contacts import given_from_json
 from sim_validate.datasets.manifest import Listed, Manifest, manifest_from_json, manifest_to_json
 from sim_validate.datasets.quarantine import left_out_from
-from sim_validate.files.reading import text_of
 from sim_validate.files.toml_tables import tables_of_toml
 from sim_validate.records.executions_json import executions_from_json, executions_to_json
 from sim_validate.records.regions_schema import RegionsFile

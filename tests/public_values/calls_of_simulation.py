@@ -81,10 +81,10 @@ CALLS = [
     Call("sv.load_dataset", lambda: {"folder": "no/such/folder"}, {
         "folder": PATH | {"nowhere": "no/such/folder"}, "split": optional(WORD),
     }, succeeds_in="tests/sim_validate/datasets/test_loading.py"),
-    Call("sv.read_regions", lambda: {"path": "no/such/file.npz"}, {
+    Call("sv.load_regions", lambda: {"path": "no/such/file.npz"}, {
         "path": PATH | {"nowhere": "no/such/file.npz"},
     }, succeeds_in="tests/sim_validate/commands/test_regions.py"),
-    Call("sv.read_executions", lambda: {"path": "no/such/executions.json"}, {
+    Call("sv.load_executions", lambda: {"path": "no/such/executions.json"}, {
         "path": PATH | {"nowhere": "no/such/executions.json"},
     }, succeeds_in="tests/sim_validate/records/test_executions_json.py"),
     Call("sv.margin_figure", of_grasp(friction=0.5), BODY_AND_GRASP | {

@@ -60,10 +60,9 @@ CALLS = [
         "patches": optional(VALUE),
         "center_of_mass": unless(array(CENTER), "none") | {"far away": [1.0, 0.0, 0.0]},
     }),
-    Call("gc.from_trimesh", lambda: {"mesh": gc.to_trimesh(body())}, {
+    Call("gc.from_trimesh", lambda: {"mesh": body().to_trimesh()}, {
         "mesh": VALUE, "name": TEXT, "faces": WORD, "patches": optional(VALUE),
     }),
-    Call("gc.to_trimesh", lambda: {"body": body()}, {"body": VALUE}),
     Call("gc.Contact", lambda: {"position": CENTER, "normal": [0.0, 0.0, 1.0]}, {
         "position": array(CENTER), "normal": units([0.0, 0.0, 1.0]),
     }),

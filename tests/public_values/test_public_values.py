@@ -23,14 +23,14 @@ CALLS = [
 ]  # fmt: skip
 BY_NAME = {call.name: call for call in CALLS}
 MADE_BY_FUNCTIONS = {
-    "sv.ExecutedGrasp": "read_executions",
-    "sv.Executions": "read_executions",
+    "sv.ExecutedGrasp": "load_executions",
+    "sv.Executions": "load_executions",
     "gc.BestSqueeze": "best_squeeze",
     "gc.FirstSlip": "first_slip",
     "gc.FreeMass": "payload",
     "gc.Grip": "grip",
     "gc.Payload": "payload",
-    "gc.CertifiedRegions": "certify_regions and read_regions",
+    "gc.CertifiedRegions": "certify_regions and load_regions",
     "gc.ClosureCertificate": "force_closure",
     "gc.FerrariCanny": "ferrari_canny",
     "gc.FrictionInterval": "critical_friction_interval",
@@ -57,8 +57,8 @@ NAMED_OTHERWISE = {
     ("gc.Polyhedron.from_mesh", "triangles"): "triangle",
     ("scenes.example_object", "name"): "name|object",
     ("scenes.write_picture", "path"): "path|picture's name",
-    ("sv.read_regions", "path"): "path|no/such",
-    ("sv.read_executions", "path"): "path|no/such",
+    ("sv.load_regions", "path"): "path|no/such",
+    ("sv.load_executions", "path"): "path|no/such",
     ("sv.load_dataset", "folder"): "folder|no/such",
     ("sv.write_report", "folder"): "folder|no/such",
     ("sv.Agenda", "rules"): "rule",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grasp_core.errors import InputError
+from grasp_core.files.text_files import read_text, write_text
 from sim_validate.datasets.building.driver import Engine, drive
 from sim_validate.datasets.building.staging import Staging
 from sim_validate.datasets.building.worker import Limits
@@ -27,7 +28,6 @@ from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.units import WorkUnit, units_of, units_sha256
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.paths import path_inside
-from sim_validate.files.reading import read_text, write_text
 from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.setup import Setup
 

@@ -18,12 +18,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
+from grasp_core.files.text_files import read_bytes, read_text
 from sim_validate.datasets.building.make_unit import Made
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.parquet import parquet_bytes
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.files.paths import path_inside
-from sim_validate.files.reading import read_bytes, read_text
 
 RECORD = "unit.json"
 OTHERS = "others"

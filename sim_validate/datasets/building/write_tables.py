@@ -11,6 +11,7 @@ from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
+from grasp_core.files.text_files import write_text
 from grasp_core.provenance import arithmetic
 from sim_validate.datasets.building.staging import Finished, Staging
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
@@ -20,7 +21,6 @@ from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, wri
 from sim_validate.datasets.quarantine import LeftOut, left_out_text
 from sim_validate.datasets.table_files import TableFiles
 from sim_validate.datasets.units import WorkUnit, provenance, units_sha256
-from sim_validate.files.reading import write_text
 
 DATA = "data"
 TWIN = "the same object as"

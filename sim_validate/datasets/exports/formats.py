@@ -19,7 +19,7 @@ from sim_validate.datasets.exports.tables import (
 )
 from sim_validate.datasets.open_dataset import Selection, select
 from sim_validate.datasets.parquet import pyarrow
-from sim_validate.files.reading import whole_folder
+from sim_validate.files.writing import whole_folder
 
 Exporter: TypeAlias = Callable[[Selection, Path, Callable[[int, int], None]], dict[Name, int]]
 EXPORTERS: Mapping[ExportFormat, Exporter] = {

@@ -33,7 +33,7 @@ from sim_validate.datasets.exports.stored_grasps import (
 from sim_validate.datasets.meshes import mesh_path
 from sim_validate.datasets.open_dataset import Selection
 from sim_validate.datasets.rows import SHORT
-from sim_validate.files.reading import write_lines
+from sim_validate.files.writing import write_lines
 
 AXES = "xyz"
 HEAD = """\

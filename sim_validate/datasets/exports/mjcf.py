@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from grasp_core.files.text_files import write_text
 from scenes.mjcf import build_scene
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.exports.stored_grasps import grasped_objects, is_grasp, new_path
 from sim_validate.datasets.open_dataset import Selection
-from sim_validate.files.reading import write_text
 
 
 def write_mjcf(

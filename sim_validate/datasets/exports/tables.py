@@ -21,11 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
+from grasp_core.files.text_files import write_text
 from grasp_core.files.whole_files import write_parts
 from sim_validate.datasets.columns import Column, Name
 from sim_validate.datasets.open_dataset import Selection
 from sim_validate.datasets.parquet import Columns, pyarrow, read_columns, schema_of
-from sim_validate.files.reading import write_arrays, write_bytes, write_lines, write_text
+from sim_validate.files.writing import write_arrays, write_bytes, write_lines
 
 PARTS = {3: tuple("xyz"), 4: tuple("0123"), 6: ("fx", "fy", "fz", "tx", "ty", "tz")}
 """Names of the components of a cell, by their number: of a point, four fingers, or a wrench."""

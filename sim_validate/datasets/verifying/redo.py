@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.errors import GraspError
+from grasp_core.files.text_files import read_text
 from grasp_core.provenance import arithmetic
 from sim_validate.datasets.building.make_unit import made_of
 from sim_validate.datasets.building.write_tables import CONFIG, CONTACTS, QUARANTINE, TWIN
@@ -32,7 +33,6 @@ from sim_validate.datasets.rows import id_beginning
 from sim_validate.datasets.units import WorkUnit, provenance
 from sim_validate.datasets.verifying.executions import loose_difference
 from sim_validate.datasets.verifying.rows_by_object import ObjectRows, Row, by_object
-from sim_validate.files.reading import read_text
 
 OTHER_ROUNDING = 1e-6
 """Relative difference that numbers may have when other packages or processors round them."""

@@ -9,7 +9,7 @@ import scenes
 @pytest.mark.parametrize("name", ["wedge", "hex-nut"])
 def test_a_polyhedron_comes_back_from_trimesh_as_it_was(name):
     body = scenes.example_object(name)
-    mesh = gc.to_trimesh(body)
+    mesh = body.to_trimesh()
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(body.volume, rel=1e-12)
     np.testing.assert_allclose(mesh.center_mass, body.center_of_mass, atol=1e-12)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import plan_to_json
 from scenes.example_objects import example_object
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.files.reading import write_text
 from sim_validate.main import main
 
 

@@ -50,7 +50,7 @@ def test_grasps_that_survive_are_shown_and_written(here, capsys):
         "2 of 2 grasps survived every trial with 0.3 kg; 14 of 14 trials were survived; 6 of 6",
     ):  # fmt: skip
         assert part in shown, shown
-    found = sv.read_executions(here / "e" / "executions.json")
+    found = sv.load_executions(here / "e" / "executions.json")
     assert [grasp.id for grasp in found.grasps] == list(IDS)
     assert found.complete
     for grasp in found.grasps:
@@ -80,7 +80,7 @@ def test_a_grasp_that_does_not_survive_is_a_result(capsys):
     said = capsys.readouterr()
     assert "0 of 1 grasps survived every trial with 1.3 kg" in said.out
     assert re.search(r"^c-0-1-2-7: weight: (slipped|dropped), moved [\d.e+]+ mm", said.err, re.M)
-    (grasp,) = sv.read_executions("executions.json").grasps
+    (grasp,) = sv.load_executions("executions.json").grasps
     assert not grasp.survived
     (trial,) = grasp.execution.trials
     assert trial.fate in {"slipped", "dropped"}
@@ -91,7 +91,7 @@ def test_a_grasp_that_does_not_survive_is_a_result(capsys):
 def test_a_grasp_without_a_squeeze_is_a_result_with_its_reason(capsys):
     words = ["execute", "grasps.json", "--friction", "0.03", "--mass-kg", "0.3", *QUICK]
     assert main([*words, "--out", "."]) == Exit.NEGATIVE
-    found = sv.read_executions("executions.json")
+    found = sv.load_executions("executions.json")
     first, second = found.grasps
     assert found.friction == 0.03
     assert first.execution is None
@@ -106,7 +106,7 @@ def test_where_no_trial_is_possible_nothing_was_survived(capsys):
     words = ["execute", "grasps.json", "--limit", "1", "--trials", "lift", "--out", "."]
     assert main(words) == Exit.NEGATIVE
     assert "no trial is possible, so nothing was survived" in capsys.readouterr().err
-    assert not sv.read_executions("executions.json").grasps[0].survived
+    assert not sv.load_executions("executions.json").grasps[0].survived
 
 
 @pytest.mark.usefixtures("here")
@@ -116,7 +116,7 @@ def test_trials_of_no_size_are_told_and_written_as_left_out(capsys):
     said = capsys.readouterr().out
     for kind, flag in (("shake", "shake_g, --shake-g"), ("knock", "knock_n_s, --knock-n-s")):
         assert f"no {kind} for 2 of 2 grasps: its size is 0 ({flag})\n" in said
-    for grasp in sv.read_executions("executions.json").grasps:
+    for grasp in sv.load_executions("executions.json").grasps:
         assert [each.kind for each in grasp.execution.skipped] == ["shake", "knock"]
         assert [each.kind for each in grasp.execution.trials] == ["weight"]
 
@@ -132,7 +132,7 @@ def test_a_control_that_holds_is_a_fault_of_the_simulator(capsys, monkeypatch):
     words = ["execute", "grasps.json", "--mass-kg", "0.3", "--limit", "1", *QUICK, "--out", "."]
     assert main(words) == Exit.INTERNAL
     assert "control friction 0.9 did not slip, though it must" in capsys.readouterr().err
-    (grasp,) = sv.read_executions("executions.json").grasps
+    (grasp,) = sv.load_executions("executions.json").grasps
     assert grasp.survived
     assert not grasp.controls_let_go
 
@@ -150,14 +150,14 @@ def test_what_was_done_is_kept_where_the_simulator_fails(capsys, monkeypatch):
     said = capsys.readouterr()
     assert "wrote what is done to executions.json" in said.out
     assert "a number is not finite" in said.err
-    found = sv.read_executions("executions.json")
+    found = sv.load_executions("executions.json")
     assert not found.complete
     assert [each.id for each in found.grasps] == [IDS[0]]
 
 
 def settings_of(here, *flags, code=Exit.GOOD):
     assert main(["execute", "grasps.json", "--limit", "1", "--out", ".", "-q", *flags]) == code
-    return sv.read_executions(here / "executions.json").settings
+    return sv.load_executions(here / "executions.json").settings
 
 
 def test_an_object_without_a_mass_has_the_density_of_water(here):

@@ -140,7 +140,7 @@ def test_a_proof_of_before_does_not_stay(folder, tmp_path):
 def test_files_give_back_the_regions_and_their_proof(folder):
     document = json.loads((folder / "regions.json").read_text())
     for grasp in document["grasps"]:
-        found = sv.read_regions(folder / grasp["proof"]["file"])
+        found = sv.load_regions(folder / grasp["proof"]["file"])
         assert found.verify()
         assert found.radius == grasp["disc_radius_m"]
         for region, told in zip(found.regions, grasp["regions"], strict=True):
@@ -153,7 +153,7 @@ def test_files_that_are_no_proofs_are_refused(tmp_path, text):
     path = tmp_path / "proof.npz"
     path.write_bytes(text)
     with pytest.raises(gc.InputError, match="expected a proof file"):
-        sv.read_regions(path)
+        sv.load_regions(path)
 
 
 def test_plans_may_come_with_certified_regions(tmp_path, folder):
@@ -164,7 +164,7 @@ def test_plans_may_come_with_certified_regions(tmp_path, folder):
     widened = 0
     for new, old in zip(found, plain, strict=True):
         assert new.id == old["id"]
-        assert sv.read_regions(tmp_path / "proofs" / f"{new.id}.npz").verify()
+        assert sv.load_regions(tmp_path / "proofs" / f"{new.id}.npz").verify()
         if new.regions[0].kind != "certified":
             assert new.radius == old["radius_m"]
             continue
@@ -187,7 +187,7 @@ def test_a_run_keeps_regions_and_proofs_and_the_next_removes_them(tmp_path):
     assert main([*asked, "--regions", "--no-report", "-q"]) == Exit.GOOD
     (grasp,) = json.loads((tmp_path / "grasps.json").read_text())["grasps"]
     assert grasp["regions"][0]["kind"] == "certified"
-    assert sv.read_regions(tmp_path / "proofs" / f"{grasp['id']}.npz").verify()
+    assert sv.load_regions(tmp_path / "proofs" / f"{grasp['id']}.npz").verify()
     assert main([*asked, "--no-report", "-q"]) == Exit.GOOD
     assert not (tmp_path / "regions.json").exists()
     assert not list((tmp_path / "proofs").iterdir())
@@ -206,7 +206,7 @@ def test_regions_stay_clear_of_edges_that_contacts_are_near_to(folder, tmp_path)
     assert main([*asked, "--edge-clearance-m", "0.006", "-q"]) == Exit.GOOD
     near = 0
     for grasp in saved.grasps:
-        found = sv.read_regions(tmp_path / "proofs" / f"{grasp.id}.npz")
+        found = sv.load_regions(tmp_path / "proofs" / f"{grasp.id}.npz")
         assert clearance_of(saved.body, grasp, found.regions) > 0.006 - 1e-9
         near += float(np.linalg.norm(found.centers - grasp.positions, axis=1).max()) > 1e-6
     assert near > 0

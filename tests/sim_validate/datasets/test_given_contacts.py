@@ -17,7 +17,7 @@ from sim_validate.datasets.exports.formats import export
 from sim_validate.datasets.given_contacts import read_given
 from sim_validate.datasets.verifying.redo import Sample
 from sim_validate.datasets.verifying.verify import verify
-from sim_validate.files.reading import write_arrays
+from sim_validate.files.writing import write_arrays
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, contents, silent
 

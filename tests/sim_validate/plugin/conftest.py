@@ -3,9 +3,9 @@
 import pytest
 
 import grasp_core as gc
+from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import plan_to_json
 from scenes.example_objects import example_object
-from sim_validate.files.reading import write_text
 from tests.sim_validate.plugin.project import run_pytest
 
 

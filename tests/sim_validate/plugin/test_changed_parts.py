@@ -5,13 +5,13 @@ import json
 import pytest
 
 import grasp_core as gc
+from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
 from sim_validate.baselines.grasp_cases import grasp_cases
 from sim_validate.baselines.source_file import ChangedPartError, Source, source_of
 from sim_validate.baselines.suite_toml import suite_from_toml
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.files.reading import write_text
 from sim_validate.main import main
 from tests.bad_input.mesh_texts import obj
 from tests.sim_validate.plugin.project import copied, run_pytest

@@ -3,8 +3,8 @@
 import json
 import re
 
+from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import grasps_from_json
-from sim_validate.files.reading import write_text
 from tests.sim_validate.plugin.project import CODE, copied, run_pytest
 
 MARKED = """

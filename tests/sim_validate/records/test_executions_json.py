@@ -26,7 +26,7 @@ def same(one, other):
 def test_executions_come_back_as_they_were(tmp_path):
     path = tmp_path / "executions.json"
     path.write_text(executions_text())
-    found = sv.read_executions(path)
+    found = sv.load_executions(path)
     assert found.settings == SETTINGS
     assert found.friction == 0.5
     assert found.complete
@@ -104,16 +104,16 @@ def test_a_file_that_is_wrong_is_refused_with_the_field(name, tmp_path):
     path = tmp_path / "x.json"
     path.write_text(json.dumps(document))
     with pytest.raises(gc.InputError, match=rf"x\.json: .*{said}"):
-        sv.read_executions(path)
+        sv.load_executions(path)
 
 
 def test_another_file_is_called_by_its_name(tmp_path):
     path = tmp_path / "grasps.json"
     path.write_text('{"schema": 1, "verdicts": []}')
     with pytest.raises(gc.InputError, match=r"this is a verdicts\.json, not an executions\.json"):
-        sv.read_executions(path)
+        sv.load_executions(path)
     path.write_text("{")
     with pytest.raises(gc.InputError, match="not complete JSON"):
-        sv.read_executions(path)
+        sv.load_executions(path)
     with pytest.raises(gc.InputError, match="cannot be read"):
-        sv.read_executions(tmp_path / "none.json")
+        sv.load_executions(tmp_path / "none.json")

@@ -11,12 +11,12 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.files.strict_json import BESIDE, DEEPEST, object_of, value_of
+from grasp_core.files.text_files import read_bytes, read_text
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.given_contacts import read_given
 from sim_validate.files import npz
 from sim_validate.files.npz import arrays_of
 from sim_validate.files.paths import path_inside, require_inside
-from sim_validate.files.reading import read_bytes, read_text
 from sim_validate.files.toml_tables import MOST_LETTERS, read_tables, tables_of_toml
 from sim_validate.main import main
 

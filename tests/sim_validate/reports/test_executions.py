@@ -23,7 +23,7 @@ from sim_validate.execution.trials import Skipped
 from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
 from sim_validate.files.stale_results import remove_executions
 from sim_validate.main import main
-from sim_validate.records.executions_json import Executions, executions_to_json, read_executions
+from sim_validate.records.executions_json import Executions, executions_to_json, load_executions
 from sim_validate.records.grasps import read_grasps
 from sim_validate.reports import drawn_grasps
 from sim_validate.reports import report as reports
@@ -148,7 +148,7 @@ def test_cards_filters_and_pages_say_how_closure_and_execution_ended(run, report
     ],
 )
 def test_a_grasp_is_bad_if_its_closure_or_its_execution_is(run, closure, place, said, tone):
-    found = read_executions(run / "executions.json")
+    found = load_executions(run / "executions.json")
     verdict = {"outcome": closure, "held": closure == "held", "mismatches": [], "controls": {}}
     one = None if place is None else found.grasps[place]
     assert said_of_both(verdict, found, one) == (said, tone)
@@ -216,7 +216,7 @@ def test_a_control_that_held_is_bad_news_and_its_grasp_counts_in_no_mark(copy, t
 
 
 def test_marks_stand_at_the_acceleration_of_their_trials(run):
-    found = read_executions(run / "executions.json")
+    found = load_executions(run / "executions.json")
     peaks = accelerations_g(SETTINGS)
     assert peaks["weight"] == peaks["misplaced"] == 0.0
     # as asked for, not as samples of the sinusoid reach it
@@ -236,7 +236,7 @@ def test_marks_stand_at_the_acceleration_of_their_trials(run):
 
 def test_the_curve_is_the_share_of_grasps_that_are_certified(run):
     """At each multiple of the weight, by counting."""
-    found = read_executions(run / "executions.json")
+    found = load_executions(run / "executions.json")
     multiples = [0.5, 1.0, 1.0, 2.0, 2.0, 7.0]
     grasp = found.grasps[0]
     many = replace(found, grasps=tuple(
@@ -256,7 +256,7 @@ def test_the_curve_is_the_share_of_grasps_that_are_certified(run):
 
 
 def test_one_sentence_says_what_the_chart_shows(run):
-    found = read_executions(run / "executions.json")
+    found = load_executions(run / "executions.json")
     said = survival_sentence([found])
     assert said.startswith("1 of 3 grasps are certified to carry the weight while the palm")
     assert "by 2 g in any direction, and in simulation 1 of 3 survived every trial" in said
@@ -277,7 +277,7 @@ def test_ticks_are_apart(end):
 
 @pytest.mark.parametrize("largest", [0.5, 3.0, 200.0, 1e6])
 def test_labels_of_the_chart_are_whole(run, largest):
-    found = read_executions(run / "executions.json")
+    found = load_executions(run / "executions.json")
     grasp = found.grasps[0]
     kinds = (*TRIALS, trial("knock", "knock +x"), trial("lift", "lift"),
              trial("misplaced", "misplaced 0"))  # fmt: skip

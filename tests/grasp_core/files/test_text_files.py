@@ -1,8 +1,7 @@
 import pytest
 
 from grasp_core.errors import InputError
-from sim_validate.files.reading import read_text, write_text
-from sim_validate.parallel.processes import each
+from grasp_core.files.text_files import read_text, write_text
 
 
 def test_a_file_is_replaced_as_a_whole(tmp_path):
@@ -32,13 +31,3 @@ def test_unreadable_files_are_refused(tmp_path):
         (tmp_path / "binary").write_bytes(data)
         with pytest.raises(InputError, match=words):
             read_text(tmp_path / "binary")
-
-
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_results_come_in_the_order_of_the_units(jobs):
-    assert list(each(abs, range(-20, 0), jobs=jobs)) == list(range(20, 0, -1))
-
-
-def test_an_error_in_a_unit_reaches_the_caller():
-    with pytest.raises(TypeError):
-        list(each(abs, [None] * 20, jobs=2))

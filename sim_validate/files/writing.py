@@ -1,0 +1,59 @@
+"""Writes files and folders so that they are complete or absent."""
+
+import io
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Generator, Iterable, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.errors import InputError
+from grasp_core.files.whole_files import write_parts
+
+
+def write_bytes(path: Path, data: bytes) -> Path:
+    """Write bytes by renaming a complete file into place; folders are made as needed."""
+    return write_parts(path, [data])
+
+
+def write_lines(path: Path, lines: Iterable[str]) -> Path:
+    """Write lines as `write_text` does, one at a time; each ends with its own line break."""
+    return write_parts(path, (line.encode() for line in lines))
+
+
+def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
+    """Write named arrays, compressed, as `numpy.load` reads them."""
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, array in arrays.items():
+            # A member made this way has a fixed date, so that equal arrays give equal files.
+            member = zipfile.ZipInfo(f"{name}.npy")
+            with archive.open(member, "w") as stream:
+                np.lib.format.write_array(stream, array, allow_pickle=False)
+    return write_parts(path, [held.getvalue()])
+
+
+@contextmanager
+def whole_folder(folder: Path) -> Generator[Path]:
+    """Yield a temporary folder that becomes `folder` on success, and is removed on failure.
+
+    Raises:
+        InputError: The folder exists and is not empty.
+    """
+    if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+        raise InputError(f"{folder}: exists and is not an empty folder; give another --out")
+    named = folder.resolve()
+    named.parent.mkdir(parents=True, exist_ok=True)
+    temporary = Path(tempfile.mkdtemp(dir=named.parent, prefix=".unfinished-"))
+    try:
+        yield temporary
+        temporary.chmod(0o755)
+        temporary.replace(named)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise

@@ -1,0 +1,112 @@
+"""Loads `verdicts.json` for people who look at verdicts in Python."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from grasp_core.by_value import ByValue
+from grasp_core.checked import path_of
+from grasp_core.errors import InputError
+from grasp_core.files.complaints import record_of
+from grasp_core.files.text_files import read_text
+from sim_validate.records.verdicts_schema import SCHEMA, VerdictRecord, VerdictsFile
+from sim_validate.simulation.hold_verdict import LET_GO, Outcome
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SavedVerdict(ByValue):
+    """The verdict on one grasp, as a file holds it."""
+
+    id: str
+    contacts_sha256: str
+    """Hash of the contacts, which tells grasps of one id apart."""
+    held: bool
+    """Whether the grasp held every wrench, of at least one."""
+    outcome: Outcome
+    """How the first wrench that was not held ended, or `Outcome.HELD`."""
+    mismatches: tuple[str, ...]
+    """Contradictions between simulation and analysis, as sentences."""
+    controls_let_go: bool
+    """Whether every negative control let go, as it must; True where there is none."""
+    predicted_critical_friction: float
+    simulated_critical_friction: float | None
+    """Least friction at which the grasp held; None if it was not measured."""
+    displacement_m: float
+    """Largest displacement of the object in the trials that say it; 0 if none does [m]."""
+    record: Mapping[str, Any] = field(repr=False)
+    """All fields of the verdict, by the names in docs/files.md."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SavedVerdicts(ByValue):
+    """The verdicts on an object's grasps, as a file holds them."""
+
+    object_sha256: str
+    """Hash of the object's canonical mesh, as in `Polyhedron.content_sha256`."""
+    friction: float
+    complete: bool
+    """Whether every grasp that was asked for was tested."""
+    verdicts: tuple[SavedVerdict, ...]
+
+    def __len__(self) -> int:
+        """Return the number of verdicts."""
+        return len(self.verdicts)
+
+    def __iter__(self) -> Iterator[SavedVerdict]:
+        """Iterate over the verdicts in the order of the file."""
+        return iter(self.verdicts)
+
+    def __getitem__(self, grasp_id: str) -> SavedVerdict:
+        """Return the verdict on the grasp with an id.
+
+        Raises:
+            KeyError: There is no verdict on such a grasp.
+        """
+        found = next((each for each in self.verdicts if each.id == grasp_id), None)
+        if found is None:
+            raise KeyError(f"there is no verdict on a grasp {grasp_id}")
+        return found
+
+
+def load_verdicts(path: str | Path) -> SavedVerdicts:
+    """Read verdicts, as `graspproof validate` and `graspproof run` write them.
+
+    Args:
+        path: A `verdicts.json`.
+
+    Raises:
+        InputError: The file is missing or invalid; the message names the file and the field.
+    """
+    path = path_of(path, "path")
+    text = read_text(path)
+    try:
+        record = record_of(VerdictsFile, text, "verdicts.json", schema=SCHEMA)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    return SavedVerdicts(
+        object_sha256=record["object"]["content_sha256"],
+        friction=record["friction"],
+        complete=record["complete"],
+        verdicts=tuple(map(_verdict, record["verdicts"])),
+    )
+
+
+def _verdict(record: VerdictRecord) -> SavedVerdict:
+    friction, trials = record["critical_friction"], record["wrenches"]
+    return SavedVerdict(
+        id=record["id"],
+        contacts_sha256=record["contacts_sha256"],
+        held=record["held"],
+        outcome=record["outcome"],
+        mismatches=tuple(record["mismatches"]),
+        controls_let_go=all(
+            trial["outcome"] in LET_GO
+            for control in record["controls"].values()
+            for trial in control["wrenches"]
+        ),
+        predicted_critical_friction=friction["predicted"],
+        simulated_critical_friction=friction["simulated"],
+        displacement_m=max((trial["displacement_m"] or 0.0 for trial in trials), default=0.0),
+        record=record,
+    )

@@ -1,0 +1,115 @@
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+import sim_validate as sv
+from grasp_core.by_value import ByValue
+
+FRICTION = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Value(ByValue):
+    name: str = "a"
+    numbers: np.ndarray = field(default_factory=lambda: np.arange(3.0))
+    parts: tuple = ()
+    table: Mapping = field(default_factory=dict)
+    size: float = 1.0
+    seconds: float = field(default=0.0, compare=False)
+
+
+@pytest.fixture(scope="module")
+def body():
+    return scenes.example_object("wedge")
+
+
+@pytest.fixture(scope="module")
+def plan(body):
+    return gc.plan(body, FRICTION)
+
+
+@pytest.fixture(scope="module")
+def results(body, plan):
+    grasp = plan[0]
+    squeeze = gc.best_squeeze(body, grasp, FRICTION, gc.any_direction(0.5, 5.0))
+    payload = gc.payload(
+        body, grasp, FRICTION, max_push_n=10.0, stiffness=2000.0, tip_radius_m=0.01
+    )
+    return [
+        body, plan, grasp, squeeze, payload, gc.first_slip(squeeze.grip, squeeze.load),
+        gc.force_closure(grasp, friction=FRICTION), gc.force_closure(grasp, friction=0.01),
+        gc.critical_friction_interval(grasp), gc.certify_regions(body, grasp, FRICTION),
+        gc.ferrari_canny(grasp, friction=FRICTION, torque_scale=body.radius),
+        gc.quality_ceiling(body, grasp.faces, FRICTION), scenes.build_scene(body, grasp, FRICTION),
+        sv.validate(body, grasp, FRICTION),
+        sv.execute(body, grasp, FRICTION, mass_kg=0.2),
+    ]  # fmt: skip
+
+
+def test_fields_decide():
+    one = Value(parts=(Value(), np.ones(2)), table={"k": np.zeros(2)}, size=np.nan)
+    assert one == copy.deepcopy(one)
+    assert one == replace(one, seconds=7.0)
+    for change in (
+        {"name": "b"},
+        {"numbers": np.arange(4.0)},
+        {"numbers": np.array([0.0, 1.0, 2.0 + 1e-15])},
+        {"numbers": None},
+        {"parts": (Value(name="b"), np.ones(2))},
+        {"parts": (Value(),)},
+        {"table": {"k": np.ones(2)}},
+        {"table": {"l": np.zeros(2)}},
+        {"size": 1.0},
+    ):
+        assert one != replace(one, **change)
+    assert one != "a"
+    assert one != copy.deepcopy(one).parts[0]
+
+
+def test_equal_values_have_equal_hashes():
+    zero = Value(numbers=np.array([0.0]))
+    assert hash(zero) == hash(Value(numbers=np.array([-0.0])))
+    assert zero == Value(numbers=np.array([-0.0]))
+    assert len({Value(), Value(), Value(name="b")}) == 2
+
+
+def test_every_result_equals_its_copy_and_no_other(results):
+    for result in results:
+        again = copy.deepcopy(result)
+        assert again == result
+        assert hash(again) == hash(result)
+        assert sum(result == other for other in results) == 1
+
+
+def test_a_result_with_another_number_is_another_result(results):
+    changed = 0
+    for result in results:
+        for each in fields(result):
+            value = getattr(result, each.name)
+            if each.compare and type(value) is float and each.init:
+                other = copy.copy(result)
+                object.__setattr__(other, each.name, np.nextafter(value, np.inf))
+                assert other != result, (type(result), each.name)
+                changed += 1
+    assert changed > 20
+
+
+def test_grasps_planned_twice_are_equal_and_figures_are_computed_only_if_compared(body, plan):
+    again = gc.plan(body, FRICTION)
+    assert hash(again[0]) == hash(plan[0])
+    assert plan[0] != plan[1]
+    assert again == plan
+    assert again.grasps[3].critical_friction == plan[3].critical_friction
+
+
+def test_public_dataclasses_with_arrays_are_compared_by_value():
+    for package in (gc, scenes, sv):
+        for name in package.__all__:
+            kind = getattr(package, name)
+            if isinstance(kind, type) and is_dataclass(kind):
+                assert kind.__eq__ is not object.__eq__, name

@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+
+FINGER = gc.Finger(0.003, 0.05)
+
+
+@pytest.fixture(scope="module")
+def body():
+    return scenes.example_object("wedge")
+
+
+def test_poses_at_contacts_are_right_handed_with_z_along_the_normal(body):
+    for grasp in gc.plan(body, limit=12):
+        poses = grasp.contact_frames()
+        assert poses.shape == (4, 4, 4)
+        for pose, contact in zip(poses, grasp.contacts, strict=True):
+            turn = pose[:3, :3]
+            assert np.allclose(turn.T @ turn, np.eye(3), atol=1e-12)
+            assert np.linalg.det(turn) == pytest.approx(1.0)
+            assert np.array_equal(pose[:3, 2], contact.normal)
+            assert np.array_equal(pose[:3, 3], contact.position)
+            assert np.array_equal(pose[3], [0.0, 0.0, 0.0, 1.0])
+
+
+def test_fingers_that_go_along_z_from_their_poses_arrive_at_the_contacts(body):
+    for planned, finger in ((gc.plan(body, limit=5), None), (gc.plan(body, finger=FINGER), FINGER)):
+        assert len(planned) > 1
+        for grasp in planned:
+            poses = grasp.approach_poses(0.02)
+            arrived = poses @ np.array([0.0, 0.0, 0.02, 1.0])
+            assert np.allclose(arrived[:, :3], grasp.positions, atol=1e-12)
+            ways = grasp.normals if finger is None else grasp.approach_directions
+            assert np.allclose(poses[:, :3, 2], ways, atol=1e-12)
+            assert np.array_equal(grasp.approach_poses()[:, :3, 3], grasp.positions)
+
+
+def test_a_distance_below_zero_is_refused(body):
+    with pytest.raises(gc.InputError, match="standoff_m"):
+        gc.plan(body, limit=1)[0].approach_poses(-0.1)
