@@ -1,4 +1,4 @@
-"""Gives frozen values an equality by their fields, and makes trusted ones without checks.
+"""Gives frozen values an equality by their fields and a short text, and makes trusted ones.
 
 Two values are equal if they are of one class and all their fields are equal: arrays of the same
 shape entry by entry, tuples and mappings item by item, numbers exactly. Two NaN count as equal, so
@@ -11,6 +11,8 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
+
+from grasp_core.short_text import short
 
 HASHED = (str, int, bool)
 """Classes of the fields that a hash is made from."""
@@ -36,6 +38,11 @@ class ByValue:
         named = (field for field in fields(cast("Any", self)) if field.compare)
         kinds = (_hashed(self, field.name) for field in named)
         return hash((type(self).__name__, *kinds))
+
+    def __repr__(self) -> str:
+        """Return a line with the figures that are short; longer fields are only counted."""
+        told = (field.name for field in fields(cast("Any", self)) if field.repr)
+        return short(type(self).__name__, {name: getattr(self, name) for name in told})
 
 
 def _same(one: Any, other: Any) -> bool:

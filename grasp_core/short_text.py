@@ -1,13 +1,19 @@
 """Shows values of many numbers in one line: a name, and the figures that tell them apart."""
 
-from typing import cast
+from collections.abc import Mapping, Sized
+from textwrap import shorten
+from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.checked import shown
 
+MOST = 300
+"""Largest number of characters of a value's text: two lines and a half."""
+SHORT_VECTOR = 6
+"""Largest number of components of a vector that is written in full."""
 NOTHING = 1e-12
 """Share of a vector's largest number below which a number is shown as zero."""
 
@@ -22,6 +28,26 @@ def summary(kind: str, *said: str, **figures: object) -> str:
     """
     parts = [*said, *(f"{name}={_figure(value)}" for name, value in figures.items())]
     return f"{kind}({', '.join(parts)})"
+
+
+def short(kind: str, fields: Mapping[str, object]) -> str:
+    """Write `Kind(name=figure, ..)` in at most `MOST` characters, longer things by their size."""
+    parts = [f"{name}={_size(value)}" for name, value in fields.items()]
+    return shorten(f"{kind}({', '.join(parts)})", MOST, placeholder=" ...)")
+
+
+def _size(value: object) -> str:
+    """Write a number, a short vector or a short text; else what the value is and its size."""
+    if isinstance(value, np.ndarray):
+        array = cast("NDArray[Any]", value)
+        if array.ndim == 1 and array.size <= SHORT_VECTOR and array.dtype.kind == "f":
+            return vector(array)
+        return f"array {array.shape}"
+    if isinstance(value, tuple | list | Mapping):
+        things = cast("Sized", value)
+        return counted(len(things), "item")
+    plain = value is None or isinstance(value, str | bool | int | float)
+    return _figure(value) if plain else type(value).__name__
 
 
 def counted(number: int, thing: str) -> str:

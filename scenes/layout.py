@@ -58,7 +58,7 @@ RETREAT = 0.5
 too fast."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FingerDrive(ByValue):
     """How one fingertip is built and driven."""
 
@@ -73,7 +73,7 @@ class FingerDrive(ByValue):
     """Depth of a fingertip in its face at the start [m]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Layout(ByValue):
     """Positions, masses and drives of everything in a scene, in the world frame."""
 

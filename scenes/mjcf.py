@@ -54,7 +54,7 @@ SCALED = (
 AXES = ("normal", "tangent1", "tangent2")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Scene(ByValue):
     """A grasp as the text of a MuJoCo model, with the settings and numbers it was made from."""
 

@@ -53,7 +53,7 @@ FAR_BELOW = -1e6
 """Margin below which minus infinity is reported: hardly any forces balance."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ClosureCertificate(ByValue):
     """A verdict on force closure, with the forces or the wrench that prove it."""
 

@@ -30,7 +30,7 @@ REPORTED_AS_ZERO = 2.0 * FRICTIONLESS
 need slightly more than `FRICTIONLESS` on one machine and not on another."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FrictionInterval(ByValue):
     """Friction up to `lower`, without force closure, and from `upper` on, with force closure.
 

@@ -74,7 +74,7 @@ def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
     return arms
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class WrenchSet(ByValue):
     """The set of wrenches that contacts can apply with bounded normal forces.
 

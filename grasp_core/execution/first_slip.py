@@ -48,7 +48,7 @@ AT_REST = 1e-9
 """How far a squeeze may leave a cone or limit at rest, in largest pushes."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FirstSlip(ByValue):
     """Where the growth of a load ends."""
 

@@ -68,7 +68,7 @@ BALANCED = 1e-6
 """Largest wrench of a squeeze, relative to the sum of its forces (times the longest arm)."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Grip(ByValue):
     """Contacts on an object, held by fingertips on springs with a squeeze that is never replanned.
 

@@ -23,7 +23,7 @@ GRAVITY_M_PER_S2 = 9.80665
 """Standard gravity."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LoadSet(ByValue):
     """Loads offset + E z with |z| <= 1, the torques about the centre of mass."""
 

@@ -43,6 +43,7 @@ from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.fields import is_a, is_indices, is_number, is_tuple_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit
+from grasp_core.short_text import summary
 from grasp_core.solvers.ties import first_best, on_grid
 from grasp_core.values import Contact, Grasp
 
@@ -58,7 +59,7 @@ FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt
 """Directions of the first rays, whose hull contains the origin."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FreeMass(ByValue):
     """Bounds of the mass that forces chosen anew for each orientation hold."""
 
@@ -73,7 +74,7 @@ class FreeMass(ByValue):
     bound is zero."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Payload(ByValue):
     """The largest mass held in every orientation, with forces chosen beforehand and chosen anew."""
 
@@ -86,6 +87,14 @@ class Payload(ByValue):
     def mass_kg(self) -> float:
         """The largest mass that is held without replanning [kg]."""
         return self.fixed.scale
+
+    @property
+    def bound_kg(self) -> float:
+        """The mass above which no forces with such pushes hold some orientation [kg]."""
+        return self.free.upper
+
+    def __repr__(self) -> str:
+        return summary("Payload", mass_kg=self.mass_kg, bound_kg=self.bound_kg)
 
     def verify(self) -> bool:
         """Re-check every field in plain arithmetic; False if they are no certificate.

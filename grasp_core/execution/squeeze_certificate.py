@@ -26,7 +26,7 @@ NONE = 1e-9
 """Scale that is none, in pushes over the change of contact forces at scale one."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class BestSqueeze(ByValue):
     """A squeeze, the loads that it survives without replanning, and a bound on what others survive.
 

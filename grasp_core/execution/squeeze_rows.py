@@ -38,7 +38,7 @@ BOUNDING = 1e-6
 """Least c.y of (3), relative to |c| |y|, that bounds the scale."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Cuts(ByValue):
     """Angles and cases of some rows (1)."""
 

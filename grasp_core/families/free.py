@@ -57,7 +57,7 @@ SAME_CORNERS = 1e-12
 """Distance of a proof's contacts from the corners of its part that counts as rounding."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Absence(ByValue):
     """A proof that no four contacts on four convex pieces are in force closure."""
 

@@ -35,7 +35,7 @@ LARGEST_INSET = 0.5
 """Largest distance that a contact keeps from edges, in radii of the piece's largest disc."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FacePiece(ByValue):
     """One convex piece of a face: the points origin + frame @ y for all y with E y <= b."""
 

@@ -48,7 +48,7 @@ ROUGH = 2e-2
 """Largest gap between the bounds of a quality while starting points are compared."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Improvement(ByValue):
     """A grasp moved on its faces, with the proved bounds of its quality before and after."""
 

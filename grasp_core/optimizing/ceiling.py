@@ -57,7 +57,7 @@ BOUND_SLACK = 1e-9
 """How far a part's bound may exceed the ceiling, relative to it or to one newton."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Leaf(ByValue):
     """A part of the faces that is not divided, with the direction that bounds its quality."""
 
@@ -69,7 +69,7 @@ class Leaf(ByValue):
     """Unit twist in which the support of all corner contacts bounds the quality, (6,)."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class QualityCeiling(ByValue):
     """A proved bound `upper` on the quality of all contacts on four faces, clear of the edges."""
 

@@ -58,7 +58,7 @@ CHECK_SLACK = 1e-12
 KERNEL = "grasp_core.quality.ferrari_canny_kernel"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FerrariCanny(ByValue):
     """Bounds of a quality, with the direction and the polytope, or forces, that prove them."""
 

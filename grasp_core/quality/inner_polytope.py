@@ -36,7 +36,7 @@ LARGEST_KEY = 2**62
 """Largest integer that may name a ridge, with one digit for each of its corners."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class InnerPolytope(ByValue):
     """A polytope inside a wrench set whose planes bound the quality from below."""
 

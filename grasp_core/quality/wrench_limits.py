@@ -40,7 +40,7 @@ LAST_DIGITS = 1e-12
 """Slack of an upper bound near zero, relative to the largest that the facet's length allows."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class WrenchLimit(ByValue):
     """The largest multiple of an external wrench that contacts resist, proved from both sides."""
 

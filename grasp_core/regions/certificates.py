@@ -30,7 +30,7 @@ PLACED = 1e-9
 to `scale`: files that keep ten digits stay within it."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CertifiedRegions(ByValue):
     """Regions in which each finger may stand while the others stand anywhere in theirs."""
 

@@ -64,7 +64,7 @@ LARGEST_ENTRY = 2.0**50
 between its inverse and it."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TwistCover(ByValue):
     """Cones that fill the space of twists, each with contact forces that resist all its twists.
 

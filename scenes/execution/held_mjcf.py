@@ -101,7 +101,7 @@ def held_physics(layout: HeldLayout) -> PhysicsSettings:
     )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class HeldScene(ByValue):
     """A held object as the text of a MuJoCo model, with the numbers it was made from."""
 

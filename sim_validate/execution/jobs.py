@@ -28,7 +28,7 @@ class ExecutionJob:
     threads: int = 1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ExecutedGrasp(ByValue):
     """A grasp with what its execution found, or with the reason why no squeeze holds the object."""
 

@@ -62,7 +62,7 @@ class ExecutionControl:
     """Multiple of the load at which the first contact slipped."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Execution(ByValue):
     """The trials of one grasp, executed with one squeeze that was never replanned."""
 

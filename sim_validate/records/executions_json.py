@@ -40,7 +40,7 @@ Where = tuple[str | int, ...]
 Settings = TypeVar("Settings", ExecutionSettings, PhysicsSettings)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Executions(ByValue):
     """The executions of an object's grasps, as a file holds them."""
 

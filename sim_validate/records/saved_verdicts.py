@@ -14,7 +14,7 @@ from sim_validate.records.verdicts_schema import SCHEMA, VerdictRecord, Verdicts
 from sim_validate.simulation.hold_verdict import LET_GO, Outcome
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SavedVerdict(ByValue):
     """The verdict on one grasp, as a file holds it."""
 
@@ -38,7 +38,7 @@ class SavedVerdict(ByValue):
     """All fields of the verdict, by the names in docs/files.md."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SavedVerdicts(ByValue):
     """The verdicts on an object's grasps, as a file holds them."""
 

@@ -34,7 +34,7 @@ LET_GO = (Outcome.SLIPPED, Outcome.LOST_CONTACT)
 it is held."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class HoldVerdict(ByValue):
     """The outcome of a trial, with the figures that led to it."""
 

@@ -110,7 +110,7 @@ def _check_model(physics: PhysicsSettings) -> None:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class NamedWrench(ByValue):
     """An external wrench with a name that the user gives it."""
 

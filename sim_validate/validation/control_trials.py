@@ -43,7 +43,7 @@ class ControlLoad:
     """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ControlTrial(ByValue):
     """One simulated trial of a negative control under one load."""
 
@@ -57,7 +57,7 @@ class ControlTrial(ByValue):
     """Recorded motion in the trial; kept only if asked for."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ControlVerdict(ByValue):
     """How a negative control, a contact set proved not to be force-closed, ended in simulation."""
 

@@ -38,7 +38,7 @@ TOWARD_CORNER = 0.95
 """How far a moved contact goes towards a corner of its face, as a share of the way."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Control(ByValue):
     """A negative control: contacts that must not hold, with the proof that they cannot."""
 

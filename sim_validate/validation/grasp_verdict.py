@@ -16,7 +16,7 @@ from sim_validate.validation.repeats import Robustness
 from sim_validate.validation.wrench_verdict import AGREEMENT, WrenchVerdict
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Verdict(ByValue):
     """The result of simulating a grasp: what it held, and whether that fits the analysis."""
 

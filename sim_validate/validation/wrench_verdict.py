@@ -13,7 +13,7 @@ AGREEMENT = 0.02
 measured."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class WrenchVerdict(ByValue):
     """One wrench on a grasp, predicted and simulated."""
 

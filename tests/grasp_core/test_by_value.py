@@ -107,6 +107,14 @@ def test_grasps_planned_twice_are_equal_and_figures_are_computed_only_if_compare
     assert again.grasps[3].critical_friction == plan[3].critical_friction
 
 
+def test_every_result_is_shown_in_three_lines(results):
+    for result in results:
+        said = repr(result)
+        assert said.startswith(type(result).__name__ + "(")
+        assert len(said) <= 300
+        assert "\n" not in said
+
+
 def test_public_dataclasses_with_arrays_are_compared_by_value():
     for package in (gc, scenes, sv):
         for name in package.__all__:
