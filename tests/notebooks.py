@@ -1,4 +1,4 @@
-"""The notebooks in docs/notebooks with what they print: `python -m tests.notebooks` runs them again."""
+"""The notebooks of docs/ with what they print: `python -m tests.notebooks` runs them again."""
 
 import os
 import sys
