@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
 DEVELOPING = (DOCS / "developing.md").read_text()
-COMMAND = re.search(r"python (-m sphinx -W .*) docs site  #", DEVELOPING)
+COMMAND = re.search(r"python (-m sphinx -W .*) docs site/html  #", DEVELOPING)
 TEXTS = "body *:not(script, style)"
 PHONE = 390
 """Width of a screen [pixels]."""
