@@ -1,5 +1,6 @@
 """Opens files in a browser without a window, where there are a browser and Selenium."""
 
+import json
 import shutil
 from importlib.util import find_spec
 
@@ -10,6 +11,33 @@ needs_browser = pytest.mark.skipif(
     not (BROWSER and DRIVER and find_spec("selenium")),
     reason="chromium, its driver or selenium (the extra test-slow) is missing",
 )
+READABLE = 4.5
+"""Contrast of text that anyone can read, after WCAG 2.1."""
+CONTRASTS = """
+const light = (text) => {
+  const parts = text.match(/[\\d.]+/g).slice(0, 3).map((part) => part / 255)
+    .map((part) => (part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4));
+  return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2];
+};
+const ground = (node) => {
+  for (; node; node = node.parentElement) {
+    const colour = getComputedStyle(node).backgroundColor;
+    if (colour !== "rgba(0, 0, 0, 0)") return colour;
+  }
+  throw new Error("no background");
+};
+const written = (node) => [...node.childNodes].some((part) => part.nodeType === Node.TEXT_NODE
+  && part.textContent.trim());
+return [...document.querySelectorAll(arguments[0])]
+  .filter((node) => written(node) && node.getClientRects().length)
+  .map((node) => {
+    const [one, two] = [getComputedStyle(node).color, ground(node)].map(light);
+    return [(Math.max(one, two) + 0.05) / (Math.min(one, two) + 0.05), node.textContent.trim()];
+  });
+"""
+"""Contrast and text of every element that a selector finds and that has text of its own."""
+OWN = ("file://", "data:", "chrome://")
+"""How addresses begin that ask nothing of a network; the last are the browser's first page."""
 
 
 def headless(profile):
@@ -37,3 +65,10 @@ def opened(browser, path, *, width=1200, dark=False, touch=False):
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": touch}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     browser.get(path.as_uri())
+
+
+def requests_of(browser):
+    """Addresses that were asked for since a file was opened."""
+    messages = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
+    return [each["params"]["request"]["url"] for each in messages
+            if each["method"] == "Network.requestWillBeSent"]  # fmt: skip

@@ -1,6 +1,10 @@
-"""The pictures of the README and of docs/: `python -m tests.docs_pictures` makes them again."""
+"""The pictures of the README and of docs/: `python -m tests.docs_pictures` makes them again.
+
+Names of pictures after the command choose some of them.
+"""
 
 import math
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -144,8 +148,8 @@ PICTURES: dict[str, Callable[[], object]] = {
 
 
 def main() -> None:
-    for name, make in PICTURES.items():
-        print(write_figure(make(), FOLDER / f"{name}.webp"))
+    for name in sys.argv[1:] or PICTURES:
+        print(write_figure(PICTURES[name](), FOLDER / f"{name}.webp"))
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """What the README and the pages in docs/ show can be done, and is all there is."""
 
+import ast
 import json
 import re
 import shlex
@@ -24,11 +25,14 @@ from sim_validate.records.setup_toml import setup_from_file
 from sim_validate.records.wrenches import wrenches_from_file
 from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.setup import Setup
-from tests import api_reference
+from tests import api_reference, docs_pictures
 from tests.sim_validate.datasets.small import build_small
 
 ROOT = Path(__file__).parent.parent
-DOCS = sorted((ROOT / "docs").glob("*.md"))
+SITE = ROOT / "docs" / "index.md"
+"""The first page of the site, which is no page of its own."""
+DOCS = sorted(set(SITE.parent.glob("*.md")) - {SITE})
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 PAGES = {page.stem: page.read_text() for page in DOCS}
 DATASETS = PAGES["datasets"]
 
@@ -89,7 +93,7 @@ def test_the_examples_print_what_they_say(code, said, tmp_path, monkeypatch, cap
 
 def test_every_block_of_code_is_one_that_a_test_runs():
     kinds = {"sh": 0, "python": 0, "text": 0, "json": 0, "toml": 0, "py": 0}
-    kinds["mermaid"] = 0  # a drawing
+    kinds["math"] = 0  # formulas
     for text in PAGES.values():
         for language in re.findall(r"^```(\w+)$", text, re.MULTILINE):
             kinds[language] += 1
@@ -110,16 +114,69 @@ def test_no_page_has_a_heading_twice():
         assert len(set(headings)) == len(headings), page
 
 
+def prose_of(path):
+    """The text of a notebook's cells that are no code, or of any other file."""
+    if path.suffix != ".ipynb":
+        return path.read_text()
+    cells = json.loads(path.read_text())["cells"]
+    return "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+
+
 def test_links_lead_somewhere_and_every_page_is_linked():
     linked = set()
-    for path in (ROOT / "README.md", *DOCS):
-        for link in re.findall(r"\]\(([^)]+)\)", path.read_text()):
+    for path in (ROOT / "README.md", *DOCS, *NOTEBOOKS):
+        for link in re.findall(r"\]\(([^)]+)\)", prose_of(path)):
             assert not link.startswith("http")
             target = (path.parent / link.partition("#")[0]).resolve()
             assert target.is_file(), link
             linked.add(target)
-    assert {page.resolve() for page in DOCS} <= linked
+    assert {page.resolve() for page in (*DOCS, *NOTEBOOKS)} <= linked
     assert {path.resolve() for path in (ROOT / "docs" / "pictures").iterdir()} <= linked
+
+
+NAMED = re.compile(r"`((?:grasp_core|scenes|sim_validate|tests)/[a-z][\w./]+\.py)(?:::(\w+))?`")
+
+
+def definitions_of(path):
+    return {each.name for each in ast.walk(ast.parse(path.read_text())) if hasattr(each, "name")}
+
+
+def test_every_module_function_and_test_that_pages_name_exists():
+    named = {pair for text in PAGES.values() for pair in NAMED.findall(text)}
+    assert len(named) > 60
+    for file, name in sorted(named):
+        assert (ROOT / file).is_file(), file
+        assert not name or name in definitions_of(ROOT / file), f"{file}::{name}"
+
+
+def test_every_statement_of_the_paper_has_its_code_and_its_test():
+    sections = re.split(r"^### ", PAGES["from-paper-to-code"], flags=re.MULTILINE)[1:]
+    titles = " ".join(section.partition("\n")[0] for section in sections)
+    for number in range(1, 6):
+        assert f"Proposition {number}" in titles
+    for other in ("Definition 1", "Definition 2", "Definition 3", "section 3.1", "Section 3.2"):
+        assert other in titles
+    for section in sections:
+        said, _, tested = section.partition("* **Test")
+        assert said.count("* **It says**") == 1
+        assert NAMED.search(said)
+        assert all(file.startswith("tests/") and name for file, name in NAMED.findall(tested))
+        assert NAMED.search(tested)
+
+
+def test_the_ranks_of_the_numbers_are_those_of_the_benchmarks():
+    rows = PAGES["which-number"].partition("| ranks survival |")[2].partition("\n\n")[0]
+    ranks = re.findall(r"\| (0\.\d\d) \|", rows)
+    measured = PAGES["benchmarks"].partition("area under the ROC curve")[2].partition("against")[2]
+    assert len(ranks) == 7
+    assert set(ranks) <= set(re.findall(r"0\.\d\d", measured.partition("Trial by trial")[0]))
+
+
+def test_the_gallery_shows_every_picture_with_its_command():
+    shown = re.findall(r"\]\(pictures/(\w+)\.webp\)\n\n`python -m tests\.docs_pictures (\w+)`",
+                       PAGES["gallery"])  # fmt: skip
+    assert all(picture == name for picture, name in shown)
+    assert sorted(name for name, _ in shown) == sorted(docs_pictures.PICTURES)
 
 
 def test_the_python_reference_is_that_of_the_docstrings():

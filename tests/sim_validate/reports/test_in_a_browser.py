@@ -8,32 +8,11 @@ import pytest
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.reports.report import write_report
-from tests.browser import headless, needs_browser, opened
+from tests.browser import CONTRASTS, OWN, READABLE, headless, needs_browser, opened, requests_of
 from tests.sim_validate.reports.test_report import EVIL, changed
 
 pytestmark = [pytest.mark.slow, needs_browser]
-READABLE = 4.5
-"""Contrast of text that anyone can read, after WCAG 2.1."""
-CONTRASTS = """
-const light = (text) => {
-  const parts = text.match(/[\\d.]+/g).slice(0, 3).map((part) => part / 255)
-    .map((part) => (part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4));
-  return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2];
-};
-const ground = (node) => {
-  for (; node; node = node.parentElement) {
-    const colour = getComputedStyle(node).backgroundColor;
-    if (colour !== "rgba(0, 0, 0, 0)") return colour;
-  }
-  throw new Error("no background");
-};
-return [...document.querySelectorAll("h1, h2, p, a, th, td, label, summary, .verdict, figcaption")]
-  .filter((node) => node.textContent.trim() && node.getClientRects().length)
-  .map((node) => {
-    const [one, two] = [getComputedStyle(node).color, ground(node)].map(light);
-    return [(Math.max(one, two) + 0.05) / (Math.min(one, two) + 0.05), node.textContent.trim()];
-  });
-"""
+TEXTS = "h1, h2, p, a, th, td, label, summary, .verdict, figcaption"
 
 
 @pytest.fixture(scope="module")
@@ -56,12 +35,6 @@ def errors_of(browser):
     return [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
 
 
-def requests_of(browser):
-    messages = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
-    return [each["params"]["request"]["url"] for each in messages
-            if each["method"] == "Network.requestWillBeSent"]  # fmt: skip
-
-
 def pages_of(report):
     return [report / "index.html", *sorted((report / "grasps").iterdir())]
 
@@ -81,8 +54,7 @@ def test_pages_open_without_errors_and_ask_nothing_of_a_network(browser, small_r
         assert browser.get_log("browser") == []
         asked = requests_of(browser)
         assert len(asked) >= 4
-        own = ("file://", "data:", "chrome://")  # the last are the browser's first page
-        assert [url for url in asked if not url.startswith(own)] == []
+        assert [url for url in asked if not url.startswith(OWN)] == []
 
 
 def test_the_policy_of_the_pages_stops_what_would_leave_them(browser, small_report):
@@ -198,7 +170,7 @@ def test_pages_are_as_wide_as_the_screen(browser, small_report, width):
 def test_text_can_be_read_by_day_and_by_night(browser, small_report, dark):
     for path in pages_of(small_report)[:2]:
         opened(browser, path, dark=dark)
-        found = browser.execute_script(CONTRASTS)
+        found = browser.execute_script(CONTRASTS, TEXTS)
         assert len(found) > 40
         assert [text for contrast, text in found if contrast < READABLE] == []
     light = browser.execute_script("return getComputedStyle(document.body).backgroundColor")
