@@ -7,7 +7,6 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_core.arrays import Array
 from grasp_core.checked import shown
 
 MOST = 300
@@ -62,7 +61,7 @@ def _plural(thing: str) -> str:
 
 def _figure(value: object) -> str:
     if isinstance(value, np.ndarray):
-        return vector(cast("Array", value))
+        return vector(cast("NDArray[Any]", value))
     return f"{value:.6g}" if isinstance(value, float) else shown(value)
 
 

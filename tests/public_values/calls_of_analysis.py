@@ -2,12 +2,14 @@
 
 import numpy as np
 
+import grasp_core as gc
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 from tests.public_values.bad_values import (
     AT_LEAST_ONE,
     COUNT,
     FRICTION,
     NOT_NEGATIVE,
+    PATH,
     POSITIVE,
     SEED,
     SEVERAL,
@@ -68,6 +70,12 @@ CALLS = [
         "jobs": AT_LEAST_ONE,
     }),
     Call("gc.iter_grasps", lambda: {"body": body()}, PLANNED),
+    Call("gc.save_grasps", lambda: {"path": "grasps.json", "plan": gc.plan(body(), limit=1)}, {
+        "path": PATH, "plan": VALUE,
+    }, succeeds_in="tests/grasp_core/records/test_grasps_files.py"),
+    Call("gc.load_grasps", lambda: {"path": "no/such/grasps.json"}, {
+        "path": PATH | {"nowhere": "no/such/grasps.json"},
+    }, succeeds_in="tests/grasp_core/records/test_grasps_files.py"),
     Call("gc.force_closure", two_arrays(friction=0.5), contacts() | {
         "friction": each_of(FRICTION, "zero", "tiny"),
     }),

@@ -128,6 +128,7 @@ CALLS = [
         "grasp": SEVERAL | {"one": grasp().contacts[:1]},
         "friction": each_of(FRICTION, "zero"),
         "settings": VALUE,
+        "mass_kg": optional(POSITIVE),
         "threads": AT_LEAST_ONE,
         "physics": optional(VALUE) | {"other gravity": tilted()},
     }),

@@ -87,6 +87,9 @@ CALLS = [
     Call("sv.load_executions", lambda: {"path": "no/such/executions.json"}, {
         "path": PATH | {"nowhere": "no/such/executions.json"},
     }, succeeds_in="tests/sim_validate/records/test_executions_json.py"),
+    Call("sv.load_verdicts", lambda: {"path": "no/such/verdicts.json"}, {
+        "path": PATH | {"nowhere": "no/such/verdicts.json"},
+    }, succeeds_in="tests/sim_validate/records/test_saved_verdicts.py"),
     Call("sv.margin_figure", of_grasp(friction=0.5), BODY_AND_GRASP | {
         "friction": FRICTION, "max_normal_force_n": POSITIVE,
     }, slow=True),

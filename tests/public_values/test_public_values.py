@@ -25,6 +25,8 @@ BY_NAME = {call.name: call for call in CALLS}
 MADE_BY_FUNCTIONS = {
     "sv.ExecutedGrasp": "load_executions",
     "sv.Executions": "load_executions",
+    "sv.SavedVerdict": "load_verdicts",
+    "sv.SavedVerdicts": "load_verdicts",
     "gc.BestSqueeze": "best_squeeze",
     "gc.FirstSlip": "first_slip",
     "gc.FreeMass": "payload",
@@ -59,6 +61,8 @@ NAMED_OTHERWISE = {
     ("scenes.write_picture", "path"): "path|picture's name",
     ("sv.load_regions", "path"): "path|no/such",
     ("sv.load_executions", "path"): "path|no/such",
+    ("sv.load_verdicts", "path"): "path|no/such",
+    ("gc.load_grasps", "path"): "path|no/such",
     ("sv.load_dataset", "folder"): "folder|no/such",
     ("sv.write_report", "folder"): "folder|no/such",
     ("sv.Agenda", "rules"): "rule",
