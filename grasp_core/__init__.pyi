@@ -61,3 +61,5 @@ from grasp_core.values import ContactRegion as ContactRegion
 from grasp_core.values import ForceCone as ForceCone
 from grasp_core.values import Grasp as Grasp
 from grasp_core.values import Witness as Witness
+
+__version__: str

@@ -55,12 +55,14 @@ def test_a_package_is_imported_at_its_door_only(package):
 
 def test_only_kernels_are_compiled():
     """A module with compiled loops is a kernel; other modules load kernels of their own room."""
-    sources = list((ROOT / "grasp_core").rglob("*.py"))
+    sources = [p for name in ("grasp_core", "scenes") for p in (ROOT / name).rglob("*.py")]
     kernels = [path for path in sources if re.search(r"^@loop\(", path.read_text(), re.M)]
     assert len(kernels) > 10
     assert all(path.stem.endswith("_kernel") for path in kernels)
     for path in sources:
-        for room in re.findall(r"\bgrasp_core\.([a-z_]+)\.[a-z_]+_kernel\b", path.read_text()):
+        for room in re.findall(
+            r"\b(?:grasp_core|scenes)\.([a-z_]+)\.[a-z_]+_kernel\b", path.read_text()
+        ):
             at_home = room == path.parent.name or path.stem in {"provenance"}
             assert at_home or path.stem.endswith("_kernel"), f"{path} loads a kernel of {room}"
 

@@ -1,0 +1,19 @@
+# graspproof with its inner loops compiled:
+#   docker build -t graspproof . && docker run --rm -v "$PWD:/work" graspproof run wedge
+FROM python:3.12-slim-bookworm
+
+RUN apt-get update \
+    && apt-get install -y --no-install-recommends libgomp1 \
+    && rm -rf /var/lib/apt/lists/* \
+    && useradd --create-home graspproof
+
+COPY . /source
+RUN pip install --no-cache-dir -c /source/.ci/constraints.txt '/source[dataset]'
+
+USER graspproof
+# one run keeps the compiled loops in the image, so that no container compiles them again
+RUN cd /tmp && graspproof run wedge --limit 2 --out /tmp/first -q && rm -r /tmp/first
+
+WORKDIR /work
+ENTRYPOINT ["graspproof"]
+CMD ["run", "wedge"]
