@@ -1,7 +1,7 @@
 """Defines the polyhedron, a solid bounded by planar faces, made from a mesh file or triangles."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, Self, TypeVar
@@ -57,8 +57,8 @@ class Polyhedron(ByValue):
     patches: PatchLimits | None = None
     """Limits of flatness for the patches of a curved surface; None where faces are exactly planar.
     """
-    notes: tuple[str, ...] = ()
-    """Notes, for people to read, on what was changed when the mesh was read."""
+    notes: tuple[str, ...] = field(default=(), compare=False)
+    """Notes, for people to read, on what was changed when the mesh was read; not compared."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))

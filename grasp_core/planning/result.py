@@ -114,6 +114,24 @@ class Outcomes:
 
 
 @dataclass(frozen=True, slots=True)
+class Moved:
+    """How optimisation changed a grasp's quality, as proved bounds (lower, upper)."""
+
+    id: str
+    moved_from: str
+    """Id of the planned grasp; equal to `id` where the grasp was not moved."""
+    before: tuple[float, float]
+    after: tuple[float, float]
+    ceiling: float | None
+    """Quality that no contacts on the same faces exceed; None where no ceiling was asked for."""
+
+    @property
+    def gain(self) -> float:
+        """Return the ratio of the proved lower bounds, after to before."""
+        return self.after[0] / self.before[0]
+
+
+@dataclass(frozen=True, slots=True)
 class PlanCounts:
     """Counts of what the planner tried on one object."""
 
@@ -121,8 +139,8 @@ class PlanCounts:
     quadruples: int
     """Number of sets of four faces; with `share_faces` also of sets with two halves of a face."""
     spanning: int | None
-    """Sets whose normals positively span at the least planned angle (P3); None above 200 faces,
-    where there are too many to count."""
+    """Sets whose normals positively span at the least planned angle (P3); None where they were not
+    counted, as above 200 faces."""
     families: Mapping[str, MethodCounts] = field(default_factory=dict[str, MethodCounts])
     """Counts of each method: the three families and `free`, as far as they were asked for."""
 
@@ -133,7 +151,8 @@ class Plan(ByValue):
 
     A plan is a sequence of its grasps: `len(plan)`, `for grasp in plan`, `plan[0]`, and also
     `plan["c-0-1-2-7"]` by id. A slice and `filter` give a plan with fewer grasps, whose counts are
-    still those of the whole search. Plans are equal if everything but `seconds` is.
+    still those of the whole search. Plans are equal if everything but `seconds`
+    and `versions` is.
     """
 
     body: Polyhedron
@@ -161,8 +180,12 @@ class Plan(ByValue):
     the choices of contacts that is open, where each cut counts for half."""
     unreached: Mapping[FaceQuadruple, str] = field(default_factory=dict[FaceQuadruple, str])
     """Face quadruples whose grasps the fingers cannot reach, with the reason."""
+    moves: tuple[Moved, ...] = ()
+    """How optimisation changed each grasp; empty if it was not asked for."""
     seconds: Mapping[str, float] = field(default_factory=dict[str, float], compare=False)
     """Processor time of each method [s], from its first program to its last grasp."""
+    versions: Mapping[str, str] | None = field(default=None, compare=False)
+    """Versions of the packages that made a plan from a file; None for those that are installed."""
 
     def __len__(self) -> int:
         """Return the number of grasps."""
