@@ -18,6 +18,7 @@ ROOT = Path(__file__).parent.parent
 DOORS = {
     "manifold3d": "grasp_core/objects/booleans.py",
     "trimesh": "grasp_core/objects/conversion.py",
+    "pandas": "grasp_core/grasp_tables.py",
     "numba": ("grasp_core/compiled.py", "grasp_core/kept_loops.py"),
     "highspy": "grasp_core/solvers/lp.py",
     "clarabel": "grasp_core/solvers/conic.py",

@@ -1,13 +1,13 @@
 """Holds a plan: the grasps found on one object, what was tried, and what was ruled out."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from textwrap import shorten
-from typing import Any, Literal, Protocol, TypeAlias, overload
+from typing import Any, Literal, Protocol, TypeAlias
 
 from grasp_core.by_value import ByValue
-from grasp_core.grasp_tables import Demands, data_frame, grasp_named
+from grasp_core.grasp_tables import ById, Demands, data_frame
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.short_text import counted, summary
@@ -146,7 +146,7 @@ class PlanCounts:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Plan(ByValue):
+class Plan(ByValue, ById[Grasp]):
     """The grasps found on one object, the best first, and what was tried.
 
     A plan is a sequence of its grasps: `len(plan)`, `for grasp in plan`, `plan[0]`, and also
@@ -186,41 +186,6 @@ class Plan(ByValue):
     """Processor time of each method [s], from its first program to its last grasp."""
     versions: Mapping[str, str] | None = field(default=None, compare=False)
     """Versions of the packages that made a plan from a file; None for those that are installed."""
-
-    def __len__(self) -> int:
-        """Return the number of grasps."""
-        return len(self.grasps)
-
-    def __bool__(self) -> bool:
-        """Return True for any plan, also for one without grasps: its proofs are a result, too."""
-        return True
-
-    def __iter__(self) -> Iterator[Grasp]:
-        """Iterate over the grasps, the best first."""
-        return iter(self.grasps)
-
-    def __contains__(self, wanted: object) -> bool:
-        """Return whether the plan has a grasp, or a grasp with an id."""
-        if isinstance(wanted, str):
-            return any(grasp.id == wanted for grasp in self.grasps)
-        return wanted in self.grasps
-
-    @overload
-    def __getitem__(self, key: int | str) -> Grasp: ...
-
-    @overload
-    def __getitem__(self, key: slice) -> "Plan": ...
-
-    def __getitem__(self, key: int | str | slice) -> "Grasp | Plan":
-        """Return a grasp by its place or its id, or a plan with some of the grasps.
-
-        Raises:
-            KeyError: No grasp has this id.
-            IndexError: There is no grasp at this place.
-        """
-        if isinstance(key, slice):
-            return replace(self, grasps=self.grasps[key])
-        return grasp_named(self.grasps, key) if isinstance(key, str) else self.grasps[key]
 
     def filter(
         self,
