@@ -25,6 +25,7 @@ from grasp_core.checked import (
 )
 from grasp_core.errors import InputError
 from grasp_core.frames import poses_along
+from grasp_core.notebooks import InNotebooks
 from grasp_core.short_text import counted, summary, vector
 
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
@@ -141,7 +142,7 @@ PUT_OFF = ("critical_friction", "ferrari_canny")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Grasp(ByValue):
+class Grasp(ByValue, InNotebooks):
     """Four contacts in finger order, with a witness that shows why they hold the object.
 
     A planned grasp computes its `critical_friction` and its `ferrari_canny` when they are first

@@ -25,6 +25,7 @@ from grasp_core.checked import (
 from grasp_core.errors import InputError, MeshError
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
+from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.build import DEFAULT_FLATNESS, DEFAULT_LIMITS, build, check_choices
 from grasp_core.objects.conversion import mesh_of, triangles_of
 from grasp_core.objects.face import Face, FaceKind, PatchLimits
@@ -35,7 +36,7 @@ UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Polyhedron(ByValue):
+class Polyhedron(ByValue, InNotebooks):
     """A solid bounded by planar faces, with the mass properties of uniform density 1 kg/m^3."""
 
     name: str

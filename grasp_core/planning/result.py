@@ -8,6 +8,7 @@ from typing import Any, Literal, Protocol, TypeAlias
 
 from grasp_core.by_value import ByValue
 from grasp_core.grasp_tables import ById, Demands, data_frame
+from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.short_text import counted, summary
@@ -146,7 +147,7 @@ class PlanCounts:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Plan(ByValue, ById[Grasp]):
+class Plan(ByValue, ById[Grasp], InNotebooks):
     """The grasps found on one object, the best first, and what was tried.
 
     A plan is a sequence of its grasps: `len(plan)`, `for grasp in plan`, `plan[0]`, and also
