@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 
 import pytest
 
@@ -117,12 +116,15 @@ def test_few_quadruples_and_searches_that_end_early_start_no_process():
     assert everything.worth_starting(large, request, 8) <= 2
 
 
-PRESSED_AGAIN_S = 4.0
 INTERRUPTED = """
+import signal
+
 import grasp_core as gc
 from grasp_core.planning.parts import everything
 from scenes.example_objects import example_object
 
+# a shell starts what runs in its background with interrupts ignored
+signal.signal(signal.SIGINT, signal.default_int_handler)
 # loops are loaded before: where numba calls Python meanwhile, an interrupt is swallowed
 gc.plan(example_object("random-11-1"), 0.3)
 everything.QUADRUPLES_PER_PROCESS = 1
@@ -134,13 +136,6 @@ gc.plan(example_object("random-24-1"), 0.3, jobs=2, progress=told)
 """
 
 
-def press(process, ended):
-    """Interrupt a process until it ends: while numba loads a loop it swallows one at times."""
-    while not ended.is_set() and process.poll() is None:
-        process.send_signal(signal.SIGINT)
-        ended.wait(PRESSED_AGAIN_S)
-
-
 @pytest.mark.skipif(os.name == "nt", reason="interrupts are sent in another way on Windows")
 def test_an_interrupt_ends_a_plan_and_its_processes():
     """The test ends only when the process has: it waits for the other one and for all threads."""
@@ -149,11 +144,7 @@ def test_an_interrupt_ends_a_plan_and_its_processes():
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert process.stdout.readline() == "planning\n"
-    ended = threading.Event()
-    pressing = threading.Thread(target=press, args=(process, ended))
-    pressing.start()
+    process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=HANGING_S)
-    ended.set()
-    pressing.join()
     assert process.returncode == -signal.SIGINT
     assert "KeyboardInterrupt" in told
