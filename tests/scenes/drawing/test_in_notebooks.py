@@ -50,7 +50,7 @@ def test_a_grasp_shows_its_four_fingers_and_no_figure_that_was_put_off(plan, mon
 def test_every_family_is_drawn_with_and_without_its_object():
     for name, family in (
         ("dodecahedron", "concurrent"),
-        ("bar", "pencil"),
+        ("double-wedge-bar", "pencil"),
         ("icosahedron", "regulus"),
     ):
         plan = gc.plan(scenes.example_object(name), 0.5, families=family, limit=1)
