@@ -27,7 +27,7 @@ DOORS = {
     "mujoco": ("sim_validate/simulation/engine.py", "scenes/drawing/frames.py"),
     "PIL": "scenes/drawing/frames.py",
     "matplotlib": "scenes/drawing/canvas.py",
-    "jinja2": "sim_validate/reports/pages.py",
+    "jinja2": "scenes/drawing/pages.py",
     "scipy.stats": "sim_validate/validation/repeats.py",
     "pebble": "sim_validate/parallel/processes.py",
     "ray": "sim_validate/parallel/clusters.py",

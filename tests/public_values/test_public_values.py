@@ -43,6 +43,7 @@ MADE_BY_FUNCTIONS = {
     "scenes.HeldScene": "build_held_scene",
     "scenes.Layout": "build_scene",
     "scenes.Scene": "build_scene",
+    "scenes.Turntable": "show",
     "sv.Execution": "execute",
     "sv.ExecutionTrial": "execute",
     "sv.Verdict": "validate",
