@@ -54,6 +54,7 @@ from grasp_core.quality.wrench_limits import max_resisted_wrench as max_resisted
 from grasp_core.quality.wrench_limits import wrench_limits as wrench_limits
 from grasp_core.records.grasps_files import load_grasps as load_grasps
 from grasp_core.records.grasps_files import save_grasps as save_grasps
+from grasp_core.records.own_plans import plan_of as plan_of
 from grasp_core.regions.certificates import CertifiedRegions as CertifiedRegions
 from grasp_core.regions.certify_regions import certify_regions as certify_regions
 from grasp_core.values import Contact as Contact

@@ -1,9 +1,19 @@
 """Finds, chooses and tabulates grasps by their ids, families and figures."""
 
 import importlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, get_args
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import (
+    Any,
+    ClassVar,
+    Generic,
+    Protocol,
+    Self,
+    TypeVar,
+    cast,
+    get_args,
+    overload,
+)
 
 import numpy as np
 
@@ -14,6 +24,77 @@ from grasp_core.values import Family, Grasp
 SHOWN_IDS = 5
 """Largest number of ids that a message lists."""
 AXES = ("x", "y", "z")
+
+
+class Named(Protocol):
+    """A grasp, or a result about one."""
+
+    @property
+    def id(self) -> str:
+        """Return the grasp's id."""
+        ...
+
+
+Item = TypeVar("Item", bound=Named)
+
+
+class ById(Generic[Item]):
+    """Base of frozen dataclasses that are sequences of grasps, or of results about them.
+
+    They have a length and an order, and give an item by its place or its id, and a value of their
+    own class for a slice. They are true even if empty: that there is no grasp is a result, too.
+    """
+
+    __slots__ = ()
+    ITEMS: ClassVar[str] = "grasps"
+    """Name of the field with the items."""
+
+    def __len__(self) -> int:
+        """Return the number of items."""
+        return len(self._items)
+
+    def __bool__(self) -> bool:
+        """Return True."""
+        return True
+
+    def __iter__(self) -> Iterator[Item]:
+        """Iterate over the items in their order."""
+        return iter(self._items)
+
+    def __contains__(self, wanted: object) -> bool:
+        """Return whether there is an item, or an item with an id."""
+        if isinstance(wanted, str):
+            return any(item.id == wanted for item in self._items)
+        return wanted in self._items
+
+    @overload
+    def __getitem__(self, key: int | str) -> Item: ...
+
+    @overload
+    def __getitem__(self, key: slice) -> Self: ...
+
+    def __getitem__(self, key: int | str | slice) -> Item | Self:
+        """Return an item by its place or its id, or a value with some of the items.
+
+        Raises:
+            KeyError: No item has this id; the message lists some that there are.
+            IndexError: There is no item at this place.
+        """
+        if isinstance(key, slice):
+            return replace(cast("Any", self), **{self.ITEMS: self._items[key]})
+        return self._named(key) if isinstance(key, str) else self._items[key]
+
+    @property
+    def _items(self) -> tuple[Item, ...]:
+        return getattr(self, self.ITEMS)
+
+    def _named(self, wanted: str) -> Item:
+        found = next((item for item in self._items if item.id == wanted), None)
+        if found is None:
+            names = ", ".join(item.id for item in self._items[:SHOWN_IDS]) or "no grasps"
+            more = f" and {len(self) - SHOWN_IDS} more" if len(self) > SHOWN_IDS else ""
+            raise KeyError(f"no grasp is named {shown(wanted)}; there are {names}{more}")
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,20 +138,6 @@ class Demands:
             )
             and (self.where is None or bool(self.where(grasp)))
         )
-
-
-def grasp_named(grasps: Sequence[Grasp], wanted: str) -> Grasp:
-    """Return the grasp with an id.
-
-    Raises:
-        KeyError: No grasp has this id; the message lists some that there are.
-    """
-    found = next((grasp for grasp in grasps if grasp.id == wanted), None)
-    if found is None:
-        names = ", ".join(grasp.id for grasp in grasps[:SHOWN_IDS]) or "no grasps"
-        more = f" and {len(grasps) - SHOWN_IDS} more" if len(grasps) > SHOWN_IDS else ""
-        raise KeyError(f"no grasp is named {shown(wanted)}; there are {names}{more}")
-    return found
 
 
 def data_frame(grasps: Sequence[Grasp]) -> Any:

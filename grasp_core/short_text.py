@@ -1,6 +1,7 @@
 """Shows values of many numbers in one line: a name, and the figures that tell them apart."""
 
 from collections.abc import Mapping, Sized
+from dataclasses import MISSING, Field, fields
 from textwrap import shorten
 from typing import Any, cast
 
@@ -29,10 +30,30 @@ def summary(kind: str, *said: str, **figures: object) -> str:
     return f"{kind}({', '.join(parts)})"
 
 
-def short(kind: str, fields: Mapping[str, object]) -> str:
+def short(kind: str, figures: Mapping[str, object]) -> str:
     """Write `Kind(name=figure, ..)` in at most `MOST` characters, longer things by their size."""
-    parts = [f"{name}={_size(value)}" for name, value in fields.items()]
+    parts = [f"{name}={_size(value)}" for name, value in figures.items()]
     return shorten(f"{kind}({', '.join(parts)})", MOST, placeholder=" ...)")
+
+
+def changed(settings: Any) -> str:
+    """Write settings by those that differ from the usual ones, in at most `MOST` characters.
+
+    Args:
+        settings: A dataclass.
+    """
+    parts = [
+        f"{field.name}={value!r}"
+        for field in fields(settings)
+        if (value := getattr(settings, field.name)) != _usual(field)
+    ]
+    return shorten(f"{type(settings).__name__}({', '.join(parts)})", MOST, placeholder=" ...)")
+
+
+def _usual(field: Field[Any]) -> object:
+    """Return the default of a field; `MISSING` where there is none."""
+    made = field.default_factory
+    return field.default if made is MISSING else made()
 
 
 def _size(value: object) -> str:

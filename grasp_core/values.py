@@ -13,18 +13,10 @@ import numpy as np
 
 from grasp_core.arrays import Array, frozen, frozen_units
 from grasp_core.by_value import ByValue
-from grasp_core.checked import (
-    LARGEST,
-    instance,
-    number,
-    one_of,
-    several,
-    shown,
-    text,
-    whole,
-)
+from grasp_core.checked import LARGEST, instance, number, one_of, several, shown, text, whole
 from grasp_core.errors import InputError
 from grasp_core.frames import poses_along
+from grasp_core.notebooks import InNotebooks
 from grasp_core.short_text import counted, summary, vector
 
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
@@ -141,7 +133,7 @@ PUT_OFF = ("critical_friction", "ferrari_canny")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Grasp(ByValue):
+class Grasp(ByValue, InNotebooks):
     """Four contacts in finger order, with a witness that shows why they hold the object.
 
     A planned grasp computes its `critical_friction` and its `ferrari_canny` when they are first
@@ -280,13 +272,12 @@ def fill_in(
         name: One of `PUT_OFF`.
         computed: Computes the figure of many grasps, in order, from what each would compute it by.
     """
-    late, figures = list[Grasp](), list[Figures]()
-    for grasp in grasps:
-        way = grasp._figures  # pyright: ignore[reportPrivateUsage] - of this module
-        if way is not None and not _is_known(grasp, name):
-            late.append(grasp)
-            figures.append(way)
-    for grasp, value in zip(late, computed(figures), strict=True):
+    late = [
+        (grasp, way) for grasp in grasps
+        if (way := grasp._figures) is not None  # pyright: ignore[reportPrivateUsage] - our own
+        and not _is_known(grasp, name)
+    ]  # fmt: skip
+    for (grasp, _), value in zip(late, computed([way for _, way in late]), strict=True):
         object.__setattr__(grasp, name, value)
 
 

@@ -24,6 +24,7 @@ from grasp_core.by_value import ByValue
 from grasp_core.checked import instance, one_of, path_of, several
 from grasp_core.errors import InputError
 from grasp_core.files.whole_files import write_parts
+from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.convexity import is_convex
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
@@ -55,7 +56,7 @@ AXES = ("normal", "tangent1", "tangent2")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Scene(ByValue):
+class Scene(ByValue, InNotebooks):
     """A grasp as the text of a MuJoCo model, with the settings and numbers it was made from."""
 
     xml: str

@@ -12,9 +12,10 @@ from dataclasses import dataclass, fields
 from grasp_core.arrays import frozen
 from grasp_core.checked import LARGEST, SMALLEST, number, one_of, switch, whole
 from grasp_core.errors import InputError
+from grasp_core.short_text import changed
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class PhysicsSettings:
     """Options of the simulation, named as in MJCF.
 
@@ -62,6 +63,10 @@ class PhysicsSettings:
     returns to its start, which looks perfectly stable."""
     diagexact: bool = False
     """Whether contact impedances use the exact inertia at each contact."""
+
+    def __repr__(self) -> str:
+        """Return the settings that differ from the usual ones."""
+        return changed(self)
 
     def __post_init__(self) -> None:
         for name, words in WORDS.items():

@@ -18,6 +18,7 @@ ROOT = Path(__file__).parent.parent
 DOORS = {
     "manifold3d": "grasp_core/objects/booleans.py",
     "trimesh": "grasp_core/objects/conversion.py",
+    "pandas": "grasp_core/grasp_tables.py",
     "numba": ("grasp_core/compiled.py", "grasp_core/kept_loops.py"),
     "highspy": "grasp_core/solvers/lp.py",
     "clarabel": "grasp_core/solvers/conic.py",
@@ -26,7 +27,7 @@ DOORS = {
     "mujoco": ("sim_validate/simulation/engine.py", "scenes/drawing/frames.py"),
     "PIL": "scenes/drawing/frames.py",
     "matplotlib": "scenes/drawing/canvas.py",
-    "jinja2": "sim_validate/reports/pages.py",
+    "jinja2": "scenes/drawing/pages.py",
     "scipy.stats": "sim_validate/validation/repeats.py",
     "pebble": "sim_validate/parallel/processes.py",
     "ray": "sim_validate/parallel/clusters.py",

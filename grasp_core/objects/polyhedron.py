@@ -1,7 +1,7 @@
 """Defines the polyhedron, a solid bounded by planar faces, made from a mesh file or triangles."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, Self, TypeVar
@@ -25,6 +25,7 @@ from grasp_core.checked import (
 from grasp_core.errors import InputError, MeshError
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
+from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.build import DEFAULT_FLATNESS, DEFAULT_LIMITS, build, check_choices
 from grasp_core.objects.conversion import mesh_of, triangles_of
 from grasp_core.objects.face import Face, FaceKind, PatchLimits
@@ -35,7 +36,7 @@ UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Polyhedron(ByValue):
+class Polyhedron(ByValue, InNotebooks):
     """A solid bounded by planar faces, with the mass properties of uniform density 1 kg/m^3."""
 
     name: str
@@ -57,8 +58,8 @@ class Polyhedron(ByValue):
     patches: PatchLimits | None = None
     """Limits of flatness for the patches of a curved surface; None where faces are exactly planar.
     """
-    notes: tuple[str, ...] = ()
-    """Notes, for people to read, on what was changed when the mesh was read."""
+    notes: tuple[str, ...] = field(default=(), compare=False)
+    """Notes, for people to read, on what was changed when the mesh was read; not compared."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))

@@ -11,6 +11,7 @@ from typing import cast
 
 import numpy as np
 
+from grasp_core.angles import kept_angle
 from grasp_core.arrays import Array, frozen_copy
 from grasp_core.by_value import trusted
 from grasp_core.closure.batches.certificates import closing_margins
@@ -272,7 +273,7 @@ def to_grasps(body: Polyhedron, friction: float, found: Sequence[Certified]) -> 
                 for position, normal in zip(positions[i], normals[i], strict=True)
             ),
             focus_points=frozen_copy(center + radius * each.placement.foci),
-            force_cones=four(each.cones),
+            force_cones=four(map(_kept_cone, each.cones)),
             regions=four(
                 trusted(
                     ContactRegion,
@@ -283,7 +284,7 @@ def to_grasps(body: Polyhedron, friction: float, found: Sequence[Certified]) -> 
                 for region in each.regions
             ),
             radius=radius * float(each.placement.radii.min()),
-            span_angle=each.span_angle,
+            span_angle=kept_angle(each.span_angle),
             closure_margin=each.margin,
             witness=trusted(Witness, points=positions[i], forces=forces[i]),
             approach_directions=None if each.ways_out is None else frozen_copy(-each.ways_out),
@@ -291,3 +292,9 @@ def to_grasps(body: Polyhedron, friction: float, found: Sequence[Certified]) -> 
         )
         for i, each in enumerate(found)
     ]
+
+
+def _kept_cone(cone: ForceCone) -> ForceCone:
+    """Return a force cone with the half-angle that files keep."""
+    half_angle = kept_angle(cone.half_angle)
+    return cone if half_angle == cone.half_angle else ForceCone(cone.axis, half_angle)

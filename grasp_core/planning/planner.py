@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial, wraps
 from typing import ParamSpec, TypeVar, cast
 
+from grasp_core.angles import kept_angle
 from grasp_core.checked import function, several, text, whole
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.errors import InputError
@@ -184,7 +185,7 @@ def _planned(body: Polyhedron, request: PlanRequest, on: Standard, searches: Sea
         body=body,
         grasps=tuple(grasps),
         friction=request.friction,
-        theta=request.theta,
+        theta=kept_angle(request.theta),
         seed=request.seed,
         counts=counts,
         outcomes=known,

@@ -1,13 +1,14 @@
 """Holds a plan: the grasps found on one object, what was tried, and what was ruled out."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from textwrap import shorten
-from typing import Any, Literal, Protocol, TypeAlias, overload
+from typing import Any, Literal, Protocol, TypeAlias
 
 from grasp_core.by_value import ByValue
-from grasp_core.grasp_tables import Demands, data_frame, grasp_named
+from grasp_core.grasp_tables import ById, Demands, data_frame
+from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.short_text import counted, summary
@@ -114,6 +115,24 @@ class Outcomes:
 
 
 @dataclass(frozen=True, slots=True)
+class Moved:
+    """How optimisation changed a grasp's quality, as proved bounds (lower, upper)."""
+
+    id: str
+    moved_from: str
+    """Id of the planned grasp; equal to `id` where the grasp was not moved."""
+    before: tuple[float, float]
+    after: tuple[float, float]
+    ceiling: float | None
+    """Quality that no contacts on the same faces exceed; None where no ceiling was asked for."""
+
+    @property
+    def gain(self) -> float:
+        """Return the ratio of the proved lower bounds, after to before."""
+        return self.after[0] / self.before[0]
+
+
+@dataclass(frozen=True, slots=True)
 class PlanCounts:
     """Counts of what the planner tried on one object."""
 
@@ -121,19 +140,20 @@ class PlanCounts:
     quadruples: int
     """Number of sets of four faces; with `share_faces` also of sets with two halves of a face."""
     spanning: int | None
-    """Sets whose normals positively span at the least planned angle (P3); None above 200 faces,
-    where there are too many to count."""
+    """Sets whose normals positively span at the least planned angle (P3); None where they were not
+    counted, as above 200 faces."""
     families: Mapping[str, MethodCounts] = field(default_factory=dict[str, MethodCounts])
     """Counts of each method: the three families and `free`, as far as they were asked for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Plan(ByValue):
+class Plan(ByValue, ById[Grasp], InNotebooks):
     """The grasps found on one object, the best first, and what was tried.
 
     A plan is a sequence of its grasps: `len(plan)`, `for grasp in plan`, `plan[0]`, and also
     `plan["c-0-1-2-7"]` by id. A slice and `filter` give a plan with fewer grasps, whose counts are
-    still those of the whole search. Plans are equal if everything but `seconds` is.
+    still those of the whole search. Plans are equal if everything but `seconds`
+    and `versions` is.
     """
 
     body: Polyhedron
@@ -161,43 +181,12 @@ class Plan(ByValue):
     the choices of contacts that is open, where each cut counts for half."""
     unreached: Mapping[FaceQuadruple, str] = field(default_factory=dict[FaceQuadruple, str])
     """Face quadruples whose grasps the fingers cannot reach, with the reason."""
+    moves: tuple[Moved, ...] = ()
+    """How optimisation changed each grasp; empty if it was not asked for."""
     seconds: Mapping[str, float] = field(default_factory=dict[str, float], compare=False)
     """Processor time of each method [s], from its first program to its last grasp."""
-
-    def __len__(self) -> int:
-        """Return the number of grasps."""
-        return len(self.grasps)
-
-    def __bool__(self) -> bool:
-        """Return True for any plan, also for one without grasps: its proofs are a result, too."""
-        return True
-
-    def __iter__(self) -> Iterator[Grasp]:
-        """Iterate over the grasps, the best first."""
-        return iter(self.grasps)
-
-    def __contains__(self, wanted: object) -> bool:
-        """Return whether the plan has a grasp, or a grasp with an id."""
-        if isinstance(wanted, str):
-            return any(grasp.id == wanted for grasp in self.grasps)
-        return wanted in self.grasps
-
-    @overload
-    def __getitem__(self, key: int | str) -> Grasp: ...
-
-    @overload
-    def __getitem__(self, key: slice) -> "Plan": ...
-
-    def __getitem__(self, key: int | str | slice) -> "Grasp | Plan":
-        """Return a grasp by its place or its id, or a plan with some of the grasps.
-
-        Raises:
-            KeyError: No grasp has this id.
-            IndexError: There is no grasp at this place.
-        """
-        if isinstance(key, slice):
-            return replace(self, grasps=self.grasps[key])
-        return grasp_named(self.grasps, key) if isinstance(key, str) else self.grasps[key]
+    versions: Mapping[str, str] | None = field(default=None, compare=False)
+    """Versions of the packages that made a plan from a file; None for those that are installed."""
 
     def filter(
         self,

@@ -33,8 +33,9 @@ def save_grasps(path: str | Path, plan: Plan) -> Path:
 def load_grasps(path: str | Path) -> Plan:
     """Read a `grasps.json` as a plan, with every grasp checked against the object in the file.
 
-    A file keeps neither proofs of absence nor times, and keeps angles in degrees: these may differ
-    from the plan's in the last digit.
+    Each grasp equals the one that was saved. A file keeps neither times nor what is known of face
+    quadruples without grasps: `absences`, `undecided` and `unreached` are empty. A plan that is
+    loaded and saved again gives the same bytes.
 
     Args:
         path: A `grasps.json`, as `save_grasps` and `graspproof plan` write it.

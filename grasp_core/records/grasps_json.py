@@ -5,12 +5,13 @@ imported only where a file is read: plans are written without it.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from grasp_core.angles import radians_of
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import text_of
 from grasp_core.mesh_files.limits import MeshLimits
@@ -19,7 +20,7 @@ from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.planning.certify import check_witness, find_critical_frictions
 from grasp_core.planning.reach import Finger
-from grasp_core.planning.result import MethodCounts, Outcomes, Plan, PlanCounts
+from grasp_core.planning.result import MethodCounts, Moved, Outcomes, Plan, PlanCounts
 from grasp_core.provenance import versions
 from grasp_core.values import Contact, ContactRegion, ForceCone, Grasp, Witness, four
 
@@ -47,25 +48,7 @@ class SavedGrasps:
     """The finger whose free paths to the contacts were planned; None if none were planned."""
 
 
-@dataclass(frozen=True, slots=True)
-class Moved:
-    """How optimisation changed a grasp's quality, as proved bounds (lower, upper)."""
-
-    id: str
-    moved_from: str
-    """Id of the planned grasp; equal to `id` where the grasp was not moved."""
-    before: tuple[float, float]
-    after: tuple[float, float]
-    ceiling: float | None
-    """Quality that no contacts on the same faces exceed; None where no ceiling was asked for."""
-
-    @property
-    def gain(self) -> float:
-        """Return the ratio of the proved lower bounds, after to before."""
-        return self.after[0] / self.before[0]
-
-
-def plan_to_json(body: Polyhedron, plan: Plan, moves: Sequence[Moved] = ()) -> str:
+def plan_to_json(body: Polyhedron, plan: Plan) -> str:
     """Write a plan as the text of a `grasps.json`; equal plans give equal text."""
     find_critical_frictions(plan.grasps)
     document: dict[str, object] = {
@@ -85,7 +68,7 @@ def plan_to_json(body: Polyhedron, plan: Plan, moves: Sequence[Moved] = ()) -> s
         "theta_deg": math.degrees(plan.theta),
         "seed": plan.seed,
         "finger": None if plan.finger is None else asdict(plan.finger),
-        "versions": versions(),
+        "versions": versions() if plan.versions is None else dict(plan.versions),
         "counts": asdict(plan.counts),
         "outcomes": asdict(plan.outcomes),
         "absence": plan.absence,
@@ -97,7 +80,7 @@ def plan_to_json(body: Polyhedron, plan: Plan, moves: Sequence[Moved] = ()) -> s
                 "ferrari_canny_after": list(move.after),
                 "ferrari_canny_ceiling": move.ceiling,
             }
-            for move in moves
+            for move in plan.moves
         ],
         "grasps": [_grasp_to_record(grasp) for grasp in plan.grasps],
     }
@@ -159,8 +142,8 @@ def grasps_from_json(text: str) -> SavedGrasps:
 def plan_from_json(text: str) -> Plan:
     """Read the text of a `grasps.json` as the plan that was written.
 
-    A file keeps neither proofs of absence nor times, and keeps angles in degrees: these may differ
-    from the plan's in the last digit.
+    A file keeps neither times nor what is known of face quadruples without grasps: `absences`,
+    `undecided` and `unreached` are empty. Written again, the plan gives the same text.
 
     Raises:
         InputError: The text is not a `grasps.json`; the message names the field.
@@ -172,7 +155,7 @@ def plan_from_json(text: str) -> Plan:
         body=body,
         grasps=_grasps_of(body, record),
         friction=record.friction,
-        theta=math.radians(record.theta_deg),
+        theta=radians_of(record.theta_deg),
         seed=record.seed,
         counts=PlanCounts(
             counts.faces,
@@ -183,6 +166,17 @@ def plan_from_json(text: str) -> Plan:
         outcomes=Outcomes(**record.outcomes.model_dump()),
         absence=record.absence,
         finger=_finger_of(record),
+        moves=tuple(
+            Moved(
+                move.id,
+                move.moved_from,
+                move.ferrari_canny_before,
+                move.ferrari_canny_after,
+                move.ferrari_canny_ceiling,
+            )
+            for move in record.optimization
+        ),
+        versions=record.versions,
     )
 
 
@@ -244,7 +238,7 @@ def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float)
         ),
         focus_points=np.array(record.focus_points_m).reshape(-1, 3),
         force_cones=four(
-            ForceCone(np.array(cone.axis), math.radians(cone.half_angle_deg))
+            ForceCone(np.array(cone.axis), radians_of(cone.half_angle_deg))
             for cone in record.force_cones
         ),
         regions=four(
@@ -252,7 +246,7 @@ def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float)
             for region in record.regions
         ),
         radius=record.radius_m,
-        span_angle=math.radians(record.span_angle_deg),
+        span_angle=radians_of(record.span_angle_deg),
         critical_friction=record.critical_friction,
         closure_margin=record.closure_margin,
         ferrari_canny=record.ferrari_canny,

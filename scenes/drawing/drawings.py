@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices
 from grasp_core.checked import coefficient
 from grasp_core.cones.spanning import angles_between
 from grasp_core.objects.on_faces import check_on_faces
@@ -18,6 +18,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from scenes.drawing.ruled_surfaces import between, rulings
 from scenes.drawing.shapes import Shape, closed, cone_rim, cone_sides, tube
+from scenes.drawing.views import Extent
 
 BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
 """Length and radius of a finger's bar, in object radii."""
@@ -62,6 +63,15 @@ def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, 
     return (*shapes, Shape("contact", points=grasp.positions))
 
 
+def drawing_alone(extent: Extent, grasp: Grasp) -> tuple[Shape, ...]:
+    """List the shapes that show a grasp without its object, and without friction cones."""
+    shapes = list[Shape]()
+    for finger in range(len(grasp.contacts)):
+        shapes += _bar_and_region(extent, grasp, finger)
+        shapes.append(_force_cone(extent, grasp, finger))
+    return (*shapes, *_family(extent, grasp), Shape("contact", points=grasp.positions))
+
+
 def glass(body: Polyhedron) -> tuple[Shape, ...]:
     """Return the shapes of the object: its surface, and the borders of its faces."""
     loops = [loop for face in body.faces for loop in (face.polygon, *face.holes)]
@@ -75,54 +85,72 @@ def _panes(body: Polyhedron) -> tuple[Array, ...]:
     """Return the polygons of the surface: face pieces, or the triangles of a curved surface."""
     if body.patches is None:
         return tuple(piece for face in body.faces for piece in face.pieces)
-    fine = len(body.triangles) > MOST_TRIANGLES
-    return tuple(_coarse(body) if fine else body.vertices[body.triangles])
+    return tuple(coarse(body.vertices, body.triangles))
 
 
-def _coarse(body: Polyhedron) -> Array:
-    """Simplify a surface by joining vertices on a grid, without tearing it, (t, 3, 3) [m].
+def coarse(vertices: Array, triangles: Indices) -> Array:
+    """Return the triangles of a surface, (t, 3, 3) [m], fewer and larger ones if they are many.
 
-    Each vertex moves to the mean of the vertices in its cell. Triangles that then have no area are
-    dropped.
+    A fine surface is simplified by joining vertices on a grid, without tearing it. Each vertex
+    moves to the mean of the vertices in its cell. Triangles that then have no area are dropped.
+
+    Args:
+        vertices: Vertices, (n, 3) [m].
+        triangles: Vertex indices, (t, 3).
     """
+    if len(triangles) <= MOST_TRIANGLES:
+        return vertices[triangles]
     cells = math.sqrt(MOST_TRIANGLES) / 2.0
-    low = body.vertices.min(axis=0)
-    size = float((body.vertices.max(axis=0) - low).max()) / cells
-    places = np.floor((body.vertices - low) / size).astype(np.int64)
+    low = vertices.min(axis=0)
+    size = float((vertices.max(axis=0) - low).max()) / cells
+    places = np.floor((vertices - low) / size).astype(np.int64)
     _, owners = np.unique(places, axis=0, return_inverse=True)
     owners = owners.reshape(-1)
     counts = np.bincount(owners)
-    middles = np.stack([np.bincount(owners, axis) / counts for axis in body.vertices.T], axis=1)
-    joined = owners[body.triangles]
+    middles = np.stack([np.bincount(owners, axis) / counts for axis in vertices.T], axis=1)
+    joined = owners[triangles]
     a, b, c = joined.T
     joined = joined[(a != b) & (b != c) & (c != a)]
     _, first = np.unique(np.sort(joined, axis=1), axis=0, return_index=True)
     return middles[joined[np.sort(first)]]
 
 
-def _finger(body: Polyhedron, grasp: Grasp, finger: int, half_angle: float) -> list[Shape]:
+def _finger(body: Extent, grasp: Grasp, finger: int, half_angle: float) -> list[Shape]:
     contact, cone = grasp.contacts[finger], grasp.force_cones[finger]
     tip, length = contact.position, CONE_LENGTH * body.radius
-    ways = grasp.approach_directions
-    inward = contact.normal if ways is None else ways[finger]
-    bar = tube(tip, tip - BAR_LENGTH * body.radius * inward, BAR_RADIUS * body.radius)
+    straight, *region = _bar_and_region(body, grasp, finger)
     rim = cone_rim(tip, contact.normal, half_angle, length)
     spokes = [np.array([tip, corner]) for corner in rim[::5]]
-    shapes = [
-        Shape("finger", finger, polygons=bar),
-        Shape("friction cone", finger, lines=(closed(rim), *spokes)),
-    ]
+    shapes = [straight, Shape("friction cone", finger, lines=(closed(rim), *spokes))]
     lean = float(angles_between(cone.axis, contact.normal))
     if lean + cone.half_angle <= half_angle + SLACK_RAD:
-        sides = cone_sides(tip, cone.axis, cone.half_angle, length)
-        shapes.append(Shape("force cone", finger, polygons=sides))
+        shapes.append(_force_cone(body, grasp, finger))
+    return [*shapes, *region]
+
+
+def _bar_and_region(body: Extent, grasp: Grasp, finger: int) -> list[Shape]:
+    """Return a finger's bar and, where it is more than a point, its region."""
+    tip, ways = grasp.contacts[finger].position, grasp.approach_directions
+    inward = grasp.contacts[finger].normal if ways is None else ways[finger]
     region = grasp.regions[finger].polygon
+    shapes = [Shape("finger", finger, polygons=bar(tip, inward, body.radius))]
     if len(region) >= POLYGON:
         shapes.append(Shape("region", finger, polygons=(region,)))
     return shapes
 
 
-def _family(body: Polyhedron, grasp: Grasp) -> list[Shape]:
+def bar(tip: Array, inward: Array, radius: float) -> tuple[Array, ...]:
+    """Return the polygons of a finger that stands on a point of an object of a given radius."""
+    return tube(tip, tip - BAR_LENGTH * radius * inward, BAR_RADIUS * radius)
+
+
+def _force_cone(body: Extent, grasp: Grasp, finger: int) -> Shape:
+    cone, tip = grasp.force_cones[finger], grasp.contacts[finger].position
+    sides = cone_sides(tip, cone.axis, cone.half_angle, CONE_LENGTH * body.radius)
+    return Shape("force cone", finger, polygons=sides)
+
+
+def _family(body: Extent, grasp: Grasp) -> list[Shape]:
     """Return the lines of force, and the shapes that show the grasp's family."""
     if grasp.family == "regulus":
         return _regulus(body, grasp)
@@ -139,7 +167,7 @@ def _family(body: Polyhedron, grasp: Grasp) -> list[Shape]:
     return shapes
 
 
-def _regulus(body: Polyhedron, grasp: Grasp) -> list[Shape]:
+def _regulus(body: Extent, grasp: Grasp) -> list[Shape]:
     """Return the lines along the witness forces, and the ruled surface that they lie on."""
     reach, beyond = REACH * body.radius, BEYOND * body.radius
     ways = grasp.witness.directions

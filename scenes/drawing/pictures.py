@@ -25,7 +25,7 @@ from scenes.drawing.drawings import BAR_LENGTH, drawing_of
 from scenes.drawing.painting import painted
 from scenes.drawing.palette import FINGERS, INK, LOOKS, NEUTRAL, colour_of
 from scenes.drawing.shapes import Role, Shape, extent_of
-from scenes.drawing.views import View, best_view
+from scenes.drawing.views import Extent, View, best_view
 
 SIDE_IN = 5.0
 """Width of a picture, and its height without the legend [inches]."""
@@ -132,7 +132,7 @@ def draw_grasp(
     """
     shapes = drawing_of(body, grasp, friction)
     numbers = number_places(body, grasp)
-    low, high = _frame(shapes, numbers, body, None if steady else view)
+    low, high = frame_around(shapes, numbers, body, None if steady else view)
     patches = painted(shapes, view, float(high[0] - low[0]))
     add_polygons(
         axes,
@@ -151,14 +151,14 @@ def draw_grasp(
     return shapes
 
 
-def number_places(body: Polyhedron, grasp: Grasp) -> Array:
+def number_places(body: Extent, grasp: Grasp) -> Array:
     """Return where the fingers' numbers are written, behind their bars, (4, 3) [m]."""
     ways = grasp.normals if grasp.approach_directions is None else grasp.approach_directions
     return grasp.positions - (BAR_LENGTH + NUMBER_BEYOND) * body.radius * ways
 
 
-def _frame(
-    shapes: Sequence[Shape], numbers: Array, body: Polyhedron, view: View | None
+def frame_around(
+    shapes: Sequence[Shape], numbers: Array, body: Extent, view: View | None
 ) -> tuple[Array, Array]:
     """Return two opposite corners of a square around the drawing, (2,) each [m].
 

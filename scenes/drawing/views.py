@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Self
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -27,6 +27,34 @@ FORESHORTENED = 0.8
 """Cosine of the angle to the line of sight above which a finger points at the viewer."""
 
 
+class Extent(Protocol):
+    """The place and size of what is drawn: an object, or a grasp alone."""
+
+    @property
+    def center_of_mass(self) -> Array:
+        """Return the point around which everything is drawn, (3,) [m]."""
+        ...
+
+    @property
+    def radius(self) -> float:
+        """Return the length by which bars and cones are measured [m]."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Alone:
+    """The extent of a grasp whose object is not known: a ball around its contacts."""
+
+    center_of_mass: Array
+    radius: float
+
+    @classmethod
+    def of_contacts(cls, positions: Array) -> Self:
+        """Measure contact points, (k, 3) [m]."""
+        mean = positions.mean(axis=0)
+        return cls(mean, float(np.linalg.norm(positions - mean, axis=1).max()))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
     """A camera that looks at a point, with z of the object's frame upwards."""
@@ -44,7 +72,7 @@ class View:
         positive(self.distance, "distance")
 
     @classmethod
-    def of_angles(cls, azimuth_deg: float, elevation_deg: float, body: Polyhedron) -> Self:
+    def of_angles(cls, azimuth_deg: float, elevation_deg: float, body: Extent) -> Self:
         """Place a camera by its azimuth and elevation [deg] as seen from the object."""
         number(azimuth_deg, "azimuth_deg")
         number(elevation_deg, "elevation_deg")
@@ -68,17 +96,29 @@ def _axes(azimuth: float, elevation: float) -> Array:
 
 def best_view(body: Polyhedron, grasp: Grasp) -> View:
     """Choose a view that keeps contacts and fingers apart and shows few faces edge-on."""
+    areas = np.array([face.area for face in body.faces])
+    _, axes = _views()
+    lines = (np.abs(axes[:, 2] @ body.normals.T) < EDGE_ON) @ areas / areas.sum()
+    return _clearest(body, grasp, 0.5 * lines)
+
+
+def view_alone(extent: Extent, grasp: Grasp) -> View:
+    """Choose a view that keeps the contacts and fingers of a grasp apart."""
+    angles, _ = _views()
+    return _clearest(extent, grasp, np.zeros(len(angles)))
+
+
+def _clearest(body: Extent, grasp: Grasp, faults: Array) -> View:
+    """Return the view with fingers best apart, less the faults (n,) of each view."""
     outward = -grasp.normals if grasp.approach_directions is None else -grasp.approach_directions
     ends = grasp.positions + body.radius * outward
-    areas = np.array([face.area for face in body.faces])
     angles, axes = _views()
     towards = axes[:, 2]
     fingers = towards @ outward.T
     apart = _least_gaps(axes, np.vstack([grasp.positions, ends]), body) / body.radius
     pointing = np.maximum(np.abs(fingers) - FORESHORTENED, 0.0).sum(axis=1)
-    lines = (np.abs(towards @ body.normals.T) < EDGE_ON) @ areas / areas.sum()
     in_front = (fingers > SAME_MERIT).mean(axis=1)
-    merits = apart + 0.1 * in_front - 2.0 * pointing - 0.5 * lines
+    merits = apart + 0.1 * in_front - 2.0 * pointing - faults
     return View.of_angles(*angles[first_best(merits, SAME_MERIT)], body)
 
 
@@ -90,7 +130,7 @@ def _views() -> tuple[list[tuple[int, int]], Array]:
     return angles, np.array(axes)
 
 
-def _least_gaps(axes: Array, points: Array, body: Polyhedron) -> Array:
+def _least_gaps(axes: Array, points: Array, body: Extent) -> Array:
     """Return the smallest distance between any two points (p, 3) in each picture, (n,) [m]."""
     turned = (points - body.center_of_mass) @ axes.transpose(0, 2, 1)
     flat = turned[..., :2] * _enlarged(turned[..., 2], DISTANCE * body.radius)[..., None]

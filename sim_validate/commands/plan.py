@@ -17,9 +17,9 @@ from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.planning.request import RankBy, methods_for
-from grasp_core.planning.result import Plan
+from grasp_core.planning.result import Moved, Plan
 from grasp_core.planning.selection import carried
-from grasp_core.records.grasps_json import Moved, plan_to_json
+from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.values import FaceQuadruple, Grasp
 from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
@@ -38,7 +38,7 @@ CARRIED = {"payload": "payload kg", "first-slip": "first slip"}
 
 def plan_object(
     body: Polyhedron, planning: flag_groups.Planning, jobs: int, reporter: Reporter
-) -> tuple[Plan, tuple[Moved, ...]]:
+) -> Plan:
     """Plan the grasps of an object and, if asked for, improve them.
 
     Raises:
@@ -62,18 +62,17 @@ def plan_object(
             progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
             jobs=left,
         )
-    moves: tuple[Moved, ...] = ()
     if planning.optimize and found.grasps:
         from sim_validate.parallel.improving import improved
 
         with reporter.progress("optimising") as steps:
-            found, moves = improved(
+            found = improved(
                 body, found, finger_radius=planning.finger_radius_m, parts=planning.ceiling,
                 jobs=jobs, progress=steps.update,
             )  # fmt: skip
-        if left_out := len(moves) - len(found.grasps):
+        if left_out := len(found.moves) - len(found):
             reporter.say(f"{left_out} optimised grasps are left out, equal to others after moving")
-    return found, moves
+    return found
 
 
 def with_regions(
@@ -106,11 +105,11 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
     """Plan grasps, write them to a file, and show the best of them."""
     body = object_to_plan(command.object, command.planning, reporter)
     with alone_in(command.out):
-        found, moves = plan_object(body, command.planning, command.jobs, reporter)
+        found = plan_object(body, command.planning, command.jobs, reporter)
         if command.out:
             remove_results(command.out)
         found = with_regions(body, found, command.planning, command.out, command.jobs, reporter)
-        text = plan_to_json(body, found, moves)
+        text = plan_to_json(body, found)
         if command.out:
             path = write_text(command.out / "grasps.json", text)
             reporter.say(f"wrote {path}")
@@ -123,8 +122,8 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
     columns, rows = _table(body, found, command.planning.rank_by)
     reporter.table(f"{len(found.grasps)} grasps of {body.name}", columns, rows)
     say_cut(len(found.grasps), reporter)
-    if moves:
-        show_gains(moves, reporter)
+    if found.moves:
+        show_gains(found.moves, reporter)
     return Exit.GOOD
 
 

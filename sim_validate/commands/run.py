@@ -61,17 +61,17 @@ def _run_in(
 ) -> int:
     (setup, agenda), jobs = trials, command.testing.jobs
     execution = execution_of_run(command, body)
-    found, moves = plan_object(body, command.planning, jobs, reporter)
+    found = plan_object(body, command.planning, jobs, reporter)
     remove_results(folder)
     found = with_regions(body, found, command.planning, folder, jobs, reporter)
-    write_text(folder / "grasps.json", plan_to_json(body, found, moves))
+    write_text(folder / "grasps.json", plan_to_json(body, found))
     say_counts(body, found, reporter)
     if found.absence:
         reporter.say(found.absence)
         reporter.document({"absence": found.absence, "out": str(folder)})
         return Exit.NONE
-    if moves:
-        show_gains(moves, reporter)
+    if found.moves:
+        show_gains(found.moves, reporter)
     saved = SavedGrasps(body, found.friction, found.seed, found.grasps, found.finger)
     _write_scenes(folder, saved, setup)
     code, text = simulate_grasps(saved, setup, agenda, jobs=jobs, folder=folder, reporter=reporter)

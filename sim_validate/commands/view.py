@@ -16,6 +16,7 @@ from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, has_display, write_clip
 from scenes.drawing.pictures import write_picture
 from scenes.drawing.turning_clips import write_turning_clip
+from scenes.drawing.turntable import turntable_page
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, build_scene
 from sim_validate.cli import showing_flags
@@ -23,7 +24,6 @@ from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.records.grasps import grasp_with_id, read_grasps
 from sim_validate.reports.run_folder import GRASPS
-from sim_validate.reports.turntable import turntable_page
 from sim_validate.simulation.setup import with_planned_radius
 
 COMING, RESTING = 60, 20

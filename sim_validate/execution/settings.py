@@ -7,6 +7,7 @@ from typing import Literal, TypeAlias, get_args
 from grasp_core.checked import LARGEST, instance, number, one_of, positive, seed_of, several, whole
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import STIFFNESS_N_PER_M
+from grasp_core.short_text import changed
 from scenes.execution.held import HeldSettings
 
 TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misplaced"]
@@ -20,7 +21,7 @@ LONGEST_S = 100.0
 """Longest duration of a lift or a stop [s]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class ExecutionSettings:
     """How grasps are executed, and how far an object may move and still count as held.
 
@@ -67,6 +68,10 @@ class ExecutionSettings:
     """Displacement against the palm up to which an object counts as held [mm]."""
     most_deg: float = 5.0
     """Turn against the palm up to which an object counts as held [degrees]."""
+
+    def __repr__(self) -> str:
+        """Return the settings that differ from the usual ones."""
+        return changed(self)
 
     def __post_init__(self) -> None:
         for name in POSITIVE:

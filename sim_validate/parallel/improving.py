@@ -8,8 +8,7 @@ import numpy as np
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.better_contacts import Improvement, optimize_contacts
 from grasp_core.optimizing.ceiling import quality_ceiling
-from grasp_core.planning.result import Plan
-from grasp_core.records.grasps_json import Moved
+from grasp_core.planning.result import Moved, Plan
 from grasp_core.values import Grasp
 from sim_validate.parallel.processes import each
 
@@ -34,8 +33,8 @@ class _Task:
 def improved(
     body: Polyhedron, found: Plan, *, finger_radius: float | None, parts: int | None, jobs: int,
     progress: Callable[[int, int, str], None],
-) -> tuple[Plan, tuple[Moved, ...]]:  # fmt: skip
-    """Improve each grasp of a plan; return the new plan, best first, and how each grasp changed.
+) -> Plan:  # fmt: skip
+    """Improve each grasp of a plan; return the new plan, best first, with how each grasp changed.
 
     The plan keeps only one of several grasps that end at the same contacts.
 
@@ -61,7 +60,7 @@ def improved(
     for grasp, _ in done:
         if not any(_same_contacts(grasp, other, SAME_CONTACTS * body.radius) for other in kept):
             kept.append(grasp)
-    return replace(found, grasps=tuple(kept)), tuple(moved for _, moved in done)
+    return replace(found, grasps=tuple(kept), moves=tuple(moved for _, moved in done))
 
 
 def _same_contacts(one: Grasp, two: Grasp, slack: float) -> bool:

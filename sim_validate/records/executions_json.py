@@ -17,6 +17,7 @@ from grasp_core.files.complaints import record_of, settings_of
 from grasp_core.files.json_text import text_of
 from grasp_core.files.strict_json import place
 from grasp_core.files.text_files import read_text
+from grasp_core.grasp_tables import ById
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from scenes.physics import PhysicsSettings
@@ -41,8 +42,11 @@ Settings = TypeVar("Settings", ExecutionSettings, PhysicsSettings)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Executions(ByValue):
-    """The executions of an object's grasps, as a file holds them."""
+class Executions(ByValue, ById[ExecutedGrasp]):
+    """The executions of an object's grasps, as a file holds them.
+
+    They are a sequence, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
+    """
 
     object_sha256: str
     """Hash of the object's canonical mesh, as in `Polyhedron.content_sha256`."""
@@ -51,21 +55,6 @@ class Executions(ByValue):
     complete: bool
     """Whether every grasp that was asked for was executed."""
     grasps: tuple[ExecutedGrasp, ...]
-
-    def __len__(self) -> int:
-        """Return the number of grasps."""
-        return len(self.grasps)
-
-    def __getitem__(self, grasp_id: str) -> ExecutedGrasp:
-        """Return the grasp with an id.
-
-        Raises:
-            KeyError: No grasp has this id.
-        """
-        found = next((each for each in self.grasps if each.id == grasp_id), None)
-        if found is None:
-            raise KeyError(grasp_id)
-        return found
 
 
 def executions_to_json(

@@ -1,6 +1,6 @@
 """Loads `verdicts.json` for people who look at verdicts in Python."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from grasp_core.checked import path_of
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
 from grasp_core.files.text_files import read_text
+from grasp_core.grasp_tables import ById
 from sim_validate.records.verdicts_schema import SCHEMA, VerdictRecord, VerdictsFile
 from sim_validate.simulation.hold_verdict import LET_GO, Outcome
 
@@ -39,8 +40,13 @@ class SavedVerdict(ByValue):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class SavedVerdicts(ByValue):
-    """The verdicts on an object's grasps, as a file holds them."""
+class SavedVerdicts(ByValue, ById[SavedVerdict]):
+    """The verdicts on an object's grasps, as a file holds them.
+
+    They are a sequence, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
+    """
+
+    ITEMS = "verdicts"
 
     object_sha256: str
     """Hash of the object's canonical mesh, as in `Polyhedron.content_sha256`."""
@@ -48,25 +54,6 @@ class SavedVerdicts(ByValue):
     complete: bool
     """Whether every grasp that was asked for was tested."""
     verdicts: tuple[SavedVerdict, ...]
-
-    def __len__(self) -> int:
-        """Return the number of verdicts."""
-        return len(self.verdicts)
-
-    def __iter__(self) -> Iterator[SavedVerdict]:
-        """Iterate over the verdicts in the order of the file."""
-        return iter(self.verdicts)
-
-    def __getitem__(self, grasp_id: str) -> SavedVerdict:
-        """Return the verdict on the grasp with an id.
-
-        Raises:
-            KeyError: There is no verdict on such a grasp.
-        """
-        found = next((each for each in self.verdicts if each.id == grasp_id), None)
-        if found is None:
-            raise KeyError(f"there is no verdict on a grasp {grasp_id}")
-        return found
 
 
 def load_verdicts(path: str | Path) -> SavedVerdicts:

@@ -9,12 +9,12 @@ from typing import cast
 
 import numpy as np
 
+from scenes.drawing.pages import NOTHING, number
 from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import Execution, ExecutionTrial
 from sim_validate.records.executions_json import Executions, executions_summary
 from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record, said_of
-from sim_validate.reports.pages import NOTHING, number
 
 MILLI = 1e3
 FLAGS = {

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from grasp_core.arrays import Array
 from grasp_core.cones.spanning import angles_between
 from grasp_core.values import Grasp
+from scenes.drawing.pages import NOTHING, number
+from scenes.drawing.turntable import as_text, grasp_data
 from sim_validate.reports.agreement import (
     BAD,
     GOOD,
@@ -22,9 +24,8 @@ from sim_validate.reports.executed_grasps import (
     execution_section,
     said_of_both,
 )
-from sim_validate.reports.pages import NOTHING, number, page
+from sim_validate.reports.pages import page
 from sim_validate.reports.run_folder import GRASPS, RunFolder
-from sim_validate.reports.turntable import as_text, grasp_data
 
 MILLI, MICRO = 1e3, 1e6
 ROTATED, MIRRORED = "rotated", "mirrored"

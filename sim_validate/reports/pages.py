@@ -1,57 +1,23 @@
-"""Fills page templates with values; the only module that uses jinja2.
+"""Fills the templates of reports, which include those of single drawings."""
 
-Values are escaped and lose unprintable characters, because names of files and objects come from
-anywhere.
-"""
-
-import importlib
-from functools import cache
 from pathlib import Path
-from typing import Any
+
+from scenes.drawing import pages
 
 ASSETS = Path(__file__).parent / "assets"
-"""Folder of templates, styles and scripts."""
-NOTHING = "-"
-"""Text that stands for a missing number."""
+"""Folder of the templates and scripts of reports."""
 
 
 def page(template: str, **values: object) -> str:
-    """Fill a page template with values.
+    """Fill a template of a report with values.
 
     Args:
         template: File name of the template.
         values: Values that the template uses, by name.
     """
-    return str(_environment().get_template(template).render(**values))
+    return pages.filled(template, ASSETS, **values)
 
 
 def asset(name: str) -> str:
-    """Read the text of a style sheet or script that pages use."""
-    return (ASSETS / name).read_text(encoding="utf-8")
-
-
-@cache
-def _environment() -> Any:
-    jinja2: Any = importlib.import_module("jinja2")
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(ASSETS),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=_printed,
-    )
-    environment.filters["number"] = number
-    return environment
-
-
-def _printed(value: object) -> object:
-    """Remove control characters from text; return other values unchanged."""
-    if type(value) is not str or value.isprintable():
-        return value
-    return "".join(c if c.isprintable() or c == "\n" else " " for c in value)
-
-
-def number(value: float | None, digits: int = 4) -> str:
-    """Write a number for people; a missing one becomes a dash."""
-    return NOTHING if value is None else f"{value:.{digits}g}"
+    """Read the text of a style sheet or script, of reports or of single drawings."""
+    return pages.text_of(name, ASSETS)

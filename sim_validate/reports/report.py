@@ -9,6 +9,7 @@ from typing import TypeAlias
 from grasp_core.checked import function, path_of, switch, whole
 from grasp_core.files.text_files import write_text
 from scenes.drawing.canvas import write_figure
+from scenes.drawing.turntable import as_text, object_data
 from sim_validate.files.stale_results import (
     FIDELITY,
     GRASPS,
@@ -43,7 +44,6 @@ from sim_validate.reports.index_page import (
 from sim_validate.reports.pages import asset
 from sim_validate.reports.run_folder import RunFolder, folder_of, runs_in
 from sim_validate.reports.survival_charts import survival_figure
-from sim_validate.reports.turntable import as_text, object_data
 
 MARKED = "The pages here were written by graspproof, which may replace them.\n"
 FIRST = 4

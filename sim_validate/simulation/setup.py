@@ -29,6 +29,7 @@ from grasp_core.errors import InputError
 from grasp_core.files.strict_json import shown
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
+from grasp_core.short_text import changed
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, Surface, build_scene
@@ -58,7 +59,7 @@ HARD_FINGER = 3
 LimitSearch: TypeAlias = Literal["none", "ramp", "bisection"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Setup:
     """How trials are simulated: physics, fingertips, surface, durations and thresholds.
 
@@ -79,6 +80,10 @@ class Setup:
     """Number of threads that the simulator uses; results do not depend on it."""
     timeout_s: float = math.inf
     """Time after which the trials of one contact set are stopped [s]."""
+
+    def __repr__(self) -> str:
+        """Return the settings that differ from the usual ones."""
+        return changed(self)
 
     def __post_init__(self) -> None:
         for name, kind in PARTS.items():

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from grasp_core.by_value import ByValue
+from grasp_core.notebooks import InNotebooks
 from grasp_core.values import Contact
 from scenes.mjcf import Scene
 from sim_validate.simulation.critical_friction import CriticalFriction
@@ -15,9 +16,12 @@ from sim_validate.validation.renamed import Renamed
 from sim_validate.validation.repeats import Robustness
 from sim_validate.validation.wrench_verdict import AGREEMENT, WrenchVerdict
 
+ROWS = 8
+"""Largest number of trials that notebooks show."""
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Verdict(ByValue):
+class Verdict(ByValue, InNotebooks):
     """The result of simulating a grasp: what it held, and whether that fits the analysis."""
 
     id: str
@@ -79,6 +83,13 @@ class Verdict(ByValue):
         """Whether all wrenches held, negative controls let go, and nothing was contradicted."""
         return self.held and self.controls_let_go and not self.mismatches
 
+    def _html(self) -> str:
+        """Return a picture of the scene with how the trials ended, the failed ones first."""
+        from scenes.drawing.in_notebooks import card, placed
+
+        title = f"{self.id}: {self.outcome.value.replace('_', ' ')}"
+        return card(placed(self.scene.layout), title, _rows(self))
+
 
 def _disagreement(friction: CriticalFriction) -> str:
     """Describe how simulated and predicted critical friction differ; empty if they agree."""
@@ -88,3 +99,17 @@ def _disagreement(friction: CriticalFriction) -> str:
     if simulated > 0.0 and abs(simulated - predicted) > AGREEMENT * predicted:
         return f"{simulated:.4g} in simulation, {predicted:.4g} predicted"
     return ""
+
+
+def _rows(verdict: Verdict) -> list[tuple[str, ...]]:
+    """Return the cells of the table by which notebooks show a verdict."""
+    rows: list[tuple[str, ...]] = [("trial", "outcome", "limit predicted", "simulated")]
+    trials = sorted(verdict.wrenches, key=lambda trial: trial.hold.outcome is Outcome.HELD)
+    for trial in trials[:ROWS]:
+        found, predicted = trial.simulated_limit, trial.predicted_limit
+        simulated = "-" if found is None else f"{found.share * predicted:.4g}"
+        rows.append((trial.name, trial.hold.outcome.value, f"{predicted:.4g}", simulated))
+    let_go = sum(control.let_go for control in verdict.controls)
+    rows.append((f"{len(verdict.failures)} of {len(trials)} trials failed",))
+    rows.append((f"{let_go} of {len(verdict.controls)} negative controls let go",))
+    return rows + [(mismatch,) for mismatch in verdict.mismatches]

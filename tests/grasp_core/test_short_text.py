@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+import scenes
+import sim_validate as sv
 from grasp_core.short_text import counted, summary, vector
 from scenes.example_objects import example_object
 
@@ -71,3 +73,10 @@ def test_counts_and_figures():
     assert vector([]) == "()"
     assert vector([1.0, 1e-13, -2.5]) == "(1, 0, -2.5)"
     assert summary("A", "b", c=1.0, d=(1, 2)) == "A(b, c=1, d=(1, 2))"
+
+
+def test_settings_show_what_differs_from_the_usual_ones():
+    assert repr(sv.Setup()) == "Setup()"
+    assert repr(sv.ExecutionSettings(mass_kg=0.3)) == "ExecutionSettings(mass_kg=0.3)"
+    setup = sv.Setup(threads=2, physics=scenes.PhysicsSettings(timestep=0.001))
+    assert repr(setup) == "Setup(physics=PhysicsSettings(timestep=0.001), threads=2)"

@@ -22,7 +22,7 @@ from tests.public_values.bad_values import (
     spread,
     units,
 )
-from tests.public_values.call import Call, body, of_grasp
+from tests.public_values.call import Call, body, grasp, of_grasp
 
 WRENCH = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 CENTER = np.zeros(3)
@@ -70,6 +70,11 @@ CALLS = [
         "jobs": AT_LEAST_ONE,
     }),
     Call("gc.iter_grasps", lambda: {"body": body()}, PLANNED),
+    Call("gc.plan_of", lambda: {"body": body(), "grasps": [grasp()], "friction": 0.5}, {
+        "body": VALUE,
+        "grasps": SEVERAL | {"twice": [grasp()] * 2, "an id": [grasp().id]},
+        "friction": FRICTION,
+    }),
     Call("gc.save_grasps", lambda: {"path": "grasps.json", "plan": gc.plan(body(), limit=1)}, {
         "path": PATH, "plan": VALUE,
     }, succeeds_in="tests/grasp_core/records/test_grasps_files.py"),

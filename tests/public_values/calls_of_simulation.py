@@ -48,6 +48,7 @@ CALLS = [
     Call("scenes.grasp_figure", of_grasp(friction=0.5), BODY_AND_GRASP | {
         "friction": FRICTION, "view": optional(VALUE), "legend": SWITCH,
     }),
+    Call("scenes.show", of_grasp(), BODY_AND_GRASP | {"friction": FRICTION}),
     Call("scenes.write_picture", of_grasp(path="a.png"), BODY_AND_GRASP | {
         "path": PATH | {"unknown ending": "a.gif", "no ending": "a"},
         "friction": FRICTION,

@@ -3,12 +3,14 @@
 import enum
 import inspect
 import re
+from dataclasses import is_dataclass
 
 import pytest
 
 import grasp_core as gc
 import scenes
 import sim_validate as sv
+from grasp_core.short_text import MOST
 from tests.public_values import (
     calls_of_analysis,
     calls_of_execution,
@@ -43,6 +45,7 @@ MADE_BY_FUNCTIONS = {
     "scenes.HeldScene": "build_held_scene",
     "scenes.Layout": "build_scene",
     "scenes.Scene": "build_scene",
+    "scenes.Turntable": "show",
     "sv.Execution": "execute",
     "sv.ExecutionTrial": "execute",
     "sv.Verdict": "validate",
@@ -106,7 +109,11 @@ def test_there_are_many_cases():
 )
 def test_the_call_that_is_spoiled_succeeds_as_it_is(name):
     call = BY_NAME[name]
-    assert call.target(**call.valid()) is not None
+    found = call.target(**call.valid())
+    assert found is not None
+    if is_dataclass(found):
+        assert len(repr(found)) <= MOST
+        assert "\n" not in repr(found)
 
 
 @pytest.mark.parametrize(("name", "argument", "label"), REFUSED)

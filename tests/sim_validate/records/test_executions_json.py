@@ -35,6 +35,7 @@ def test_executions_come_back_as_they_were(tmp_path):
     assert same(found.grasps, GRASPS)
     assert not same(found.grasps, (*GRASPS[:2], replace(GRASPS[2], reason="another")))
     assert found["p-0-1-2-3"].survived
+    assert list(found[:2]) == [found[0], found.grasps[1]]
     assert not found["c-0-1-2-3"].controls_let_go
     with pytest.raises(KeyError, match="nobody"):
         found["nobody"]

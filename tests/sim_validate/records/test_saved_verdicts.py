@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -28,6 +29,9 @@ def test_verdicts_are_loaded_with_their_figures(folder):
         assert verdict.controls_let_go
         assert verdict.predicted_critical_friction == pytest.approx(grasp.critical_friction)
         assert 0.0 <= verdict.displacement_m < 1e-3
+    assert found[0] is found.verdicts[0]
+    assert found[-1].id in found
+    assert found[1:] == replace(found, verdicts=found.verdicts[1:])
     with pytest.raises(KeyError, match="c-9"):
         found["c-9"]
     assert sv.load_verdicts(folder / "verdicts.json") == found

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scenes.drawing.turntable import UNITS
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.records.grasps import read_grasps
 from sim_validate.reports.index_page import cards_of
 from sim_validate.reports.report import FIRST, write_report
 from sim_validate.reports.run_folder import runs_in
-from sim_validate.reports.turntable import UNITS
 from tests.sim_validate.reports.test_report import Page
 
 

@@ -12,6 +12,7 @@ import pytest
 from grasp_core.errors import InputError
 from scenes.drawing.painting import DARKEST, LIGHT
 from scenes.drawing.palette import FINGERS
+from scenes.drawing.turntable import UNITS
 from scenes.drawing.views import DISTANCE
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
@@ -20,7 +21,6 @@ from sim_validate.records.grasps import read_grasps
 from sim_validate.reports.agreement import said_of
 from sim_validate.reports.pages import asset
 from sim_validate.reports.report import write_report
-from sim_validate.reports.turntable import UNITS
 
 EVIL = '<script>document.title="taken"</script>"\'&\x1b[31m'
 

@@ -1,4 +1,4 @@
-"""Turns a drawing into the numbers of a page on which a reader can rotate it.
+"""Turns a drawing into a page, or its numbers, on which a reader can rotate it.
 
 Lengths are whole thousandths of the object's radius from its centre of mass. That is finer than a
 screen shows, and takes a tenth of the text of full numbers.
@@ -6,22 +6,76 @@ screen shows, and takes a tenth of the text of full numbers.
 
 import json
 from collections.abc import Iterable
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.by_value import ByValue
+from grasp_core.checked import path_of
+from grasp_core.files.whole_files import write_parts
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from scenes.drawing.drawings import drawing_of, glass
+from scenes.drawing.pages import filled, text_of
 from scenes.drawing.palette import LOOKS, colour_of
-from scenes.drawing.pictures import number_places
+from scenes.drawing.pictures import check_drawn, number_places
 from scenes.drawing.shapes import Shape
 from scenes.drawing.views import best_view
-from sim_validate.reports.pages import asset, page
 
 UNITS = 1000.0
 """Number of units of length in one object radius."""
+WIDTH, HEIGHT = 560, 800
+"""Size of the page in a notebook [pixels]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Turntable(ByValue):
+    """A drawing of a grasp that a reader can turn, in a notebook or in a browser."""
+
+    object: str
+    """Name of the object."""
+    grasp: str
+    """Id of the grasp."""
+    page: str
+    """Text of a web page that needs no other file."""
+
+    def write(self, path: str | Path) -> Path:
+        """Write the page to a file, which a browser opens from disk.
+
+        Raises:
+            InputError: The value is not a path.
+            OSError: The file cannot be written.
+        """
+        return write_parts(path_of(path, "path"), [self.page.encode()])
+
+    def _repr_html_(self) -> str:
+        """Return the page in a frame of its own, whose scripts cannot reach the notebook."""
+        return (
+            f'<iframe sandbox="allow-scripts" width="{WIDTH}" height="{HEIGHT}" '
+            f'style="border:0;max-width:100%" srcdoc="{escape(self.page)}"></iframe>'
+        )
+
+
+def show(body: Polyhedron, grasp: Grasp, friction: float = 0.5) -> Turntable:
+    """Draw a grasp on its object so that it can be turned with the mouse.
+
+    A notebook shows the drawing at the end of a cell; elsewhere `show(...).write("grasp.html")`
+    writes it as a page.
+
+    Args:
+        body: The object.
+        grasp: A grasp on the faces of `body`.
+        friction: Coulomb coefficient of the friction cones.
+
+    Raises:
+        InputError: The grasp does not lie on the body, or the friction is out of range.
+    """
+    check_drawn(body, grasp, friction, None)
+    return Turntable(body.name, grasp.id, turntable_page(body, grasp, friction))
 
 
 def object_data(body: Polyhedron) -> list[dict[str, Any]]:
@@ -41,14 +95,14 @@ def grasp_data(body: Polyhedron, grasp: Grasp, friction: float) -> dict[str, Any
 
 def turntable_page(body: Polyhedron, grasp: Grasp, friction: float) -> str:
     """Write a page that needs no other file and on which a reader can rotate a grasp."""
-    return page(
+    return filled(
         "turntable.html",
         id=grasp.id,
         object=body.name,
         family=grasp.family,
         friction=friction,
-        style=asset("style.css"),
-        script=asset("turntable.js"),
+        style=text_of("style.css"),
+        script=text_of("turntable.js"),
         object_drawing=as_text(object_data(body)),
         drawing=as_text(grasp_data(body, grasp, friction)),
     )

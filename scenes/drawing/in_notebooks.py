@@ -1,0 +1,152 @@
+"""Writes the small pictures with figures by which notebooks show objects, grasps, plans and scenes.
+
+A picture takes some hundredths of a second. Figures that a grasp has put off are left out, because
+the first of them may take seconds; `repr` shows them.
+"""
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.result import Plan
+from grasp_core.values import Grasp
+from scenes.drawing.drawings import (
+    bar,
+    coarse,
+    drawing_alone,
+    drawing_of,
+    glass,
+)
+from scenes.drawing.painting import painted
+from scenes.drawing.pictures import frame_around, number_places
+from scenes.drawing.shapes import Shape
+from scenes.drawing.svg import svg_of
+from scenes.drawing.views import Alone, Extent, View, best_view, view_alone
+from scenes.layout import Layout
+from scenes.mjcf import Scene
+
+SIDE = 260
+"""Width and height of a picture [pixels]."""
+AZIMUTH_DEG, ELEVATION_DEG = 35.0, 28.0
+"""The view of an object without fingers [deg]."""
+MOST_CORNERS = 20_000
+"""Largest number of points that are drawn: they take a third of a second, and a megabyte."""
+ROWS = 5
+"""Largest number of grasps in the table of a plan."""
+COLUMNS = 4
+"""Largest number of cells in a row."""
+MM, CM3 = 1e3, 1e6
+Row = Sequence[str]
+
+
+def html_of(value: object) -> str | None:
+    """Return a picture of a value with its figures; None for a value that has no picture."""
+    if isinstance(value, Plan):
+        return _plan(value)
+    if isinstance(value, Grasp):
+        return _grasp(value)
+    if isinstance(value, Scene):
+        layout = value.layout
+        return card(placed(layout), layout.name, [("friction", f"{layout.friction:g}")])
+    return _body(value) if isinstance(value, Polyhedron) else None
+
+
+def card(drawing: str, title: str, rows: Iterable[Row]) -> str:
+    """Put a title and a table beside a drawing.
+
+    Args:
+        drawing: An SVG element, or nothing.
+        title: Text of the title.
+        rows: Texts of the cells, one row after the other; a single cell is as wide as the table.
+    """
+    cells = "".join(f"<tr>{_cells(row)}</tr>" for row in rows)
+    return (
+        '<div style="display:flex;flex-wrap:wrap;gap:1em;align-items:center">'
+        f"{drawing}<div><b>{escape(title)}</b><table>{cells}</table></div></div>"
+    )
+
+
+def _cells(row: Row) -> str:
+    if len(row) == 1:
+        return f'<td colspan="{COLUMNS}" style="text-align:left">{escape(row[0])}</td>'
+    return "".join(f"<td>{escape(cell)}</td>" for cell in row)
+
+
+def picture(
+    shapes: Sequence[Shape], extent: Extent, view: View, numbers: Array | None = None
+) -> str:
+    """Draw shapes as a small SVG element; nothing where there are too many of them.
+
+    Args:
+        shapes: What is drawn.
+        extent: Place and size of the object.
+        view: The view to draw from.
+        numbers: Where the number of each finger is written, (k, 3) [m]; None for no fingers.
+    """
+    if sum(len(shape.vertices()) for shape in shapes) > MOST_CORNERS:
+        return ""
+    places = np.empty((0, 3)) if numbers is None else numbers
+    corners = frame_around(shapes, places, extent, view)
+    patches = painted(shapes, view, float(corners[1][0] - corners[0][0]))
+    return svg_of(patches, corners, SIDE, view.seen(places)[0])
+
+
+def held(body: Polyhedron, grasp: Grasp, friction: float) -> str:
+    """Draw an object with a grasp as a small SVG element."""
+    shapes = drawing_of(body, grasp, friction)
+    return picture(shapes, body, best_view(body, grasp), number_places(body, grasp))
+
+
+def placed(layout: Layout) -> str:
+    """Draw the object of a scene with the bars of its fingers as a small SVG element."""
+    size, inward = layout.radius_m, layout.frames[:, :, 0]
+    extent = Alone(np.zeros(3), size)
+    bars = [
+        Shape("finger", finger, polygons=bar(tip, way, size))
+        for finger, (tip, way) in enumerate(zip(layout.contacts, inward, strict=True))
+    ]
+    surface = Shape("object", polygons=tuple(coarse(layout.vertices, layout.triangles)))
+    view = View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, extent)
+    return picture([surface, *bars, Shape("contact", points=layout.contacts)], extent, view)
+
+
+def _body(body: Polyhedron) -> str:
+    return card(_alone(body), body.name, [
+        ("faces" if body.patches is None else "patches", str(len(body.faces))),
+        ("triangles", str(len(body.triangles))),
+        ("radius", f"{MM * body.radius:.4g} mm"),
+        ("volume", f"{CM3 * body.volume:.4g} cm³"),
+    ])  # fmt: skip
+
+
+def _alone(body: Polyhedron) -> str:
+    return picture(glass(body), body, View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, body))
+
+
+def _grasp(grasp: Grasp) -> str:
+    extent = Alone.of_contacts(grasp.positions)
+    shapes, view = drawing_alone(extent, grasp), view_alone(extent, grasp)
+    return card(picture(shapes, extent, view, number_places(extent, grasp)), grasp.id, [
+        ("family", grasp.family),
+        ("faces", ", ".join(map(str, grasp.faces))),
+        ("radius", _radius(grasp)),
+        ("closure margin", f"{grasp.closure_margin:.4g}"),
+    ])  # fmt: skip
+
+
+def _plan(plan: Plan) -> str:
+    drawing = held(plan.body, plan[0], plan.friction) if len(plan) else _alone(plan.body)
+    count = f"{len(plan)} grasp{'' if len(plan) == 1 else 's'}"
+    title = f"{count} of {plan.body.name} at friction {plan.friction:g}"
+    if not len(plan):
+        return card(drawing, title, [(plan.absence or "",)])
+    rows: list[Row] = [("grasp", "family", "radius", "closure margin")]
+    rows += [(g.id, g.family, _radius(g), f"{g.closure_margin:.4g}") for g in plan[:ROWS]]
+    return card(drawing, title, [*rows, ("...",)] if len(plan) > ROWS else rows)
+
+
+def _radius(grasp: Grasp) -> str:
+    return f"{MM * grasp.radius:.3g} mm" if grasp.radius else "-"

@@ -1,0 +1,59 @@
+"""Fills page templates with values; the only module that uses jinja2.
+
+Values are escaped and lose unprintable characters, because names of files and objects come from
+anywhere.
+"""
+
+import importlib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+ASSETS = Path(__file__).parent / "assets"
+"""Folder of the templates, styles and scripts of single drawings."""
+NOTHING = "-"
+"""Text that stands for a missing number."""
+
+
+def filled(template: str, folder: Path = ASSETS, **values: object) -> str:
+    """Fill a page template with values.
+
+    Args:
+        template: File name of the template.
+        folder: Folder of the template, which may include templates of this package.
+        values: Values that the template uses, by name.
+    """
+    return str(_environment(folder).get_template(template).render(**values))
+
+
+def text_of(name: str, folder: Path = ASSETS) -> str:
+    """Read a style sheet or script of a folder or, if it has none of that name, of this package."""
+    own = folder / name
+    return (own if own.is_file() else ASSETS / name).read_text(encoding="utf-8")
+
+
+@cache
+def _environment(folder: Path) -> Any:
+    jinja2: Any = importlib.import_module("jinja2")
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader([folder, ASSETS]),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_printed,
+    )
+    environment.filters["number"] = number
+    return environment
+
+
+def _printed(value: object) -> object:
+    """Remove control characters from text; return other values unchanged."""
+    if type(value) is not str or value.isprintable():
+        return value
+    return "".join(c if c.isprintable() or c == "\n" else " " for c in value)
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """Write a number for people; a missing one becomes a dash."""
+    return NOTHING if value is None else f"{value:.{digits}g}"

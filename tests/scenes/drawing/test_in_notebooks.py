@@ -1,0 +1,123 @@
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+import sim_validate as sv
+from scenes.drawing import in_notebooks
+from scenes.drawing.shapes import SIDES
+from tests.grasp_core.curved import curved_body
+
+SVG = "{http://www.w3.org/2000/svg}"
+EVIL = "<script>alert('&')</script>"
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return gc.plan(scenes.example_object("wedge"), 0.5, limit=7)
+
+
+def read(value):
+    """The element of a value's HTML, which is XML too, and the texts of its cells."""
+    found = ElementTree.fromstring(value._repr_html_())  # noqa: S314 - our own text
+    return found, ["".join(cell.itertext()) for cell in found.iter("td")]
+
+
+def test_an_object_shows_its_edges_and_its_size(plan):
+    found, cells = read(plan.body)
+    assert cells == ["faces", "8", "triangles", "8", "radius", "67.74 mm", "volume", "199.1 cm³"]
+    assert found.find(f".//{SVG}path") is not None
+    assert found.find(f".//{SVG}text") is None
+
+
+def test_a_grasp_shows_its_four_fingers_and_no_figure_that_was_put_off(plan, monkeypatch):
+    monkeypatch.setattr(gc.Grasp, "__getattr__", lambda *_: pytest.fail("a figure was computed"))
+    found, cells = read(plan[0])
+    assert [text.text for text in found.iter(f"{SVG}text")] == ["0", "1", "2", "3"]
+    assert cells[:2] == ["family", "concurrent"]
+    _, cells = read(plan)
+    assert cells[4:6] == ["c-0-1-2-7", "concurrent"]
+    assert cells[-1] == "..."
+    assert len(cells) == 4 * 6 + 1
+
+
+def test_every_family_is_drawn_with_and_without_its_object():
+    for name, family in (
+        ("dodecahedron", "concurrent"),
+        ("double-wedge-bar", "pencil"),
+        ("icosahedron", "regulus"),
+    ):
+        plan = gc.plan(scenes.example_object(name), 0.5, families=family, limit=1)
+        assert plan[0].family == family
+        for value in (plan, plan[0]):
+            found, _ = read(value)
+            assert len(list(found.iter(f"{SVG}path"))) >= 4 * (SIDES + 2) + 4 * SIDES  # bars, cones
+
+
+def test_points_are_where_the_view_shows_them(plan):
+    """The picture of a finger's number lies in the square, and the four are apart."""
+    found, _ = read(plan)
+    at = np.array([[float(text.get(axis)) for axis in "xy"] for text in found.iter(f"{SVG}text")])
+    assert ((at > 0.0) & (at < in_notebooks.SIDE)).all()
+    gaps = np.linalg.norm(at[:, None] - at[None], axis=-1)[np.triu_indices(4, 1)]
+    assert gaps.min() > 20.0
+
+
+def test_a_plan_without_grasps_says_why():
+    plan = gc.plan(scenes.example_object("box"), 0.5, families=("concurrent",), cones="normal")
+    assert read(plan)[1] == [plan.absence]
+
+
+def test_a_verdict_shows_its_trials_and_a_scene_its_object(plan):
+    verdict = sv.validate(plan.body, plan[0], 0.5)
+    found, cells = read(verdict)
+    assert found.find(".//b").text == "c-0-1-2-7: held"
+    assert cells.count("held") == 8
+    assert cells[-2:] == ["0 of 13 trials failed", "4 of 4 negative controls let go"]
+    assert read(verdict.scene)[1] == ["friction", "0.5"]
+
+
+def test_names_of_objects_run_nothing(plan):
+    body = replace(plan.body, name=EVIL)
+    for value in (body, replace(plan, body=body)):
+        found, _ = read(value)
+        assert found.find(".//script") is None
+        assert EVIL in found.find(".//b").text
+
+
+def test_what_cannot_be_drawn_is_shown_as_text_and_never_raises(plan, monkeypatch):
+    elsewhere = replace(plan, body=scenes.example_object("dodecahedron"))
+    assert elsewhere._repr_html_() is None
+    assert repr(elsewhere).startswith("Plan(")
+    monkeypatch.setattr(in_notebooks, "MOST_CORNERS", 10)
+    found, cells = read(plan.body)
+    assert found.find(f".//{SVG}path") is None
+    assert "67.74 mm" in cells
+
+
+def test_fine_surfaces_are_drawn_in_less_than_a_second():
+    body = curved_body(subdivisions=6)
+    assert len(body.triangles) > 80_000
+    read(body)
+    start = time.process_time()
+    found, _ = read(body)
+    assert time.process_time() - start < 1.0
+    assert found.find(f".//{SVG}path") is not None
+
+
+def test_pictures_come_with_scenes_alone():
+    code = """
+import grasp_core as gc
+cube = gc.from_trimesh(__import__("trimesh").creation.box())
+print(cube._repr_html_())
+import scenes
+print(cube._repr_html_()[:4])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["None", "<div"]
