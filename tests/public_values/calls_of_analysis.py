@@ -20,7 +20,7 @@ from tests.public_values.bad_values import (
     spread,
     units,
 )
-from tests.public_values.call import Call, body, of_grasp
+from tests.public_values.call import Call, body, grasp, of_grasp
 
 WRENCH = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 CENTER = np.zeros(3)
@@ -138,6 +138,15 @@ CALLS = [
         "friction": FRICTION,
         "finger_radius": optional(POSITIVE) | {"larger than the object": 1.0},
         "seed": SEED,
+    }),
+    Call("gc.transfer", lambda: {"old": body(), "new": body(), "grasps": (grasp(),)}, {
+        "old": VALUE,
+        "new": VALUE,
+        "grasps": SEVERAL,
+        "friction": FRICTION,
+        "distance": optional(NOT_NEGATIVE) | {"larger than the object": 1.0},
+        "angle_deg": NOT_NEGATIVE | {"too wide": 46.0},
+        "finger": optional(VALUE) | {"radius": 0.006},
     }),
     Call("gc.certify_regions", of_grasp(friction=0.5), BODY_AND_GRASP | {
         "friction": FRICTION,
