@@ -1,8 +1,8 @@
 """Reads the mesh file of a part that has changed, the way its old version was read.
 
-A `grasps.json` does not say in which unit its mesh file was. Where the caller does not say so
-either, it is the unit in which the changed part is most nearly as large as the old one, measured by
-the diagonals of their bounding boxes. A part that has then become larger or smaller by more than
+A `grasps.json` does not say in which unit its mesh file was. Where the user does not say so either,
+it is taken to be the unit in which the changed part is most nearly as large as the old one, by the
+diagonals of their bounding boxes. A part that has then become larger or smaller by more than
 `SURE_GROWTH` could be in another unit, so it is refused.
 """
 
@@ -29,7 +29,7 @@ which it was given by the user."""
 
 
 def load_changed_part(
-    path: Path, old: Polyhedron, *, unit: str | None = None, limits: MeshLimits = DEFAULT_LIMITS
+    path: Path, old: Polyhedron, unit: str, limits: MeshLimits = DEFAULT_LIMITS
 ) -> Polyhedron:
     """Read a changed part from its mesh file, with exact planar faces.
 
@@ -39,16 +39,14 @@ def load_changed_part(
     Args:
         path: The mesh file.
         old: The part before.
-        unit: Unit of length of the file; None for the one in which the size fits.
+        unit: Unit of length of the file.
         limits: Largest size of the file, and largest cost of reading it.
 
     Raises:
-        InputError: No unit fits the old part's size.
         MeshError: The file is not a solid; its `reason` says why.
     """
-    chosen = _fitting_unit(path, old, limits) if unit is None else unit
     center = given_center(old)
-    return load_polyhedron(path, unit=chosen, faces="planar", center_of_mass=center, limits=limits)
+    return load_polyhedron(path, unit=unit, faces="planar", center_of_mass=center, limits=limits)
 
 
 def given_center(body: Polyhedron) -> Array | None:
@@ -67,7 +65,18 @@ def growth(old: Polyhedron, new: Polyhedron) -> float:
     return _diagonal(new.vertices) / _diagonal(old.vertices)
 
 
-def _fitting_unit(path: Path, old: Polyhedron, limits: MeshLimits) -> str:
+def fitting_unit(path: Path, old: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS) -> str:
+    """Find the unit in which a mesh file holds a part about as large as the old one.
+
+    Args:
+        path: The mesh file.
+        old: The part before.
+        limits: Largest size of the file, and largest cost of reading it.
+
+    Raises:
+        InputError: The size fits in no unit.
+        MeshError: The file cannot be read.
+    """
     vertices, _, _ = read_triangles(path, limits)
     size = _diagonal(vertices) / _diagonal(old.vertices)
     off = {unit: abs(math.log(size * length)) if size > 0.0 else math.inf

@@ -1,10 +1,12 @@
 """Says which face of an old part became which face of a changed one, and how it moved.
 
-Each old face is represented by the centres of the convex pieces that tile it, weighted by area. Of
-the new faces that are like it (see `like_faces`), the one to which these centres are nearest in the
-mean becomes its successor, if that mean is at most the allowed distance; of equally near faces, the
-one with the lowest number. One new face may succeed several old ones that have merged. Of a face
-that was cut in two, one part succeeds it, and the other counts as added.
+Each old face is represented by the centres of the convex pieces that tile it, weighted by area. Its
+*distance* from a new face is the mean distance of these centres from that face. Of the new faces
+that are like it (see `like_faces`), the nearest becomes its successor if its distance is at most
+the one that contacts may move. An old face without such a successor gets the nearest like face that
+succeeds no other one, however far it is. Of equally near faces, the one with the lowest number is
+taken. One new face may succeed several old ones that have merged; of a face that was cut in two,
+one part succeeds it, and the other counts as added.
 
 How far a face moved is measured on the line through its old centroid c along its old normal n. With
 q any point of the new plane and n' its normal, the line meets that plane at c - h n, where
@@ -25,7 +27,7 @@ from grasp_core.objects.face import Face
 from grasp_core.objects.on_faces import ON_FACE
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import nearest_in
-from grasp_core.transferring.like_faces import Likeness
+from grasp_core.transferring.like_faces import SAME, Likeness
 
 MOVED = ON_FACE
 """Least distance that counts as moved, relative to the old part's radius: files that keep six
@@ -68,7 +70,7 @@ class FaceChange:
         """Say what became of the face, such as `face 3 moved 1.00 mm outward`."""
         named = f"face {self.old}"
         if self.new is None:
-            return f"{named} has no like face near enough"
+            return f"{named} is gone"
         if self.new != self.old:
             named += f", now {self.new},"
         said = list(_motions(self)) if self.moved else []
@@ -95,16 +97,15 @@ def face_changes(old: Polyhedron, new: Polyhedron, rule: Likeness) -> tuple[Face
         new: The changed part, in the same frame.
         rule: How near, and how little turned, a successor must be.
     """
-    normals, points = new.normals, np.array([face.centroid for face in new.faces])
+    reach = rule.distance + rule.same
+    near = [_successor(face, new, range(len(new.faces)), rule, reach) for face in old.faces]
+    free = sorted({*range(len(new.faces))} - {*near})
     changes: list[FaceChange] = []
-    for index, face in enumerate(old.faces):
-        like = normals @ face.normal >= math.cos(rule.angle) - rule.same / old.radius
-        heights = np.abs(np.einsum("fi,fi->f", normals, face.centroid - points))
-        # a lean of the new plane adds to its distance from the centroid, at most a face's extent
-        slope = math.sin(rule.angle) * 2.0 * old.radius
-        near = np.flatnonzero(like & (heights <= rule.distance + slope + rule.same))
-        successor = _nearest_face(face, new, near.tolist(), rule)
-        changes.append(_change(index, face, successor, new, old.radius))
+    for index, (face, successor) in enumerate(zip(old.faces, near, strict=True)):
+        found = successor
+        if found is None and (found := _successor(face, new, free, rule, math.inf)) is not None:
+            free.remove(found)
+        changes.append(_change(index, face, found, new, old.radius))
     return tuple(changes)
 
 
@@ -114,15 +115,21 @@ def added_faces(changes: Iterable[FaceChange], new: Polyhedron) -> tuple[int, ..
     return tuple(index for index in range(len(new.faces)) if index not in known)
 
 
-def _nearest_face(
-    face: Face, new: Polyhedron, candidates: Iterable[int], rule: Likeness
+def _successor(
+    face: Face, new: Polyhedron, candidates: Sequence[int], rule: Likeness, reach: float
 ) -> int | None:
+    """Find the nearest like face among some of the changed part; None if none is within reach."""
+    like = new.normals @ face.normal >= math.cos(rule.angle + SAME)
     centers, weights = _representatives(face)
-    best, least = None, rule.distance + 2.0 * rule.same
-    for index in candidates:
-        far = [_distance(new.faces[index], center) for center in centers]
-        mean = float(np.average(far, weights=weights))
-        if mean < least - rule.same:
+    best, least = None, math.inf
+    for index in (each for each in candidates if like[each]):
+        # planes are nowhere nearer than this, so most faces are left out at once
+        plane = new.faces[index]
+        heights = np.abs((centers - plane.centroid) @ plane.normal)
+        if float(np.average(heights, weights=weights)) > min(reach, least):
+            continue
+        mean = float(np.average([_distance(plane, at) for at in centers], weights=weights))
+        if mean <= reach and mean < least - rule.same:
             best, least = index, mean
     return best
 
