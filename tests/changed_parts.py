@@ -51,6 +51,7 @@ def with_hole(body, face, at, radius, depth=None):
 
 def with_chamfer(body, one, other, width):
     """The part without a strip along the edge between two faces, cut off at half their angle."""
+    assert one != other
     outward = -(body.normals[one] + body.normals[other])
     outward /= np.linalg.norm(outward)
     edge = _common_edge(body, one, other)
