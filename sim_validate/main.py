@@ -20,6 +20,7 @@ from sim_validate.cli import (
     dataset_flags,
     execution_flags,
     showing_flags,
+    transfer_flags,
 )
 from sim_validate.cli.baseline_flags import Baseline
 from sim_validate.cli.command_flags import COMMANDS, Command
@@ -40,6 +41,7 @@ ACTIONS: dict[type[Any], str] = {
     command_flags.Regions: "regions:certify_file",
     command_flags.Replay: "replay:replay_trial",
     command_flags.Analyze: "analyze:analyze_file",
+    transfer_flags.Transfer: "transfer:transfer_file",
     dataset_flags.Build: "dataset:build_dataset",
     dataset_flags.Import: "dataset:import_dataset",
     dataset_flags.Verify: "dataset:verify_dataset",

@@ -74,7 +74,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     wrong = ""
     try:
         cases = grasp_cases(metafunc.definition.path.parent, marker.args, marker.kwargs)
-        metafunc.parametrize("grasp_case", cases, ids=[case.grasp.id for case in cases])
+        names = [case.grasp.id for case in cases]
+        metafunc.parametrize("grasp_case", cases, ids=names, indirect=True)
     except GraspError as error:
         wrong = str(error)
     if wrong:  # outside, so that the report shows it once
@@ -115,7 +116,7 @@ class _Collecting:
         self._lines += getattr(report, TRAVELS, [])
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """List the tests that used a copy of a mesh instead of its file."""
+        """List the meshes that are not the files that grasps were planned from."""
         notes = sorted({line["mesh_note"] for line in self._lines if line["mesh_note"]})
         if notes:
             terminalreporter.section("meshes of grasps")
@@ -164,33 +165,28 @@ class GraspItem(_SuiteItem):
     """The test of one grasp, simulated and compared with its baseline."""
 
     def runtest(self) -> None:
-        """Fail if the grasp is worse, missing or new, or cannot be compared."""
+        """Fail if the grasp is worse, gone, missing or new, or cannot be compared."""
         from grasp_core.errors import GraspError
+        from sim_validate.baselines.changed_part import ChangedPartError
         from sim_validate.baselines.compare import Status, failing
         from sim_validate.baselines.entries import plain, properties_of
         from sim_validate.baselines.explain import explained
-        from sim_validate.baselines.source_file import ChangedPartError
 
         suite = self.suite
         try:
             done = suite.tested(self.name)
-        except ChangedPartError as error:
-            _note(self, self.name, Status.NOT_COMPARABLE.value, str(error))
-            raise
         except GraspError as error:
-            _note(self, self.name, "refused", str(error))
+            changed = isinstance(error, ChangedPartError)
+            _note(self, self.name, "not comparable" if changed else "refused", str(error))
             raise
         (finding,) = done.findings
-        fails = finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE)
-        told = fails or finding.status is not Status.SAME
-        files = suite.baseline, suite.grasps
-        now = done.verdicts.get(self.name), done.measured.executions.get(self.name)
-        why = explained(finding, now[0], files, done.how, now[1]) if told else ""
+        files, same = (suite.baseline, suite.grasps), finding.status is Status.SAME
+        why = "" if same else explained(done, files, suite.present)
         before, after = plain(finding.before), plain(finding.after)
         self.user_properties.append(("status", finding.status.value))
         self.user_properties += properties_of(after or {}).items()
-        _note(self, finding.id, finding.status.value, why, (before, after), suite.source)
-        if fails:
+        _note(self, finding.id, finding.status.value, why, (before, after), suite.present.mesh)
+        if finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE):
             raise UnstableError(f"{why}\n  to accept the change: pytest --grasp-bless {self.path}")
 
 
@@ -203,14 +199,21 @@ class BlessItem(_SuiteItem):
 
         found = self.suite.bless()
         self.user_properties.append(("grasps", len(found.entries)))
+        for name, why in self.suite.present.gone.items():
+            _note(self, name, "gone", why, source=self.suite.present.mesh)
         for entry in found.entries:
-            _note(self, entry.id, "blessed", "", (None, plain(entry)), self.suite.source)
+            _note(self, entry.id, "blessed", "", (None, plain(entry)), self.suite.present.mesh)
 
 
 @pytest.fixture
 def grasp_case(request: pytest.FixtureRequest) -> Any:
     """The grasp, object and friction that a test marked with `grasp` is run with."""
-    pytest.fail(f"{request.node.name}: grasp_case needs @pytest.mark.grasp(...)", pytrace=False)
+    if not hasattr(request, "param"):
+        pytest.fail(f"{request.node.name}: grasp_case needs @pytest.mark.grasp(...)", pytrace=False)
+    if request.param.gone:
+        _note(request.node, request.param.grasp.id, "gone", request.param.gone)
+        pytest.fail(request.param.gone, pytrace=False)
+    return request.param
 
 
 @pytest.fixture

@@ -74,18 +74,18 @@ def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
     """
     points = frozen(positions, (FINGERS, 3), "positions")
     inward = frozen_units(normals, (FINGERS, 3), "normals")
-    parts = _parts(body)
+    parts = flat_parts(body)
     found = [
         _nearest(body, parts, i, p, n) for i, (p, n) in enumerate(zip(points, inward, strict=True))
     ]
-    faces = [part.face for part, _, _ in found]
+    faces = [each.part.face for each in found]
     if body.patches is not None:
-        around = [_around(body, part, contact) for part, contact, _ in found]
+        around = [_around(body, each.part, each.contact) for each in found]
         faces = [len(body.faces) + finger for finger in range(FINGERS)]
         body = replace(body, faces=(*body.faces, *around))
     a, b, c, d = faces
-    contacts = four(contact for _, contact, _ in found)
-    return Seated(body, (a, b, c, d), contacts, max(distance for *_, distance in found))
+    contacts = four(each.contact for each in found)
+    return Seated(body, (a, b, c, d), contacts, max(each.distance for each in found))
 
 
 def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCertificate:
@@ -132,7 +132,7 @@ def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCerti
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Part:
+class FlatPart:
     """A flat convex part of a surface: a piece of a face, or a triangle of a curved surface."""
 
     face: int
@@ -143,11 +143,11 @@ class _Part:
     """Corners, counter-clockwise about the normal, (k, 3) [m]."""
 
 
-def _parts(body: Polyhedron) -> tuple[_Part, ...]:
+def flat_parts(body: Polyhedron) -> tuple[FlatPart, ...]:
     """List the flat convex parts that make up the surface of an object."""
     if body.patches is None:
         return tuple(
-            _Part(index, face.normal, piece)
+            FlatPart(index, face.normal, piece)
             for index, face in enumerate(body.faces)
             for piece in face.pieces
         )
@@ -155,43 +155,73 @@ def _parts(body: Polyhedron) -> tuple[_Part, ...]:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1)
     return tuple(
-        _Part(index, normals[index] / lengths[index], corners[index])
+        FlatPart(index, normals[index] / lengths[index], corners[index])
         for index in np.flatnonzero(lengths > 0.0).tolist()
     )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Nearest:
+    """The point of a surface that is nearest to a given one, among parts with a like normal."""
+
+    part: FlatPart
+    contact: Contact
+    distance: float
+    """Distance from the given point [m]."""
+
+
+def nearest_like(
+    parts: Sequence[FlatPart], point: Array, normal: Array, *, lean: float, reach: float,
+    margin: float,
+) -> Nearest | None:  # fmt: skip
+    """Find the point nearest to a given one on parts whose normals lean little from a given one.
+
+    Args:
+        parts: Flat convex parts, in the order in which ties go to them.
+        point: The given point, (3,) [m].
+        normal: Unit vector into the object, (3,).
+        lean: Largest angle between that vector and a part's normal [rad].
+        reach: Largest distance of a part from the given point [m].
+        margin: Distance by which a part must be nearer than an earlier one to replace it [m].
+
+    Returns:
+        The point, with its part's normal; None if no such part is within reach.
+    """
+    normals = np.array([part.normal for part in parts])
+    firsts = np.array([part.polygon[0] for part in parts])
+    heights = np.einsum("ti,ti->t", normals, point - firsts)
+    likely = np.flatnonzero((normals @ normal >= math.cos(lean)) & (np.abs(heights) <= reach))
+    best: Nearest | None = None
+    for index in likely.tolist():
+        part = parts[index]
+        at = nearest_in(part.polygon, part.normal, point)
+        distance = float(np.linalg.norm(at - point))
+        if distance <= reach and (best is None or distance < best.distance - margin):
+            best = Nearest(part, Contact(at, part.normal), distance)
+    return best
+
+
 def _nearest(
-    body: Polyhedron, parts: Sequence[_Part], finger: int, point: Array, normal: Array
-) -> tuple[_Part, Contact, float]:
-    """Find the nearest part with a fitting normal, the contact on it, and the distance [m].
+    body: Polyhedron, parts: Sequence[FlatPart], finger: int, point: Array, normal: Array
+) -> Nearest:
+    """Find the nearest part with a fitting normal, and the contact on it.
 
     Raises:
         InputError: No part with a fitting normal is near.
     """
     reach = LARGEST_MOVE * body.radius
-    normals = np.array([part.normal for part in parts])
-    firsts = np.array([part.polygon[0] for part in parts])
-    heights = np.einsum("ti,ti->t", normals, point - firsts)
-    likely = np.flatnonzero(
-        (normals @ normal >= math.cos(LARGEST_LEAN)) & (np.abs(heights) <= reach)
+    found = nearest_like(
+        parts, point, normal, lean=LARGEST_LEAN, reach=reach, margin=NEARER * body.radius
     )
-    best: tuple[float, _Part, Array] | None = None
-    for index in likely.tolist():
-        part = parts[index]
-        at = _nearest_in(part.polygon, part.normal, point)
-        distance = float(np.linalg.norm(at - point))
-        if distance <= reach and (best is None or distance < best[0] - NEARER * body.radius):
-            best = distance, part, at
-    if best is None:
+    if found is None:
         raise InputError(
             f"contact {finger} is on no face: expected one within {reach:.3g} m whose inward "
             f"normal is within {math.degrees(LARGEST_LEAN):.0f} deg of the given one"
         )
-    distance, part, at = best
-    return part, Contact(at, part.normal), distance
+    return found
 
 
-def _around(body: Polyhedron, part: _Part, contact: Contact) -> Face:
+def _around(body: Polyhedron, part: FlatPart, contact: Contact) -> Face:
     """Make a round face around a contact on a triangle, in the triangle's plane."""
     turns = np.linspace(0.0, 2.0 * math.pi, CORNERS, endpoint=False)
     radius = SURROUNDINGS * body.radius
@@ -208,7 +238,7 @@ def _around(body: Polyhedron, part: _Part, contact: Contact) -> Face:
     )
 
 
-def _nearest_in(polygon: Array, normal: Array, point: Array) -> Array:
+def nearest_in(polygon: Array, normal: Array, point: Array) -> Array:
     """Compute the point of a convex polygon that is nearest to a given point, (3,) [m]."""
     flat = point - float(normal @ (point - polygon[0])) * normal
     if within(flat, polygon, normal, 0.0):

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from grasp_core.records.grasps_json import SavedGrasps
-from sim_validate.baselines.compare import Finding, Status, bands_between, compare
+from sim_validate.baselines.changed_part import Present
+from sim_validate.baselines.compare import Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.entries import Baseline
 from sim_validate.baselines.measure import Measured, Report, measured, with_planned_fingers
 from sim_validate.baselines.settings import How
@@ -27,13 +27,13 @@ class Checked:
 
 
 def check(
-    before: Baseline, saved: SavedGrasps, where: str, how: How, processors: int, report: Report
+    before: Baseline, now: Present, where: str, how: How, processors: int, report: Report
 ) -> Checked:
     """Simulate grasps again and compare them with a baseline.
 
     Args:
         before: The baseline.
-        saved: The present grasps.
+        now: The present grasps, on the part as it is now.
         where: Path of the grasps from the baseline's folder.
         how: How trials are simulated, and which ones.
         processors: Number of processors to use; no result depends on it.
@@ -43,25 +43,35 @@ def check(
         InputError: The file of grasps is empty.
         UnfaithfulError: The simulator fails its checks on cases with known answers.
     """
-    how = with_planned_fingers(how, before, saved)
-    found = measured(saved, (where, before.limit), how, processors, report)
+    now = now.first(before.limit)
+    how = with_planned_fingers(how, before, now.saved)
+    if now.gone and not now.saved.grasps:
+        found = _nothing_measured(before, now)
+    else:
+        found = measured(now.saved, (where, before.limit), how, processors, report)
+    carried = None if now.carried is None else Carried(now.change, now.gone)
     return Checked(
-        compare(before, found.baseline, found.refused),
+        compare(before, found.baseline, found.refused, carried),
         found,
-        bands_between(before, found.baseline)[1],
+        bands_between(before, found.baseline, carried)[1],
     )
 
 
-def check_one(before: Baseline, saved: SavedGrasps, where: str, how: How, name: str) -> Checked:
+def check_one(before: Baseline, now: Present, where: str, how: How, name: str) -> Checked:
     """Simulate one grasp again, by its id, and compare it with a baseline."""
-    limited = saved.grasps[: before.limit]
-    one = tuple(grasp for grasp in limited if grasp.id == name)
+    one = now.first(before.limit).only(name)
     kept = replace(before, entries=tuple(e for e in before.entries if e.id == name), limit=None)
-    if one:
-        alone = SavedGrasps(saved.body, saved.friction, saved.seed, one, saved.finger)
-        return check(kept, alone, where, how, 1, silent)
-    gone = Measured(replace(kept, entries=(), content_sha256=saved.body.content_sha256), {}, {})
-    return Checked(compare(kept, gone.baseline), gone, "")
+    if one.saved.grasps or one.gone:
+        return check(kept, one, where, how, 1, silent)
+    gone = _nothing_measured(kept, one)
+    carried = None if one.carried is None else Carried(one.change, {})
+    return Checked(compare(kept, gone.baseline, carried=carried), gone, "")
+
+
+def _nothing_measured(before: Baseline, now: Present) -> Measured:
+    """Return a measurement of no grasp, on the part as it is now."""
+    body = now.saved.body
+    return Measured(replace(before, entries=(), content_sha256=body.content_sha256), {}, {})
 
 
 def demanded(done: Checked) -> Checked:

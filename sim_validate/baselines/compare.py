@@ -4,15 +4,17 @@ With the same versions, on processors that round alike, results are the same, an
 counts. With the same versions and other rounding, results differ by rounding, which the searches of
 the simulation enlarge to their step size. With other versions verdicts must be the same, except for
 grasps so close to their critical friction that tiny changes decide, and numbers may differ within
-wider tolerances, called bands.
+wider tolerances, called bands. Where the part has changed and grasps were carried over to it, the
+bands are wide enough for what no user would call better or worse.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import radians
 from typing import Any, cast
 
+from grasp_core.transferring.judging import FRICTION_BAND
 from sim_validate.baselines.differences import Bands, Difference, differences
 from sim_validate.baselines.entries import Baseline, Entry
 from sim_validate.simulation.hold_verdict import LET_GO, Outcome
@@ -40,9 +42,12 @@ class Status(StrEnum):
     """The grasp is in the baseline, but not among the present grasps."""
     NEW = "new"
     """The grasp is among the present grasps, but not in the baseline."""
+    GONE = "gone"
+    """The part has changed, and the grasp does not exist on it: a contact has no place, or the
+    contacts are no longer in force closure."""
 
 
-FAILED = (Status.REGRESSED, Status.MISSING, Status.NEW)
+FAILED = (Status.REGRESSED, Status.MISSING, Status.NEW, Status.GONE)
 
 
 def failing(*, strict: bool) -> tuple[Status, ...]:
@@ -50,6 +55,11 @@ def failing(*, strict: bool) -> tuple[Status, ...]:
     return (*FAILED, Status.IMPROVED) if strict else FAILED
 
 
+WORDS = {
+    Status.SAME: "same", Status.WITHIN: "same", Status.GREY: "same", Status.IMPROVED: "better",
+    Status.REGRESSED: "worse",
+}  # fmt: skip
+"""What a grasp that was carried over to a changed part is called, by its status."""
 EXACT = Bands(
     predicted=1e-9, simulated=1e-9, least=0.0, displacement_m=1e-12, rotation_rad=1e-12,
     grey=0.0, exact=True,
@@ -67,6 +77,19 @@ OTHER_VERSIONS = Bands(
     predicted=0.05, simulated=0.05, least=1e-7, displacement_m=2e-4, rotation_rad=radians(0.2),
     grey=0.02, exact=False,
 )  # fmt: skip
+OTHER_PART = replace(OTHER_VERSIONS, same_part=False)
+"""Bands for a changed part: to these, `FRICTION_BAND` of the friction is added for critical
+frictions, as in `grasp_core.transferring.judging`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """What a comparison must know of a part that has changed since its grasps were planned."""
+
+    change: str
+    """Which faces moved and by how much, in words."""
+    gone: Mapping[str, str]
+    """Why grasps do not exist on the changed part, by id."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +106,13 @@ class Finding:
     after: Entry | None = None
 
 
-def bands_between(before: Baseline, after: Baseline) -> tuple[Bands, str]:
+def bands_between(
+    before: Baseline, after: Baseline, carried: Carried | None = None
+) -> tuple[Bands, str]:
     """Choose the tolerances within which results may differ, and say in words why."""
+    if carried is not None and _is_other_part(before, after):
+        bands = replace(OTHER_PART, friction=FRICTION_BAND * before.friction)
+        return bands, f"with the bands of a changed part: {carried.change}"
     names = sorted({*before.versions, *after.versions} - {*ASIDE})
     others = [
         f"{name} {before.versions.get(name)} -> {after.versions.get(name)}"
@@ -101,31 +129,38 @@ def bands_between(before: Baseline, after: Baseline) -> tuple[Bands, str]:
 
 
 def compare(
-    before: Baseline, after: Baseline, refused: Mapping[str, str] | None = None
-) -> tuple[Finding, ...]:
+    before: Baseline, after: Baseline, refused: Mapping[str, str] | None = None,
+    carried: Carried | None = None,
+) -> tuple[Finding, ...]:  # fmt: skip
     """Compare each grasp of two baselines, sorted by id.
 
     Args:
         before: The baseline.
         after: The baseline measured now.
         refused: Reasons why grasps could not be simulated, by id.
+        carried: How the part has changed since the grasps were planned; None if it has not. Then
+            another part is no reason not to compare.
     """
-    refused = refused or {}
-    bands, _ = bands_between(before, after)
-    changed = tuple(_changed(before, after))
-    another = before.content_sha256 != after.content_sha256
+    bands, _ = bands_between(before, after, carried)
+    other_part = _is_other_part(before, after)
+    changed = tuple(_changed(before, after, carried))
+    known = _Known(before, changed, bands, carried if other_part else None)
     old = {entry.id: entry for entry in before.entries}
     new = {entry.id: entry for entry in after.entries}
+    refused = refused or {}
+    gone: Mapping[str, str] = {} if carried is None else carried.gone
     found = list[Finding]()
-    for name in sorted({*old, *new, *refused}):
+    for name in sorted({*old, *new, *refused, *gone}):
         one, other = old.get(name), new.get(name)
-        if one is not None and other is not None:
-            found.append(_compared(one, other, before.friction, changed, bands))
+        if name in gone:
+            found.append(known.gone(name, one, gone[name]))
+        elif one is not None and other is not None:
+            found.append(_compared(one, other, known))
         elif name in refused:
             status = Status.NOT_COMPARABLE if changed else Status.REGRESSED
             why = (*changed, f"refused: {refused[name]}")
             found.append(Finding(name, status, why, (), one, other))
-        elif another:
+        elif other_part and carried is None:
             found.append(Finding(name, Status.NOT_COMPARABLE, changed, (), one, other))
         elif one is None:
             found.append(Finding(name, Status.NEW, ("not in the baseline",), (), one, other))
@@ -135,9 +170,37 @@ def compare(
     return tuple(found)
 
 
-def _changed(before: Baseline, after: Baseline) -> Iterator[str]:
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """What is the same in the comparison of every grasp."""
+
+    before: Baseline
+    changed: tuple[str, ...]
+    """Reasons why no grasp can be compared."""
+    bands: Bands
+    carried: Carried | None
+    """How the part has changed since the baseline was recorded; None if it has not."""
+
+    def gone(self, name: str, one: Entry | None, why: str) -> Finding:
+        """Judge a grasp that does not exist on the part as it is now.
+
+        That is no change if it did not exist either when the baseline was recorded.
+        """
+        if self.carried is None and one is None:
+            return Finding(name, Status.SAME, (f"gone, as it was: {why}",))
+        if self.changed:
+            return Finding(name, Status.NOT_COMPARABLE, (*self.changed, why), (), one)
+        change = () if self.carried is None else (self.carried.change,)
+        return Finding(name, Status.GONE, (why, *change), (), one)
+
+
+def _is_other_part(before: Baseline, after: Baseline) -> bool:
+    return before.content_sha256 != after.content_sha256
+
+
+def _changed(before: Baseline, after: Baseline, carried: Carried | None) -> Iterator[str]:
     """Yield the reasons why two baselines cannot be compared."""
-    if before.content_sha256 != after.content_sha256:
+    if carried is None and _is_other_part(before, after):
         same = before.object == after.object
         named = f"{before.object} has changed" if same else f"{before.object} -> {after.object}"
         yield f"the object is another one: {named}"
@@ -159,21 +222,22 @@ def _settings_changed(where: str, before: Any, after: Any) -> Iterator[str]:
         yield f"{where}: {before} -> {after}"
 
 
-def _compared(
-    one: Entry, other: Entry, friction: float, changed: tuple[str, ...], bands: Bands
-) -> Finding:
+def _compared(one: Entry, other: Entry, known: _Known) -> Finding:
+    changed, bands = known.changed, known.bands
     every = differences(one, other, bands)
     texts = tuple(each.text for each in every)
-    if one.contacts_sha256 != other.contacts_sha256:
+    if known.carried is None and one.contacts_sha256 != other.contacts_sha256:
         changed = (*changed, "the contacts are others")
     if changed:
         return Finding(one.id, Status.NOT_COMPARABLE, changed, texts, one, other)
-    grey = _is_grey(one, other, friction, bands)
+    grey = _is_grey(one, other, known.before.friction, bands)
     counting = [each for each in every if each.counts and not (grey and each.of_holding)]
     status = _status(counting, grey=grey, same=one == other)
     reasons = tuple(each.text for each in counting if each.worse is (status is Status.REGRESSED))
     if status is Status.GREY:
         reasons = (f"{one.outcome} -> {other.outcome}, at its critical friction",)
+    if known.carried is not None:
+        reasons = (f"{WORDS[status]} on the changed part: {known.carried.change}", *reasons)
     return Finding(one.id, status, reasons, texts, one, other)
 
 

@@ -29,6 +29,10 @@ class Bands:
     exact: bool
     """Whether exactly the same repeats with noise must hold; otherwise repeats with a load close to
     the limit may change."""
+    friction: float = 0.0
+    """Differences of critical frictions that never count, beside `least`."""
+    same_part: bool = True
+    """Whether the part is the same; on another one, other negative controls may exist."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +56,7 @@ def differences(one: Entry, other: Entry, bands: Bands) -> tuple[Difference, ...
     """
     return (
         *_of_wrenches(one, other),
-        *_of_controls(one, other),
+        *_of_controls(one, other, bands),
         *_of_numbers(one, other, bands),
         *_of_repeats(one, other, bands),
         *_of_executions(one.execution, other.execution, bands),
@@ -79,21 +83,21 @@ def _of_wrenches(one: Entry, other: Entry) -> Iterator[Difference]:
         yield Difference(text, more > 0, of_holding=abs(more) <= len(lost) + len(won))
 
 
-def _of_controls(one: Entry, other: Entry) -> Iterator[Difference]:
+def _of_controls(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
     before, after = (entry.controls - entry.controls_let_go for entry in (one, other))
     if before != after:
         text = f"negative controls that were not let go: {before} -> {after}"
         yield Difference(text, worse=after > before)
     if one.controls != other.controls:
         text = f"negative controls: {one.controls} -> {other.controls}"
-        yield Difference(text, worse=other.controls < one.controls)
+        yield Difference(text, worse=other.controls < one.controls, counts=bands.same_part)
 
 
 def _of_numbers(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
     """Compare the measured numbers; a larger number is worse, except for wrench limits."""
     rows = (
-        ("critical_friction", bands.predicted, bands.least, 1.0),
-        ("simulated_critical_friction", bands.simulated, bands.least, 1.0),
+        ("critical_friction", bands.predicted, bands.least + bands.friction, 1.0),
+        ("simulated_critical_friction", bands.simulated, bands.least + bands.friction, 1.0),
         ("limit_n", bands.predicted, bands.least, -1.0),
         ("simulated_limit_n", bands.simulated, bands.least, -1.0),
         ("displacement_m", 0.0, bands.displacement_m, 1.0),

@@ -4,27 +4,25 @@ import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
-from sim_validate.baselines.compare import Finding
+from sim_validate.baselines.changed_part import Present
+from sim_validate.baselines.check import Checked
 from sim_validate.baselines.entries import Entry
 from sim_validate.baselines.executions import not_survived
-from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.validation.grasp_verdict import Verdict
 from sim_validate.validation.wrench_verdict import WrenchVerdict
 
 
-def explained(
-    finding: Finding, verdict: Verdict | None, files: tuple[Path, Path], how: str,
-    executed: ExecutedGrasp | None = None,
-) -> str:  # fmt: skip
+def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
     """Explain how a grasp has changed: prediction, simulation, baseline, and commands to run next.
 
     Args:
-        finding: How the grasp has changed.
-        verdict: The verdict measured now, or None if the grasp could not be simulated.
+        done: The check of this grasp alone.
         files: Paths of the baseline and the grasps.
-        how: How results were compared, in words.
-        executed: The execution measured now; None if the grasp was not executed.
+        now: The grasps on their part as it is now.
     """
+    (finding,) = done.findings
+    verdict, how = done.verdicts.get(finding.id), done.how
+    executed = done.measured.executions.get(finding.id)
     lines = [f"{finding.id}: {finding.status.value}", *(f"  {why}" for why in finding.reasons)]
     lines += [f"  {text}" for text in finding.differences if text not in finding.reasons]
     lines += [f"  compared {how}"] if how else []
@@ -34,13 +32,34 @@ def explained(
     if failed is not None:
         lines.append(f"  first wrench that was not held: {in_words(failed)}")
     lines += [f"  {not_survived(executed)}"] if executed and not_survived(executed) else []
+    at = None if verdict is None else "" if failed is None else failed.name
+    return "\n".join([*lines, *_next_steps(finding.id, at, files, now)])
+
+
+def _next_steps(name: str, at: str | None, files: tuple[Path, Path], now: Present) -> Iterator[str]:
+    """Yield the commands that show a grasp, and that check all of them.
+
+    Args:
+        name: Id of the grasp.
+        at: The first wrench that was not held; empty if all were, None if nothing was simulated.
+        files: Paths of the baseline and the grasps.
+        now: The grasps on their part as it is now.
+    """
     baseline, grasps = (shlex.quote(str(path)) for path in files)
-    if verdict is not None:
-        chosen = "" if failed is None else f" --wrench={shlex.quote(failed.name)}"
-        which = f"--grasp {shlex.quote(finding.id)}{chosen} --grasps {grasps}"
-        lines.append(f"  to see it: graspproof replay {baseline} {which} --out replay")
-    lines.append(f"  all of them: graspproof baseline check {baseline} --grasps {grasps}")
-    return "\n".join(lines)
+    chosen = f" --wrench={shlex.quote(at)}" if at else ""
+    check = f"  all of them: graspproof baseline check {baseline} --grasps {grasps}"
+    if now.carried is None:
+        which = f"--grasp {shlex.quote(name)}{chosen} --grasps {grasps}"
+        if at is not None:
+            yield f"  to see it: graspproof replay {baseline} {which} --out replay"
+        yield check
+        return
+    part = shlex.quote(str(now.source.file))
+    yield f"  its contacts: graspproof transfer {grasps} {part} --unit {now.unit} --out carried"
+    if at is not None:
+        which = f"--grasp {shlex.quote(now.id_on_part(name) or name)}{chosen}"
+        yield f"  to see it: graspproof replay carried/grasps.json {which} --out replay"
+    yield f"{check} --object {part}"
 
 
 def unstable(verdict: Verdict) -> str:

@@ -10,6 +10,7 @@ from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
+from sim_validate.baselines.changed_part import TABLE, if_changed, present
 from sim_validate.baselines.source_file import Source, source_of
 from sim_validate.records.grasps import read_grasps
 
@@ -27,6 +28,9 @@ class GraspCase:
     friction: float
     source: Source = field(default_factory=Source)
     """The mesh file that the grasp was planned from, if it comes from a file of grasps."""
+    gone: str = ""
+    """Why the grasp does not exist on its changed part; empty if it does. Object and grasp are then
+    those that the file holds."""
 
 
 def case_of(
@@ -64,17 +68,17 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
         folder: Folder in which relative paths start.
         args: Path of a grasps.json; if empty, grasps are planned.
         settings: `object` (a mesh file or a built-in object), `unit`, and the arguments of `plan`;
-            with a file, `friction` alone.
+            with a file, `friction`, and `changed_part` with the fields of `IfChanged`.
 
     Raises:
         InputError: A setting is unknown, missing or refused, no grasp was found, or the mesh that
-            the grasps were planned on has changed.
+            the grasps were planned on has changed and that is refused or cannot be judged.
     """
     if len(args) > 1 or not all(isinstance(each, str) for each in args):
         raise InputError(
             f"@pytest.mark.grasp takes the path of one file of grasps, got {list(args)}"
         )
-    known = ("friction",) if args else SETTINGS
+    known = ("friction", TABLE) if args else SETTINGS
     for name in settings:
         if name not in known:
             beside = " beside a file of grasps" if args else ""
@@ -82,23 +86,39 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
                 f"@pytest.mark.grasp has no setting {name!r}{beside}; it takes {', '.join(known)}"
             )
     friction = _number(settings.get("friction", FRICTION))
-    source = Source()
     if args:
-        path = folder / args[0]
-        saved = read_grasps(path)
-        source = source_of(saved, path, [folder])
-        body, grasps = saved.body, saved.grasps
-        friction = friction if "friction" in settings else saved.friction
-    else:
-        wanted: dict[str, Any] = {"limit": 1, **settings, "friction": friction}
-        body = _body(folder, wanted)
-        grasps = _planned(body, wanted)
+        return _cases_of_file(folder, folder / args[0], settings)
+    wanted: dict[str, Any] = {"limit": 1, **settings, "friction": friction}
+    body = _body(folder, wanted)
+    grasps = _planned(body, wanted)
+    _check_any(grasps, body, friction)
+    return [GraspCase(body, grasp, friction) for grasp in grasps]
+
+
+def _cases_of_file(folder: Path, path: Path, settings: Mapping[str, Any]) -> list[GraspCase]:
+    """Read the grasps of a file, and carry them over to their part as it is now."""
+    saved = read_grasps(path)
+    friction = _number(settings.get("friction", saved.friction))
+    _check_any(saved.grasps, saved.body, friction)
+    asked = if_changed(settings.get(TABLE, {}))
+    source = source_of(saved, path, [folder])
+    now = present(replace(saved, friction=friction), path, source, asked)
+    tested = {grasp.id: grasp for grasp in now.saved.grasps}
+    return [
+        GraspCase(now.saved.body, tested[each.id], friction, now.mesh)
+        if each.id in tested
+        else GraspCase(saved.body, each, friction, now.mesh, f"{each.id} is gone: "
+                       f"{now.gone[each.id]}; {now.change}")
+        for each in saved.grasps
+    ]  # fmt: skip
+
+
+def _check_any(grasps: Sequence[Grasp], body: Polyhedron, friction: float) -> None:
     if not grasps:
         raise InputError(
             f"@pytest.mark.grasp: no grasp of {body.name} was found at friction {friction:g}; try "
             "a higher friction"
         )
-    return [GraspCase(body, grasp, friction, source) for grasp in grasps]
 
 
 def _number(value: Any) -> float:

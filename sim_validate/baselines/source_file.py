@@ -1,9 +1,9 @@
-"""Checks whether the mesh file that grasps were planned from has changed since.
+"""Finds the mesh file that grasps were planned from, and says whether it has changed since.
 
-Grasps are tested on the mesh that their file holds, so a part that has been changed since would
-pass unnoticed. Therefore its mesh file is searched, and a changed one is refused. The file counts
-as unchanged if its bytes are those that were planned from, or if it gives the same solid in some
-unit: comments, line ends and the order of vertices do not count.
+A file of grasps holds the mesh that they were planned on, so a part that has been changed since
+would pass unnoticed. Therefore its mesh file is searched each time. The file counts as unchanged if
+its bytes are those that were planned from, or if it gives the same solid in some unit: comments,
+line ends and the order of vertices do not count.
 """
 
 import hashlib
@@ -18,10 +18,6 @@ from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.records.grasps_json import RECORDED, SavedGrasps
 
 
-class ChangedPartError(InputError):
-    """Error for a mesh file that is not the one that the grasps were planned from."""
-
-
 @dataclass(frozen=True, slots=True)
 class Source:
     """The mesh file that grasps were planned from, if it was found."""
@@ -30,12 +26,16 @@ class Source:
     """Path of the mesh file; None if it was not found, or the grasps come from no file."""
     note: str = ""
     """A sentence that says the mesh file was not found; empty otherwise."""
+    changed: bool = False
+    """Whether the file holds another solid than the one that was planned on."""
 
 
 def source_of(
     saved: SavedGrasps, grasps: Path, folders: Iterable[Path], named: Path | None = None
 ) -> Source:
-    """Find the mesh file that grasps were planned from, and refuse one that has changed.
+    """Find the mesh file that grasps were planned from.
+
+    Of several files with the object's name, an unchanged one is taken, or else the first.
 
     Args:
         saved: The grasps.
@@ -44,7 +44,6 @@ def source_of(
         named: The mesh file if the user names it; then nothing else is searched.
 
     Raises:
-        ChangedPartError: Mesh files were found, but none holds the mesh of the grasps.
         InputError: The named file is missing, or the grasps were not planned from a file.
     """
     body = saved.body
@@ -60,12 +59,7 @@ def source_of(
         if _is_source(path, body):
             return Source(file=path)
     if found:
-        raise ChangedPartError(
-            f"{found[0]}: this is not the mesh that {grasps} was planned on: the mesh has changed "
-            f"since, or is another object's. Plan on it again (graspproof plan {found[0]} --out "
-            "...) and write the baseline with pytest --grasp-bless, put the former file back, or "
-            "name the right file with `object` in a *.grasps.toml"
-        )
+        return Source(file=found[0], changed=True)
     return Source(
         note=f"{grasps}: the mesh that it holds was tested; the file it was planned from, "
         f"{body.name!r} with some ending, is not beside it (`object` in a *.grasps.toml says where)"

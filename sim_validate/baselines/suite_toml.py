@@ -13,6 +13,15 @@ from grasp_core.errors import InputError
 from grasp_core.files.strict_json import place, shown
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
+from sim_validate.baselines.changed_part import (
+    CARRY,
+    IfChanged,
+    Present,
+    if_changed,
+    present,
+    testable,
+)
+from sim_validate.baselines.changed_part import TABLE as CHANGED
 from sim_validate.baselines.check import Checked, check_one, demanded, silent
 from sim_validate.baselines.entries import Baseline
 from sim_validate.baselines.measure import (
@@ -34,7 +43,7 @@ ENDING = ".grasps.toml"
 KINDS: Mapping[str, type] = {
     "grasps": str, "object": str, "baseline": str, "strict": bool, "setup": str, "wrenches": str,
     "limits": str, "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
-    "survives": bool, "execution": dict,
+    "survives": bool, "execution": dict, "changed_part": dict,
 }  # fmt: skip
 """Types of the file's settings, by name."""
 WORDS = {str: "text", bool: "true or false", int: "a whole number", dict: "a table"}
@@ -72,6 +81,8 @@ class Suite:
     """Whether each grasp must survive its execution, whatever the baseline says."""
     execution: AskedExecution | None = None
     """How grasps are executed besides."""
+    changed_part: IfChanged = CARRY
+    """What to do if the part has changed since the grasps were planned."""
 
     @cached_property
     def saved(self) -> SavedGrasps:
@@ -84,12 +95,22 @@ class Suite:
 
     @cached_property
     def source(self) -> Source:
-        """Find the mesh file that the grasps were planned from; a changed one is refused.
+        """Find the mesh file that the grasps were planned from.
 
         Raises:
-            InputError: The mesh has changed since the grasps were planned, or a file is refused.
+            InputError: A file is refused.
         """
         return source_of(self.saved, self.grasps, [self.path.parent], self.object)
+
+    @cached_property
+    def present(self) -> Present:
+        """Carry the grasps over to their part as it is now.
+
+        Raises:
+            InputError: The part has changed, and that is refused or cannot be judged, or a file is
+                refused.
+        """
+        return present(self.saved, self.grasps, self.source, self.changed_part)
 
     @cached_property
     def kept(self) -> Baseline:
@@ -125,29 +146,29 @@ class Suite:
         """Simulate one grasp again, and compare the result with the baseline.
 
         Raises:
-            InputError: A file is refused, or the part has changed.
+            InputError: A file or a changed part is refused.
             UnfaithfulError: The simulator fails its checks on cases with known answers.
         """
-        _ = self.source
-        before = self.kept
-        done = check_one(before, self.saved, self.where, self._how(before), name)
+        now, before = self.present, self.kept
+        done = check_one(before, now, self.where, self._how(before), name)
         return demanded(done) if self.survives else done
 
     def bless(self) -> Baseline:
         """Simulate all grasps and write the results as the new baseline.
 
         Raises:
-            InputError: A file or a grasp is refused, or the part has changed.
+            InputError: A file, a grasp or a changed part is refused, or no grasp could be carried
+                over to it.
             UnfaithfulError: The simulator fails its checks on cases with known answers.
         """
-        _ = self.source
+        now = self.present
         check_writable(self.baseline)
-        before, saved = self._kept_if_any(), self.saved
+        before = self._kept_if_any()
         how = self._how(before)
         if before is not None:
-            how = with_planned_fingers(how, before, saved)
-        about = self.where, before and before.limit
-        found = complete(measured(saved, about, how, 1, silent))
+            how = with_planned_fingers(how, before, now.saved)
+        limit = before and before.limit
+        found = complete(measured(testable(now, limit), (self.where, limit), how, 1, silent))
         write_baseline(self.baseline, found)
         return found
 
@@ -217,11 +238,13 @@ def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
             settings["noise"] = noise_from_table(settings["noise"])
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
-    if TABLE in settings:
-        try:
+    try:
+        if TABLE in settings:
             settings[TABLE] = asked_execution(settings[TABLE])
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from error
+        if CHANGED in settings:
+            settings[CHANGED] = if_changed(settings[CHANGED])
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
     return Suite(path=path, **settings)
 
 

@@ -9,7 +9,23 @@ from tyro.conf import OmitArgPrefixes, Positional, arg, subcommand
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from sim_validate.cli.flag_bounds import at_least
 from sim_validate.cli.flag_groups import Count, Repeats, Seed, Speech
+from sim_validate.cli.transfer_flags import Carrying
 from sim_validate.parallel.processes import available_cores
+
+
+@dataclass(frozen=True, slots=True)
+class ChangedPart:
+    """Where the mesh file is, and what to do if it has changed since the grasps were planned."""
+
+    object: Path | None = None
+    """The mesh file that the grasps were planned from; if not given, a file with the object's name
+    beside them or the baseline."""
+    refuse_changed_part: bool = False
+    """Refuse a mesh file that has changed, in place of carrying the grasps over to it."""
+    carrying: OmitArgPrefixes[Carrying] = field(default_factory=Carrying)
+    unit: Literal["m", "cm", "mm", "in"] | None = None
+    """Unit of length in a mesh file that has changed; if not given, the one in which the part is
+    about as large as it was."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +49,7 @@ class Record:
     repeats: OmitArgPrefixes[Repeats] = field(default_factory=Repeats)
     seed: Seed | None = None
     """Seed of all random choices; if not given, the seed that the grasps were planned with."""
+    changed: OmitArgPrefixes[ChangedPart] = field(default_factory=ChangedPart)
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
@@ -54,6 +71,7 @@ class Check:
     """Write the new results over the baseline, even if grasps have become worse."""
     junit: Path | None = None
     """Also write a JUnit file, which build servers show, with a case for each grasp."""
+    changed: OmitArgPrefixes[ChangedPart] = field(default_factory=ChangedPart)
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)

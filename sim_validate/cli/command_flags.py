@@ -28,6 +28,7 @@ from sim_validate.cli.flag_groups import (
     Wrench,
 )
 from sim_validate.cli.showing_flags import Report, View
+from sim_validate.cli.transfer_flags import Transfer
 from sim_validate.parallel.processes import available_cores
 
 RUN_LIMIT = 100
@@ -237,6 +238,7 @@ Command = (
     | Regions
     | Replay
     | Analyze
+    | Transfer
     | Dataset
     | Baseline
     | Inspect

@@ -35,6 +35,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "analyze contacts.json --friction 0.5 --wrench 0 0 -3 0 0 0",
         "analyze plan/grasps.json --json",
     ),
+    "transfer": (
+        "transfer plan/grasps.json part-v2.stl --unit mm --out carried",
+        "transfer plan/grasps.json part-v2.stl --unit mm --distance-m 0.005 --angle-deg 2",
+    ),
     "inspect": ("inspect part.stl --unit mm",),
     "objects": ("objects",),
     "doctor": ("doctor",),

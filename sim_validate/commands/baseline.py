@@ -6,13 +6,14 @@ from dataclasses import replace
 
 from grasp_core.files.text_files import write_text
 from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
+from sim_validate.baselines.changed_part import IfChanged, Present, present, testable
 from sim_validate.baselines.check import Checked, check
 from sim_validate.baselines.compare import Finding, Status, failing
 from sim_validate.baselines.entries import fields_of
 from sim_validate.baselines.junit import junit_text
 from sim_validate.baselines.measure import complete, measured, seen_from
 from sim_validate.baselines.settings import How, of_settings, setup_for
-from sim_validate.baselines.source_file import Source, source_of
+from sim_validate.baselines.source_file import source_of
 from sim_validate.cli import baseline_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
@@ -27,7 +28,8 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     """Simulate grasps and write the results as a baseline, to compare later results with."""
     check_writable(command.out)
     saved = read_grasps(command.grasps)
-    source = source_of(saved, command.grasps, [command.out.parent])
+    source = source_of(saved, command.grasps, [command.out.parent], command.changed.object)
+    now = present(saved, command.grasps, source, _asked(command.changed))
     agenda = Agenda(
         random_wrenches=command.random_wrenches,
         wrenches=() if command.wrenches is None else wrenches_from_file(command.wrenches),
@@ -39,12 +41,13 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     how = How(setup_for(saved, command.setup), agenda)
     about = seen_from(command.out, command.grasps)
     with reporter.progress("simulating") as steps:
-        done = measured(saved, (about, command.limit), how, command.jobs, steps.update)
+        tested = testable(now, command.limit)
+        done = measured(tested, (about, command.limit), how, command.jobs, steps.update)
     found = complete(done)
     write_baseline(command.out, found)
     held = sum(entry.held for entry in found.entries)
     reporter.say(f"wrote {command.out}: {held} of {len(found.entries)} grasps held")
-    _say_source(source, reporter)
+    _say_mesh(now, reporter)
     reporter.document({"baseline": str(command.out), "grasps": len(found.entries), "held": held})
     return Exit.GOOD
 
@@ -54,28 +57,43 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     before = read_baseline(command.baseline)
     path = command.grasps or command.baseline.parent / before.grasps_file
     saved = read_grasps(path)
-    source = source_of(saved, path, [command.baseline.parent])
+    source = source_of(saved, path, [command.baseline.parent], command.changed.object)
+    now = present(saved, path, source, _asked(command.changed))
     how = of_settings(before.settings, str(command.baseline))
     if command.setup is not None:
         how = replace(how, setup=setup_from_file(command.setup, how.setup))
     where = seen_from(command.baseline, path)
     with reporter.progress("simulating") as steps:
-        done = check(before, saved, where, how, command.jobs, steps.update)
+        done = check(before, now, where, how, command.jobs, steps.update)
     if command.junit is not None:
         text = junit_text(str(command.baseline), done.findings, strict=command.strict)
         write_text(command.junit, text)
     _show(done, reporter)
-    _say_source(source, reporter)
+    _say_mesh(now, reporter)
     if command.bless:
+        testable(now, before.limit)
         write_baseline(command.baseline, complete(done.measured))
         reporter.say(f"wrote {command.baseline}")
         return Exit.GOOD
     return exit_code(done.findings, strict=command.strict)
 
 
-def _say_source(source: Source, reporter: Reporter) -> None:
-    if source.note:
-        reporter.say(source.note)
+def _asked(given: baseline_flags.ChangedPart) -> IfChanged:
+    """Turn the flags about changed parts into their settings."""
+    return IfChanged(
+        refuse=given.refuse_changed_part,
+        unit=given.unit,
+        distance_m=given.carrying.distance_m,
+        angle_deg=given.carrying.angle_deg,
+    )
+
+
+def _say_mesh(now: Present, reporter: Reporter) -> None:
+    """Say what must be known about the mesh that was tested, and which grasps it lost."""
+    if now.note:
+        reporter.say(now.note)
+    for name, why in list(now.gone.items())[:TABLE_ROWS]:
+        reporter.say(f"{name} is gone: {why}")
 
 
 def exit_code(findings: Sequence[Finding], *, strict: bool) -> int:

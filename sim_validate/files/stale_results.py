@@ -14,6 +14,7 @@ from grasp_core.errors import InputError
 REPORT, INDEX, GRASPS = "report", "index.html", "grasps"
 STATIC = ("style.css", "gallery.js", "turntable.js")
 FIDELITY, SURVIVAL = "fidelity.svg", "survival.svg"
+OF_GRASPS = ("transfer.json", "grasps.json")
 PICTURES, CHARTS, CLIPS = "pictures", "charts", "clips"
 MARK = ".graspproof-report"
 ID = re.compile(r"[cprf](-\d+){4}[\w-]*", re.ASCII)
@@ -25,7 +26,7 @@ def remove_results(folder: Path) -> None:
     remove_verdicts(folder)
     remove_regions(folder)
     remove_executions(folder)
-    _remove([*_of_grasps(folder / "scenes", ".xml"), folder / "grasps.json"])
+    _remove([*_of_grasps(folder / "scenes", ".xml"), *(folder / name for name in OF_GRASPS)])
 
 
 def remove_verdicts(folder: Path) -> None:

@@ -23,6 +23,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from sim_validate.baselines.baseline_json import read_baseline
+from sim_validate.baselines.changed_part import Present
 from sim_validate.baselines.check import check, silent
 from sim_validate.baselines.settings import of_settings
 from sim_validate.records.grasps import read_grasps
@@ -87,7 +88,8 @@ def statuses(folder: Path) -> list[str]:
     path = baseline_in(folder)
     before = read_baseline(path)
     saved = read_grasps(path.parent / before.grasps_file)
-    done = check(before, saved, before.grasps_file, of_settings(before.settings, ""), 1, silent)
+    how = of_settings(before.settings, "")
+    done = check(before, Present(saved), before.grasps_file, how, 1, silent)
     return [" ".join([each.status.value, *each.reasons]) for each in done.findings]
 
 

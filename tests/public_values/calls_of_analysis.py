@@ -152,6 +152,15 @@ CALLS = [
         "finger_radius": optional(POSITIVE) | {"larger than the object": 1.0},
         "seed": SEED,
     }),
+    Call("gc.transfer", lambda: {"old": body(), "new": body(), "grasps": (grasp(),)}, {
+        "old": VALUE,
+        "new": VALUE,
+        "grasps": SEVERAL,
+        "friction": FRICTION,
+        "distance": optional(NOT_NEGATIVE) | {"larger than the object": 1.0},
+        "angle_deg": NOT_NEGATIVE | {"too wide": 46.0},
+        "finger": optional(VALUE) | {"radius": 0.006},
+    }),
     Call("gc.certify_regions", of_grasp(friction=0.5), BODY_AND_GRASP | {
         "friction": FRICTION,
         "reserve": NOT_NEGATIVE | {"all": 1.0},

@@ -4,7 +4,14 @@ import dataclasses
 
 import pytest
 
-from sim_validate.baselines.compare import OTHER_VERSIONS, Status, bands_between, compare
+from sim_validate.baselines.compare import (
+    OTHER_VERSIONS,
+    Carried,
+    Status,
+    bands_between,
+    compare,
+    failing,
+)
 from sim_validate.baselines.entries import Baseline, Entry
 from sim_validate.simulation.hold_verdict import Outcome
 
@@ -219,3 +226,75 @@ def test_grasps_that_are_gone_or_new_are_named():
         ("a-new-one", Status.NEW),
         ("c-0-1-2-3", Status.MISSING),
     ]
+
+
+MOVED = Carried("part.obj has changed: face 3 moved 1.00 mm outward", {})
+OTHER_PART = {"content_sha256": "cd"}
+
+
+def on_another_part(**changed):
+    after = now(OTHER_PART, contacts_sha256="2e", **changed)
+    (finding,) = compare(BEFORE, after, carried=MOVED)
+    return finding
+
+
+@pytest.mark.parametrize(
+    ("changed", "status", "word"),
+    [
+        ({}, Status.WITHIN, "same"),
+        ({"critical_friction": 0.2 + 0.024 + 0.2 * 0.049}, Status.WITHIN, "same"),
+        ({"critical_friction": 0.2 + 0.026 + 0.2 * 0.051}, Status.REGRESSED, "worse"),
+        ({"critical_friction": 0.2 - 0.026 - 0.2 * 0.051}, Status.IMPROVED, "better"),
+        ({"limit_n": 3.0 * 0.94}, Status.REGRESSED, "worse"),
+        ({"limit_n": 3.0 * 1.06}, Status.IMPROVED, "better"),
+        ({"controls": 3, "controls_let_go": 3}, Status.WITHIN, "same"),
+        ({"controls_let_go": 3}, Status.REGRESSED, "worse"),
+        (SLIPPED, Status.REGRESSED, "worse"),
+    ],
+)
+def test_a_grasp_on_a_changed_part_is_compared_and_the_face_is_named(changed, status, word):
+    """At friction 0.5 the band of critical frictions is 0.025 and 5 % of them."""
+    finding = on_another_part(**changed)
+    assert finding.status is status
+    assert finding.reasons[0] == f"{word} on the changed part: {MOVED.change}"
+
+
+def test_it_is_said_that_the_bands_are_those_of_a_changed_part():
+    words = bands_between(BEFORE, now(OTHER_PART), MOVED)[1]
+    assert words == f"with the bands of a changed part: {MOVED.change}"
+    assert bands_between(BEFORE, now(), MOVED)[1] == "exactly"
+
+
+def test_without_being_carried_over_another_part_is_still_not_comparable():
+    assert found(now(OTHER_PART)).status is Status.NOT_COMPARABLE
+
+
+def test_once_the_changed_part_has_a_baseline_it_is_compared_exactly():
+    (finding,) = compare(BEFORE, now(limit_n=3.0001), carried=MOVED)
+    assert finding.status is Status.IMPROVED
+    (finding,) = compare(BEFORE, now(contacts_sha256="2e"), carried=MOVED)
+    assert finding.status is Status.NOT_COMPARABLE
+
+
+def test_a_grasp_that_does_not_exist_on_the_changed_part_is_gone():
+    gone = dataclasses.replace(MOVED, gone={ENTRY.id: "finger 2 has lost face 3"})
+    nothing = dataclasses.replace(BEFORE, entries=(), **OTHER_PART)
+    (finding,) = compare(BEFORE, nothing, carried=gone)
+    assert finding.status is Status.GONE
+    assert finding.reasons == ("finger 2 has lost face 3", MOVED.change)
+    assert Status.GONE in failing(strict=False)
+
+
+def test_a_grasp_that_was_gone_already_when_the_baseline_was_written_is_the_same():
+    gone = dataclasses.replace(MOVED, gone={"c-9-9-9-9": "finger 2 has lost face 3"})
+    _, other = compare(BEFORE, now(), carried=gone)
+    assert (other.id, other.status) == ("c-9-9-9-9", Status.SAME)
+    (_, other) = compare(BEFORE, now(OTHER_PART), carried=gone)
+    assert other.status is Status.GONE
+
+
+def test_other_settings_are_not_compared_on_a_changed_part_either():
+    header = {**OTHER_PART, "settings": {**BEFORE.settings, "seed": 1}}
+    (finding,) = compare(BEFORE, now(header), carried=MOVED)
+    assert finding.status is Status.NOT_COMPARABLE
+    assert finding.reasons == ("seed: 0 -> 1",)

@@ -1,5 +1,9 @@
-"""A part that was changed after its grasps were planned does not pass unseen."""
+"""A part that was changed after its grasps were planned does not pass unseen.
 
+Its grasps are carried over to it and judged anew, or it is refused where that is asked for.
+"""
+
+import dataclasses
 import json
 
 import pytest
@@ -8,24 +12,32 @@ import grasp_core as gc
 from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
+from sim_validate.baselines.changed_part import ChangedPartError
+from sim_validate.baselines.compare import Status
 from sim_validate.baselines.grasp_cases import grasp_cases
-from sim_validate.baselines.source_file import ChangedPartError, Source, source_of
+from sim_validate.baselines.source_file import Source, source_of
 from sim_validate.baselines.suite_toml import suite_from_toml
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from tests.bad_input.mesh_texts import obj
 from tests.sim_validate.plugin.project import copied, run_pytest
 
+TOP = 3
+"""The highest face of the part."""
+
 
 @pytest.fixture(scope="module")
 def parted(tmp_path_factory):
     """A part, grasps planned on it in millimetres, and their baseline."""
     folder = tmp_path_factory.mktemp("parted")
-    wedge = example_object("wedge")
-    text = obj((1e3 * wedge.vertices).tolist(), wedge.triangles.tolist())
+    box = example_object("box")
+    text = obj((1e3 * box.vertices).tolist(), box.triangles.tolist())
     part = write_text(folder / "part.obj", text)
     body = gc.load_polyhedron(part, unit="mm")
-    plan = gc.plan(body, 0.5, families=("concurrent",), limit=1)
+    plan = gc.plan(body, 0.5, families=("concurrent",))
+    chosen = [grasp for grasp in plan.grasps if TOP in grasp.faces]
+    plan = dataclasses.replace(plan, grasps=(chosen[0],))
+    assert body.faces[TOP].centroid[2] == pytest.approx(0.025)
     write_text(folder / "grasps.json", plan_to_json(body, plan))
     write_text(folder / "part.grasps.toml", 'grasps = "grasps.json"\n')
     asked = ["-o", str(folder / "part.baseline.json"), "-q"]
@@ -39,19 +51,158 @@ def project(parted, tmp_path):
     return tmp_path
 
 
-def edited(project):
-    """A face of the part moved by a millimetre."""
+def edited(project, by_mm=1.0):
+    """The highest face of the part moved up."""
     part = project / "part.obj"
     rows = [row.split() for row in part.read_text().splitlines()]
     highest = max(float(row[3]) for row in rows if row[0] == "v")
     for row in rows:
         if row[0] == "v" and float(row[3]) == highest:
-            row[3] = repr(highest + 1.0)
+            row[3] = repr(highest + by_mm)
     write_text(part, "\n".join(map(" ".join, rows)) + "\n")
     return part
 
 
-def test_a_changed_part_fails_its_tests_and_is_named(project):
+def refusing(project):
+    """The project, with a file that refuses changed parts."""
+    text = (project / "part.grasps.toml").read_text()
+    return write_text(project / "part.grasps.toml", text + "[changed_part]\nrefuse = true\n")
+
+
+def line_in(report):
+    (line,) = json.loads((report / "report.json").read_text())["grasps"]
+    return line
+
+
+def test_grasps_are_carried_over_to_a_changed_part_and_it_is_said_how_it_changed(project):
+    """The grasp of this part holds on it as before, to within the bands."""
+    part = edited(project)
+    code, said = run_pytest(project, "--grasp-report", "report")
+    assert code == 0, said
+    assert "1 passed" in said
+    assert f"{part} has changed: face 3 moved 1.00 mm outward" in " ".join(said.split())
+    assert "its grasps were carried over to it" in " ".join(said.split())
+    line = line_in(project / "report")
+    assert line["status"] == "within bands"
+    assert f"same on the changed part: {part} has changed: face 3 moved 1.00 mm" in line["why"]
+    assert line["mesh_file"] == str(part)
+    assert "face 3 moved 1.00 mm outward" in line["mesh_note"]
+    assert line["before"]["contacts_sha256"] != line["after"]["contacts_sha256"]
+
+
+def test_a_grasp_that_the_changed_part_does_not_have_fails_and_is_gone(project):
+    toml = project / "part.grasps.toml"
+    write_text(toml, toml.read_text() + "[changed_part]\ndistance_m = 0.0005\n")
+    edited(project)
+    code, said = run_pytest(project, "--grasp-report", "report")
+    assert code == 1
+    assert "1 failed" in said
+    line = line_in(project / "report")
+    assert line["status"] == "gone"
+    assert (
+        "has lost face 3: the nearest like face, 3 of the changed part, is 1.00 mm away, " in said
+    )
+    assert "face 3 moved 1.00 mm outward" in line["why"]
+    assert "graspproof transfer" in said
+
+
+def test_a_grasp_that_is_better_fails_only_where_that_is_strict(project):
+    """The baseline says that the grasp needed more friction than it does on the changed part."""
+    edited(project)
+    path = project / "part.baseline.json"
+    record = json.loads(path.read_text())
+    record["grasps"][0].update(critical_friction=0.2, simulated_critical_friction=0.2)
+    write_text(path, json.dumps(record))
+    code, said = run_pytest(project, "--grasp-report", "report")
+    assert code == 0, said
+    line = line_in(project / "report")
+    assert line["status"] == "improved"
+    assert "better on the changed part: " in line["why"]
+    toml = project / "part.grasps.toml"
+    write_text(toml, "strict = true\n" + toml.read_text())
+    assert run_pytest(project)[0] == 1
+
+
+def test_a_grasp_that_is_worse_fails_and_the_face_that_moved_is_named(project):
+    edited(project)
+    path = project / "part.baseline.json"
+    record = json.loads(path.read_text())
+    record["grasps"][0].update(limit_n=1e3)
+    write_text(path, json.dumps(record))
+    code, said = run_pytest(project)
+    assert code == 1
+    assert ": regressed" in said
+    assert "worse on the changed part: " in said
+    assert "face 3 moved 1.00 mm outward" in said
+
+
+def test_blessing_a_changed_part_writes_its_hash_and_then_everything_is_the_same(project):
+    part = edited(project)
+    grasps = (project / "grasps.json").read_text()
+    code, said = run_pytest(project, "--grasp-bless")
+    assert code == 0, said
+    record = json.loads((project / "part.baseline.json").read_text())
+    assert record["content_sha256"] == gc.load_polyhedron(part, unit="mm").content_sha256
+    assert (project / "grasps.json").read_text() == grasps
+    suite = suite_from_toml(project / "part.grasps.toml")
+    (finding,) = suite.tested(suite.ids[0]).findings
+    assert (finding.status, finding.differences) == (Status.SAME, ())
+    edited(project, 0.5)  # and changed again
+    suite = suite_from_toml(project / "part.grasps.toml")
+    (finding,) = suite.tested(suite.ids[0]).findings
+    assert finding.status is Status.WITHIN
+    assert "face 3 moved 1.50 mm outward" in finding.reasons[0]
+
+
+def test_a_grasp_that_was_gone_when_it_was_blessed_stays_gone_without_a_failure(project):
+    body = gc.load_polyhedron(project / "part.obj", unit="mm")
+    plan = gc.plan(body, 0.5)
+    high = [grasp for grasp in plan.grasps if TOP in grasp.faces][:1]
+    other = [grasp for grasp in plan.grasps if TOP not in grasp.faces][:1]
+    both = dataclasses.replace(plan, grasps=(*high, *other))
+    write_text(project / "grasps.json", plan_to_json(body, both))
+    toml = project / "part.grasps.toml"
+    write_text(toml, toml.read_text() + "[changed_part]\ndistance_m = 0.0005\n")
+    (project / "part.baseline.json").unlink()
+    edited(project)
+    code, said = run_pytest(project, "--grasp-bless", "--grasp-report", "report")
+    assert code == 0, said
+    lines = json.loads((project / "report" / "report.json").read_text())["grasps"]
+    assert sorted(line["status"] for line in lines) == ["blessed", "gone"]
+    assert [
+        e["id"] for e in json.loads((project / "part.baseline.json").read_text())["grasps"]
+    ] == [other[0].id]
+    code, said = run_pytest(project)
+    assert code == 0, said
+    assert "2 passed" in said
+
+
+def test_marked_tests_run_on_the_changed_part_and_fail_for_what_is_gone(project):
+    edited(project)
+    write_text(
+        project / "test_it.py",
+        """
+import pytest
+
+@pytest.mark.grasp("grasps.json")
+def test_carried(grasp_case, assert_stable):
+    assert max(grasp_case.body.vertices[:, 2]) == pytest.approx(0.026)
+    assert assert_stable(grasp_case).held
+
+@pytest.mark.grasp("grasps.json", changed_part={"distance_m": 0.0005})
+def test_gone(grasp_case):
+    raise AssertionError("this is never reached")
+""",
+    )
+    code, said = run_pytest(project, "test_it.py")
+    assert code == 1
+    assert "1 passed, 1 error" in said, said
+    assert "is gone: finger" in said
+    assert "never reached" not in said.replace('"this is never reached"', "")
+
+
+def test_a_changed_part_is_refused_where_that_is_asked_for(project):
+    refusing(project)
     part = edited(project)
     code, said = run_pytest(project, "--grasp-report", "report")
     assert code == 1
@@ -59,7 +210,7 @@ def test_a_changed_part_fails_its_tests_and_is_named(project):
     assert f"{part}: this is not the mesh that {project / 'grasps.json'} was planned on" in said
     assert f"graspproof plan {part}" in said
     assert "Traceback" not in said
-    (line,) = json.loads((project / "report" / "report.json").read_text())["grasps"]
+    line = line_in(project / "report")
     assert line["status"] == "not comparable"
     assert str(part) in line["why"]
 
@@ -85,26 +236,88 @@ def test_where_there_is_no_part_it_is_said_that_a_copy_was_tested(project):
     assert line["mesh_note"].startswith(note)
 
 
-def test_blessing_and_commands_refuse_a_changed_part_too(project, capsys):
+def test_blessing_commands_and_markers_refuse_a_changed_part_too(project, capsys):
     edited(project)
+    refusing(project)
     before = (project / "part.baseline.json").read_text()
     with pytest.raises(ChangedPartError):
         suite_from_toml(project / "part.grasps.toml").bless()
     baseline, grasps = str(project / "part.baseline.json"), str(project / "grasps.json")
-    assert main(["baseline", "check", baseline, "--bless"]) == Exit.INPUT
+    asked = "--refuse-changed-part"
+    assert main(["baseline", "check", baseline, "--bless", asked]) == Exit.INPUT
     assert "part.obj: this is not the mesh that" in capsys.readouterr().err
-    assert main(["baseline", "record", grasps, "-o", baseline]) == Exit.INPUT
+    assert main(["baseline", "record", grasps, "-o", baseline, asked]) == Exit.INPUT
     assert (project / "part.baseline.json").read_text() == before
     with pytest.raises(ChangedPartError):
-        grasp_cases(project, ["grasps.json"], {})
+        grasp_cases(project, ["grasps.json"], {"changed_part": {"refuse": True}})
+
+
+def test_commands_carry_grasps_over_and_name_the_face(project, capsys):
+    edited(project)
+    baseline, grasps = str(project / "part.baseline.json"), str(project / "grasps.json")
+    assert main(["baseline", "check", baseline]) == Exit.GOOD
+    said = " ".join(capsys.readouterr().out.split())
+    assert "1 within bands" in said
+    assert "part.obj has changed: face 3 moved 1.00 mm outward" in said
+    assert main(["baseline", "check", baseline, "--distance-m", "0.0005"]) == Exit.NEGATIVE
+    said = " ".join(capsys.readouterr().out.split())
+    assert "1 gone" in said
+    assert "face 3 moved 1.00 mm outward" in said
+    assert main(["baseline", "record", grasps, "-o", baseline, "-q"]) == Exit.GOOD
+    capsys.readouterr()
+    assert main(["baseline", "check", baseline]) == Exit.GOOD
+    assert "1 same" in capsys.readouterr().out
+    other = str(project / "part.obj")
+    assert main(["baseline", "check", baseline, "--object", other, "-q"]) == Exit.GOOD
+
+
+def test_nothing_is_recorded_where_no_grasp_is_left(project, capsys):
+    edited(project)
+    baseline, grasps = str(project / "part.baseline.json"), str(project / "grasps.json")
+    before = (project / "part.baseline.json").read_text()
+    asked = ["--distance-m", "0.0005"]
+    assert main(["baseline", "record", grasps, "-o", baseline, *asked]) == Exit.INPUT
+    assert "none of its 1 grasps exists on it" in capsys.readouterr().err
+    assert main(["baseline", "check", baseline, "--bless", "-q", *asked]) == Exit.INPUT
+    assert (project / "part.baseline.json").read_text() == before
+
+
+def test_a_part_whose_unit_is_not_clear_asks_for_it(project):
+    part = project / "part.obj"
+    rows = [row.split() for row in part.read_text().splitlines()]
+    for row in rows:
+        if row[0] == "v":
+            row[1:] = [repr(1.6 * float(number)) for number in row[1:]]
+    write_text(part, "\n".join(map(" ".join, rows)) + "\n")
+    toml = project / "part.grasps.toml"
+    with pytest.raises(ChangedPartError, match="unit of the changed part is not clear"):
+        _ = suite_from_toml(toml).present
+    write_text(toml, toml.read_text() + '[changed_part]\nunit = "mm"\ndistance_m = 0.001\n')
+    assert suite_from_toml(toml).present.gone
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("refuse = 1", "changed_part.refuse: expected true or false"),
+        ("angle_deg = 90", "angle_deg must be a number"),
+        ('unit = "ft"', "unit must be one of"),
+        ("unknown = 1", "changed_part: no setting is named"),
+    ],
+)
+def test_settings_of_changed_parts_are_checked(project, line, said):
+    toml = project / "part.grasps.toml"
+    write_text(toml, toml.read_text() + f"[changed_part]\n{line}\n")
+    with pytest.raises(gc.InputError, match=said):
+        suite_from_toml(toml)
 
 
 def test_comments_line_ends_and_the_order_of_vertices_are_no_change(project):
     saved = grasps_from_json((project / "grasps.json").read_text())
     part, found = project / "part.obj", 0
-    wedge = example_object("wedge")
-    last = len(wedge.vertices) - 1
-    turned = obj((1e3 * wedge.vertices[::-1]).tolist(), (last - wedge.triangles).tolist())
+    box = example_object("box")
+    last = len(box.vertices) - 1
+    turned = obj((1e3 * box.vertices[::-1]).tolist(), (last - box.triangles).tolist())
     for text in (
         "# exported again\n" + part.read_text(),
         part.read_text().replace("\n", "\r\n"),
@@ -133,8 +346,8 @@ def test_a_part_elsewhere_is_named_in_the_file(project):
     (project / "part.obj").rename(elsewhere / "renamed.obj")
     write_text(project / "part.stl", "another part")
     toml = project / "part.grasps.toml"
-    with pytest.raises(ChangedPartError, match=r"part\.stl"):
-        _ = suite_from_toml(toml).source
+    with pytest.raises(ChangedPartError, match=r"part\.stl: .* cannot be carried over"):
+        _ = suite_from_toml(toml).present
     write_text(toml, 'grasps = "grasps.json"\nobject = "cad/renamed.obj"\n')
     assert suite_from_toml(toml).source.file == elsewhere / "renamed.obj"
     write_text(toml, 'grasps = "grasps.json"\nobject = "cad/nowhere.obj"\n')

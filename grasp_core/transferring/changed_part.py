@@ -1,0 +1,94 @@
+"""Reads the mesh file of a part that has changed, the way its old version was read.
+
+A `grasps.json` does not say in which unit its mesh file was. Where the user does not say so either,
+it is taken to be the unit in which the changed part is most nearly as large as the old one, by the
+diagonals of their bounding boxes. A part that has then become larger or smaller by more than
+`SURE_GROWTH` could be in another unit, so it is refused.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.errors import InputError
+from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.mesh_files.reading import read_triangles
+from grasp_core.objects.booleans import Solid
+from grasp_core.objects.build import DEFAULT_LIMITS
+from grasp_core.objects.mass import mass_properties
+from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
+
+SURE_GROWTH = 1.5
+"""Largest ratio of the two sizes at which the unit is sure: an inch and a centimetre, the two units
+nearest to each other, differ by 2.54, which is more than the square of it."""
+GIVEN = 1e-7
+"""Distance of a centre of mass from that of uniform density, relative to the part's radius, above
+which it was given by the user."""
+
+
+def load_changed_part(
+    path: Path, old: Polyhedron, unit: str, limits: MeshLimits = DEFAULT_LIMITS
+) -> Polyhedron:
+    """Read a changed part from its mesh file, with exact planar faces.
+
+    A centre of mass that was given for the old part is kept; otherwise it is that of uniform
+    density.
+
+    Args:
+        path: The mesh file.
+        old: The part before.
+        unit: Unit of length of the file.
+        limits: Largest size of the file, and largest cost of reading it.
+
+    Raises:
+        MeshError: The file is not a solid; its `reason` says why.
+    """
+    center = given_center(old)
+    return load_polyhedron(path, unit=unit, faces="planar", center_of_mass=center, limits=limits)
+
+
+def given_center(body: Polyhedron) -> Array | None:
+    """Return the centre of mass of a part with planar faces if it is not that of uniform density.
+
+    Args:
+        body: A closed solid.
+    """
+    uniform = mass_properties(Solid(body.vertices, body.triangles)).center
+    off = float(np.linalg.norm(body.center_of_mass - uniform))
+    return body.center_of_mass if off > GIVEN * body.radius else None
+
+
+def growth(old: Polyhedron, new: Polyhedron) -> float:
+    """Return the size of a changed part relative to the old one."""
+    return _diagonal(new.vertices) / _diagonal(old.vertices)
+
+
+def fitting_unit(path: Path, old: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS) -> str:
+    """Find the unit in which a mesh file holds a part about as large as the old one.
+
+    Args:
+        path: The mesh file.
+        old: The part before.
+        limits: Largest size of the file, and largest cost of reading it.
+
+    Raises:
+        InputError: The size fits in no unit.
+        MeshError: The file cannot be read.
+    """
+    vertices, _, _ = read_triangles(path, limits)
+    size = _diagonal(vertices) / _diagonal(old.vertices)
+    off = {unit: abs(math.log(size * length)) if size > 0.0 else math.inf
+           for unit, length in UNITS_M.items()}  # fmt: skip
+    best = min(off, key=off.__getitem__)
+    if off[best] > math.log(SURE_GROWTH):
+        raise InputError(
+            f"{path}: the unit of the changed part is not clear: in {best}, which fits best, its "
+            f"size is {size * UNITS_M[best]:.3g} times that of the old part; say the unit"
+        )
+    return best
+
+
+def _diagonal(vertices: Array) -> float:
+    return float(np.linalg.norm(np.ptp(vertices, axis=0))) if len(vertices) else 0.0

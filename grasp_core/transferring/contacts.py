@@ -1,0 +1,75 @@
+"""Carries the contacts of a grasp over to a changed part, one by one."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import cross
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.short_text import summary
+from grasp_core.transferring.like_faces import Likeness, nearest_at_any_distance, place_of
+from grasp_core.values import Contact, Grasp
+
+MM = 1e3
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class CarriedContact:
+    """What became of one contact of a grasp on the changed part."""
+
+    finger: int
+    old_face: int
+    """Number of the face of the old part on which the contact was."""
+    new_face: int | None
+    """Number of the face of the changed part that it is on now; None if it has no place there."""
+    contact: Contact | None
+    """The contact on the changed part, with the normal of its face; None if it has no place."""
+    distance: float
+    """How far it moved [m]; without a place, the distance of the nearest like face, which is
+    infinite if there is none."""
+    turn: float
+    """Angle between its old normal and that of the nearest like face [rad]; 0.0 if there is none.
+    """
+    reason: str = ""
+    """Why it has no place: finger, face and distance; empty if it has one."""
+
+    def __repr__(self) -> str:
+        return summary(
+            "CarriedContact", finger=self.finger, old_face=self.old_face, new_face=self.new_face,
+            distance=self.distance,
+        )  # fmt: skip
+
+
+def carried_contacts(new: Polyhedron, grasp: Grasp, rule: Likeness) -> tuple[CarriedContact, ...]:
+    """Carry the four contacts of a grasp over to a changed part, in finger order.
+
+    Args:
+        new: The changed part, with planar faces.
+        grasp: A grasp of the old part.
+        rule: How near, and how little turned, the face of a carried contact must be.
+    """
+    return tuple(
+        _carried(new, finger, face, contact, rule)
+        for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True))
+    )
+
+
+def _carried(
+    new: Polyhedron, finger: int, face: int, contact: Contact, rule: Likeness
+) -> CarriedContact:
+    place = place_of(new, contact.position, contact.normal, rule)
+    near = place or nearest_at_any_distance(new, contact.position, contact.normal, rule)
+    if near is None:
+        said = f"no face of the changed part is within {math.degrees(rule.angle):.4g} deg of it"
+        reason = f"finger {finger} has lost face {face}: {said}"
+        return CarriedContact(finger, face, None, None, math.inf, 0.0, reason)
+    sine = float(np.linalg.norm(cross(contact.normal, near.contact.normal)))
+    turn = math.atan2(sine, float(contact.normal @ near.contact.normal))
+    if place is not None:
+        return CarriedContact(finger, face, place.part.face, place.contact, place.distance, turn)
+    reason = (
+        f"finger {finger} has lost face {face}: the nearest like face, {near.part.face} of the "
+        f"changed part, is {MM * near.distance:.2f} mm away, more than {MM * rule.distance:.2f} mm"
+    )
+    return CarriedContact(finger, face, None, None, near.distance, turn, reason)

@@ -1,0 +1,189 @@
+"""Says which face of an old part became which face of a changed one, and how it moved.
+
+Each old face is represented by the centres of the convex pieces that tile it, weighted by area. Its
+*distance* from a new face is the mean distance of these centres from that face. Of the new faces
+that are like it (see `like_faces`), the nearest becomes its successor if its distance is at most
+the one that contacts may move. An old face without such a successor gets the nearest like face that
+succeeds no other one, however far it is. Of equally near faces, the one with the lowest number is
+taken. One new face may succeed several old ones that have merged; of a face that was cut in two,
+one part succeeds it, and the other counts as added.
+
+How far a face moved is measured on the line through its old centroid c along its old normal n. With
+q any point of the new plane and n' its normal, the line meets that plane at c - h n, where
+
+    h = n'.(c - q) / n'.n,                                                              (1)
+
+positive outwards, because normals point into the part.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, cross
+from grasp_core.objects.face import Face
+from grasp_core.objects.on_faces import ON_FACE
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.given_contacts import nearest_in
+from grasp_core.transferring.like_faces import SAME, Likeness
+
+MOVED = ON_FACE
+"""Least distance that counts as moved, relative to the old part's radius: files that keep six
+digits stay within it."""
+TURNED = 1e-4
+"""Least angle that counts as turned [rad]: six digits turn a face by no more unless it is narrower
+than a hundredth of the part."""
+RESHAPED = 1e-5
+"""Least change of a face's area that counts, relative to its area."""
+MOST_NAMED = 5
+"""Largest number of faces that one line names."""
+MM, MM2 = 1e3, 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class FaceChange:
+    """What became of one face of the old part."""
+
+    old: int
+    """Number of the face on the old part."""
+    new: int | None
+    """Number of its successor on the changed part; None if there is none."""
+    distance: float
+    """How far the face moved, positive outwards, at its old centroid [m]; 0.0 without successor."""
+    turn: float
+    """Angle between the old and the new normal [rad]; 0.0 without successor."""
+    old_area: float
+    """Area on the old part [m^2]."""
+    new_area: float
+    """Area of the successor [m^2]; 0.0 without one."""
+    moved: bool
+    """Whether the face is gone, or its plane is another one by more than rounding."""
+
+    @property
+    def reshaped(self) -> bool:
+        """Return whether the area of the face is another one, as after a hole was drilled."""
+        return abs(self.new_area - self.old_area) > RESHAPED * self.old_area
+
+    def __str__(self) -> str:
+        """Say what became of the face, such as `face 3 moved 1.00 mm outward`."""
+        named = f"face {self.old}"
+        if self.new is None:
+            return f"{named} is gone"
+        if self.new != self.old:
+            named += f", now {self.new},"
+        said = list(_motions(self)) if self.moved else []
+        if not said and self.reshaped:
+            said = [f"has {MM2 * (self.new_area - self.old_area):+.4g} mm2 of area"]
+        return f"{named} {' and '.join(said) or 'is as it was'}"
+
+
+def _motions(change: FaceChange) -> Iterable[str]:
+    far = f"{abs(MM * change.distance):.2f}"
+    if float(far):
+        yield f"moved {far} mm {'outward' if change.distance > 0.0 else 'inward'}"
+    if change.turn > TURNED:
+        yield f"turned {math.degrees(change.turn):.2f} deg"
+    elif not float(far):  # less than the digits show
+        yield f"moved {MM * change.distance:+.2g} mm"
+
+
+def face_changes(old: Polyhedron, new: Polyhedron, rule: Likeness) -> tuple[FaceChange, ...]:
+    """Find the successor of each face of an old part, in the order of the old faces.
+
+    Args:
+        old: The old part, with planar faces.
+        new: The changed part, in the same frame.
+        rule: How near, and how little turned, a successor must be.
+    """
+    reach = rule.distance + rule.same
+    near = [_successor(face, new, range(len(new.faces)), rule, reach) for face in old.faces]
+    free = sorted({*range(len(new.faces))} - {*near})
+    changes: list[FaceChange] = []
+    for index, (face, successor) in enumerate(zip(old.faces, near, strict=True)):
+        found = successor
+        if found is None and (found := _successor(face, new, free, rule, math.inf)) is not None:
+            free.remove(found)
+        changes.append(_change(index, face, found, new, old.radius))
+    return tuple(changes)
+
+
+def added_faces(changes: Iterable[FaceChange], new: Polyhedron) -> tuple[int, ...]:
+    """List the faces of the changed part that succeed no face of the old one, ascending."""
+    known = {change.new for change in changes}
+    return tuple(index for index in range(len(new.faces)) if index not in known)
+
+
+def _successor(
+    face: Face, new: Polyhedron, candidates: Sequence[int], rule: Likeness, reach: float
+) -> int | None:
+    """Find the nearest like face among some of the changed part; None if none is within reach."""
+    like = new.normals @ face.normal >= math.cos(rule.angle + SAME)
+    centers, weights = _representatives(face)
+    best, least = None, math.inf
+    for index in (each for each in candidates if like[each]):
+        # planes are nowhere nearer than this, so most faces are left out at once
+        plane = new.faces[index]
+        heights = np.abs((centers - plane.centroid) @ plane.normal)
+        if float(np.average(heights, weights=weights)) > min(reach, least):
+            continue
+        mean = float(np.average([_distance(plane, at) for at in centers], weights=weights))
+        if mean <= reach and mean < least - rule.same:
+            best, least = index, mean
+    return best
+
+
+def _representatives(face: Face) -> tuple[Array, Array]:
+    """Return the centre of each convex piece of a face, (k, 3) [m], and twice its area, (k,)."""
+    centers = np.array([piece.mean(axis=0) for piece in face.pieces])
+    areas = [
+        float(np.linalg.norm(cross(piece[1:-1] - piece[0], piece[2:] - piece[0]).sum(axis=0)))
+        for piece in face.pieces
+    ]
+    return centers, np.array(areas)
+
+
+def _distance(face: Face, point: Array) -> float:
+    """Return the distance of a point from a planar face [m]."""
+    feet = (nearest_in(piece, face.normal, point) for piece in face.pieces)
+    return min(float(np.linalg.norm(foot - point)) for foot in feet)
+
+
+def _change(
+    index: int, face: Face, successor: int | None, new: Polyhedron, size: float
+) -> FaceChange:
+    if successor is None:
+        return FaceChange(index, None, 0.0, 0.0, face.area, 0.0, moved=True)
+    now = new.faces[successor]
+    along = float(now.normal @ face.normal)
+    # (1), positive outwards
+    distance = float(now.normal @ (face.centroid - now.centroid)) / along
+    turn = math.atan2(float(np.linalg.norm(cross(face.normal, now.normal))), along)
+    moved = abs(distance) > MOVED * size or turn > TURNED
+    return FaceChange(index, successor, distance, turn, face.area, now.area, moved=moved)
+
+
+def in_words(changes: Iterable[FaceChange]) -> str:
+    """Say in one line which faces moved, the farthest first, and which have another outline."""
+    listed = list(changes)
+    moved = sorted(
+        (change for change in listed if change.moved),
+        key=lambda change: (change.new is not None, -abs(change.distance), change.old),
+    )
+    said = [str(change) for change in moved[:MOST_NAMED]]
+    if len(moved) > MOST_NAMED:
+        said.append(f"{len(moved) - MOST_NAMED} more faces moved")
+    kept = [change for change in listed if change.reshaped and not change.moved]
+    smaller = [change.old for change in kept if change.new_area < change.old_area]
+    larger = [change.old for change in kept if change.new_area > change.old_area]
+    said += [f"{_named(group)} became {word}"
+             for group, word in ((smaller, "smaller"), (larger, "larger")) if group]  # fmt: skip
+    return "; ".join(said) or "no face moved"
+
+
+def _named(faces: Sequence[int]) -> str:
+    """Name some faces, such as `faces 1, 2`."""
+    names = ", ".join(map(str, faces[:MOST_NAMED]))
+    more = f" and {len(faces) - MOST_NAMED} more" if len(faces) > MOST_NAMED else ""
+    return f"{'face' if len(faces) == 1 else 'faces'} {names}{more}"

@@ -1,0 +1,236 @@
+"""Carries grasps over to a changed part and judges them anew.
+
+A grasp keeps its fingers: finger i goes where `like_faces` says that its contact is now. A grasp is
+`gone` if a contact has no place, if its contacts are no longer in force closure at the friction, or
+if its fingers cannot reach it; otherwise its figures are compared with those on the old part, by
+the bands of `judging`, and it is `same`, `better` or `worse`. The old figures are computed anew at
+the same friction, so both sides are judged alike.
+
+An id that a plan has made of face numbers, such as `c-0-1-2-7`, gets the new face numbers; any
+other id stays. Where a new id is taken, the later grasp gets `-2`, `-3` and so on behind it.
+"""
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from grasp_core.checked import coefficient, instance, several
+from grasp_core.errors import UndecidedError
+from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.given_contacts import Seated
+from grasp_core.planning.reach import Finger
+from grasp_core.short_text import counted, summary
+from grasp_core.transferring.contacts import CarriedContact, carried_contacts
+from grasp_core.transferring.face_changes import FaceChange, added_faces, face_changes, in_words
+from grasp_core.transferring.judging import (
+    CHANGES,
+    Change,
+    GraspFigures,
+    Judged,
+    compared,
+    judged,
+    reached,
+)
+from grasp_core.transferring.like_faces import ANGLE_DEG, Likeness, check_planar, likeness
+from grasp_core.values import Contact, Grasp, four
+
+BY_FACES = re.compile(r"([a-z](?:-[a-z])*)((?:-\d+[ab]?){4})")
+"""Ids that plans make: letters of methods, then the faces by finger, perhaps halves of faces."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class CarriedGrasp:
+    """What became of one grasp on the changed part."""
+
+    old: Grasp
+    """The grasp of the old part."""
+    status: Change
+    """`same`, `better` or `worse` by the bands of this module; `gone` if there is no grasp."""
+    reason: str
+    """Why it is better, worse or gone; empty if it is the same."""
+    contacts: tuple[CarriedContact, ...]
+    """What became of each contact, in finger order."""
+    before: GraspFigures
+    """What the grasp reached on the old part, at the friction that is judged with."""
+    after: GraspFigures | None
+    """What its contacts reach on the changed part; None if a contact has no place there, or if
+    closure cannot be decided."""
+    grasp: Grasp | None
+    """The grasp of the changed part, without regions; None exactly where the status is `gone`."""
+
+    def __repr__(self) -> str:
+        now = "none" if self.grasp is None else self.grasp.id
+        return summary("CarriedGrasp", f"{self.old.id} -> {now}", self.status, reason=self.reason)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Transfer:
+    """Grasps carried over to a changed part, with what became of its faces."""
+
+    old: Polyhedron
+    new: Polyhedron
+    friction: float
+    distance: float
+    """Largest distance by which a contact was allowed to move [m]."""
+    angle: float
+    """Largest angle between the normals of like faces [rad]."""
+    faces: tuple[FaceChange, ...]
+    """What became of each face of the old part, in order."""
+    added: tuple[int, ...]
+    """Faces of the changed part that succeed no old one, ascending."""
+    grasps: tuple[CarriedGrasp, ...]
+    """What became of each grasp, in the order in which they were given."""
+
+    @property
+    def carried(self) -> tuple[Grasp, ...]:
+        """Return the grasps of the changed part."""
+        return tuple(each.grasp for each in self.grasps if each.grasp is not None)
+
+    def count(self, status: Change) -> int:
+        """Return the number of grasps with a status."""
+        return sum(each.status == status for each in self.grasps)
+
+    @property
+    def faces_in_words(self) -> str:
+        """Say which faces moved and by how much, such as `face 3 moved 1.00 mm outward`."""
+        return in_words(self.faces)
+
+    def __repr__(self) -> str:
+        counts = [f"{self.count(status)} {status}" for status in CHANGES]
+        said = f"of {counted(len(self.grasps), 'grasp')} {', '.join(counts)}"
+        return summary("Transfer", said, self.faces_in_words, friction=self.friction)
+
+
+def transfer(  # noqa: PLR0913 - one keyword for each rule
+    old: Polyhedron,
+    new: Polyhedron,
+    grasps: Iterable[Grasp],
+    friction: float = 0.5,
+    *,
+    distance: float | None = None,
+    angle_deg: float = ANGLE_DEG,
+    finger: Finger | None = None,
+) -> Transfer:
+    """Carry grasps over to a part that has changed since they were planned, and judge them anew.
+
+    Each contact goes to the nearest point of the changed part on a face whose normal is like its
+    own; the rules are in `grasp_core.transferring.like_faces`, the bands by which grasps are
+    compared in `grasp_core.transferring.judging`.
+
+    Args:
+        old: The part that the grasps were planned on, with planar faces.
+        new: The changed part, with planar faces, in the same frame and unit.
+        grasps: Grasps of the old part, or a plan's `grasps`.
+        friction: Coulomb coefficient at every contact.
+        distance: Largest distance by which a contact may move [m]; None for a twentieth of the old
+            part's radius.
+        angle_deg: Largest angle between the normals of like faces, up to 45 [deg].
+        finger: Size of the fingers that must reach their contacts on free straight lines; None if
+            that is not asked for.
+
+    Raises:
+        InputError: A part is curved, a grasp is not one of the old part, or a number is out of
+            range.
+        SolverError: A program's answer failed its check.
+    """
+    for body, name in ((old, "old"), (new, "new")):
+        check_planar(body, name)
+    coefficient(friction)
+    if finger is not None:
+        instance(finger, Finger, "finger")
+    rule = likeness(old, distance, angle_deg)
+    listed = several(grasps, partial(instance, kind=Grasp, name="grasps"), "grasps", "Grasp values")
+    for grasp in listed:
+        check_on_faces(old, grasp)
+    changes = face_changes(old, new, rule)
+    judge, taken = _Judge(old, new, friction, rule, finger), set[str]()
+    return Transfer(
+        old, new, friction, rule.distance, rule.angle, changes, added_faces(changes, new),
+        tuple(judge.carried(grasp, taken) for grasp in listed),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Judge:
+    """Carries single grasps over from one part to another."""
+
+    old: Polyhedron
+    new: Polyhedron
+    friction: float
+    rule: Likeness
+    finger: Finger | None
+
+    def carried(self, grasp: Grasp, taken: set[str]) -> CarriedGrasp:
+        """Carry a grasp over; its new id joins those that are taken."""
+        before = self._before(grasp)
+        contacts = carried_contacts(self.new, grasp, self.rule)
+        lost = [each.reason for each in contacts if each.contact is None]
+        if lost:
+            return CarriedGrasp(grasp, "gone", "; ".join(lost), contacts, before, None, None)
+        name = _free_id(_id_on(grasp, contacts), taken)
+        try:
+            now = judged(self.new, _seated(self.new, contacts), self.friction, name)
+        except UndecidedError as error:
+            why = f"whether its contacts are still in force closure is too close to call: {error}"
+            return CarriedGrasp(grasp, "gone", why, contacts, before, None, None)
+        held = self._held(now)
+        if isinstance(held, str):
+            return CarriedGrasp(grasp, "gone", held, contacts, before, now.figures, None)
+        taken.add(name)
+        status, reason = compared(before, now.figures, self.friction)
+        return CarriedGrasp(grasp, status, reason, contacts, before, now.figures, held)
+
+    def _before(self, grasp: Grasp) -> GraspFigures:
+        """Judge a grasp on the old part, as it will be judged on the changed one."""
+        seated = Seated(self.old, grasp.faces, grasp.contacts, 0.0)
+        try:
+            return judged(self.old, seated, self.friction, grasp.id).figures
+        except UndecidedError:  # at its critical friction, so neither better nor closed for sure
+            return GraspFigures(0.0, self.friction, (0.0, 0.0))
+
+    def _held(self, now: Judged) -> Grasp | str:
+        """Return the grasp that contacts make, or why they make none."""
+        if now.figures.closure_margin <= 0.0:
+            needed = now.figures.critical_friction
+            said = f"above {needed:.4f} they are" if math.isfinite(needed) else "none suffices"
+            return f"its contacts are not in force closure at friction {self.friction:g}: {said}"
+        if now.grasp is None:
+            return "its friction cones leave too little room for a witness of force closure"
+        if self.finger is None:
+            return now.grasp
+        found = reached(self.new, now.grasp, self.finger)
+        return f"out of reach: {found}" if isinstance(found, str) else found
+
+
+def _seated(new: Polyhedron, contacts: Iterable[CarriedContact]) -> Seated:
+    placed = [(c.new_face, c.contact, c.distance) for c in contacts]
+    faces = four(face for face, *_ in placed if face is not None)
+    return Seated(new, faces, four(at for _, at, _ in placed if isinstance(at, Contact)),
+                  float(np.max([far for *_, far in placed])))  # fmt: skip
+
+
+def _id_on(grasp: Grasp, contacts: Iterable[CarriedContact]) -> str:
+    """Return the id of a grasp with the new numbers of its faces, if the id is made of them."""
+    parts = BY_FACES.fullmatch(grasp.id)
+    if parts is None:
+        return grasp.id
+    named = parts[2].split("-")[1:]
+    if tuple(int(each.rstrip("ab")) for each in named) != grasp.faces:
+        return grasp.id
+    now = (f"{each.new_face}{half[len(half.rstrip('ab')):]}"
+           for each, half in zip(contacts, named, strict=True))  # fmt: skip
+    return "-".join([parts[1], *now])
+
+
+def _free_id(wanted: str, taken: set[str]) -> str:
+    """Return an id that no other grasp has: the wanted one, or with a number behind it."""
+    name, number = wanted, 1
+    while name in taken:
+        number += 1
+        name = f"{wanted}-{number}"
+    return name

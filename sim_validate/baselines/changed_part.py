@@ -1,0 +1,215 @@
+"""Carries grasps over to their part as it is now, if its mesh file has changed since planning.
+
+What is then tested is the part on the disk, not the one that the file of grasps remembers. Grasps
+keep their ids, so that each is compared with its own entry of the baseline. Whoever wants every
+change to be refused says so.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any, cast
+
+from grasp_core.checked import number, one_of, switch
+from grasp_core.errors import InputError
+from grasp_core.files.complaints import settings_of
+from grasp_core.files.strict_json import shown
+from grasp_core.objects.polyhedron import UNITS_M
+from grasp_core.records.grasps_json import RECORDED, SavedGrasps
+from grasp_core.transferring.changed_part import fitting_unit, load_changed_part
+from grasp_core.transferring.like_faces import ANGLE_DEG, WIDEST_DEG, check_planar
+from grasp_core.transferring.transfer import Transfer, transfer
+from sim_validate.baselines.source_file import Source
+
+TABLE = "changed_part"
+"""Name of the table of `IfChanged` in a `*.grasps.toml` file."""
+
+
+class ChangedPartError(InputError):
+    """Error for a mesh file that has changed although that is refused, or that cannot be judged."""
+
+
+@dataclass(frozen=True, slots=True)
+class IfChanged:
+    """What to do if a part has changed since its grasps were planned.
+
+    Raises:
+        InputError: A field is out of range.
+    """
+
+    refuse: bool = False
+    """Whether a changed part is refused; otherwise grasps are carried over to it."""
+    unit: str | None = None
+    """Unit of length of the mesh file; None for the one in which the part is about as large as it
+    was."""
+    distance_m: float | None = None
+    """Largest distance by which a contact may move [m]; None for a twentieth of the part's radius.
+    """
+    angle_deg: float = ANGLE_DEG
+    """Largest angle between the normals of a face before and after [deg]."""
+
+    def __post_init__(self) -> None:
+        switch(self.refuse, "refuse")
+        if self.unit is not None:
+            one_of(self.unit, UNITS_M, "unit")
+        if self.distance_m is not None:
+            number(self.distance_m, "distance_m", least=0.0)
+        number(self.angle_deg, "angle_deg", least=0.0, most=WIDEST_DEG)
+
+
+CARRY = IfChanged()
+KNOWN = tuple(each.name for each in fields(IfChanged))
+
+
+def if_changed(table: object) -> IfChanged:
+    """Read the table `[changed_part]` of a `*.grasps.toml` file, or the same given by a marker.
+
+    Raises:
+        InputError: A setting is unknown or out of range.
+    """
+    if not isinstance(table, Mapping):
+        raise InputError(f"{TABLE}: expected a table of settings, got {shown(table)}")
+    given = {**cast("Mapping[str, Any]", table)}
+    for name in given:
+        if name not in KNOWN:
+            raise InputError(
+                f"{TABLE}: no setting is named {shown(name)}; choose from {', '.join(KNOWN)}"
+            )
+    return settings_of(IfChanged, given, [TABLE])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Present:
+    """The grasps of a file on their part as it is now."""
+
+    saved: SavedGrasps
+    """The grasps that can be tested: those of the file, or what became of them on the changed part,
+    with their old ids."""
+    source: Source = field(default_factory=Source)
+    carried: Transfer | None = None
+    """How they were carried over; None where the part is as it was."""
+    unit: str = ""
+    """Unit of length of the changed part's file; empty where the part is as it was."""
+
+    @property
+    def gone(self) -> dict[str, str]:
+        """Return why grasps of the file do not exist on the changed part, by id."""
+        found = () if self.carried is None else self.carried.grasps
+        return {each.old.id: each.reason for each in found if each.grasp is None}
+
+    @property
+    def change(self) -> str:
+        """Say which faces moved and by how much; empty where the part is as it was."""
+        if self.carried is None or self.source.file is None:
+            return ""
+        return f"{self.source.file} has changed: {self.carried.faces_in_words}"
+
+    @property
+    def note(self) -> str:
+        """Say what readers must know about the mesh that is tested; empty if nothing."""
+        if not self.change:
+            return self.source.note
+        return f"{self.change}; its grasps were carried over to it"
+
+    @property
+    def mesh(self) -> Source:
+        """Return the mesh file, with what readers must know about it."""
+        return replace(self.source, note=self.note)
+
+    def id_on_part(self, name: str) -> str | None:
+        """Return the id that a grasp of the file has on the changed part; None if it is gone."""
+        found = () if self.carried is None else self.carried.grasps
+        return next((each.grasp.id for each in found if each.old.id == name and each.grasp), None)
+
+    def first(self, limit: int | None) -> "Present":
+        """Return only the first grasps of the file, up to a limit."""
+        if self.carried is None:
+            return replace(self, saved=replace(self.saved, grasps=self.saved.grasps[:limit]))
+        kept = self.carried.grasps[:limit]
+        return self._with(replace(self.carried, grasps=kept))
+
+    def only(self, name: str) -> "Present":
+        """Return only the grasp with an id; none if the file has no such grasp."""
+        if self.carried is None:
+            one = tuple(grasp for grasp in self.saved.grasps if grasp.id == name)
+            return replace(self, saved=replace(self.saved, grasps=one))
+        kept = tuple(each for each in self.carried.grasps if each.old.id == name)
+        return self._with(replace(self.carried, grasps=kept))
+
+    def _with(self, carried: Transfer) -> "Present":
+        return replace(self, saved=_tested(self.saved, carried), carried=carried)
+
+
+def present(saved: SavedGrasps, path: Path, source: Source, asked: IfChanged = CARRY) -> Present:
+    """Carry grasps over to their part as it is now; they stay as they are if it has not changed.
+
+    Args:
+        saved: The grasps of a file.
+        path: Path of that file, for messages.
+        source: Their mesh file.
+        asked: What to do if it has changed.
+
+    Raises:
+        ChangedPartError: The part has changed, and that is refused or cannot be judged.
+    """
+    if not source.changed or source.file is None:
+        return Present(saved, source)
+    if asked.refuse:
+        raise ChangedPartError(
+            f"{source.file}: this is not the mesh that {path} was planned on: the mesh has changed "
+            f"since, or is another object's. Plan on it again (graspproof plan {source.file} --out "
+            "...) and write the baseline with pytest --grasp-bless, put the former file back, or "
+            "name the right file with `object` in a *.grasps.toml"
+        )
+    unit, carried = _carried(saved, path, source.file, asked)
+    return Present(_tested(saved, carried), source, carried, unit)
+
+
+def _carried(saved: SavedGrasps, path: Path, file: Path, asked: IfChanged) -> tuple[str, Transfer]:
+    """Read the changed part, in the unit that is returned, and carry the grasps over to it.
+
+    Raises:
+        ChangedPartError: The part cannot be read, or is curved.
+    """
+    try:
+        check_planar(saved.body, "the old part")
+        unit = asked.unit or fitting_unit(file, saved.body, RECORDED)
+        new = load_changed_part(file, saved.body, unit, RECORDED)
+        return unit, transfer(
+            saved.body, new, saved.grasps, saved.friction, distance=asked.distance_m,
+            angle_deg=asked.angle_deg, finger=saved.finger,
+        )  # fmt: skip
+    except InputError as error:
+        said = str(error).removeprefix(f"{file}: ")
+        raise ChangedPartError(
+            f"{file}: this is not the mesh that {path} was planned on, and its grasps cannot be "
+            f"carried over: {said}"
+        ) from error
+
+
+def _tested(saved: SavedGrasps, carried: Transfer) -> SavedGrasps:
+    """Return the carried grasps with their old ids."""
+    grasps = tuple(
+        replace(each.grasp, id=each.old.id) for each in carried.grasps if each.grasp is not None
+    )
+    return replace(saved, body=carried.new, grasps=grasps)
+
+
+def testable(now: Present, limit: int | None) -> SavedGrasps:
+    """Return the grasps that a new baseline is about.
+
+    Args:
+        now: The grasps on the part as it is now.
+        limit: Number of grasps of the file to keep, the first ones; None for all.
+
+    Raises:
+        ChangedPartError: None of them could be carried over to the changed part.
+    """
+    first = now.first(limit)
+    if first.gone and not first.saved.grasps:
+        name, why = next(iter(first.gone.items()))
+        raise ChangedPartError(
+            f"{now.change}; none of its {len(first.gone)} grasps exists on it, so there is nothing "
+            f"to record ({name}: {why}); plan on it again"
+        )
+    return first.saved

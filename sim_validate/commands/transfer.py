@@ -1,0 +1,139 @@
+"""Runs the command `transfer`, which carries grasps over to a part that has changed."""
+
+from pathlib import Path
+
+from grasp_core.errors import InputError
+from grasp_core.files.text_files import write_text
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.short_text import counted
+from grasp_core.transferring.changed_part import SURE_GROWTH, given_center, growth
+from grasp_core.transferring.judging import CHANGES, Change, GraspFigures
+from grasp_core.transferring.like_faces import check_planar
+from grasp_core.transferring.transfer import CarriedGrasp, Transfer, transfer
+from sim_validate.cli import flag_groups, transfer_flags
+from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands.asked.grasps import saved_grasps
+from sim_validate.commands.asked.objects import load_object
+from sim_validate.files.folder_lock import alone_in
+from sim_validate.files.stale_results import remove_results
+from sim_validate.records.transfer_json import TRANSFER, carried_to_json, transfer_to_json
+
+MM = 1e3
+GRASPS = "grasps.json"
+ABSENT = "-"
+BAD: tuple[Change, ...] = ("worse", "gone")
+"""What becomes of a grasp if its part should not have changed like that."""
+
+
+def transfer_file(command: transfer_flags.Transfer, reporter: Reporter) -> int:
+    """Carry the grasps of a file over to a changed part, write them, and say what has changed."""
+    saved = saved_grasps(command.grasps, reporter)
+    if saved is None:
+        return Exit.NONE
+    check_planar(saved.body, "the old part")
+    _check_elsewhere(command.grasps, command.out)
+    new = _changed_part(command, saved.body)
+    if not 1.0 / SURE_GROWTH <= (times := growth(saved.body, new)) <= SURE_GROWTH:
+        reporter.warn(
+            f"{command.part}: the changed part is {times:.4g} times as large as the old one; if "
+            "that is not so, say its unit with --unit"
+        )
+    friction = saved.friction if command.friction is None else command.friction
+    with alone_in(command.out), reporter.progress("carrying over"):
+        found = transfer(
+            saved.body,
+            new,
+            saved.grasps,
+            friction,
+            distance=command.carrying.distance_m,
+            angle_deg=command.carrying.angle_deg,
+            finger=saved.finger,
+        )
+        text = transfer_to_json(found)
+        if command.out is not None:
+            _write(command.out, found, saved, text, reporter)
+    reporter.text(text)
+    _show(found, reporter)
+    return _code(found)
+
+
+def _check_elsewhere(grasps: Path, out: Path | None) -> None:
+    """Refuse to write the new grasps over the old ones, from which they can be carried again.
+
+    Raises:
+        InputError: The folder for the results holds the old grasps under the same name.
+    """
+    if out is not None and (out / GRASPS).exists() and (out / GRASPS).samefile(grasps):
+        raise InputError(
+            f"{out}: the grasps of the old part are in this folder and would be overwritten; give "
+            "another --out"
+        )
+
+
+def _changed_part(command: transfer_flags.Transfer, old: Polyhedron) -> Polyhedron:
+    center = command.center_of_mass_m
+    if center is None and (kept := given_center(old)) is not None:
+        x, y, z = kept.tolist()
+        center = x, y, z
+    return load_object(
+        command.part,
+        flag_groups.Mesh(
+            unit=command.unit, faces="planar", center_of_mass_m=center, limits=command.limits
+        ),
+    )
+
+
+def _write(
+    folder: Path, found: Transfer, saved: SavedGrasps, text: str, reporter: Reporter
+) -> None:
+    """Write both files in place of the results of earlier commands."""
+    remove_results(folder)
+    grasps = write_text(folder / GRASPS, carried_to_json(found, saved))
+    path = write_text(folder / TRANSFER, text)
+    reporter.say(f"wrote {grasps} and {path}")
+
+
+def _code(found: Transfer) -> Exit:
+    if not found.carried:
+        return Exit.NONE
+    return Exit.NEGATIVE if any(map(found.count, BAD)) else Exit.GOOD
+
+
+def _show(found: Transfer, reporter: Reporter) -> None:
+    """Show a table of the grasps, what happened to faces, and why grasps are worse or gone."""
+    columns = ("grasp", "now", "status", "mm moved", "mu*", "mu* now", "quality N", "now N")
+    order = sorted(found.grasps, key=lambda each: -CHANGES.index(each.status))
+    shown = order[:TABLE_ROWS]
+    title = f"{counted(len(order), 'grasp')} of {found.old.name} on {found.new.name}"
+    reporter.table(title, columns, [_row(each) for each in shown])
+    say_cut(len(order), reporter)
+    reporter.say(f"{found.new.name}: {found.faces_in_words}")
+    if found.added:
+        reporter.say(f"{counted(len(found.added), 'face')} of the changed part took no old place")
+    counts = ", ".join(f"{found.count(status)} {status}" for status in CHANGES)
+    reporter.say(
+        f"{len(found.carried)} of {len(found.grasps)} grasps were carried over, with contacts "
+        f"that may move by {MM * found.distance:.4g} mm: {counts}"
+    )
+    for each in shown:
+        if each.status in BAD:
+            reporter.warn(f"{each.old.id}: {each.status}: {each.reason}")
+    if not found.carried:
+        reporter.warn("no grasp is left; plan on the changed part anew")
+
+
+def _row(each: CarriedGrasp) -> tuple[str, ...]:
+    now = ABSENT if each.grasp is None else each.grasp.id
+    lost = any(contact.contact is None for contact in each.contacts)
+    moved = ABSENT if lost else f"{MM * max(contact.distance for contact in each.contacts):.2f}"
+    old, new = _figures(each.before), _figures(each.after)
+    return (each.old.id, now, each.status, moved, old[0], new[0], old[1], new[1])
+
+
+def _figures(figures: GraspFigures | None) -> tuple[str, str]:
+    """Write critical friction and quality."""
+    if figures is None:
+        return ABSENT, ABSENT
+    return f"{figures.critical_friction:.4f}", f"{figures.ferrari_canny[0]:.4f}"

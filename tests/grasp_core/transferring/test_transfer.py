@@ -1,0 +1,394 @@
+"""Grasps carried over to parts that were changed by known motions, holes and chamfers."""
+
+import dataclasses
+import itertools
+import math
+
+import numpy as np
+import pytest
+import trimesh
+
+import grasp_core as gc
+from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
+from grasp_core.transferring.judging import FRICTION_BAND, QUALITY_BAND, compared
+from scenes.example_objects import example_object
+from tests.changed_parts import (
+    distances,
+    is_on_surface,
+    nearest_like,
+    triangles_of,
+    with_chamfer,
+    with_face_moved,
+    with_hole,
+)
+
+FRICTION = 0.5
+
+
+def planned(name, limit=20):
+    body = example_object(name)
+    return body, gc.plan(body, FRICTION, limit=limit).grasps
+
+
+@pytest.fixture(scope="module")
+def box():
+    return planned("box")
+
+
+def scaled(body, by):
+    return gc.Polyhedron.from_mesh(by * body.vertices, body.triangles, faces="planar")
+
+
+def test_on_the_same_part_every_grasp_is_the_same(box):
+    body, grasps = box
+    found = gc.transfer(body, body, grasps, FRICTION)
+    assert [each.status for each in found.grasps] == ["same"] * len(grasps) != []
+    assert [each.grasp.id for each in found.grasps] == [grasp.id for grasp in grasps]
+    assert found.faces_in_words == "no face moved"
+    assert found.added == ()
+    for each in found.grasps:
+        np.testing.assert_allclose(each.grasp.positions, each.old.positions, atol=1e-15)
+        np.testing.assert_array_equal(each.grasp.normals, each.old.normals)
+
+
+@pytest.mark.parametrize("by_mm", [1.0, -0.7, 0.1])
+def test_contacts_of_a_moved_face_move_with_it_and_the_others_stay(box, by_mm):
+    body, grasps = box
+    face = 3
+    found = gc.transfer(body, with_face_moved(body, face, 1e-3 * by_mm), grasps, FRICTION)
+    moved = [change for change in found.faces if change.moved]
+    assert [change.old for change in moved] == [face]
+    assert moved[0].distance == pytest.approx(1e-3 * by_mm, abs=1e-12)
+    way = "outward" if by_mm > 0.0 else "inward"
+    assert str(moved[0]) == f"face 3 moved {abs(by_mm):.2f} mm {way}"
+    seen = 0
+    for each in found.grasps:
+        shift = each.grasp.positions - each.old.positions
+        on_it = np.array(each.old.faces) == face
+        inside = np.array(each.old.faces) != face
+        outward = -body.normals[face]
+        np.testing.assert_allclose(shift[on_it], 1e-3 * by_mm * np.tile(outward, (on_it.sum(), 1)),
+                                   atol=1e-12)  # fmt: skip
+        # a face beside it may have become shorter than where the contact was
+        assert np.linalg.norm(shift[inside], axis=1).max() <= max(0.0, -1e-3 * by_mm) + 1e-12
+        seen += on_it.sum()
+    assert seen >= 5
+
+
+def test_a_face_that_moved_too_far_is_named_with_finger_face_and_distance(box):
+    body, grasps = box
+    found = gc.transfer(body, with_face_moved(body, 3, 2e-3), grasps, FRICTION, distance=1.5e-3)
+    gone = [each for each in found.grasps if 3 in each.old.faces]
+    assert 0 < len(gone) < len(grasps)
+    for each in gone:
+        finger = each.old.faces.index(3)
+        assert each.status == "gone"
+        assert each.grasp is None
+        assert each.after is None
+        lost = each.contacts[finger]
+        assert lost.contact is None
+        assert lost.distance == pytest.approx(2e-3, abs=1e-12)
+        assert each.reason == (
+            f"finger {finger} has lost face 3: the nearest like face, 3 of the changed part, is "
+            "2.00 mm away, more than 1.50 mm"
+        )
+    assert "face 3 moved 2.00 mm outward" in found.faces_in_words
+    exactly = gc.transfer(body, with_face_moved(body, 3, 2e-3), grasps, FRICTION, distance=2e-3)
+    assert not exactly.count("gone")
+
+
+def test_a_face_that_turned_too_far_is_lost():
+    """A wedge of the box's top, cut off with a slope of just below and just above the angle."""
+    body, grasps = planned("box")
+    for slope, lost in ((4.9, False), (5.1, True)):
+        vertices = body.vertices.copy()
+        top = np.isclose(vertices[:, 2], vertices[:, 2].max())
+        vertices[top, 2] += vertices[top, 0] * math.tan(math.radians(slope))
+        new = gc.Polyhedron.from_mesh(vertices, body.triangles, faces="planar")
+        found = gc.transfer(body, new, grasps, FRICTION, distance=5e-3)
+        on_top = [each for each in found.grasps if 3 in each.old.faces]
+        assert on_top
+        assert all((each.contacts[each.old.faces.index(3)].contact is None) is lost
+                   for each in on_top)  # fmt: skip
+        if lost:
+            assert "no face of the changed part is within 5 deg of it" in on_top[0].reason
+        else:
+            assert f"turned {slope:.2f} deg" in found.faces_in_words
+
+
+def test_a_contact_in_a_new_hole_goes_to_its_rim(box):
+    body, grasps = box
+    grasp = grasps[0]
+    radius = 2e-3
+    new = with_hole(body, grasp.faces[0], grasp.positions[0], radius, depth=5e-3)
+    found = gc.transfer(body, new, [grasp], FRICTION).grasps[0]
+    contact = found.contacts[0]
+    # the hole is a polygon of 24 sides in a circle
+    assert radius * math.cos(math.pi / 24) - 1e-9 <= contact.distance <= radius + 1e-9
+    assert is_on_surface(new, contact.contact)
+    np.testing.assert_array_equal(contact.contact.normal, grasp.normals[0])
+    narrow = gc.transfer(body, new, [grasp], FRICTION, distance=1e-3).grasps[0]
+    assert narrow.status == "gone"
+
+
+def test_nothing_is_found_through_a_thin_plate():
+    """A plate of 2 mm lowered by 1.5 mm.
+
+    Its new upper side is half a millimetre above its old lower side, nearer than any like face, but
+    has the opposite normal.
+    """
+    box = trimesh.creation.box([0.1, 0.08, 0.002])
+    body = gc.Polyhedron.from_mesh(box.vertices, box.faces)
+    new = gc.Polyhedron.from_mesh(body.vertices - [0.0, 0.0, 0.0015], body.triangles)
+    flat = {index for index in range(6) if abs(body.normals[index][2]) > 0.5}
+    grasps = [grasp for grasp in gc.plan(body, 1.0).grasps if flat & {*grasp.faces}]
+    found = gc.transfer(body, new, grasps, 1.0, distance=0.001)
+    assert found.count("gone") == len(grasps) > 0
+    for each in found.grasps:
+        for contact in each.contacts:
+            if contact.old_face in flat:
+                assert contact.contact is None
+                assert contact.distance == pytest.approx(0.0015, abs=1e-12)
+    assert gc.transfer(body, new, grasps, 1.0, distance=0.0015).count("gone") == 0
+
+
+CHANGES = [
+    ("box", "moved", 1e-3), ("prism", "moved", -2e-3), ("l-bracket", "moved", 1.5e-3),
+    ("chamfered-box", "hole", 3e-3), ("l-bracket", "hole", 2e-3), ("prism", "chamfer", 4e-3),
+    ("box", "chamfer", 6e-3), ("hex-nut", "moved", 5e-3),
+]  # fmt: skip
+
+
+def changed(body, grasp, kind, size):
+    face = grasp.faces[0]
+    if kind == "moved":
+        return with_face_moved(body, face, size)
+    if kind == "hole":
+        return with_hole(body, face, grasp.positions[0] + 0.3 * size, size, depth=size)
+    for other in range(len(body.faces)):
+        try:
+            return with_chamfer(body, face, other, size)
+        except AssertionError:
+            continue
+    raise AssertionError("no edge")
+
+
+@pytest.mark.parametrize(("name", "kind", "size"), CHANGES)
+def test_carried_contacts_are_on_the_new_surface_and_none_is_nearer(name, kind, size):
+    """Measured on all triangles with plain NumPy: on the surface, its normal, and the nearest."""
+    body, grasps = planned(name, limit=8)
+    new = changed(body, grasps[0], kind, size)
+    found = gc.transfer(body, new, grasps, FRICTION)
+    placed = 0
+    for each in found.grasps:
+        for contact, before in zip(each.contacts, each.old.contacts, strict=True):
+            nearest = nearest_like(new, before.position, before.normal, 5.0)
+            assert (contact.contact is not None) == (nearest <= found.distance + 1e-9 * body.radius)
+            if contact.contact is None:
+                assert contact.distance == pytest.approx(nearest, abs=1e-9 * body.radius)
+                continue
+            placed += 1
+            assert is_on_surface(new, contact.contact)
+            moved = np.linalg.norm(contact.contact.position - before.position)
+            assert moved == pytest.approx(nearest, abs=1e-9 * body.radius)
+            assert moved == pytest.approx(contact.distance, abs=1e-12)
+            angle = math.acos(min(float(contact.contact.normal @ before.normal), 1.0))
+            assert angle <= math.radians(5.0) + 1e-7
+        if each.grasp is not None:
+            check_on_faces(new, each.grasp)
+    assert placed >= 16
+
+
+@pytest.mark.parametrize(("name", "kind", "size"), CHANGES)
+def test_grasps_are_judged_as_their_contacts_are_by_hand(name, kind, size):
+    body, grasps = planned(name, limit=6)
+    new = changed(body, grasps[0], kind, size)
+    found = gc.transfer(body, new, grasps, FRICTION)
+    judged = 0
+    for each in found.grasps:
+        if each.after is None:
+            continue
+        points = np.array([contact.contact.position for contact in each.contacts])
+        normals = np.array([contact.contact.normal for contact in each.contacts])
+        by_hand = gc.force_closure(points, normals, FRICTION)
+        assert by_hand.closed == (each.grasp is not None)
+        critical = gc.critical_friction(points, normals)
+        assert each.after.critical_friction == pytest.approx(critical, abs=1e-7)
+        assert each.after.closure_margin == pytest.approx(by_hand.margin, abs=1e-9)
+        quality = gc.ferrari_canny(points, normals, FRICTION, center=new.center_of_mass,
+                                   torque_scale=new.radius)  # fmt: skip
+        if by_hand.closed:
+            assert each.after.ferrari_canny == (quality.lower, quality.upper)
+        judged += 1
+    assert judged >= 2
+
+
+def test_the_carried_grasps_of_a_file_can_be_read_back():
+    """Witnesses whose forces all meet become skew, as the family of the file demands."""
+    read = 0
+    for name in ("tetrahedron", "octahedron", "box"):
+        body, grasps = planned(name, limit=10)
+        plan = gc.plan(body, FRICTION, limit=10)
+        found = gc.transfer(body, scaled(body, 1.001), grasps, FRICTION)
+        text = plan_to_json(found.new, dataclasses.replace(plan, grasps=found.carried))
+        saved = grasps_from_json(text)
+        assert [grasp.id for grasp in saved.grasps] == [grasp.id for grasp in found.carried]
+        for grasp in saved.grasps:
+            assert gc.classify_lines(grasp.witness.points, grasp.witness.forces) == "regulus"
+            read += 1
+    assert read >= 25
+
+
+def test_a_grasp_that_loses_force_closure_is_gone_and_says_what_it_would_need(box):
+    body, grasps = box
+    low = min(each.critical_friction for each in grasps)
+    found = gc.transfer(body, body, grasps, 0.5 * low)
+    assert found.count("gone") == len(grasps)
+    for each in found.grasps:
+        assert each.before.closure_margin <= 0.0
+        assert f"above {each.after.critical_friction:.4f} they are" in each.reason
+
+
+def test_new_ids_name_the_new_faces_and_are_unique():
+    """The same box with its triangles turned round, so that faces get other numbers."""
+    body, grasps = planned("box", limit=30)
+    turned = gc.Polyhedron.from_mesh(body.vertices[::-1], len(body.vertices) - 1 - body.triangles,
+                                     faces="planar")  # fmt: skip
+    new = with_hole(turned, 0, turned.faces[0].centroid, 1e-3, 2e-3)
+    named = dataclasses.replace(grasps[0], id="mine")
+    found = gc.transfer(body, new, [*grasps, named], FRICTION)
+    ids = [each.grasp.id for each in found.grasps if each.grasp is not None]
+    assert len(set(ids)) == len(ids) >= 10
+    assert ids[-1] == "mine"
+    renamed = 0
+    for each in found.grasps[:-1]:
+        if each.grasp is not None:
+            faces = [contact.new_face for contact in each.contacts]
+            assert each.grasp.id.split("-")[1:5] == [str(face) for face in faces]
+            assert list(each.grasp.faces) == faces
+            renamed += each.grasp.id != each.old.id
+    assert renamed
+    twice = gc.transfer(body, body, [grasps[0], grasps[0]], FRICTION).carried
+    assert [grasp.id for grasp in twice] == [grasps[0].id, f"{grasps[0].id}-2"]
+
+
+def test_moving_both_parts_moves_what_is_carried(box):
+    body, grasps = box
+    turn = trimesh.transformations.rotation_matrix(0.7, [1.0, 2.0, 3.0])[:3, :3]
+    shift = np.array([0.3, -0.2, 0.1])
+
+    def moved(part):
+        return gc.Polyhedron.from_mesh(part.vertices @ turn.T + shift, part.triangles,
+                                       faces="planar")  # fmt: skip
+
+    at = grasps[0].positions[0] + [0.0, 3e-4, 5e-4]  # so that one point of the rim is nearest
+    new = with_hole(with_face_moved(body, 3, 1e-3), grasps[0].faces[0], at, 2e-3, 3e-3)
+    here = gc.transfer(body, new, grasps, FRICTION)
+    there_grasps = [
+        dataclasses.replace(
+            grasp, contacts=tuple(gc.Contact(turn @ c.position + shift, turn @ c.normal)
+                                  for c in grasp.contacts),
+            faces=tuple(face_at(moved(body), turn @ c.position + shift, turn @ c.normal)
+                        for c in grasp.contacts),
+        )
+        for grasp in grasps
+    ]  # fmt: skip
+    there = gc.transfer(moved(body), moved(new), there_grasps, FRICTION)
+    assert [e.status for e in here.grasps] == [e.status for e in there.grasps]
+    for one, other in zip(here.grasps, there.grasps, strict=True):
+        for a, b in zip(one.contacts, other.contacts, strict=True):
+            np.testing.assert_allclose(turn @ a.contact.position + shift, b.contact.position,
+                                       atol=1e-10)  # fmt: skip
+
+
+def face_at(body, point, normal):
+    at = [abs(float(face.normal @ (point - face.centroid))) < 1e-9 and face.normal @ normal > 0.99
+          for face in body.faces]  # fmt: skip
+    return at.index(True)
+
+
+def test_fingers_that_cannot_reach_a_carried_contact_are_named():
+    """A finger as thick as the bracket's notch is wide cannot come to the faces of the notch."""
+    body, finger = example_object("l-bracket"), gc.Finger(0.003, 0.03)
+    grasps = gc.plan(body, FRICTION, finger=finger).grasps
+    found = gc.transfer(body, body, grasps, FRICTION, finger=finger)
+    assert found.count("same") == len(grasps) > 10
+    for each in found.grasps:
+        np.testing.assert_allclose(each.grasp.approach_directions, each.old.approach_directions,
+                                   atol=1e-9)  # fmt: skip
+    thick = gc.transfer(body, body, grasps, FRICTION, finger=gc.Finger(0.02, 0.03))
+    lost = [each for each in thick.grasps if each.status == "gone"]
+    assert lost
+    assert all(each.reason.startswith("out of reach: finger") for each in lost)
+    assert all(
+        each.after == one.after for each, one in zip(thick.grasps, found.grasps, strict=True)
+    )
+
+
+def test_curved_parts_and_grasps_of_other_parts_are_refused(box):
+    body, grasps = box
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+    curved = gc.Polyhedron.from_mesh(ball.vertices, ball.faces, faces="patches")
+    for old, new in ((curved, body), (body, curved)):
+        with pytest.raises(gc.InputError, match="must have exact planar faces"):
+            gc.transfer(old, new, grasps, FRICTION)
+    with pytest.raises(gc.InputError, match="use a grasp of this object"):
+        gc.transfer(scaled(body, 2.0), body, grasps, FRICTION)
+
+
+def test_a_fine_mesh_of_planar_faces_can_be_carried_over():
+    """A ball of 1280 planar faces, blown up by a thousandth: every contact finds its face."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+    body = gc.Polyhedron.from_mesh(ball.vertices, ball.faces, faces="planar")
+    rng = np.random.default_rng(0)
+    grasps = [
+        grasp for _ in range(30)
+        if (grasp := grasp_on(body, rng.choice(len(body.faces), 4, replace=False))) is not None
+    ]  # fmt: skip
+    assert len(grasps) >= 3
+    found = gc.transfer(body, scaled(body, 1.001), grasps, 1.0)
+    assert found.count("same") == len(grasps)
+    assert all(each.distance == pytest.approx(5e-5, rel=0.01)
+               for grasp in found.grasps for each in grasp.contacts)  # fmt: skip
+
+
+def grasp_on(body, faces):
+    from grasp_core.planning.given_contacts import grasp_of, seat
+
+    points = np.array([body.faces[face].centroid for face in faces])
+    found = grasp_of(seat(body, points, body.normals[faces]), 1.0, "ball")
+    return found if isinstance(found, gc.Grasp) else None
+
+
+def test_bands_are_where_they_are_said_to_be():
+    """Just inside a band is the same; just outside of it better or worse, and worse prevails."""
+    plain = gc.GraspFigures(0.1, 0.2, (0.1, 0.1001))
+
+    def status(friction=0.2, quality=0.1):
+        new = gc.GraspFigures(0.1, friction, (quality, quality))
+        return compared(plain, new, FRICTION)[0]
+
+    step = FRICTION_BAND * FRICTION
+    share = QUALITY_BAND * 0.1
+    for near, far in itertools.product((0.99,), (1.01,)):
+        assert status(0.2 + near * step) == status(0.2 - near * step) == "same"
+        assert status(quality=0.1 + near * share) == status(quality=0.1 - near * share) == "same"
+        assert status(0.2 + far * step) == status(quality=0.1 - far * share) == "worse"
+        assert status(0.2 - far * step) == status(quality=0.1 + far * share) == "better"
+    assert status(0.2 - 2.0 * step, 0.1 - 2.0 * share) == "worse"
+
+
+def test_the_judge_of_these_tests_measures_distances():
+    """Points above, beside and beyond a corner of one triangle, by hand."""
+    corners, normals = triangles_of(example_object("box"))
+    top = [i for i in range(len(normals)) if normals[i] @ [0.0, 0.0, -1.0] > 0.9]
+    high = float(corners[top, :, 2].max())
+    point = np.array([0.0, 0.0, high + 0.01])
+    assert distances(point, corners, normals).min() == pytest.approx(0.01)
+    beyond = np.array([0.05 + 0.03, 0.035 + 0.04, high])
+    assert distances(beyond, corners, normals).min() == pytest.approx(0.05)
+    found = trimesh.triangles.closest_point(corners, np.tile(point, (len(corners), 1)))
+    np.testing.assert_allclose(
+        np.linalg.norm(found - point, axis=1), distances(point, corners, normals), atol=1e-12
+    )
