@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import cross
+from grasp_core.by_value import ByValue
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.short_text import summary
 from grasp_core.transferring.like_faces import Likeness, nearest_at_any_distance, place_of
@@ -15,7 +16,7 @@ MM = 1e3
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class CarriedContact:
+class CarriedContact(ByValue):
     """What became of one contact of a grasp on the changed part."""
 
     finger: int

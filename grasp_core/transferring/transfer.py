@@ -18,6 +18,7 @@ from functools import partial
 
 import numpy as np
 
+from grasp_core.by_value import ByValue
 from grasp_core.checked import coefficient, instance, several
 from grasp_core.errors import UndecidedError
 from grasp_core.objects.on_faces import check_on_faces
@@ -44,7 +45,7 @@ BY_FACES = re.compile(r"([a-z](?:-[a-z])*)((?:-\d+[ab]?){4})")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class CarriedGrasp:
+class CarriedGrasp(ByValue):
     """What became of one grasp on the changed part."""
 
     old: Grasp
@@ -69,7 +70,7 @@ class CarriedGrasp:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Transfer:
+class Transfer(ByValue):
     """Grasps carried over to a changed part, with what became of its faces."""
 
     old: Polyhedron

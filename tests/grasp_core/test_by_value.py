@@ -48,6 +48,7 @@ def results(body, plan):
         gc.quality_ceiling(body, grasp.faces, FRICTION), scenes.build_scene(body, grasp, FRICTION),
         sv.validate(body, grasp, FRICTION),
         sv.execute(body, grasp, FRICTION, mass_kg=0.2),
+        gc.transfer(body, body, [grasp], FRICTION),
     ]  # fmt: skip
 
 
