@@ -16,6 +16,9 @@ from grasp_core.short_text import short
 
 HASHED = (str, int, bool)
 """Classes of the fields that a hash is made from."""
+HASHED_ENTRIES = 3
+"""Number of entries of an array that a hash is made from: a point tells contacts apart when they
+are looked up in a cache, without looking at each entry of a large mesh."""
 Item = TypeVar("Item")
 
 
@@ -34,7 +37,7 @@ class ByValue:
         return all(_same(getattr(self, name), getattr(other, name)) for name in compared)
 
     def __hash__(self) -> int:
-        """Return a hash of the texts, whole numbers and shapes of arrays among the fields."""
+        """Return a hash of the texts, whole numbers and first entries of arrays in the fields."""
         named = (field for field in fields(cast("Any", self)) if field.compare)
         kinds = (_hashed(self, field.name) for field in named)
         return hash((type(self).__name__, *kinds))
@@ -78,7 +81,9 @@ def _hashed(value: object, name: str) -> object:
     except AttributeError:
         return None
     if isinstance(kept, np.ndarray):
-        return cast("NDArray[Any]", kept).shape
+        entries = cast("NDArray[Any]", kept)
+        first = entries.flat[:HASHED_ENTRIES].tolist()
+        return (entries.shape, *(0.0 if _is_nan(entry) else entry for entry in first))
     return kept if isinstance(kept, HASHED) else None
 
 

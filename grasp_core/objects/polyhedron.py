@@ -2,7 +2,7 @@
 
 import hashlib
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
@@ -60,6 +60,9 @@ class Polyhedron(ByValue, InNotebooks):
     """
     notes: tuple[str, ...] = field(default=(), compare=False)
     """Notes, for people to read, on what was changed when the mesh was read; not compared."""
+    radius: float = field(init=False, compare=False)
+    """Largest distance of a vertex from the centre of mass [m]; computed, as it is the unit of most
+    lengths and asked for very often."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))
@@ -75,6 +78,8 @@ class Polyhedron(ByValue, InNotebooks):
             raise InputError(
                 f"triangles must hold vertex numbers from 0 to {len(self.vertices) - 1}"
             )
+        reach = np.linalg.norm(self.vertices - center, axis=1).max(initial=0.0)
+        object.__setattr__(self, "radius", float(reach))
         several(self.faces, partial(instance, kind=Face, name="faces"), "faces", "Face values")
         several(self.notes, partial(text, name="notes"), "notes", "texts")
         if self.patches is not None:
@@ -113,11 +118,6 @@ class Polyhedron(ByValue, InNotebooks):
         """Return the surface as a `trimesh.Trimesh` with the same vertices and triangles [m]."""
         return mesh_of(self.vertices, self.triangles, self.name)
 
-    @property
-    def radius(self) -> float:
-        """Return the largest distance of a vertex from the centre of mass [m]."""
-        return _radius(self)
-
     def mass_at(self, density_kg_m3: float) -> float:
         """Return the mass of the object at a uniform density [kg], to nine digits.
 
@@ -144,12 +144,6 @@ class Polyhedron(ByValue, InNotebooks):
         sizes = [(self.vertices, "vertex"), (self.triangles, "triangle"), (self.faces, kind)]
         parts = [counted(len(things), name) for things, name in sizes]
         return summary("Polyhedron", shown(self.name), *parts, radius=self.radius)
-
-
-@lru_cache(maxsize=8)
-def _radius(body: Polyhedron) -> float:
-    """Measure a radius once: it is the unit of most lengths, and asked for very often."""
-    return float(np.linalg.norm(body.vertices - body.center_of_mass, axis=1).max())
 
 
 def from_trimesh(
