@@ -163,7 +163,15 @@ class WrenchSet(ByValue):
 
     def support(self, direction: Array) -> tuple[float, Array]:
         """Compute how far the set reaches in a direction, and the local forces that attain it."""
-        slopes = (direction @ self.G).reshape(-1, 3)
+        return self.reach(direction @ self.G)
+
+    def reach(self, slopes: Array) -> tuple[float, Array]:
+        """Compute the largest value of a linear function of local forces, and forces that have it.
+
+        Args:
+            slopes: Coefficients of the function, (3k,).
+        """
+        slopes = slopes.reshape(-1, 3)
         across = np.hypot(slopes[:, 1], slopes[:, 2])
         each = slopes[:, 0] + self.friction * across
         forces = np.zeros_like(slopes)

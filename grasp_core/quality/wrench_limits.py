@@ -12,14 +12,22 @@ a conic program. Its dual is a facet of W: a twist y with
 the support of W (s_i as in `force_closure`). `weakest_wrench` steps along such facets to the wrench
 of unit size that is hardest to resist. No such wrench has a limit below f_max times the `linf`
 quality of the contacts (see `ferrari_canny`), which is the bound over all directions.
+
+Where motors hold the fingertips, the torques of their joints are limited too: rows of (1) that are
+linear in the forces. With a multiplier m for each joint, (2) of `motors` bounds
+
+    h(y) <= f_max sum_i max(0, s_i(G'y - L'm)) + sum_j |m_j| c_j - m_j g_j              (3)
+
+for every m, with equality for the multipliers of the program; s_i is the support of cone i in the
+direction that contact i has in its argument.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import Array, frozen, frozen_copy
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, positive
 from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions
@@ -27,6 +35,7 @@ from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 from grasp_core.errors import InputError
 from grasp_core.fields import is_array, is_number
+from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.values import Grasp
 
@@ -58,6 +67,8 @@ class WrenchLimit(ByValue):
     facet: Array
     """Twist y of the facet that limits the wrench, (6,), with y.wrench = -1, about the stated
     centre."""
+    motor_multipliers: Array = field(default_factory=lambda: frozen_copy(np.zeros(0)))
+    """Multipliers m of the joints in (3), (joints,) [1/(N m)]; none where no motors are given."""
 
     def verify(
         self,
@@ -67,6 +78,7 @@ class WrenchLimit(ByValue):
         *,
         max_normal_force: float,
         center: ArrayLike = (0.0, 0.0, 0.0),
+        motors: Motors | None = None,
     ) -> bool:
         """Check both bounds again in plain arithmetic, for the contacts they refer to.
 
@@ -76,6 +88,7 @@ class WrenchLimit(ByValue):
             friction: Coulomb coefficient, one for all contacts or one each.
             max_normal_force: Largest normal force of each contact [N].
             center: Point about which torques are taken, (3,) [m].
+            motors: The motors that were given to `wrench_limits`.
 
         Returns:
             Whether both bounds are proved; False if the fields are no certificate.
@@ -86,25 +99,28 @@ class WrenchLimit(ByValue):
         points, units = contact_arrays(positions, normals)
         about = frozen(center, (3,), "center")
         body = WrenchBody(
-            points - about, units, contact_frictions(friction, len(points)), max_normal_force
-        )
+            points - about, units, contact_frictions(friction, len(points)), max_normal_force,
+            motors,
+        )  # fmt: skip
         with np.errstate(all="ignore"):
-            return self.has_numbers(len(points)) and body.attains(self) and body.bounds(self)
+            known = self.has_numbers(len(points), len(body.levers))
+            return known and body.attains(self) and body.bounds(self)
 
-    def has_numbers(self, count: int) -> bool:
-        """Return whether the fields are numbers of the right shapes, for `count` contacts."""
+    def has_numbers(self, count: int, joints: int = 0) -> bool:
+        """Return whether fields are numbers of the right shapes, for `count` contacts."""
         return (
             is_array(self.wrench, WRENCH)
             and bool(self.wrench.any())
             and is_array(self.facet, WRENCH)
             and is_array(self.forces, count, 3)
+            and is_array(self.motor_multipliers, joints)
             and is_number(self.limit, least=0.0)
             and is_number(self.upper)
             and self.limit <= self.upper
         )
 
 
-def max_resisted_wrench(
+def max_resisted_wrench(  # noqa: PLR0913 - each is a quantity of its own
     positions: ArrayLike | Grasp,
     normals: ArrayLike | None,
     friction: ArrayLike,
@@ -112,6 +128,7 @@ def max_resisted_wrench(
     *,
     max_normal_force: float,
     center: ArrayLike = (0.0, 0.0, 0.0),
+    motors: Motors | None = None,
 ) -> float:
     """Find the largest multiple of an external wrench that the contacts can resist.
 
@@ -122,6 +139,8 @@ def max_resisted_wrench(
         wrench: External (force, torque), (6,) [N, N m], torque about `center`.
         max_normal_force: Largest normal force of each contact [N].
         center: Point about which torques are taken, (3,) [m].
+        motors: Joints that the contact forces load, with the torques of their motors; None for
+            fingers that are as strong as `max_normal_force` says.
 
     Raises:
         InputError: Shapes or limits are wrong, or the wrench is zero.
@@ -129,11 +148,12 @@ def max_resisted_wrench(
     loads = frozen(wrench, (6,), "wrench")[None]
     _check_sizes(loads, "wrench")
     return wrench_limits(
-        positions, normals, friction, loads, max_normal_force=max_normal_force, center=center
-    )[0].limit
+        positions, normals, friction, loads, max_normal_force=max_normal_force, center=center,
+        motors=motors,
+    )[0].limit  # fmt: skip
 
 
-def wrench_limits(
+def wrench_limits(  # noqa: PLR0913 - each is a quantity of its own
     positions: ArrayLike | Grasp,
     normals: ArrayLike | None,
     friction: ArrayLike,
@@ -141,6 +161,7 @@ def wrench_limits(
     *,
     max_normal_force: float,
     center: ArrayLike = (0.0, 0.0, 0.0),
+    motors: Motors | None = None,
 ) -> tuple[WrenchLimit, ...]:
     """Find the largest multiple of each wrench that contacts resist, with forces and a bound.
 
@@ -153,6 +174,8 @@ def wrench_limits(
         wrenches: External (force, torque), (n, 6) [N, N m], torque about `center`.
         max_normal_force: Largest normal force of each contact [N].
         center: Point about which torques are taken, (3,) [m].
+        motors: Joints that the contact forces load, with the torques of their motors; None for
+            fingers that are as strong as `max_normal_force` says.
 
     Raises:
         InputError: Shapes or limits are wrong, or a wrench is zero.
@@ -163,7 +186,7 @@ def wrench_limits(
     _check_sizes(loads, "wrenches")
     about = frozen(center, (3,), "center")
     body = WrenchBody(
-        points - about, units, contact_frictions(friction, len(points)), max_normal_force
+        points - about, units, contact_frictions(friction, len(points)), max_normal_force, motors
     )
     return tuple(body.limit(load) for load in loads)
 
@@ -180,11 +203,12 @@ def _check_sizes(loads: Array, name: str) -> None:
 
 
 class WrenchBody:
-    """The body of wrenches that contacts can apply with bounded normal forces."""
+    """The body of wrenches that contacts can apply with bounded normal forces and joint torques."""
 
     def __init__(
-        self, arms: Array, normals: Array, friction: Array, max_normal_force: float
-    ) -> None:
+        self, arms: Array, normals: Array, friction: Array, max_normal_force: float,
+        motors: Motors | None = None,
+    ) -> None:  # fmt: skip
         """Set up the conic program; its last column will hold the wrench in question.
 
         Args:
@@ -192,9 +216,14 @@ class WrenchBody:
             normals: Unit vectors into the object, (k, 3).
             friction: Coulomb coefficients, (k,).
             max_normal_force: Largest normal force of each contact [N].
+            motors: Joints that the forces load; None for none.
+
+        Raises:
+            InputError: The motors are not those of so many contacts.
         """
         self.max_normal_force = positive(max_normal_force, "max_normal_force")
         self.count = k = len(arms)
+        self.motors = motors_for(motors, k)
         # at the contacts' own middle and at unit size all numbers are of order one
         self.middle = arms.mean(axis=0)  # a far centre would swamp the levers
         arms = arms - self.middle
@@ -203,14 +232,28 @@ class WrenchBody:
         self.frames = contact_frames(normals)
         G = in_frames(grasp_map(arms / self.size), self.frames)
         self.G, self.bounded = G, WrenchSet(G, friction, "linf")
-        # (1): G f + lambda w = 0, then 0 <= normal parts <= 1 in units of f_max, then the cones
-        self.A = np.zeros((WRENCH + 5 * k, 3 * k + 1))
-        self.A[:WRENCH, :-1] = G
-        caps, cones = WRENCH + np.arange(2 * k), WRENCH + 2 * k + np.arange(3 * k)
-        self.A[caps, np.tile(np.arange(0, 3 * k, 3), 2)] = np.repeat([1.0, -1.0], k)
-        self.A[cones, np.arange(3 * k)] = -1.0
-        self.A[cones[::3], np.arange(0, 3 * k, 3)] = -friction
-        self.b = np.concatenate([np.zeros(6), np.ones(k), np.zeros(4 * k)])
+        self.levers = in_frames(self.motors.levers, self.frames)
+        self.A, self.b = self._rows(friction)
+
+    def _rows(self, friction: Array) -> tuple[Array, Array]:
+        """Build the rows of (1) in units of f_max.
+
+        They are G f + lambda w = 0, then 0 <= normal parts <= 1, then the torques of each joint
+        over its limit, both ways, then the cones.
+        """
+        k, joints = self.count, len(self.levers)
+        A = np.zeros((WRENCH + 5 * k + 2 * joints, 3 * k + 1))
+        A[:WRENCH, :-1] = self.G
+        caps, torques = WRENCH + np.arange(2 * k), WRENCH + 2 * k + np.arange(2 * joints)
+        cones = WRENCH + 2 * k + 2 * joints + np.arange(3 * k)
+        A[caps, np.tile(np.arange(0, 3 * k, 3), 2)] = np.repeat([1.0, -1.0], k)
+        shares = self.max_normal_force * self.levers / self.motors.limits[:, None]
+        A[torques, :-1] = np.vstack([shares, -shares])
+        A[cones, np.arange(3 * k)] = -1.0
+        A[cones[::3], np.arange(0, 3 * k, 3)] = -friction
+        carried = self.motors.gravity / self.motors.limits
+        b = [np.zeros(6), np.ones(k), np.zeros(k), 1.0 - carried, 1.0 + carried, np.zeros(3 * k)]
+        return A, np.concatenate(b)
 
     def limit(self, wrench: Array) -> WrenchLimit:
         """Find the largest multiple of an external wrench that is resisted, with its proof."""
@@ -221,20 +264,30 @@ class WrenchBody:
         A[:6, -1] = unit / length
         q = np.zeros(A.shape[1])
         q[-1] = -1.0
-        k = self.count
-        answer = minimize(ConicProgram(q, A, self.b, 6, 2 * k, (3,) * k))
+        k, joints = self.count, len(self.levers)
+        answer = minimize(ConicProgram(q, A, self.b, 6, 2 * (k + joints), (3,) * k))
         share = self.max_normal_force / length
-        # the equations' multipliers, scaled to (2)
-        facet = answer.z[:6] / -float(answer.z[:6] @ unit)
+        # the equations' multipliers, scaled to (2), and those of the torques alike
+        power = -float(answer.z[:6] @ unit)
+        facet = answer.z[:6] / power
+        more, less = answer.z[6 + 2 * k : 6 + 2 * (k + joints)].reshape(2, joints)
+        multipliers = self.max_normal_force * (more - less) / (power * -self.motors.limits)
         limit = max(share * float(answer.x[-1]), 0.0)
         local = answer.x[:-1].reshape(k, 3)
         return WrenchLimit(
             wrench=wrench,
             limit=limit,
-            upper=max(limit, self.max_normal_force * self.bounded.support(facet)[0]),
+            upper=max(limit, self._support(facet, multipliers)),
             forces=self.max_normal_force * np.einsum("kij,kj->ki", self.frames, local),
             facet=self._about_center(facet / self.scale),
+            motor_multipliers=multipliers,
         )
+
+    def _support(self, twist: Array, multipliers: Array) -> float:
+        """Bound the support of the body by (3), for a scaled twist about the contacts' mean."""
+        slopes = twist @ self.G - multipliers @ self.levers
+        pushed = self.max_normal_force * self.bounded.reach(slopes)[0]
+        return pushed + self.motors.relaxed(multipliers)
 
     def attains(self, found: WrenchLimit) -> bool:
         """Return whether the forces are allowed and balance the limit's multiple of the wrench."""
@@ -244,7 +297,16 @@ class WrenchBody:
         left += found.limit / self.max_normal_force * self._about_middle(found.wrench)
         balanced = float(np.linalg.norm(left)) <= HELD * self.bounded.size
         allowed = self.bounded.holds(shares.ravel()[None], HELD * self.bounded.size)
-        return balanced and allowed
+        # rows of torques are met as all rows of the program are, by shares of the motors' limits
+        torques = np.abs(self.motors.torques(found.forces)) / self.motors.limits
+        return balanced and allowed and bool((torques <= 1.0 + HELD * self._strongest).all())
+
+    @property
+    def _strongest(self) -> float:
+        """Return how many times its limit a joint's torque is at most under unit pushes, or one."""
+        shares = np.linalg.norm(self.levers.reshape(-1, 3), axis=1).max(initial=0.0)
+        weakest = self.motors.limits.min(initial=np.inf)
+        return max(1.0, self.max_normal_force * float(shares) / float(weakest))
 
     def bounds(self, found: WrenchLimit) -> bool:
         """Return whether the facet proves that no multiple above the upper one is resisted."""
@@ -253,8 +315,8 @@ class WrenchBody:
         twist[:3] += slides
         power = float(twist @ load)
         lengths = float(np.linalg.norm(twist) * np.linalg.norm(load))
-        # (2): h(y) is at most the upper limit, and y.w = -1, each but for rounding
-        bound = self.max_normal_force * self.bounded.support(twist)[0]
+        # (3): h(y) is at most the upper limit, and y.w = -1, each but for rounding
+        bound = self._support(twist, found.motor_multipliers)
         farthest = self.bounded.size * float(np.linalg.norm(twist))
         slack = LAST_DIGITS * self.max_normal_force * farthest
         bounded = bound <= found.upper * (1.0 + FACET_SLACK) + slack

@@ -31,6 +31,8 @@ FACE_INDICES = SEVERAL | {
     "three": (0, 1, 2), "beyond": (0, 1, 2, 9), "negative": (-1, 1, 2, 3),
     "fraction": (0.5, 1, 2, 3), "bools": (True, 1, 2, 3), "huge": (0, 1, 2, 10**30),
 }  # fmt: skip
+MOTORS = optional(VALUE) | {"of three contacts": gc.Motors.of(np.eye(2, 9), 1.0)}
+LEVERS = np.eye(2, 12)
 BODY_AND_GRASP = {"body": VALUE, "grasp": VALUE}
 PLANNED = {
     "body": VALUE,
@@ -134,6 +136,7 @@ CALLS = [
         "wrench": array(WRENCH) | {"zero": 0.0 * WRENCH, "tiny": 1e-300 * WRENCH},
         "max_normal_force": POSITIVE,
         "center": array(CENTER),
+        "motors": MOTORS,
     }),
     Call("gc.wrench_limits", two_arrays(friction=0.5, wrenches=WRENCH[None], max_normal_force=1.0),
          contacts() | {
@@ -141,6 +144,12 @@ CALLS = [
         "wrenches": array(WRENCH[None]) | {"zero": np.zeros((1, 6)), "tiny": 1e-300 * WRENCH[None]},
         "max_normal_force": POSITIVE,
         "center": array(CENTER),
+        "motors": MOTORS,
+    }),
+    Call("gc.Motors", lambda: {"levers": LEVERS, "limits": np.ones(2), "gravity": np.zeros(2)}, {
+        "levers": array(LEVERS),
+        "limits": array(np.ones(2)) | {"zero": np.zeros(2), "negative": -np.ones(2)},
+        "gravity": array(np.zeros(2)) | {"more than the motors": np.array([0.0, 1.0])},
     }),
     Call("gc.cones_positively_span", lambda: {"axes": TETRA_NORMALS, "half_angles": [0.1] * 4}, {
         "axes": units(TETRA_NORMALS),

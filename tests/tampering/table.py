@@ -138,11 +138,12 @@ class Limited:
     friction: Any
     max_normal_force: Any
     center: Any
+    motors: Any
 
     def verify(self):
         return self.found.verify(
             self.positions, self.normals, self.friction,
-            max_normal_force=self.max_normal_force, center=self.center,
+            max_normal_force=self.max_normal_force, center=self.center, motors=self.motors,
         )  # fmt: skip
 
 
@@ -152,9 +153,21 @@ def wrench_limit(seed):
     size, largest = float(np.ptp(x, axis=0).max()), float(10.0 ** rng.uniform(-1, 2))
     center = x.mean(axis=0) + size * rng.normal(size=3)
     load = rng.normal(size=6) * np.repeat([1.0, size], 3)
-    given = {"max_normal_force": largest, "center": center}
+    given = {
+        "max_normal_force": largest,
+        "center": center,
+        "motors": motors(rng, len(x), largest) if seed % 2 else None,
+    }
     (found,) = gc.wrench_limits(x, n, mu, load[None], **given)
-    return Limited(found, x, n, mu, largest, center)
+    return Limited(found, x, n, mu, largest, center, given["motors"])
+
+
+def motors(rng, count, largest):
+    """Motors of two joints for each of `count` contacts, whose limits count."""
+    levers = rng.normal(size=(2 * count, 3 * count))
+    levers *= np.kron(np.eye(count), np.ones((2, 3)))
+    limits = largest * rng.uniform(0.2, 2.0, size=2 * count)
+    return gc.Motors(levers, limits, rng.uniform(-0.5, 0.5) * limits)
 
 
 @cache
@@ -215,9 +228,7 @@ TABLE = {
     ),
     "WrenchLimit": Row(
         wrench_limit,
-        lambda c, _: wrench_bounds.wrench_limit(
-            c.found, c.positions, c.normals, c.friction, c.max_normal_force, c.center
-        ),
+        lambda c, _: wrench_bounds.wrench_limit(c),
     ),
     "BestSqueeze": Row(best_squeeze, lambda c, _: squeezes.squeeze(c), 0.8),
     "Payload": Row(payload, lambda c, _: squeezes.payload(c), 0.4),

@@ -93,27 +93,30 @@ def ceiling(c, rng):
     return True
 
 
-def wrench_limit(found, x, n, mu, largest, center):
+def wrench_limit(c):
     """The largest multiple, solved again, is between the limit and the upper bound."""
-    mu = np.full(len(x), mu) if np.ndim(mu) == 0 else np.asarray(mu)
+    found, x, n, largest = c.found, c.positions, c.normals, c.max_normal_force
+    mu = np.full(len(x), c.friction) if np.ndim(c.friction) == 0 else np.asarray(c.friction)
     if not contacts_make_sense(np.asarray(x), np.asarray(n), mu):
         return False
     middle = x.mean(axis=0)
     arms, size = unit_arms(x)
     load = np.append(
-        found.wrench[:3], (found.wrench[3:] - np.cross(middle - center, found.wrench[:3])) / size
+        found.wrench[:3], (found.wrench[3:] - np.cross(middle - c.center, found.wrench[:3])) / size
     )
     k, length = len(x), np.linalg.norm(load)
-    A = np.zeros((6 + 4 * k, 3 * k + 1))
+    torques, room = _torques(c.motors, n, largest)
+    A = np.zeros((6 + k + len(room) + 3 * k, 3 * k + 1))
     A[:6, :-1], A[:6, -1] = locals_of(arms, n, mu), load / length
     A[6 + np.arange(k), 3 * np.arange(k)] = 1.0
-    A[6 + k :, :-1] = -np.eye(3 * k)
+    A[6 + k : -3 * k, :-1] = torques @ np.diag(np.ravel([[1.0, m, m] for m in mu]))
+    A[-3 * k :, :-1] = -np.eye(3 * k)
     solved = conic(
         np.append(np.zeros(3 * k), -1.0),
         A,
-        np.r_[np.zeros(6), np.ones(k), np.zeros(3 * k)],
+        np.r_[np.zeros(6), np.ones(k), room, np.zeros(3 * k)],
         6,
-        k,
+        k + len(room),
         k,
     )
     best = largest * solved.x[-1] / length
@@ -123,8 +126,27 @@ def wrench_limit(found, x, n, mu, largest, center):
     across = np.linalg.norm(f - along[:, None] * n, axis=1)
     left = np.append(f.sum(axis=0), np.cross(arms, f).sum(axis=0)) + found.limit / largest * load
     weight = np.sqrt(1.0 + mu.max() ** 2)
+    strong = np.abs(torques).max(initial=1.0)
     return bool(
         found.limit <= best + slack and found.upper >= best - slack and found.limit <= found.upper
         and (across <= mu * along + 1e-6 * weight).all() and along.max() <= 1.0 + 1e-6 * weight
+        and (torques @ _local(f, n) <= room + 1e-6 * weight * strong).all()
         and np.linalg.norm(left) <= 1e-6 * weight and abs(found.facet @ found.wrench + 1.0) <= 1e-6
     )  # fmt: skip
+
+
+def _torques(motors, n, largest):
+    """Rows of both directions of every joint for local unit forces, over limits, and their room."""
+    if motors is None:
+        return np.zeros((0, 3 * len(n))), np.zeros(0)
+    frames = np.array([np.column_stack([normal, tangents(normal)]) for normal in n])
+    levers = np.einsum("jki,kil->jkl", motors.levers.reshape(-1, len(n), 3), frames)
+    share = largest * levers.reshape(len(levers), -1) / motors.limits[:, None]
+    carried = motors.gravity / motors.limits
+    return np.vstack([share, -share]), np.append(1.0 - carried, 1.0 + carried)
+
+
+def _local(f, n):
+    """Forces in the contacts' frames, (3k,)."""
+    frames = np.array([np.column_stack([normal, tangents(normal)]) for normal in n])
+    return np.einsum("kil,ki->kl", frames, f).ravel()

@@ -1,0 +1,110 @@
+"""Motors behind fingertips: limits on joint torques, as limits on the contact forces.
+
+A hand at rest applies the contact forces f, stacked, through the joint torques
+
+    tau = L f + g,   |tau_j| <= c_j,                                                    (1)
+
+with L the transposed Jacobian of its contact points, g the torques that carry the links' weight,
+and c the motors' limits. For any multipliers m of the joints, one each,
+
+    m.L f  <=  sum_j |m_j| c_j - m_j g_j,                                               (2)
+
+so that a bound on a linear function v.f of the contact forces is one on (v - L'm).f without (1),
+plus the right side of (2): the Lagrange relaxation of (1), which loses nothing for the best m.
+
+Links that move, friction in the joints and the motors' dynamics are left out. Friction in the
+joints only helps a hold.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, frozen, real_array
+from grasp_core.by_value import ByValue
+from grasp_core.checked import LARGEST, SMALLEST, instance
+from grasp_core.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Motors(ByValue):
+    """The joints of a hand in one pose, with the torques of their motors."""
+
+    levers: Array
+    """The matrix L from contact forces on the object, stacked, to joint torques, (joints, 3k) [m],
+    object axes: the transposed Jacobian of the contact points by the joints."""
+    limits: Array
+    """Largest torque of each joint, either way, (joints,) [N m]."""
+    gravity: Array
+    """Torque of each joint that carries the weight of the links, (joints,) [N m]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "levers", frozen(self.levers, (None, None), "levers"))
+        joints, columns = self.levers.shape
+        if columns % 3:
+            raise InputError(
+                f"levers must have three columns for each contact, got {columns} columns"
+            )
+        object.__setattr__(self, "limits", frozen(self.limits, (joints,), "limits"))
+        object.__setattr__(self, "gravity", frozen(self.gravity, (joints,), "gravity"))
+        sizes = self.limits
+        if joints and not SMALLEST <= float(sizes.min()) <= float(sizes.max()) <= LARGEST:
+            raise InputError(
+                f"limits must be torques from {SMALLEST:g} to {LARGEST:g} N m, got "
+                f"{float(sizes.min()):.6g} to {float(sizes.max()):.6g}"
+            )
+        weak = np.flatnonzero(np.abs(self.gravity) >= sizes)
+        if weak.size:
+            raise InputError(
+                f"gravity of joint {int(weak[0])} asks for {abs(self.gravity[weak[0]]):.6g} N m, "
+                f"but its limit is {sizes[weak[0]]:.6g} N m: the hand cannot carry its own links; "
+                "give larger limits, or another pose"
+            )
+
+    @classmethod
+    def of(cls, levers: ArrayLike, limits: ArrayLike, gravity: ArrayLike = 0.0) -> "Motors":
+        """Make motors from numbers that may be one for all joints.
+
+        Args:
+            levers: Transposed Jacobian of the contact points, (joints, 3k) [m], object axes.
+            limits: Largest torque of each joint, one for all or one each [N m].
+            gravity: Torque that carries the links' weight, one for all or one each [N m].
+
+        Raises:
+            InputError: Shapes or ranges are wrong, or a motor cannot carry the links.
+        """
+        rows = frozen(levers, (None, None), "levers")
+        spread = (_each(limits, len(rows)), _each(gravity, len(rows)))
+        return cls(rows, *spread)
+
+    def torques(self, forces: Array) -> Array:
+        """Compute the joint torques (1) under contact forces (k, 3) [N], (joints,)."""
+        return self.levers @ forces.ravel() + self.gravity
+
+    def relaxed(self, multipliers: Array) -> float:
+        """Compute the right side of (2) for multipliers of the joints, (joints,)."""
+        return float(np.abs(multipliers) @ self.limits - multipliers @ self.gravity)
+
+
+def _each(value: ArrayLike, joints: int) -> Array:
+    """Spread a number over the joints; arrays are left as they are."""
+    given = real_array(value, "limits and gravity")
+    return np.full(joints, float(given)) if given.ndim == 0 else given
+
+
+def motors_for(motors: Motors | None, contacts: int) -> Motors:
+    """Check that motors are those of so many contacts; None gives a hand without joints.
+
+    Raises:
+        InputError: They are not, or their fields make no sense.
+    """
+    if motors is None:
+        return Motors(np.zeros((0, 3 * contacts)), np.zeros(0), np.zeros(0))
+    instance(motors, Motors, "motors", "gc.Motors.of makes one")
+    if motors.levers.shape[-1:] != (3 * contacts,):
+        raise InputError(
+            f"motors must have levers with three columns for each of {contacts} contacts, "
+            f"{3 * contacts} in all, got an array of shape {motors.levers.shape}"
+        )
+    return replace(motors)  # a certificate's check takes them from anywhere
