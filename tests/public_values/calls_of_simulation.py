@@ -21,7 +21,7 @@ from tests.public_values.bad_values import (
     optional,
     unless,
 )
-from tests.public_values.call import Call, of_grasp, scene
+from tests.public_values.call import Call, of_grasp, plan, scene
 
 WRENCH = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 CENTER = np.zeros(3)
@@ -38,6 +38,12 @@ CALLS = [
     Call("scenes.write_scene", lambda: {"scene": scene(), "path": "no/such/folder/a.xml"}, {
         "scene": VALUE, "path": PATH,
     }, succeeds_in="tests/scenes/test_mjcf.py"),
+    Call("scenes.export_grasps", lambda: {"plan": plan(), "path": "no/such/a.glb", "to": "gltf"}, {
+        "plan": VALUE,
+        "path": PATH | {"unknown ending": "a.obj", "no ending": "a"},
+        "to": WORD,
+        "fingertip_radius_m": optional(POSITIVE),
+    }, succeeds_in="tests/scenes/exports/test_formats.py"),
     Call("scenes.example_names", dict, {}),
     Call("scenes.example_object", lambda: {"name": "box"}, {
         "name": TEXT | {
