@@ -57,10 +57,7 @@ def test_what_is_there_is_whole_and_the_next_run_is_as_undisturbed(
         for name, data in contents(struck).items() if struck.is_dir() else ():
             assert UNFINISHED in name or data == whole[name], (step, name)
         after = contents(tmp_path / str(step))
-        if words[0] in {
-            "baseline",
-            "export",
-        }:  # the file may stand in anybody's folder, where nothing is cleaned
+        if words[0] in {"baseline", "export"}:  # in anybody's folder, where nothing is cleaned
             after = {name: data for name, data in after.items() if UNFINISHED not in name}
         assert after == whole, step
 
