@@ -23,6 +23,7 @@ from sim_validate.simulation.setup import Agenda as Agenda
 from sim_validate.simulation.setup import NamedWrench as NamedWrench
 from sim_validate.simulation.setup import Setup as Setup
 from sim_validate.validation.grasp_verdict import Verdict as Verdict
+from sim_validate.validation.jobs import validate_all as validate_all
 from sim_validate.validation.validation import (
     simulated_critical_friction as simulated_critical_friction,
 )

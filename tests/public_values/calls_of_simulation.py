@@ -21,7 +21,7 @@ from tests.public_values.bad_values import (
     optional,
     unless,
 )
-from tests.public_values.call import Call, of_grasp, plan, scene
+from tests.public_values.call import Call, body, grasp, of_grasp, plan, scene
 
 WRENCH = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 CENTER = np.zeros(3)
@@ -121,6 +121,18 @@ CALLS = [
         "friction": FRICTION,
         "agenda": optional(VALUE),
         "setup": optional(VALUE) | {"of another class": scenes.PhysicsSettings()},
+    }, slow=True),
+    Call("sv.validate_all", lambda: {
+        "body": body(), "grasps": plan(),
+        "agenda": sv.Agenda(critical_friction=False, controls=False),
+    }, {
+        "body": VALUE,
+        "grasps": SEVERAL | {"a grasp": grasp(), "several plans": [plan()]},
+        "friction": FRICTION,
+        "agenda": optional(VALUE),
+        "setup": optional(VALUE) | {"of another class": scenes.PhysicsSettings()},
+        "jobs": AT_LEAST_ONE,
+        "progress": {"number": 3, "text": "a"},
     }, slow=True),
     Call("sv.simulated_critical_friction", of_grasp(), BODY_AND_GRASP | {"setup": optional(VALUE)},
          slow=True),
