@@ -7,6 +7,9 @@ from sim_validate.execution.verdict import ExecutionTrial as ExecutionTrial
 from sim_validate.records.executions_json import Executions as Executions
 from sim_validate.records.executions_json import load_executions as load_executions
 from sim_validate.records.regions import load_regions as load_regions
+from sim_validate.records.saved_transfer import SavedCarriedGrasp as SavedCarriedGrasp
+from sim_validate.records.saved_transfer import SavedTransfer as SavedTransfer
+from sim_validate.records.saved_transfer import load_transfer as load_transfer
 from sim_validate.records.saved_verdicts import SavedVerdict as SavedVerdict
 from sim_validate.records.saved_verdicts import SavedVerdicts as SavedVerdicts
 from sim_validate.records.saved_verdicts import load_verdicts as load_verdicts
@@ -20,6 +23,7 @@ from sim_validate.simulation.setup import Agenda as Agenda
 from sim_validate.simulation.setup import NamedWrench as NamedWrench
 from sim_validate.simulation.setup import Setup as Setup
 from sim_validate.validation.grasp_verdict import Verdict as Verdict
+from sim_validate.validation.jobs import validate_all as validate_all
 from sim_validate.validation.validation import (
     simulated_critical_friction as simulated_critical_friction,
 )

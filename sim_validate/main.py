@@ -36,6 +36,7 @@ ACTIONS: dict[type[Any], str] = {
     command_flags.Validate: "validate:validate_file",
     execution_flags.Execute: "execute:execute_file",
     command_flags.Scene: "scene:write_scenes",
+    command_flags.Export: "scene:export_grasps",
     showing_flags.View: "view:view_grasp",
     showing_flags.Report: "report:report_folder",
     command_flags.Regions: "regions:certify_file",

@@ -17,7 +17,9 @@ from sim_validate.main import ACTIONS
 ROOT = Path(__file__).parent.parent
 DOORS = {
     "manifold3d": "grasp_core/objects/booleans.py",
-    "trimesh": "grasp_core/objects/conversion.py",
+    "trimesh": ("grasp_core/objects/conversion.py", "scenes/exports/gltf.py"),
+    "yaml": "scenes/exports/moveit.py",
+    "pxr": "scenes/exports/usd.py",
     "pandas": "grasp_core/grasp_tables.py",
     "numba": ("grasp_core/compiled.py", "grasp_core/kept_loops.py"),
     "highspy": "grasp_core/solvers/lp.py",

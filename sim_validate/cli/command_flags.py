@@ -121,6 +121,27 @@ class Scene:
 
 
 @dataclass(frozen=True, slots=True)
+class Export:
+    """Write grasps for other programs: MoveIt, or viewers and editors of 3D scenes."""
+
+    grasps: Positional[Path]
+    """The grasps.json with the grasps to write."""
+    to: Literal["moveit", "gltf", "usd"]
+    """Format to write: YAML with the fields of ROS messages (moveit), a binary glTF scene (gltf) or
+    a USD stage (usd), see docs/exports.md."""
+    out: Annotated[Path, arg(aliases=("-o",))]
+    """File to write, which ends in .yaml for moveit, .glb for gltf, and .usda or .usdc for usd."""
+    grasp: str | None = None
+    """Id of the grasp to write; if not given, all grasps are written."""
+    limit: Count | None = None
+    """Write only this many grasps, from the first."""
+    fingertip_radius_m: Usual | None = None
+    """Radius of the fingertips [m]; if not given, the one planned for, or a tenth of the object's
+    radius, or less if that does not fit."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
+@dataclass(frozen=True, slots=True)
 class Regions:
     """Prove regions in which each finger may stand anywhere, whatever the others do."""
 
@@ -233,6 +254,7 @@ Command = (
     | Validate
     | Execute
     | Scene
+    | Export
     | View
     | Report
     | Regions

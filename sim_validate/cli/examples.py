@@ -23,6 +23,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "scene plan/grasps.json --grasp c-0-1-2-7",
         "scene plan/grasps.json --mass-kg 0.3 --out held",
     ),
+    "export": (
+        "export plan/grasps.json --to gltf -o grasps.glb",
+        "export plan/grasps.json --to moveit --limit 5 -o grasps.yaml",
+    ),
     "regions": (
         "regions plan/grasps.json --out plan",
         "regions plan/grasps.json --reserve 0.1 --balance area --limit 5 --out smaller",

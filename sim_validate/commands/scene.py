@@ -1,12 +1,19 @@
-"""Runs the command `scene`, which writes grasps as MuJoCo scenes, with true masses if asked to."""
+"""Runs the commands that write grasps for other programs: `scene` for MuJoCo, `export` for others.
+
+Scenes have true masses if the flags ask for them.
+"""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.files.text_files import write_text
+from grasp_core.records.grasps_files import load_grasps
 from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.short_text import counted
 from grasp_core.values import Grasp
+from scenes.exports import formats
 from scenes.mjcf import build_scene
 from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import Reporter
@@ -116,3 +123,26 @@ def _held(
         return held_scene(saved.body, best.grip, settings).xml
 
     return text_of
+
+
+def export_grasps(command: command_flags.Export, reporter: Reporter) -> int:
+    """Write the grasps of a file as one file of another program's format."""
+    endings = formats.ENDINGS[command.to]
+    if command.out.suffix.lower() not in endings:
+        raise FlagsError(
+            f"--out must end in {' or '.join(endings)} with --to {command.to}, got {command.out}"
+        )
+    plan = load_grasps(command.grasps)
+    if command.grasp is not None:
+        plan = replace(plan, grasps=(grasp_with_id(command.grasps, plan, command.grasp),))
+    if not plan.grasps:
+        reporter.say(f"{command.grasps} holds no grasp")
+        reporter.document({"absence": f"{command.grasps} holds no grasp"})
+        return Exit.NONE
+    chosen = plan[: command.limit]
+    radius = command.fingertip_radius_m
+    formats.export_grasps(chosen, command.out, command.to, fingertip_radius_m=radius)
+    reporter.say(f"wrote {command.out} with {counted(len(chosen), 'grasp')}")
+    ids = [grasp.id for grasp in chosen]
+    reporter.document({"to": command.to, "out": str(command.out), "grasps": ids})
+    return Exit.GOOD

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import read_text
+from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import SavedGrasps, grasps_from_json
 from grasp_core.values import Grasp
 
@@ -25,7 +26,7 @@ def read_grasps(path: Path) -> SavedGrasps:
         raise InputError(f"{path}: {error}") from error
 
 
-def grasp_with_id(path: Path, saved: SavedGrasps, wanted: str | None) -> Grasp:
+def grasp_with_id(path: Path, saved: SavedGrasps | Plan, wanted: str | None) -> Grasp:
     """Find the grasp with an id; the id may be left out if the file has one grasp only.
 
     Raises:

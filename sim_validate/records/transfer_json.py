@@ -75,6 +75,7 @@ def _face_record(change: FaceChange) -> FaceChangeRecord:
         "turned_deg": _rounded(math.degrees(change.turn)),
         "old_area_mm2": _rounded(MM2 * change.old_area),
         "new_area_mm2": _rounded(MM2 * change.new_area),
+        "moved": change.moved,
         "in_words": str(change),
     }
 

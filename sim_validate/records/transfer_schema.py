@@ -22,6 +22,7 @@ class FaceChangeRecord(TypedDict):
     turned_deg: NotNegative
     old_area_mm2: NotNegative
     new_area_mm2: NotNegative
+    moved: bool
     in_words: str
 
 

@@ -1,9 +1,12 @@
 """Validates several grasps of one object, in one process or in several, with results in order."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Any, TypeAlias
 
+from grasp_core.checked import coefficient, function, instance, several, whole
+from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from sim_validate.parallel.processes import each, processes
@@ -11,7 +14,10 @@ from sim_validate.parallel.shared import Shared
 from sim_validate.simulation.gate.gate import Gate, measured_gate, remember_gate
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.validation import validate
+from sim_validate.validation.validation import asked_for, validate
+
+Progress: TypeAlias = Callable[[int, int, Verdict], object]
+"""Function that is told the number of grasps done, the number of all, and the last verdict."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,3 +79,50 @@ def verdict_of(job: Job) -> Verdict:
     if job.gate is not None:
         remember_gate(job.gate, job.setup, job.friction, job.body.radius)
     return validate(job.body, job.grasp, job.friction, agenda=job.agenda, setup=job.setup)
+
+
+def validate_all(  # noqa: PLR0913 - what `validate` takes, and two more
+    body: Polyhedron,
+    grasps: Iterable[Grasp],
+    friction: float = 0.5,
+    *,
+    agenda: Agenda | None = None,
+    setup: Setup | None = None,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> tuple[Verdict, ...]:
+    """Test many grasps of one object in simulation, each as `validate` does.
+
+    Args:
+        body: The object.
+        grasps: Grasps in force closure at this friction, such as a plan.
+        friction: Coulomb coefficient at every contact.
+        agenda: Which trials to run; the default agenda if None.
+        setup: How trials are simulated; the default setup if None.
+        jobs: Largest number of processors to use; results do not depend on it. From 16 grasps on
+            they are used as processes, and a script then needs `if __name__ == "__main__":`.
+        progress: Called after each grasp, in order, with the number of grasps done, the number of
+            all, and the verdict. What it raises ends the loop.
+
+    Returns:
+        One verdict per grasp, in order.
+
+    Raises:
+        InputError: A grasp is not on the body's faces, or not closed at this friction.
+        UnfaithfulError: The simulator fails its checks with these settings.
+    """
+    check_body(body)
+    coefficient(friction)
+    kind = partial(instance, kind=Grasp, name="grasps")
+    listed = several(grasps, kind, "grasps", "Grasp values")
+    agenda, setup = asked_for(agenda, setup)
+    whole(jobs, "jobs", least=1)
+    if progress is not None:
+        function(progress, "progress")
+    tasks = [Job(body, grasp, friction, agenda, setup) for grasp in listed]
+    verdicts: list[Verdict] = []
+    for verdict in validated(tasks, jobs) if jobs > 1 else map(verdict_of, tasks):
+        verdicts.append(verdict)
+        if progress is not None:
+            progress(len(verdicts), len(tasks), verdict)
+    return tuple(verdicts)

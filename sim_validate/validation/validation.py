@@ -65,7 +65,7 @@ def validate(
     """
     check_on_faces(body, grasp)
     coefficient(friction)
-    agenda, setup = _given(agenda, Agenda(), "agenda"), _given(setup, Setup(), "setup")
+    agenda, setup = asked_for(agenda, setup)
     critical = critical_friction(grasp)
     if not (friction > critical and force_closure(grasp, friction=friction).closed):
         raise InputError(
@@ -123,6 +123,15 @@ def simulated_critical_friction(
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     found = released_friction(bench, grasp.positions, grasp.normals, predicted, setup)
     return np.inf if found.simulated is None else found.simulated
+
+
+def asked_for(agenda: Agenda | None, setup: Setup | None) -> tuple[Agenda, Setup]:
+    """Check which trials are asked for and how they are simulated; None stands for the defaults.
+
+    Raises:
+        InputError: One of them is of another class.
+    """
+    return _given(agenda, Agenda(), "agenda"), _given(setup, Setup(), "setup")
 
 
 def _given(value: Chosen | None, default: Chosen, name: str) -> Chosen:

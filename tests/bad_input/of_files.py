@@ -14,6 +14,7 @@ READERS = {
     "plan": ("part.stl", "plan FILE"),
     "validate": ("grasps.json", "validate FILE"),
     "scene": ("grasps.json", "scene FILE"),
+    "export": ("grasps.json", "export FILE --to gltf --out made.glb"),
     "analyze": ("contacts.json", "analyze FILE"),
     "wrenches": ("task.json", "validate {grasps} --wrenches FILE"),
     "setup": ("setup.toml", "validate {grasps} --setup FILE"),

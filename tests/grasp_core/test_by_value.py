@@ -9,6 +9,8 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.by_value import ByValue
+from sim_validate.records.saved_transfer import transfer_from_json
+from sim_validate.records.transfer_json import transfer_to_json
 
 FRICTION = 0.5
 
@@ -40,6 +42,7 @@ def results(body, plan):
     payload = gc.payload(
         body, grasp, FRICTION, max_push_n=10.0, stiffness=2000.0, tip_radius_m=0.01
     )
+    carried = gc.transfer(body, body, [grasp], FRICTION)
     return [
         body, plan, grasp, squeeze, payload, gc.first_slip(squeeze.grip, squeeze.load),
         gc.force_closure(grasp, friction=FRICTION), gc.force_closure(grasp, friction=0.01),
@@ -48,7 +51,7 @@ def results(body, plan):
         gc.quality_ceiling(body, grasp.faces, FRICTION), scenes.build_scene(body, grasp, FRICTION),
         sv.validate(body, grasp, FRICTION),
         sv.execute(body, grasp, FRICTION, mass_kg=0.2),
-        gc.transfer(body, body, [grasp], FRICTION),
+        carried, transfer_from_json(transfer_to_json(carried)),
     ]  # fmt: skip
 
 

@@ -20,8 +20,13 @@ def body():
 
 
 @cache
+def plan():
+    return gc.plan(body(), limit=1)
+
+
+@cache
 def grasp():
-    return gc.plan(body(), limit=1).grasps[0]
+    return plan().grasps[0]
 
 
 @cache

@@ -21,7 +21,7 @@ from tests.public_values.bad_values import (
     optional,
     unless,
 )
-from tests.public_values.call import Call, of_grasp, scene
+from tests.public_values.call import Call, body, grasp, of_grasp, plan, scene
 
 WRENCH = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 CENTER = np.zeros(3)
@@ -38,6 +38,12 @@ CALLS = [
     Call("scenes.write_scene", lambda: {"scene": scene(), "path": "no/such/folder/a.xml"}, {
         "scene": VALUE, "path": PATH,
     }, succeeds_in="tests/scenes/test_mjcf.py"),
+    Call("scenes.export_grasps", lambda: {"plan": plan(), "path": "no/such/a.glb", "to": "gltf"}, {
+        "plan": VALUE,
+        "path": PATH | {"unknown ending": "a.obj", "no ending": "a"},
+        "to": WORD,
+        "fingertip_radius_m": optional(POSITIVE),
+    }, succeeds_in="tests/scenes/exports/test_formats.py"),
     Call("scenes.example_names", dict, {}),
     Call("scenes.example_object", lambda: {"name": "box"}, {
         "name": TEXT | {
@@ -88,6 +94,9 @@ CALLS = [
     Call("sv.load_executions", lambda: {"path": "no/such/executions.json"}, {
         "path": PATH | {"nowhere": "no/such/executions.json"},
     }, succeeds_in="tests/sim_validate/records/test_executions_json.py"),
+    Call("sv.load_transfer", lambda: {"path": "no/such/transfer.json"}, {
+        "path": PATH | {"nowhere": "no/such/transfer.json"},
+    }, succeeds_in="tests/sim_validate/records/test_saved_transfer.py"),
     Call("sv.load_verdicts", lambda: {"path": "no/such/verdicts.json"}, {
         "path": PATH | {"nowhere": "no/such/verdicts.json"},
     }, succeeds_in="tests/sim_validate/records/test_saved_verdicts.py"),
@@ -112,6 +121,18 @@ CALLS = [
         "friction": FRICTION,
         "agenda": optional(VALUE),
         "setup": optional(VALUE) | {"of another class": scenes.PhysicsSettings()},
+    }, slow=True),
+    Call("sv.validate_all", lambda: {
+        "body": body(), "grasps": plan(),
+        "agenda": sv.Agenda(critical_friction=False, controls=False),
+    }, {
+        "body": VALUE,
+        "grasps": SEVERAL | {"a grasp": grasp(), "several plans": [plan()]},
+        "friction": FRICTION,
+        "agenda": optional(VALUE),
+        "setup": optional(VALUE) | {"of another class": scenes.PhysicsSettings()},
+        "jobs": AT_LEAST_ONE,
+        "progress": {"number": 3, "text": "a"},
     }, slow=True),
     Call("sv.simulated_critical_friction", of_grasp(), BODY_AND_GRASP | {"setup": optional(VALUE)},
          slow=True),

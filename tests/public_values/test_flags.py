@@ -39,6 +39,8 @@ OTHERS = [
     ["run", "tetrahedron", "--timeout-s", "nan"],
     ["run", "tetrahedron", "--mass-kg", "0"],
     ["scene", "no.json", "--density-kg-m3", "-1"],
+    ["export", "no.json", "--to", "gltf", "-o", "a.glb", "--limit", "0"],
+    ["export", "no.json", "--to", "gltf", "-o", "a.glb", "--fingertip-radius-m", "0"],
     ["execute", "no.json", "--seed", f"{MOST_SEED + 1}"],
     ["execute", "no.json", "--misplacements", "1001"],
     ["execute", "no.json", "--off-deg", "nan"],

@@ -27,6 +27,8 @@ BY_NAME = {call.name: call for call in CALLS}
 MADE_BY_FUNCTIONS = {
     "sv.ExecutedGrasp": "load_executions",
     "sv.Executions": "load_executions",
+    "sv.SavedCarriedGrasp": "load_transfer",
+    "sv.SavedTransfer": "load_transfer",
     "sv.SavedVerdict": "load_verdicts",
     "sv.SavedVerdicts": "load_verdicts",
     "gc.BestSqueeze": "best_squeeze",
@@ -70,6 +72,7 @@ NAMED_OTHERWISE = {
     ("sv.load_regions", "path"): "path|no/such",
     ("sv.load_executions", "path"): "path|no/such",
     ("sv.load_verdicts", "path"): "path|no/such",
+    ("sv.load_transfer", "path"): "path|no/such",
     ("gc.load_grasps", "path"): "path|no/such",
     ("sv.load_dataset", "folder"): "folder|no/such",
     ("sv.write_report", "folder"): "folder|no/such",

@@ -2,7 +2,10 @@
 
 import pickle
 
+import pytest
+
 import grasp_core as gc
+import sim_validate as sv
 from scenes.example_objects import example_object
 from sim_validate import Agenda, Setup
 from sim_validate.simulation.gate import gate as gate_module
@@ -39,3 +42,52 @@ def test_a_worker_takes_over_how_the_simulator_did(monkeypatch):
     monkeypatch.setattr(gate_module, "_measured", fail)
     assert verdict_of(arrived).held
     assert verdict_of(arrived).gate == job.gate
+
+
+def test_many_validations_are_those_of_single_ones_and_say_how_far_they_are():
+    body, told = example_object("tetrahedron"), []
+    plan = gc.plan(body, FRICTION, limit=3)
+    found = sv.validate_all(
+        body, plan, FRICTION, agenda=SHORT, progress=lambda *step: told.append(step)
+    )
+    assert [verdict.id for verdict in found] == [grasp.id for grasp in plan]
+    assert list(found) == [sv.validate(body, grasp, FRICTION, agenda=SHORT) for grasp in plan]
+    assert told == [(1, 3, found[0]), (2, 3, found[1]), (3, 3, found[2])]
+
+
+def test_several_processors_give_the_same_verdicts():
+    """From sixteen grasps on these are two processes."""
+    body = example_object("wedge")
+    plan, told = gc.plan(body, FRICTION, limit=16), []
+    assert len(plan) == 16
+    one = sv.validate_all(body, plan, FRICTION, agenda=SHORT)
+    two = sv.validate_all(
+        body, plan, FRICTION, agenda=SHORT, jobs=2, progress=lambda *step: told.append(step[:2])
+    )
+    assert [verdict.wrenches for verdict in one] == [verdict.wrenches for verdict in two]
+    assert told == [(done, 16) for done in range(1, 17)]
+
+
+def test_what_progress_raises_ends_the_loop():
+    body, done = example_object("tetrahedron"), []
+
+    def stop(number, total, verdict):
+        done.append(verdict)
+        if number == 1:
+            raise StopAsyncIteration(f"{number} of {total}")
+
+    with pytest.raises(StopAsyncIteration, match="1 of 2"):
+        sv.validate_all(
+            body, gc.plan(body, FRICTION, limit=2), FRICTION, agenda=SHORT, progress=stop
+        )
+    assert [verdict.held for verdict in done] == [True]
+
+
+def test_no_grasps_give_no_verdicts():
+    assert sv.validate_all(example_object("box"), ()) == ()
+
+
+def test_a_grasp_that_is_refused_is_named():
+    plan = gc.plan(example_object("tetrahedron"), FRICTION, limit=1)
+    with pytest.raises(gc.InputError, match="grasp c-0-1-2-3: contact 0 does not lie on face 0"):
+        sv.validate_all(example_object("box"), plan, FRICTION, agenda=SHORT)
