@@ -11,7 +11,7 @@ from pathlib import Path
 import grasp_core as gc
 import scenes
 from scenes.drawing.canvas import Around, entitle, figure_with_panels, in_style, write_figure
-from scenes.drawing.palette import FINGERS
+from scenes.drawing.flat.colours import FINGERS
 from scenes.drawing.pictures import draw_grasp, grasp_figure
 from scenes.drawing.views import best_view
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp

@@ -14,7 +14,8 @@ from scenes.drawing import pictures
 from scenes.drawing.canvas import FORMATS, encoded
 from scenes.drawing.drawings import BAR_RADIUS, drawing_of
 from scenes.drawing.painting import painted
-from scenes.drawing.palette import BAD, FINGERS, FOCUS, GOOD, INK, LOOKS, SURFACE, rgb
+from scenes.drawing.flat.colours import BAD, FINGERS, FOCUS, GOOD, INK, SURFACE, rgb
+from scenes.drawing.palette import LOOKS
 from scenes.drawing.pictures import draw_grasp, empty_picture, grasp_figure, write_picture
 from scenes.drawing.shapes import Shape
 from scenes.drawing.turning_clips import FRAMES, write_turning_clip

@@ -11,7 +11,7 @@ import pytest
 
 from grasp_core.errors import InputError
 from scenes.drawing.painting import DARKEST, LIGHT
-from scenes.drawing.palette import FINGERS
+from scenes.drawing.flat.colours import FINGERS
 from scenes.drawing.turntable import UNITS
 from scenes.drawing.views import DISTANCE
 from sim_validate import main as commands
