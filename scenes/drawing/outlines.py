@@ -146,4 +146,3 @@ def _loops(ways: dict[int, list[tuple[int, int]]]) -> list[list[int]]:
                 loop.append(place)
             loops.append(loop)
     return loops
-

@@ -31,8 +31,8 @@ FEW = 100
 """Number of polygons of a surface up to which each has its own depth; of more, those that are
 equally bright and on the same side are joined."""
 SHADES = 7
-"""Number of shades of a joined surface: hardly fewer than eight bits tell apart in clear glass. Round bars
-have as many."""
+"""Number of shades of joined surfaces and of round bars: hardly fewer than eight bits tell apart in
+clear glass."""
 WHOLE: tuple[Role, ...] = ("friction cone",)
 """Roles whose lines are short, so that each is drawn whole."""
 

@@ -45,4 +45,3 @@ OF_ROLES: dict[Role, str] = {
 def colour_of(shape: Shape) -> str:
     """Return the colour of a shape, written as #rrggbb."""
     return OF_ROLES.get(shape.role, INK) if shape.finger is None else FINGERS[shape.finger]
-

@@ -27,6 +27,8 @@ SIDE = 500
 NUMBER, NUMBER_SHARE = 8.0, 0.02
 """Radius of the circle around a finger's number: at least so many pixels, and such a share of the
 picture's width."""
+POLYGON = 3
+"""Least number of corners of an area."""
 MANY = 60
 """Number of corners of an area above which those that are not seen are left out."""
 AZIMUTH_DEG, ELEVATION_DEG = 35.0, 28.0
@@ -123,7 +125,7 @@ def grasp_sheet(
     return Sheet(SIDE, SIDE + ROW * (rows + 0.5), sheet.name, (*sheet.marks, *marks))
 
 
-def sheet_of(
+def sheet_of(  # noqa: PLR0913 - what a drawing consists of
     shapes: Sequence[Shape], extent: Extent, view: View, name: str, *,
     numbers: Array | None = None, side: int, steady: bool = False,
 ) -> Sheet:  # fmt: skip
@@ -164,7 +166,7 @@ def _moved(patch: Patch, place: Callable[[Array], Array], scale: float) -> Mark:
         return Line(loops, patch.colour, round(scale * patch.width, 3), patch.opacity)
     if sum(map(len, loops)) > MANY:
         loops = tuple(thinned(np.vstack([loop, loop[:1]]))[:-1] for loop in loops)
-    return Area(tuple(loop for loop in loops if len(loop) > 2), patch.colour, patch.opacity)
+    return Area(tuple(loop for loop in loops if len(loop) >= POLYGON), patch.colour, patch.opacity)
 
 
 def _together(marks: Iterable[Mark]) -> Iterable[Mark]:

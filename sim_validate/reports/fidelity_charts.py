@@ -14,9 +14,9 @@ from scenes.drawing.flat.sheets import Area, Dots, Line, Mark, Sheet, Words, bes
 from sim_validate.reports.agreement import Agreement
 from sim_validate.validation.wrench_verdict import AGREEMENT
 
-WIDTH, HEIGHT = 400.0, 424.0
+WIDTH, HEIGHT = 360.0, 388.0
 """Size of a panel [pixels]."""
-PLACE = (70.0, 28.0, 318.0, 318.0)
+PLACE = (70.0, 28.0, 280.0, 280.0)
 """Left and upper border of what a panel draws in, its width and its height [pixels]."""
 LEAST_SHOWN = 0.5
 """Place of zero on a logarithmic axis, relative to the least value above zero."""

@@ -50,8 +50,8 @@ QUALITY = (
     "object's radius"
 )
 SPAN = (
-    "half-angle of the widest cones around the normals of which any choice of directions positively "
-    "spans space; 0: none do, and the force cones lean"
+    "half-angle of the widest cones around the normals of which any choice of directions "
+    "positively spans space; 0: none do, and the force cones lean"
 )
 FOCUS = "where lines of force meet, in the object's frame"
 

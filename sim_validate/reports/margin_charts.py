@@ -42,6 +42,8 @@ EDGE = 12.0
 """Width of the margins beside the scale of colours [pixels]."""
 MIDDLE, HALF = np.array([220.0, 130.0]), 100.0
 """Middle of a map on its panel, and half of its height [pixels]."""
+APART = 0.15
+"""Least distance of a number below the scale from its ends, as a share of its length."""
 LABEL = 18.0
 """Distance from the circle of the least value within which a label gives way [pixels]."""
 ROWS = 80
@@ -160,7 +162,9 @@ def _map(values: Array, kind: str, unit: str) -> Sheet:
         outlined([rim], NEUTRAL, 2.5),
     ]  # fmt: skip
     row, column = np.unravel_index(int(values.argmin()), values.shape)
-    least = MIDDLE + HALF * np.array([1.0, -1.0]) * [part[row, column] for part in on_map(*_nodes())]
+    least = MIDDLE + HALF * np.array([1.0, -1.0]) * [
+        part[row, column] for part in on_map(*_nodes())
+    ]
     for name, angles in NAMED.items():
         place = np.array(on_map(*(np.array(math.radians(angle)) for angle in angles)))
         middle = MIDDLE + HALF * place * np.array([1.0, -1.0])
@@ -184,8 +188,10 @@ def _scale(low: float, high: float) -> Iterator[Mark]:
     ends = f"{low:.3g}", f"{high:.3g}"
     yield Words(EDGE, top + 20.0, ends[0], "start", SMALL)
     yield Words(WIDTH - EDGE, top + 20.0, ends[1], "end", SMALL)
-    between = [tick for tick in ticks_in(low, high) if 0.15 < (tick - low) / (high - low) < 0.85] \
-        if high > low else []  # fmt: skip
+    inside = [tick for tick in ticks_in(low, high) if low < tick < high] if high > low else []
+    between = [
+        tick for tick in inside if APART < (tick - low) / (high - low) < 1.0 - APART
+    ]  # fmt: skip
     for tick in between:
         x = EDGE + long * (tick - low) / (high - low)
         yield ink_line([(x, top + 10.0), (x, top + 13.0)])

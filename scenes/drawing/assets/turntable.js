@@ -32,8 +32,9 @@
     }
   }
   for (const point of drawing.numbers) farthest = Math.max(farthest, hypot(point));
-  // what is nearer is larger, and the circles of numbers reach beyond their middles
-  let zoom = 465 / (farthest * DISTANCE / Math.max(DISTANCE - farthest, 0.5 * DISTANCE));
+  // what is nearer is larger, at most by this; the circles of numbers reach beyond their middles
+  const nearer = 1 / Math.sqrt(1 - Math.min(farthest / DISTANCE, 0.9) ** 2);
+  let zoom = 465 / (farthest * nearer);
 
   // Normals and neighbours do not change when the drawing turns.
   for (const shape of shapes) {
@@ -127,7 +128,7 @@
     for (let place = 0; place < shape.polygons.length; place++) {
       if (solid && !faces(shape, place)) continue;
       const flat = shape.polygons[place].map(seen);
-      yield { near: mean(solid ? all : flat), flat, colour: tinted(shape, shape.normals[place], shape.fill) };
+      yield { near: mean(solid ? all : flat), flat, solid, colour: tinted(shape, shape.normals[place], shape.fill) };
     }
   }
 
@@ -190,6 +191,11 @@
       } else {
         pen.fillStyle = part.colour;
         pen.fill();
+      }
+      if (part.solid) { // without gaps between the sides of a solid
+        pen.strokeStyle = part.colour;
+        pen.lineWidth = 0.8;
+        pen.stroke();
       }
     }
     pen.font = "bold 13px sans-serif";

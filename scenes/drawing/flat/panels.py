@@ -165,4 +165,3 @@ def thinned(points: Array) -> Array:
             kept.add(middle)
             open_ends += [(first, middle), (middle, last)]
     return points[sorted(kept)]
-

@@ -122,7 +122,7 @@ def _look(mark: Mark) -> Look:
 
 
 def _paint(kind: str, colour: str, opacity: float) -> Look:
-    name = ((("class", f"{kind[0]}{list(NIGHT).index(colour)}"),) if colour in NIGHT else ())
+    name = (("class", f"{kind[0]}{list(NIGHT).index(colour)}"),) if colour in NIGHT else ()
     faint = () if opacity >= 1.0 else ((f"{kind}-opacity", f"{opacity:.2g}".lstrip("0")),)
     return (*name, (kind, colour), *faint)
 

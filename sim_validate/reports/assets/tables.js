@@ -1,6 +1,7 @@
 "use strict";
 // Sorts a table by a column when its heading is pressed; again, the other way round. Numbers are
-// sorted by size and stand before words; rows that are equal keep their order.
+// sorted by size and stand before words; rows that are equal keep their order. On narrow screens the
+// style puts the cells of a row below one another, each after the name of its column.
 (() => {
   const value = (row, column) => {
     const text = row.cells[column].textContent.trim();
@@ -24,11 +25,15 @@
   }
 
   for (const table of document.querySelectorAll("table.sorts")) {
-    if (table.tBodies[0].rows.length < 2) continue;
-    [...table.tHead.rows[0].cells].forEach((heading, column) => {
+    const rows = [...table.tBodies[0].rows], headings = [...table.tHead.rows[0].cells];
+    const names = headings.map((heading) => heading.textContent.trim() || "verdict");
+    for (const row of rows) [...row.cells].forEach((cell, column) => { cell.dataset.label = names[column]; });
+    table.classList.add("stacks");
+    if (rows.length < 2) continue;
+    headings.forEach((heading, column) => {
       const button = document.createElement("button");
       button.type = "button";
-      button.append(...(heading.childNodes.length ? heading.childNodes : ["verdict"]));
+      button.append(...(heading.childNodes.length ? heading.childNodes : [names[column]]));
       button.addEventListener("click", () => sort(table, column, heading));
       heading.append(button);
     });

@@ -13,8 +13,8 @@ from grasp_core.errors import InputError
 from scenes.drawing import pictures
 from scenes.drawing.canvas import FORMATS, encoded
 from scenes.drawing.drawings import BAR_RADIUS, drawing_of
-from scenes.drawing.painting import painted
 from scenes.drawing.flat.colours import BAD, FINGERS, FOCUS, GOOD, INK, SURFACE, rgb
+from scenes.drawing.painting import painted
 from scenes.drawing.palette import LOOKS
 from scenes.drawing.pictures import draw_grasp, empty_picture, grasp_figure, write_picture
 from scenes.drawing.shapes import Shape

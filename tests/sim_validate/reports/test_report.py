@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
-from scenes.drawing.painting import DARKEST, LIGHT
 from scenes.drawing.flat.colours import FINGERS
+from scenes.drawing.painting import DARKEST, LIGHT
 from scenes.drawing.turntable import UNITS
 from scenes.drawing.views import DISTANCE
 from sim_validate import main as commands
