@@ -67,7 +67,7 @@ def _sentences(body: Polyhedron, spanning: int | None) -> Iterator[str]:
         f"centre of mass, which is at {vector(np.round(MM * body.center_of_mass, 3))} mm."
     )
     if spanning is not None:
-        least = "so the paper's constructions have faces to start from" if spanning else (
+        least = "so the constructions of the paper have faces to start from" if spanning else (
             "so grasps need friction or leaning force cones"
         )  # fmt: skip
         yield (
@@ -92,7 +92,7 @@ def _on_faces(body: Polyhedron) -> str:
     return (
         f"Its surface is curved: fingers may stand on {len(body.faces)} nearly flat patches, which "
         f"turn by {spread:.2g} deg at most ({asked.spread_deg:.4g} deg allowed) and are "
-        f"{MM * depth:.2g} mm deep at most ({asked.depth:.4g} of the object's extent allowed)."
+        f"{MM * depth:.2g} mm deep at most ({asked.depth:.4g} of its extent allowed)."
     )
 
 

@@ -158,7 +158,7 @@ def _map(values: Array, kind: str, unit: str) -> Sheet:
     marks: list[Mark] = [
         Words(8.0, 14.0, title, bold=True),
         Image(MIDDLE[0] - 2.0 * HALF, MIDDLE[1] - HALF, 4.0 * HALF, 2.0 * HALF,
-              _pixels(values, low, high)),
+              pixels(values, low, high)),
         outlined([rim], NEUTRAL, 2.5),
     ]  # fmt: skip
     row, column = np.unravel_index(int(values.argmin()), values.shape)
@@ -201,7 +201,7 @@ def _scale(low: float, high: float) -> Iterator[Mark]:
     yield Words(EDGE + 18.0, y, f"least: {low:.3g}", size=SMALL)
 
 
-def _pixels(values: Array, low: float, high: float) -> Indices:
+def pixels(values: Array, low: float, high: float) -> Indices:
     """Find the level of each pixel of a map, from the top, (ROWS, 2 ROWS); -1 outside of it."""
     up, right = np.meshgrid(
         1.0 - (2.0 * np.arange(ROWS) + 1.0) / ROWS,

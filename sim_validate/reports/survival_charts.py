@@ -212,14 +212,20 @@ def survival_sheet(executed: Sequence[Executions]) -> Sheet:
 
 def _curve(panel: Panel, multiples: Array, end: float) -> Iterator[Mark]:
     """Draw the share of grasps that are certified for each multiple of the weight."""
-    steps = np.concatenate([[1.0], np.sort(multiples[(multiples >= 1.0) & (multiples < end)])])
-    shares = (multiples[None] > steps[:, None]).mean(axis=1)
-    shares[0] = (multiples >= 1.0).mean()
+    steps, shares = certified_steps(multiples, end)
     x = np.append(np.repeat(steps, 2)[1:], end)
     line = panel.at(x, np.repeat(shares, 2))
     feet = panel.at(np.array([end, 1.0]), np.zeros(2))
     yield Area((np.vstack([line, feet]),), GOOD, 0.15)
     yield Line((line,), GOOD)
+
+
+def certified_steps(multiples: Array, end: float) -> tuple[Array, Array]:
+    """Find where the share of certified grasps drops, and the share from there on, (n,) each."""
+    steps = np.concatenate([[1.0], np.sort(multiples[(multiples >= 1.0) & (multiples < end)])])
+    shares = (multiples[None] > steps[:, None]).mean(axis=1)
+    shares[0] = (multiples >= 1.0).mean()
+    return steps, shares
 
 
 def _marked(panel: Panel, mark: Survival) -> Iterator[Mark]:

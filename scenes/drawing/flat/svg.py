@@ -49,9 +49,10 @@ def svg_of(sheet: Sheet, *, alone: bool = False, paper: bool = False) -> str:
         f"{_drawn(marks, names)}</g>" for plain, marks in runs
     )  # fmt: skip
     width, height = f"{sheet.width:g}", f"{sheet.height:g}"
+    kind = ' xmlns="http://www.w3.org/2000/svg"' if alone or paper else ""  # pages know it
     ground = ' style="background:#fff"' if paper else ""
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="sheet" width="{width}" height="{height}" '
+        f'<svg{kind} class="sheet" width="{width}" height="{height}" '
         f'viewBox="0 0 {width} {height}" role="img" aria-label="{escape(sheet.name)}"{ground} '
         f'font-family="{FONT}" fill="none" stroke-linejoin="round">'
         f"{_style(names) if alone else ''}{inside}</svg>"
