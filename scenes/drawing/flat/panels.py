@@ -12,6 +12,8 @@ from scenes.drawing.flat.letters import width_of
 from scenes.drawing.flat.scales import Scale
 from scenes.drawing.flat.sheets import LETTER, Area, Dots, Line, Mark, Words, ink_line, outlined
 
+EDGE = 8.0
+"""Place of a title, from the left edge of the sheet [pixels]."""
 TICK = 4.0
 """Length of a tick [pixels]."""
 SMALL = 11.0
@@ -100,7 +102,7 @@ class Panel:
     def named(self, title: str, across: str, up: str) -> Iterator[Words]:
         """Write the title of the panel, and the names of its axes."""
         middle = self.left + 0.5 * self.width
-        yield Words(self.left, self.top - LETTER, title, bold=True)
+        yield Words(EDGE, self.top - LETTER, title, bold=True)
         if across:
             low = self.top + self.height + TICK + 2.4 * SMALL
             yield Words(middle, low, across, "middle", SMALL)

@@ -128,8 +128,8 @@ def test_nothing_is_cut_off(family, legend):
 def test_every_finger_is_seen(name, family, monkeypatch):
     """The picture changes where a bar is left out.
 
-    A bar 0.1 by 0.75 finger sizes that is seen at the worst angle covers 0.033 square sizes. That of
-    the mug is 0.81 of its radius, so a picture that is at most 3.7 radii wide has 0.16 % of it.
+    A bar 0.1 by 0.75 finger sizes that is seen at the worst angle covers 0.033 square sizes. The
+    finger size is 0.59 radii or more, so in a picture of at most 3.7 radii the bar fills 0.085 %.
     """
     body, (grasp,) = grasps(name, 0.5, 1, (family,), cones="tilted")
     whole = pixels_of(grasp_figure(body, grasp, 0.5, legend=False))
@@ -140,7 +140,7 @@ def test_every_finger_is_seen(name, family, monkeypatch):
         figure = grasp_figure(body, grasp, 0.5, legend=False)
         monkeypatch.undo()
         changed = np.abs(whole - pixels_of(figure)).max(axis=2) > 0.15
-        assert changed.mean() > 0.0016
+        assert changed.mean() > 0.0008
 
 
 def pixels_of(figure):
