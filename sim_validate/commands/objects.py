@@ -63,8 +63,9 @@ def _sentences(body: Polyhedron, spanning: int | None) -> Iterator[str]:
     yield f"The mesh has {len(body.vertices)} vertices and {len(body.triangles)} triangles."
     yield _on_faces(body)
     yield (
-        f"It encloses {CM3 * body.volume:.4g} cm^3, and reaches {MM * body.radius:.4g} mm from its "
-        f"centre of mass, which is at {vector(np.round(MM * body.center_of_mass, 3))} mm."
+        f"It encloses a volume of {CM3 * body.volume:.4g} cm^3, and reaches "
+        f"{MM * body.radius:.4g} mm from its centre of mass, which is at "
+        f"{vector(np.round(MM * body.center_of_mass, 3))} mm."
     )
     if spanning is not None:
         least = "so the constructions of the paper have faces to start from" if spanning else (

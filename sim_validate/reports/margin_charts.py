@@ -5,6 +5,7 @@ The maps use Hammer's projection, which keeps areas; +x is in the middle and -x 
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from grasp_core.checked import positive
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.quality.wrench_limits import wrench_limits
+from grasp_core.quality.wrench_limits import many_limits
 from grasp_core.values import Grasp
 from scenes.drawing.canvas import figure_of
 from scenes.drawing.flat.colours import BAD, LEVELS, NEUTRAL, PAPER, levels_of
@@ -103,28 +104,30 @@ def margins(
     """
     check_drawn(body, grasp, friction, None)
     positive(max_normal_force_n, "max_normal_force_n")
-    if not force_closure(grasp, friction=friction).closed:
+    certificate = force_closure(grasp, friction=friction)
+    if certificate.forces is None:
         raise InputError(
             f"{grasp.id} is not in force closure at friction {friction:g}, so it resists nothing "
             f"in some direction; draw it at a friction above {grasp.critical_friction:.4g}"
         )
     ways = np.zeros((LATITUDES * LONGITUDES, 6))
     ways[:, :3] = directions_of_map().reshape(-1, 3)
-    forces = _limits(body, grasp, friction, max_normal_force_n, ways)
+    find = partial(_limits, body, grasp, friction, max_normal_force_n, certificate.forces)
+    forces = find(ways)
     ways = np.roll(ways, 3, axis=1) * body.radius
-    torques = _limits(body, grasp, friction, max_normal_force_n, ways)
+    torques = find(ways)
     return forces, MILLI * body.radius * torques
 
 
 def _limits(
-    body: Polyhedron, grasp: Grasp, friction: float, largest: float, wrenches: Array
-) -> Array:
+    body: Polyhedron, grasp: Grasp, friction: float, largest: float, inside: Array, wrenches: Array
+) -> Array:  # fmt: skip
     """Compute how far each wrench of a map is resisted, (LATITUDES, LONGITUDES)."""
     different, same = np.unique(np.round(wrenches, SAME), axis=0, return_inverse=True)
-    found = wrench_limits(
-        grasp, None, friction, different, max_normal_force=largest, center=body.center_of_mass
-    )
-    limits = np.array([each.limit for each in found])
+    limits = many_limits(
+        grasp.positions, grasp.normals, friction, different, inside, max_normal_force=largest,
+        center=body.center_of_mass,
+    )  # fmt: skip
     return limits[same.reshape(-1)].reshape(LATITUDES, LONGITUDES)
 
 

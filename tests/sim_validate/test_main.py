@@ -331,7 +331,9 @@ def test_a_mesh_is_described_in_words(capsys):
         "  The mesh has 6 vertices and 8 triangles.",
         "  Its 8 faces are planar; 0 of them are not convex, and 0 have holes.",
     ]
-    assert "It encloses 199.1 cm^3, and reaches 67.74 mm from its centre of mass" in said
+    assert (
+        "It encloses a volume of 199.1 cm^3, and reaches 67.74 mm from its centre of mass" in said
+    )
     assert not re.search(r"[{}\[\]']|None|_", said)
 
 
