@@ -24,7 +24,7 @@ from scenes.drawing.views import Extent, View, best_view
 
 SIDE = 500
 """Width of a picture, and its height without the key [pixels]."""
-NUMBER, NUMBER_SHARE = 8.0, 0.02
+NUMBER, NUMBER_SHARE = 8.0, 0.028
 """Radius of the circle around a finger's number: at least so many pixels, and such a share of the
 picture's width."""
 POLYGON = 3

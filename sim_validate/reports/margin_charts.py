@@ -47,7 +47,7 @@ APART = 0.15
 """Least distance of a number below the scale from its ends, as a share of its length."""
 LABEL = 18.0
 """Distance from the circle of the least value within which a label gives way [pixels]."""
-ROWS = 80
+ROWS = 60
 """Height of the image of a map [its own pixels]; the map is twice as wide."""
 MILLI = 1e3
 USUAL_PUSH_N = FingerSettings().max_normal_force_n
