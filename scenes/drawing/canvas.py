@@ -33,6 +33,9 @@ STYLE = {
     "svg.fonttype": "path", "lines.solid_capstyle": "butt",
 }  # fmt: skip
 ANCHORS = {"start": "left", "middle": "center", "end": "right"}
+SHORT = 2
+"""Number of letters up to which words may be bold: the widths of bold letters depend so much on how
+fonts are hinted that longer words would end at other places."""
 POINTS = 0.72
 """Points in a pixel."""
 DOTS_PER_INCH = 100.0
@@ -129,7 +132,7 @@ def _draw(axes: Any, mark: Mark, zorder: int) -> None:
                 mark.x, mark.y, mark.text, ha=ANCHORS[mark.anchor], zorder=zorder,
                 va="center_baseline" if not mark.upwards else "center",
                 rotation=90.0 if mark.upwards else 0.0, fontsize=POINTS * mark.size,
-                weight="bold" if mark.bold else "normal",
+                weight="bold" if mark.bold and len(mark.text) <= SHORT else "normal",
             )  # fmt: skip
         case Image():
             colours: Any = _part("colors").ListedColormap(ramp_bytes() / 255.0)
