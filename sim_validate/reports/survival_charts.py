@@ -31,7 +31,7 @@ from sim_validate.records.executions_json import Executions
 
 WIDTH = 400.0
 """Width of the chart [pixels]; its height depends on its key."""
-PLACE = (70.0, 28.0, 318.0, 230.0)
+PLACE = (70.0, 28.0, 306.0, 230.0)
 """Left and upper border of what the chart draws in, its width and its height [pixels]."""
 BELOW = 44.0
 """Height of the numbers and the name below the axis [pixels]."""
