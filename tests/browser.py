@@ -31,11 +31,44 @@ const written = (node) => [...node.childNodes].some((part) => part.nodeType === 
 return [...document.querySelectorAll(arguments[0])]
   .filter((node) => written(node) && node.getClientRects().length)
   .map((node) => {
-    const [one, two] = [getComputedStyle(node).color, ground(node)].map(light);
+    const style = getComputedStyle(node);
+    const own = node instanceof SVGElement ? style.fill : style.color;
+    const [one, two] = [own, ground(node)].map(light);
     return [(Math.max(one, two) + 0.05) / (Math.min(one, two) + 0.05), node.textContent.trim()];
   });
 """
 """Contrast and text of every element that a selector finds and that has text of its own."""
+CLIPPED = """
+const wide = document.documentElement.clientWidth;
+const scrolls = (node) => node && (/auto|scroll/.test(getComputedStyle(node).overflowX)
+  || scrolls(node.parentElement));
+const written = (node) => [...node.childNodes].some((part) => part.nodeType === Node.TEXT_NODE
+  && part.textContent.trim());
+const found = [];
+for (const node of document.body.querySelectorAll("*")) {
+  const hidden = !node.getClientRects().length;
+  if (hidden || ["SCRIPT", "STYLE", "OPTION"].includes(node.tagName)) continue;
+  const box = node.getBoundingClientRect();
+  const sheet = node.ownerSVGElement && node.ownerSVGElement.getBoundingClientRect();
+  const name = `${node.tagName} ${node.textContent.trim().slice(0, 40)}`;
+  if (sheet && node.tagName === "text" && (box.left < sheet.left - 1
+      || box.right > sheet.right + 1 || box.top < sheet.top - 1 || box.bottom > sheet.bottom + 1)) {
+    found.push(`off its chart: ${name}`);
+  }
+  if (sheet) continue;
+  if (!written(node) && !["IMG", "CANVAS", "INPUT", "SELECT"].includes(node.tagName)) continue;
+  if (!scrolls(node) && (box.left < -1 || box.right > wide + 1)) {
+    found.push(`off the screen: ${name}`);
+  }
+  const hides = getComputedStyle(node).overflowX === "hidden";
+  if (hides && node.scrollWidth > node.clientWidth + 1) found.push(`cut: ${name}`);
+}
+for (const node of document.querySelectorAll(".wide")) {
+  if (node.scrollWidth > node.clientWidth + 1) found.push(`scrolls: ${node.textContent.trim()}`);
+}
+return found;
+"""
+"""What of a page is not wholly on the screen, or not wholly on its chart."""
 OWN = ("file://", "data:", "chrome://")
 """How addresses begin that ask nothing of a network; the last are the browser's first page."""
 

@@ -8,12 +8,16 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 import grasp_core as gc
 import scenes
-from scenes.drawing.canvas import Around, entitle, figure_with_panels, in_style, write_figure
-from scenes.drawing.palette import FINGERS
-from scenes.drawing.pictures import draw_grasp, grasp_figure
-from scenes.drawing.views import best_view
+from scenes.drawing.canvas import figure_of, write_figure
+from scenes.drawing.flat.colours import FINGERS
+from scenes.drawing.flat.panels import Entry, Panel, keyed
+from scenes.drawing.flat.scales import Scale
+from scenes.drawing.flat.sheets import Dots, Sheet, Words, beside, moved
+from scenes.drawing.pictures import grasp_figure, grasp_sheet
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.records.executions_json import Executions
@@ -29,7 +33,6 @@ from sim_validate.simulation.setup import Agenda, Setup
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
 BENCHMARKS = FOLDER.parent / "benchmarks.md"
-AXES = Around(left=0.11, right=0.03, below=0.16, above=0.05, between=0.0)
 TEN_DEGREES = math.tan(math.radians(10.0))
 FAMILIES = (
     ("dodecahedron", "concurrent", TEN_DEGREES, "normal"),
@@ -37,6 +40,8 @@ FAMILIES = (
     ("icosahedron", "regulus", 0.3, "tilted"),
 )
 FRICTION = 0.5
+TITLE = 24.0
+"""Height of a line for a title [pixels]."""
 
 
 def best(name, family, friction, cones="tilted"):
@@ -45,16 +50,15 @@ def best(name, family, friction, cones="tilted"):
     return body, plan.grasps[0]
 
 
-@in_style
 def families():
     """A grasp of each of the paper's families, side by side."""
-    around = Around(left=0.0, right=0.0, below=0.0, above=0.07, between=0.02)
-    figure, places = figure_with_panels(12.0, 4.3, 3, around=around)
-    for axes, case in zip(places, FAMILIES, strict=True):
-        body, grasp = best(*case)
-        draw_grasp(axes, body, grasp, case[2], best_view(body, grasp))
-        entitle(axes, case[1])
-    return figure
+    sheets = []
+    for case in FAMILIES:
+        sheet = grasp_sheet(*best(*case), case[2])
+        title = Words(0.5 * sheet.width, 14.0, case[1], "middle", 16.0, bold=True)
+        marks = [moved(mark, np.array([0.0, TITLE])) for mark in sheet.marks]
+        sheets.append(Sheet(sheet.width, sheet.height + TITLE, case[1], (*marks, title)))
+    return figure_of(beside(sheets))
 
 
 def grasp():
@@ -117,20 +121,28 @@ def survival():
     )
 
 
-@in_style
 def misplaced():
     """Share of misplaced objects that are kept, from the table of the benchmarks' page."""
     header, _, *rows = kept_by_distance()
-    distances = [float(cell) for cell in header[1:]]
-    figure, (axes,) = figure_with_panels(6.4, 3.6, 1, around=AXES)
-    for colour, (family, *cells) in zip(FINGERS, rows, strict=True):
-        counts = [[int(part) for part in cell.split(" of ")] for cell in cells]
-        shares = [kept / count for kept, count in counts]
-        axes.plot(distances, shares, "o-", color=colour, label=family)
-    axes.set(xlabel="distance from the expected place [mm]", ylabel="share kept", ylim=(0.0, 1.02))
-    axes.set_xticks(distances)
-    axes.legend(loc="lower left", frameon=False)
-    return figure
+    distances = np.array([float(cell) for cell in header[1:]])
+    panel = Panel(70.0, 28.0, 500.0, 240.0, Scale(0.0, float(distances.max())), Scale(0.0, 1.02))
+    marks = [
+        *panel.frame(
+            [(each, f"{each:g}") for each in distances.tolist()],
+            [(share, f"{share:.0%}") for share in (0.0, 0.25, 0.5, 0.75, 1.0)],
+        )
+    ]
+    for colour, (_, *cells) in zip(FINGERS, rows, strict=True):
+        counts = np.array([[int(part) for part in cell.split(" of ")] for cell in cells])
+        shares = counts[:, 0] / counts[:, 1]
+        marks += [
+            panel.curve(distances, shares, colour),
+            Dots(panel.at(distances, shares), colour, 3.5),
+        ]
+    key = [Entry(row[0], colour) for colour, row in zip(FINGERS, rows, strict=True)]
+    below, _ = keyed(key, 70.0, 325.0, 500.0)
+    names = panel.named("misplaced objects", "distance from the expected place [mm]", "share kept")
+    return figure_of(Sheet(600.0, 350.0, "share kept", (*marks, *names, *below)))
 
 
 def kept_by_distance():

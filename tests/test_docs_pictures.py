@@ -67,7 +67,7 @@ def another_grasp():
 
 def with_other_figures():
     figure = PICTURES["fidelity"]()
-    figure.axes[0].plot([0.01, 0.05], [0.02, 0.02], "o", color="#0072B2", ms=12)
+    figure.axes[0].plot([150.0, 200.0], [250.0, 250.0], "o", color="#0072B2", ms=12)  # pixels
     return figure
 
 

@@ -33,12 +33,18 @@ from grasp_core.checked import LARGEST, SMALLEST, positive
 from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
+from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
 from grasp_core.fields import is_array, is_number
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.values import Grasp
 
+KERNEL = "grasp_core.quality.wrench_limits_kernel"
+CLOSE = 1e-7
+"""Distance up to which two bounds of a limit count as one, relative to it."""
+HALF = 0.5
+"""Largest normal force from which the compiled code starts, in units of f_max."""
 HELD = 1e-7
 """How far forces at a limit may leave cones and balance, relative to the largest wrench of a unit
 normal force: the accuracy of conic programs."""
@@ -191,6 +197,33 @@ def wrench_limits(  # noqa: PLR0913 - each is a quantity of its own
     return tuple(body.limit(load) for load in loads)
 
 
+def many_limits(  # noqa: PLR0913 - all that limits depend on
+    positions: Array, normals: Array, friction: float, wrenches: Array, inside: Array, *,
+    max_normal_force: float, center: Array,
+) -> Array:  # fmt: skip
+    """Find the largest multiple of each of hundreds of wrenches that contacts resist, (n,).
+
+    Compiled code finds them, and a wrench whose two bounds are farther apart than `CLOSE` is
+    solved for by itself.
+
+    Args:
+        positions: Contact points, (k, 3) [m].
+        normals: Unit vectors into the object, (k, 3).
+        friction: Coulomb coefficient of all contacts.
+        wrenches: External (force, torque), (n, 6) [N, N m], torque about `center`.
+        inside: Balanced contact forces strictly inside the cones, as `force_closure` gives them,
+            (k, 3).
+        max_normal_force: Largest normal force of each contact [N].
+        center: Point about which torques are taken, (3,) [m].
+
+    Raises:
+        SolverError: A program's answer failed its check.
+    """
+    _check_sizes(wrenches, "wrenches")
+    mu = np.full(len(positions), friction)
+    return WrenchBody(positions - center, normals, mu, max_normal_force).limits(wrenches, inside)
+
+
 def _check_sizes(loads: Array, name: str) -> None:
     """Refuse wrenches (n, 6) that are zero, because every multiple of zero is resisted."""
     sizes = np.abs(loads).max(axis=1)
@@ -321,6 +354,30 @@ class WrenchBody:
         slack = LAST_DIGITS * self.max_normal_force * farthest
         bounded = bound <= found.upper * (1.0 + FACET_SLACK) + slack
         return bounded and abs(power + 1.0) <= FACET_SLACK * lengths
+
+    def limits(self, wrenches: Array, inside: Array) -> Array:
+        """Find the largest multiple of each wrench that is resisted, (n,) (see `many_limits`)."""
+        if len(self.levers):  # the compiled code knows no motors
+            return np.array([self.limit(wrench).limit for wrench in wrenches])
+        local = np.einsum("kij,ki->kj", self.frames, inside)
+        start = (HALF / local[:, 0].max() * local).ravel()
+        units = np.array([self._about_middle(wrench) for wrench in wrenches])
+        lengths = np.linalg.norm(units, axis=1)
+        loads, found = units / lengths[:, None], np.empty(len(units))
+        forces, facets = np.empty((len(units), len(start))), np.empty(units.shape)
+        friction = self.bounded.friction
+        kernel = compiled(KERNEL)
+        contacts = kernel.Contacts(self.G, friction, start)
+        kernel.limits(contacts, loads, found, forces, facets)
+        upper = self.bounded.supports(facets) / -np.einsum("ij,ij->i", facets, loads)
+        close = np.abs(upper - found) <= CLOSE * np.abs(upper)
+        close &= np.abs(forces @ self.G.T + found[:, None] * loads).max(axis=1) <= CLOSE * upper
+        normal, *across = forces.reshape(len(units), -1, 3).transpose(2, 0, 1)
+        close &= (np.hypot(*across) <= friction * normal).all(axis=1) & (normal <= 1.0).all(axis=1)
+        limits = self.max_normal_force / lengths * found
+        for place in np.flatnonzero(~close):
+            limits[place] = self.limit(wrenches[place]).limit
+        return limits
 
     def _about_middle(self, wrench: Array) -> Array:
         """Move a wrench's reference point to the contacts' mean, and scale it to unit size."""

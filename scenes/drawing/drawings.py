@@ -7,6 +7,7 @@ regulus the ruled surface on which the lines lie. Pictures and web pages draw th
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,14 +17,18 @@ from grasp_core.cones.spanning import angles_between
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
+from scenes.drawing.outlines import feature_edges
 from scenes.drawing.ruled_surfaces import between, rulings
 from scenes.drawing.shapes import Shape, closed, cone_rim, cone_sides, tube
 from scenes.drawing.views import Extent
 
 BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
-"""Length and radius of a finger's bar, in object radii."""
+"""Length and radius of a finger's bar, in finger sizes."""
 CONE_LENGTH = 0.42
-"""Length of a cone's sides, in object radii."""
+"""Length of a cone's sides, in finger sizes."""
+STOUT = 1.3
+"""Finger size over the radius of a ball of the object's volume: compact objects have fingers in
+proportion to their radius, and long or thin ones fingers in proportion to how thick they are."""
 BEYOND = 0.2
 """Length by which a line is drawn past the points it connects, in object radii."""
 REACH = 0.95
@@ -72,19 +77,35 @@ def drawing_alone(extent: Extent, grasp: Grasp) -> tuple[Shape, ...]:
     return (*shapes, *_family(extent, grasp), Shape("contact", points=grasp.positions))
 
 
+def finger_size(body: Extent) -> float:
+    """Return the length by which bars and cones are measured [m]: at most the object's radius."""
+    volume = getattr(body, "volume", math.inf)
+    return float(min(body.radius, STOUT * math.cbrt(0.75 * volume / math.pi)))
+
+
 def glass(body: Polyhedron) -> tuple[Shape, ...]:
-    """Return the shapes of the object: its surface, and the borders of its faces."""
-    loops = [loop for face in body.faces for loop in (face.polygon, *face.holes)]
+    """Return the shapes of the object: its surface, and the edges at which it is bent."""
+    panes = _panes(body)
     return (
-        Shape("object", polygons=_panes(body)),
-        Shape("edge", lines=tuple(closed(loop) for loop in loops)),
+        Shape("object", polygons=panes),
+        Shape("edge", lines=tuple(feature_edges(_edged(body, panes)))),
     )
 
 
-def _panes(body: Polyhedron) -> tuple[Array, ...]:
-    """Return the polygons of the surface: face pieces, or the triangles of a curved surface."""
+def _edged(body: Polyhedron, panes: tuple[Array, ...]) -> Sequence[Array]:
+    """Return the polygons whose edges are the object's; fine surfaces keep their own triangles."""
     if body.patches is None:
-        return tuple(piece for face in body.faces for piece in face.pieces)
+        return panes
+    return tuple(body.vertices[body.triangles])
+
+
+def _panes(body: Polyhedron) -> tuple[Array, ...]:
+    """Return the polygons of the surface, counter-clockwise as seen from outside.
+
+    They are face pieces, or the triangles of a curved surface.
+    """
+    if body.patches is None:
+        return tuple(piece[::-1] for face in body.faces for piece in face.pieces)
     return tuple(coarse(body.vertices, body.triangles))
 
 
@@ -117,7 +138,7 @@ def coarse(vertices: Array, triangles: Indices) -> Array:
 
 def _finger(body: Extent, grasp: Grasp, finger: int, half_angle: float) -> list[Shape]:
     contact, cone = grasp.contacts[finger], grasp.force_cones[finger]
-    tip, length = contact.position, CONE_LENGTH * body.radius
+    tip, length = contact.position, CONE_LENGTH * finger_size(body)
     straight, *region = _bar_and_region(body, grasp, finger)
     rim = cone_rim(tip, contact.normal, half_angle, length)
     spokes = [np.array([tip, corner]) for corner in rim[::5]]
@@ -133,20 +154,20 @@ def _bar_and_region(body: Extent, grasp: Grasp, finger: int) -> list[Shape]:
     tip, ways = grasp.contacts[finger].position, grasp.approach_directions
     inward = grasp.contacts[finger].normal if ways is None else ways[finger]
     region = grasp.regions[finger].polygon
-    shapes = [Shape("finger", finger, polygons=bar(tip, inward, body.radius))]
+    shapes = [Shape("finger", finger, polygons=bar(tip, inward, finger_size(body)))]
     if len(region) >= POLYGON:
         shapes.append(Shape("region", finger, polygons=(region,)))
     return shapes
 
 
-def bar(tip: Array, inward: Array, radius: float) -> tuple[Array, ...]:
-    """Return the polygons of a finger that stands on a point of an object of a given radius."""
-    return tube(tip, tip - BAR_LENGTH * radius * inward, BAR_RADIUS * radius)
+def bar(tip: Array, inward: Array, size: float) -> tuple[Array, ...]:
+    """Return the polygons of a finger of a given size that stands on a point."""
+    return tube(tip, tip - BAR_LENGTH * size * inward, BAR_RADIUS * size)
 
 
 def _force_cone(body: Extent, grasp: Grasp, finger: int) -> Shape:
     cone, tip = grasp.force_cones[finger], grasp.contacts[finger].position
-    sides = cone_sides(tip, cone.axis, cone.half_angle, CONE_LENGTH * body.radius)
+    sides = cone_sides(tip, cone.axis, cone.half_angle, CONE_LENGTH * finger_size(body))
     return Shape("force cone", finger, polygons=sides)
 
 

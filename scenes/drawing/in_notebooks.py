@@ -20,18 +20,15 @@ from scenes.drawing.drawings import (
     drawing_of,
     glass,
 )
-from scenes.drawing.painting import painted
-from scenes.drawing.pictures import frame_around, number_places
+from scenes.drawing.flat.svg import svg_of
+from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG, number_places, sheet_of
 from scenes.drawing.shapes import Shape
-from scenes.drawing.svg import svg_of
 from scenes.drawing.views import Alone, Extent, View, best_view, view_alone
 from scenes.layout import Layout
 from scenes.mjcf import Scene
 
 SIDE = 260
 """Width and height of a picture [pixels]."""
-AZIMUTH_DEG, ELEVATION_DEG = 35.0, 28.0
-"""The view of an object without fingers [deg]."""
 MOST_CORNERS = 20_000
 """Largest number of points that are drawn: they take a third of a second, and a megabyte."""
 ROWS = 5
@@ -88,10 +85,7 @@ def picture(
     """
     if sum(len(shape.vertices()) for shape in shapes) > MOST_CORNERS:
         return ""
-    places = np.empty((0, 3)) if numbers is None else numbers
-    corners = frame_around(shapes, places, extent, view)
-    patches = painted(shapes, view, float(corners[1][0] - corners[0][0]))
-    return svg_of(patches, corners, SIDE, view.seen(places)[0])
+    return svg_of(sheet_of(shapes, extent, view, "picture", numbers=numbers, side=SIDE), paper=True)
 
 
 def held(body: Polyhedron, grasp: Grasp, friction: float) -> str:

@@ -54,6 +54,6 @@ def _printed(value: object) -> object:
     return "".join(c if c.isprintable() or c == "\n" else " " for c in value)
 
 
-def number(value: float | None, digits: int = 4) -> str:
+def number(value: float | None, digits: int = 3) -> str:
     """Write a number for people; a missing one becomes a dash."""
     return NOTHING if value is None else f"{value:.{digits}g}"

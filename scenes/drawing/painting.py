@@ -1,17 +1,21 @@
-"""Projects shapes to flat coloured polygons, sorted so that the farthest is drawn first.
+"""Projects shapes to flat coloured parts, sorted so that the farthest is drawn first.
 
-Lines and points become polygons too, so that one order by depth holds for everything: a finger in
-front of a line of force hides it, and glass in front of the line lets it show through.
+Lines are cut into pieces, so that one order by depth holds for everything: a finger in front of a
+line of force hides it, and glass in front of the line lets it show through. Solid bodies are
+covered by their outline first, so that nothing shines through between their sides.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array
-from scenes.drawing.palette import LOOKS, Look, colour_of, rgb
-from scenes.drawing.shapes import SIDES, Shape
+from grasp_core.arrays import Array, Indices
+from grasp_core.geometry.polygons import convex_hull
+from scenes.drawing.flat.colours import hexed, rgb
+from scenes.drawing.outlines import Surface, joined, outline
+from scenes.drawing.palette import LOOKS, Look, colour_of
+from scenes.drawing.shapes import Role, Shape
 from scenes.drawing.views import View
 
 LIGHT = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
@@ -21,87 +25,173 @@ DARKEST = 0.55
 """Brightness of a side that faces away from the light, as a share of its colour."""
 DASHES = 24
 """Number of parts, every other one drawn, in a dashed line as long as the picture is wide."""
-SEAMS = 0.5
-"""Opacity up to which polygons are drawn without smoothed borders, which would show as lines."""
-PIECES = 12
+PIECES = 8
 """Number of parts in a solid line as long as the picture is wide; each part has its own depth."""
+FEW = 100
+"""Number of polygons of a surface up to which each has its own depth; of more, those that are
+equally bright and on the same side are joined."""
+SHADES = 7
+"""Number of shades of joined surfaces and of round bars: hardly fewer than eight bits tell apart in
+clear glass."""
+WHOLE: tuple[Role, ...] = ("friction cone",)
+"""Roles whose lines are short, so that each is drawn whole."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patch:
-    """One flat polygon of a picture, with its depth and colour."""
+    """One flat part of a picture, with its depth and colour: an area, a line or a dot."""
 
-    polygon: Array
-    """Corners in the picture, (k, 2) [m]."""
+    loops: tuple[Array, ...]
+    """Borders of the area, the two ends of the line, or the middle of the dot, (k, 2) each [m]."""
     nearness: float
     """Position along the line of sight [m]; larger values are nearer to the viewer."""
-    colour: tuple[float, float, float, float]
-    """Red, green, blue and opacity, from 0 to 1."""
-    smooth: bool
-    """Whether the border of the polygon is smoothed; False where polygons share a border, because
-    smoothing would make that border visible."""
+    colour: str
+    opacity: float
+    width: float = 0.0
+    """Width of the line [m]; 0 for areas and dots."""
+    radius: float = 0.0
+    """Radius of the dot [m]; 0 for areas and lines."""
 
 
 def painted(shapes: Iterable[Shape], view: View, width: float) -> tuple[Patch, ...]:
-    """Return the polygons of a picture of a given width [m], in the order to draw them."""
+    """Return the parts of a picture of a given width [m], in the order to draw them."""
     patches = [patch for shape in shapes for patch in _patches(shape, view, width)]
     return tuple(sorted(patches, key=lambda patch: patch.nearness))
 
 
 def _patches(shape: Shape, view: View, width: float) -> Iterator[Patch]:
-    look, colour = LOOKS[shape.role], rgb(colour_of(shape))
-    if look.fill:
-        for polygon in shape.polygons:
-            yield _filled(polygon, look, colour, view)
-    solid = (*colour, look.opacity)
-    for line in shape.lines if look.line else ():
-        yield from _line(line, look, solid, view, width)
+    look = LOOKS[shape.role]
+    if look.fill and shape.polygons:
+        yield from FILLED.get(shape.role, _each)(shape, look, view)
+    lines = [*shape.lines, *_outline(shape, view)] if look.line or shape.role == "object" else []
+    for line in lines if shape.role not in WHOLE else ():
+        drawn = LOOKS["edge"] if shape.role == "object" else look
+        yield from _line(line, drawn, _line_colour(shape), view, width)
+    for line in lines if shape.role in WHOLE else ():
+        flat, near = view.seen(line)
+        yield Patch((flat,), float(near.mean()), colour_of(shape), look.opacity,
+                    width=0.01 * look.line * width)  # fmt: skip
     for point in () if shape.points is None else shape.points:
-        (place,), (near,) = view.seen(point[None])
-        angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
-        around = 0.005 * look.dot * width * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        place, (near,) = view.seen(point[None])
         # A dot is drawn in front of what it marks.
-        yield Patch(place + around, float(near) + 0.02 * width, solid, smooth=True)
+        yield Patch((place,), float(near) + 0.02 * width, colour_of(shape), look.opacity,
+                    radius=0.005 * look.dot * width)  # fmt: skip
 
 
-def _filled(polygon: Array, look: Look, colour: tuple[float, float, float], view: View) -> Patch:
-    flat, near = view.seen(polygon)
-    shade = _brightness(polygon, view) if look.shaded else 1.0
-    red, green, blue = (shade * part for part in colour)
-    return Patch(flat, float(near.mean()), (red, green, blue, look.fill), smooth=look.fill > SEAMS)
+def _line_colour(shape: Shape) -> str:
+    return colour_of(Shape("edge") if shape.role == "object" else shape)
 
 
-def _brightness(polygon: Array, view: View) -> float:
-    """Compute the brightness of a flat side from its angle to the light, `DARKEST` to 1."""
+def _outline(shape: Shape, view: View) -> Sequence[Array]:
+    if shape.role != "object" or not shape.polygons:
+        return ()
+    return tuple(outline(Surface.of(shape.polygons), view.camera))
+
+
+def _each(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
+    """Draw each polygon by itself."""
+    colour = colour_of(shape)
+    for polygon in shape.polygons:
+        flat, near = view.seen(polygon)
+        shade = float(_brightness(_normal(polygon)[None], view)[0]) if look.shaded else 1.0
+        yield Patch((flat,), float(near.mean()), _shaded(colour, shade), look.fill)
+
+
+def _glass(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
+    """Draw a clear surface; of many polygons, those that look alike are joined."""
+    if len(shape.polygons) <= FEW:
+        yield from _each(shape, look, view)
+        return
+    surface = Surface.of(shape.polygons)
+    front = surface.facing(view.camera)
+    bright = _brightness(surface.normals, view)
+    levels = _levels(bright)
+    nearness = view.seen(surface.corners)[1]
+    for side in (False, True):
+        near = nearness[(front == side)[surface.owners]]
+        depth = float(near.mean()) if len(near) else 0.0
+        for level in np.unique(levels[front == side]).tolist():
+            loops = joined(surface, (front == side) & (levels == level))
+            yield Patch(tuple(view.seen(loop)[0] for loop in loops), depth,
+                        _shaded(colour_of(shape), _shade(level)), look.fill)  # fmt: skip
+
+
+def _solid(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
+    """Draw a convex body: its outline, and on it the sides that face the viewer."""
+    corners = shape.vertices()
+    middle = corners.mean(axis=0)
+    flat, near = view.seen(corners)
+    depth, colour = float(near.mean()), colour_of(shape)
+    sides = list[tuple[Array, int]]()
+    for polygon in shape.polygons:
+        normal = _normal(polygon)
+        normal = normal if normal @ (polygon.mean(axis=0) - middle) > 0.0 else -normal
+        if normal @ (view.camera - polygon[0]) > 0.0:
+            sides.append((polygon, int(_levels(_brightness(normal[None], view))[0])))
+    mean = round(float(np.mean([level for _, level in sides] or [SHADES - 1])))
+    yield Patch((convex_hull(flat),), depth, _shaded(colour, _shade(mean)), look.fill)
+    for level in sorted({level for _, level in sides} - {mean}):
+        alike = tuple(view.seen(polygon)[0] for polygon, other in sides if other == level)
+        yield Patch(alike, depth, _shaded(colour, _shade(level)), look.fill)
+
+
+def _cone(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
+    """Draw a clear cone as its outline and its open end."""
+    rim = np.array([polygon[1] for polygon in shape.polygons])
+    flat, near = view.seen(shape.vertices())
+    for part in (convex_hull(flat), view.seen(rim)[0]):
+        yield Patch((part,), float(near.mean()), colour_of(shape), look.fill)
+
+
+FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Patch]]] = {
+    "object": _glass, "finger": _solid, "force cone": _cone,
+}  # fmt: skip
+"""How the polygons of some roles are drawn; those of the others are drawn one by one."""
+
+
+def _normal(polygon: Array) -> Array:
+    """Return the unit normal of a flat polygon; zero if its first corners are in line."""
     one, two = (polygon[1] - polygon[0]).tolist(), (polygon[2] - polygon[1]).tolist()
     # written out, because NumPy's function takes twenty times as long for one pair
-    normal = view.axes @ np.array([
+    normal = np.array([
         one[1] * two[2] - one[2] * two[1],
         one[2] * two[0] - one[0] * two[2],
         one[0] * two[1] - one[1] * two[0],
     ])  # fmt: skip
-    length = float(np.linalg.norm(normal))
-    if length == 0.0:
-        return 1.0
-    facing = float(normal @ LIGHT) / length
-    facing = facing if normal[2] > 0.0 else -facing
-    return DARKEST + (1.0 - DARKEST) * max(facing, 0.0)
+    return normal / max(float(np.linalg.norm(normal)), np.finfo(np.float64).tiny)
 
 
-def _line(
-    line: Array, look: Look, colour: tuple[float, float, float, float], view: View, width: float
-) -> Iterator[Patch]:
+def _brightness(normals: Array, view: View) -> Array:
+    """Compute the brightness of flat sides from their angle to the light, `DARKEST` to 1, (k,)."""
+    seen = normals @ view.axes.T
+    facing = np.where(seen[:, 2] > 0.0, 1.0, -1.0) * (seen @ LIGHT)
+    bright = DARKEST + (1.0 - DARKEST) * np.maximum(facing, 0.0)
+    return np.where(seen.any(axis=1), bright, 1.0)
+
+
+def _levels(bright: Array) -> Indices:
+    """Round brightnesses to shades, from 0 to SHADES - 1, of any shape."""
+    return np.rint((bright - DARKEST) / (1.0 - DARKEST) * (SHADES - 1)).astype(np.int64)
+
+
+def _shade(level: int) -> float:
+    return DARKEST + (1.0 - DARKEST) * level / (SHADES - 1)
+
+
+def _shaded(colour: str, shade: float) -> str:
+    return colour if shade >= 1.0 else hexed(tuple(shade * part for part in rgb(colour)))
+
+
+def _line(line: Array, look: Look, colour: str, view: View, width: float) -> Iterator[Patch]:
     flat, near = view.seen(line)
-    half = 0.005 * look.line * width
+    thick = 0.01 * look.line * width
     for start, end, first, last in zip(flat, flat[1:], near, near[1:], strict=False):
         length = float(np.linalg.norm(end - start))
         if length > 0.0:
-            across = half * np.array([start[1] - end[1], end[0] - start[0]]) / length
             for low, high in _spans(length / width, look):
-                a, b = start + low * (end - start), start + high * (end - start)
-                depth = float(first + 0.5 * (low + high) * (last - first)) + half
-                yield Patch(np.array([a - across, b - across, b + across, a + across]), depth,
-                            colour, smooth=True)  # fmt: skip
+                ends = np.array([start + low * (end - start), start + high * (end - start)])
+                depth = float(first + 0.5 * (low + high) * (last - first)) + 0.5 * thick
+                yield Patch((ends,), depth, colour, look.opacity, width=thick)
 
 
 def _spans(length: float, look: Look) -> Sequence[tuple[float, float]]:

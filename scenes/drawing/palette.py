@@ -1,16 +1,9 @@
-"""Sets the colours of drawings, after Okabe and Ito, which colour-blind people can tell apart.
-
-Source: Okabe & Ito, "Color Universal Design", 2008.
-"""
+"""Sets how shapes of each role, such as force cones, look."""
 
 from dataclasses import dataclass
 
+from scenes.drawing.flat.colours import FINGERS, FOCUS, GLASS, INK, SURFACE
 from scenes.drawing.shapes import Role, Shape
-
-FINGERS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7")
-"""Colour of each finger, which its cones, region, line of force and curves share."""
-INK, GLASS, FOCUS, SURFACE = "#30363d", "#8296ab", "#D55E00", "#0072B2"
-GOOD, BAD, NEUTRAL = "#0072B2", "#D55E00", "#767c85"
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +26,7 @@ class Look:
 LOOKS: dict[Role, Look] = {
     "object": Look(fill=0.13, shaded=True),
     "edge": Look(line=0.18, opacity=0.75),
-    "finger": Look(fill=0.95, shaded=True),
+    "finger": Look(fill=1.0, shaded=True),
     "friction cone": Look(line=0.16, opacity=0.9),
     "force cone": Look(fill=0.28),
     "region": Look(fill=0.6),
@@ -52,9 +45,3 @@ OF_ROLES: dict[Role, str] = {
 def colour_of(shape: Shape) -> str:
     """Return the colour of a shape, written as #rrggbb."""
     return OF_ROLES.get(shape.role, INK) if shape.finger is None else FINGERS[shape.finger]
-
-
-def rgb(colour: str) -> tuple[float, float, float]:
-    """Convert a colour written as #rrggbb to red, green and blue from 0 to 1."""
-    red, green, blue = (int(colour[at : at + 2], 16) / 255.0 for at in (1, 3, 5))
-    return red, green, blue

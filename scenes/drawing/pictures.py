@@ -1,6 +1,7 @@
-"""Draws a grasp in the style of the paper, as a matplotlib figure or a file."""
+"""Draws a grasp in the style of the paper, or an object alone."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -11,32 +12,33 @@ from grasp_core.checked import coefficient, instance, path_of, switch
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
-from scenes.drawing.canvas import (
-    Around,
-    add_polygons,
-    figure_with_panels,
-    format_of,
-    in_style,
-    legend_line,
-    legend_patch,
-    write_figure,
-)
-from scenes.drawing.drawings import BAR_LENGTH, drawing_of
-from scenes.drawing.painting import painted
-from scenes.drawing.palette import FINGERS, INK, LOOKS, NEUTRAL, colour_of
+from scenes.drawing.canvas import figure_of, format_of, write_sheet
+from scenes.drawing.drawings import BAR_LENGTH, drawing_of, finger_size, glass
+from scenes.drawing.flat.colours import FINGERS, NEUTRAL
+from scenes.drawing.flat.panels import ROW, Entry, keyed, thinned
+from scenes.drawing.flat.sheets import Area, Dots, Line, Mark, Sheet, numbered
+from scenes.drawing.painting import Patch, painted
+from scenes.drawing.palette import LOOKS, colour_of
 from scenes.drawing.shapes import Role, Shape, extent_of
 from scenes.drawing.views import Extent, View, best_view
 
-SIDE_IN = 5.0
-"""Width of a picture, and its height without the legend [inches]."""
-LEGEND_IN = 0.5
-"""Height of the legend [inches]."""
+SIDE = 500
+"""Width of a picture, and its height without the key [pixels]."""
+NUMBER, NUMBER_SHARE = 8.0, 0.028
+"""Radius of the circle around a finger's number: at least so many pixels, and such a share of the
+picture's width."""
+POLYGON = 3
+"""Least number of corners of an area."""
+MANY = 60
+"""Number of corners of an area above which those that are not seen are left out."""
+AZIMUTH_DEG, ELEVATION_DEG = 35.0, 28.0
+"""The view of an object without fingers [deg]."""
 MARGIN = 0.04
 """Width of the empty margin, as a share of the picture's width."""
 FARTHEST = 2.0
 """Distance from the object's centre beyond which points may be cut off, in object radii."""
 NUMBER_BEYOND = 0.12
-"""Distance of a finger's number from the end of its bar, in object radii."""
+"""Distance of a finger's number from the end of its bar, in finger sizes."""
 EXPLAINED: tuple[Role, ...] = (
     "finger", "friction cone", "force cone", "region", "line of force", "focus", "plane",
     "ruled surface",
@@ -66,11 +68,20 @@ def write_picture(
     """
     path = path_of(path, "path")
     format_of(path)
-    figure = grasp_figure(body, grasp, friction, view=view)
-    return write_figure(figure, path)
+    return write_sheet(grasp_sheet(body, grasp, friction, view=view, legend=True), path)
 
 
-@in_style
+def write_object_picture(body: Polyhedron, path: Path) -> Path:
+    """Draw an object without fingers, and write the picture to a file.
+
+    Raises:
+        InputError: The ending of the file's name is unknown.
+    """
+    format_of(path)
+    view = View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, body)
+    return write_sheet(sheet_of(glass(body), body, view, body.name, side=SIDE), path)
+
+
 def grasp_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
     legend: bool = True,
@@ -80,16 +91,95 @@ def grasp_figure(
     Raises:
         InputError: The grasp does not lie on the body, or the friction is out of range.
     """
+    return figure_of(grasp_sheet(body, grasp, friction, view=view, legend=legend))
+
+
+def grasp_sheet(
+    body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
+    legend: bool = False, steady: bool = False,
+) -> Sheet:  # fmt: skip
+    """Draw a grasp in the style of the paper.
+
+    Args:
+        body: The object.
+        grasp: A grasp on the faces of `body`.
+        friction: Coulomb coefficient of the friction cones.
+        view: The view to draw from; None chooses the best one.
+        legend: Whether a key stands below the picture.
+        steady: Whether to choose a scale that suits every view, as clips that turn need.
+
+    Raises:
+        InputError: The grasp does not lie on the body, or the friction is out of range.
+    """
     check_drawn(body, grasp, friction, view)
     switch(legend, "legend")
-    figure, axes = empty_picture(legend=legend)
-    shapes = draw_grasp(axes, body, grasp, friction, view or best_view(body, grasp))
-    if legend:
-        figure.legend(
-            handles=_legend(shapes), loc="lower center", ncols=4, handlelength=1.4,
-            columnspacing=1.2,
-        )  # fmt: skip
-    return figure
+    shapes = drawing_of(body, grasp, friction)
+    view = view or best_view(body, grasp)
+    sheet = sheet_of(
+        shapes, body, view, f"Grasp {grasp.id} of {body.name}",
+        numbers=number_places(body, grasp), side=SIDE, steady=steady,
+    )  # fmt: skip
+    if not legend:
+        return sheet
+    marks, rows = keyed(_entries(shapes), 20.0, SIDE, SIDE - 30.0)
+    return Sheet(SIDE, SIDE + ROW * (rows + 0.5), sheet.name, (*sheet.marks, *marks))
+
+
+def sheet_of(  # noqa: PLR0913 - what a drawing consists of
+    shapes: Sequence[Shape], extent: Extent, view: View, name: str, *,
+    numbers: Array | None = None, side: int, steady: bool = False,
+) -> Sheet:  # fmt: skip
+    """Draw shapes on a square sheet.
+
+    Args:
+        shapes: What is drawn.
+        extent: Place and size of the object.
+        view: The view to draw from.
+        name: What the picture shows.
+        numbers: Where the number of each finger is written, (k, 3) [m]; None for no fingers.
+        side: Width and height of the sheet [pixels].
+        steady: Whether to choose a scale that suits every view.
+    """
+    places = np.empty((0, 3)) if numbers is None else numbers
+    low, high = frame_around(shapes, places, extent, None if steady else view)
+    scale = side / float(high[0] - low[0])
+    patches = painted(shapes, view, float(high[0] - low[0]))
+
+    def place(points: Array) -> Array:
+        return np.array([0.0, side]) + np.array([scale, -scale]) * (points - low)
+
+    radius = max(NUMBER, NUMBER_SHARE * side)
+    labels = [
+        mark
+        for finger, middle in enumerate(place(view.seen(places)[0]))
+        for mark in numbered(middle, radius, str(finger), FINGERS[finger])
+    ]
+    moved = [_moved(patch, place, scale) for patch in patches]
+    return Sheet(side, side, name, (*_together(moved), *labels))
+
+
+def _moved(patch: Patch, place: Callable[[Array], Array], scale: float) -> Mark:
+    loops = tuple(place(loop) for loop in patch.loops)
+    if patch.radius:
+        return Dots(loops[0], patch.colour, scale * patch.radius, patch.opacity)
+    if patch.width:
+        return Line(loops, patch.colour, round(scale * patch.width, 3), patch.opacity)
+    if sum(map(len, loops)) > MANY:
+        loops = tuple(thinned(np.vstack([loop, loop[:1]]))[:-1] for loop in loops)
+    return Area(tuple(loop for loop in loops if len(loop) >= POLYGON), patch.colour, patch.opacity)
+
+
+def _together(marks: Iterable[Mark]) -> Iterable[Mark]:
+    """Join lines that follow one another and look alike."""
+    for look, alike in groupby(
+        marks, key=lambda mark: (mark.colour, mark.width, mark.opacity)
+        if isinstance(mark, Line) else None
+    ):  # fmt: skip
+        if look is None:
+            yield from alike
+        else:
+            lines = tuple(line for mark in alike if isinstance(mark, Line) for line in mark.lines)
+            yield Line(lines, *look)
 
 
 def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | None) -> None:
@@ -105,56 +195,10 @@ def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | No
         instance(view, View, "view", "View.of_angles makes one")
 
 
-def empty_picture(*, legend: bool = False) -> tuple[Any, Any]:
-    """Make a figure for a grasp, perhaps with a legend, and return it with its axes."""
-    height = SIDE_IN + (LEGEND_IN if legend else 0.0)
-    below = LEGEND_IN / (SIDE_IN + LEGEND_IN) if legend else 0.0
-    around = Around(0.0, 0.0, below, 0.0)
-    figure, (axes,) = figure_with_panels(SIDE_IN, height, 1, around=around)
-    return figure, axes
-
-
-def draw_grasp(
-    axes: Any, body: Polyhedron, grasp: Grasp, friction: float, view: View, *, steady: bool = False
-) -> tuple[Shape, ...]:  # fmt: skip
-    """Draw a grasp into square axes.
-
-    Args:
-        axes: Axes of a matplotlib figure.
-        body: The object.
-        grasp: A grasp on the faces of `body`.
-        friction: Coulomb coefficient of the friction cones.
-        view: The view to draw from.
-        steady: Whether to choose a scale that suits every view, as clips that turn need.
-
-    Returns:
-        The shapes that were drawn.
-    """
-    shapes = drawing_of(body, grasp, friction)
-    numbers = number_places(body, grasp)
-    low, high = frame_around(shapes, numbers, body, None if steady else view)
-    patches = painted(shapes, view, float(high[0] - low[0]))
-    add_polygons(
-        axes,
-        [patch.polygon for patch in patches],
-        [patch.colour for patch in patches],
-        [patch.smooth for patch in patches],
-    )
-    for finger, (x, y) in enumerate(view.seen(numbers)[0]):
-        axes.text(x, y, str(finger), ha="center", va="center", weight="bold", color=INK,
-                  bbox={"boxstyle": "circle,pad=0.18", "fc": "white", "ec": FINGERS[finger]},
-                  zorder=10)  # fmt: skip
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_aspect("equal")
-    axes.set_axis_off()
-    return shapes
-
-
 def number_places(body: Extent, grasp: Grasp) -> Array:
     """Return where the fingers' numbers are written, behind their bars, (4, 3) [m]."""
     ways = grasp.normals if grasp.approach_directions is None else grasp.approach_directions
-    return grasp.positions - (BAR_LENGTH + NUMBER_BEYOND) * body.radius * ways
+    return grasp.positions - (BAR_LENGTH + NUMBER_BEYOND) * finger_size(body) * ways
 
 
 def frame_around(
@@ -177,19 +221,21 @@ def frame_around(
     return middle - half, middle + half
 
 
-def _legend(shapes: Sequence[Shape]) -> list[Any]:
-    """Make a legend entry for each role that occurs among the shapes."""
+def _entries(shapes: Sequence[Shape]) -> list[Entry]:
+    """Make an entry of the key for each role that occurs among the shapes."""
     found = {shape.role: shape for shape in reversed(shapes)}
-    handles = list[Any]()
+    entries = list[Entry]()
     for role in EXPLAINED:
         if role not in found:
             continue
         look, shape = LOOKS[role], found[role]
         colour = NEUTRAL if shape.finger is not None else colour_of(shape)
         if look.dot:
-            handles.append(legend_line(colour, role, style="", marker="o"))
+            entries.append(Entry(role, colour, "disc"))
+        elif look.fill == 1.0:
+            entries.append(Entry(role, colour, "square"))
         elif look.fill:
-            handles.append(legend_patch(colour, role, max(look.fill, 0.3)))
+            entries.append(Entry(role, colour, "area"))
         else:
-            handles.append(legend_line(colour, role, style="--" if look.dashed else "-"))
-    return handles
+            entries.append(Entry(role, colour, "dashes" if look.dashed else "line"))
+    return entries

@@ -4,9 +4,9 @@ from pathlib import Path
 
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
-from scenes.drawing.canvas import in_style, write_frames
+from scenes.drawing.canvas import draw_sheet, new_figure, write_frames
 from scenes.drawing.clips import require_clip
-from scenes.drawing.pictures import draw_grasp, empty_picture
+from scenes.drawing.pictures import SIDE, grasp_sheet
 from scenes.drawing.views import View
 
 FRAMES, RATE = 48, 12.0
@@ -14,7 +14,6 @@ FRAMES, RATE = 48, 12.0
 ELEVATION_DEG = 25.0
 
 
-@in_style
 def write_turning_clip(body: Polyhedron, grasp: Grasp, path: Path, friction: float) -> Path:
     """Draw a grasp from all sides and write the pictures as a clip that turns around once.
 
@@ -28,11 +27,11 @@ def write_turning_clip(body: Polyhedron, grasp: Grasp, path: Path, friction: flo
         InputError: The file's name does not end in gif or webp.
     """
     require_clip(path)
-    figure, axes = empty_picture()
+    figure = new_figure(SIDE, SIDE)
     views = [View.of_angles(360.0 * frame / FRAMES, ELEVATION_DEG, body) for frame in range(FRAMES)]
 
     def draw(frame: int) -> None:
-        axes.clear()
-        draw_grasp(axes, body, grasp, friction, views[frame], steady=True)
+        sheet = grasp_sheet(body, grasp, friction, view=views[frame], steady=True)
+        draw_sheet(figure, sheet)
 
     return write_frames(figure, draw, FRAMES, RATE, path)

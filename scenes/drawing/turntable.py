@@ -20,7 +20,7 @@ from grasp_core.files.whole_files import write_parts
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from scenes.drawing.drawings import drawing_of, glass
-from scenes.drawing.pages import filled, text_of
+from scenes.drawing.pages import filled, number, text_of
 from scenes.drawing.palette import LOOKS, colour_of
 from scenes.drawing.pictures import check_drawn, number_places
 from scenes.drawing.shapes import Shape
@@ -28,7 +28,8 @@ from scenes.drawing.views import best_view
 
 UNITS = 1000.0
 """Number of units of length in one object radius."""
-WIDTH, HEIGHT = 560, 800
+MILLI = 1e3
+WIDTH, HEIGHT = 900, 640
 """Size of the page in a notebook [pixels]."""
 
 
@@ -101,11 +102,34 @@ def turntable_page(body: Polyhedron, grasp: Grasp, friction: float) -> str:
         object=body.name,
         family=grasp.family,
         friction=friction,
+        facts=_facts(body, grasp),
         style=text_of("style.css"),
         script=text_of("turntable.js"),
         object_drawing=as_text(object_data(body)),
         drawing=as_text(grasp_data(body, grasp, friction)),
     )
+
+
+def _facts(body: Polyhedron, grasp: Grasp) -> list[tuple[str, str, str]]:
+    """List the figures of a grasp, each with its meaning."""
+    kind = "faces" if body.patches is None else "patches"
+    disc = f"{number(MILLI * grasp.radius)} mm" if grasp.radius else "none"
+    return [
+        (kind, ", ".join(map(str, grasp.faces)), "that the fingers stand on, by finger"),
+        ("smallest disc", disc, "within it a finger may stand anywhere"),
+        (
+            "critical friction", number(grasp.critical_friction),
+            "least coefficient with which the contacts hold the object",
+        ),
+        (
+            "margin of closure", number(grasp.closure_margin),
+            "how far inside their cones balanced forces can be",
+        ),
+        (
+            "quality", f"{number(grasp.ferrari_canny[0])} N",
+            "largest wrench resisted in every direction, for forces of sum 1 N",
+        ),
+    ]  # fmt: skip
 
 
 def as_text(data: object) -> str:

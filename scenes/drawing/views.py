@@ -79,6 +79,11 @@ class View:
         axes = _axes(math.radians(azimuth_deg), math.radians(elevation_deg))
         return cls(axes, body.center_of_mass, DISTANCE * body.radius)
 
+    @property
+    def camera(self) -> Array:
+        """The place of the camera, (3,) [m]."""
+        return self.center + self.distance * self.axes[2]
+
     def seen(self, points: Array) -> tuple[Array, Array]:
         """Project points (n, 3) to the picture, (n, 2) [m], with their nearness, (n,) [m]."""
         turned = (points - self.center) @ self.axes.T

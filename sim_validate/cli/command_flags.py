@@ -11,7 +11,7 @@ from grasp_core.checked import MOST_COUNT
 from sim_validate.cli.baseline_flags import Baseline
 from sim_validate.cli.dataset_flags import Dataset
 from sim_validate.cli.execution_flags import UPRIGHT, Execute, Executing, Mass, Tips, Trials
-from sim_validate.cli.flag_bounds import at_least
+from sim_validate.cli.flag_bounds import at_least, ends_in
 from sim_validate.cli.flag_groups import (
     Count,
     Direction,
@@ -27,7 +27,7 @@ from sim_validate.cli.flag_groups import (
     Usual,
     Wrench,
 )
-from sim_validate.cli.showing_flags import Report, View
+from sim_validate.cli.showing_flags import PICTURES, Report, View
 from sim_validate.cli.transfer_flags import Transfer
 from sim_validate.parallel.processes import available_cores
 
@@ -230,6 +230,8 @@ class Inspect:
 
     object: Positional[str]
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
+    picture: Annotated[Path, ends_in(*PICTURES)] | None = None
+    """Write the object as a picture (png, svg, pdf, webp, jpg)."""
     mesh: OmitArgPrefixes[Mesh] = field(default_factory=Mesh)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 

@@ -43,7 +43,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "transfer plan/grasps.json part-v2.stl --unit mm --out carried",
         "transfer plan/grasps.json part-v2.stl --unit mm --distance-m 0.005 --angle-deg 2",
     ),
-    "inspect": ("inspect part.stl --unit mm",),
+    "inspect": ("inspect part.stl --unit mm", "inspect part.stl --unit mm --picture part.png"),
     "objects": ("objects",),
     "doctor": ("doctor",),
     "view": (

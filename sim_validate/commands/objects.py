@@ -3,20 +3,23 @@
 import math
 from collections.abc import Iterator
 from dataclasses import asdict
+from typing import Any
+
+import numpy as np
 
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
 from grasp_core.short_text import vector
+from scenes.drawing.pictures import write_object_picture
 from scenes.example_objects import example_names
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.objects import load_object
 
-WIDTH = 20
-"""Width of the column with the names of facts, in characters."""
+MM, CM3 = 1e3, 1e6
 
 
 def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
@@ -25,7 +28,7 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
     spanning = (
         count_spanning(body.normals, LEAST_SPAN_ANGLE) if len(body.faces) <= MAX_FACES else None
     )
-    facts = {
+    facts: dict[str, Any] = {
         "name": body.name,
         "vertices": len(body.vertices),
         "triangles": len(body.triangles),
@@ -42,38 +45,56 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
         "content_sha256": body.content_sha256,
         "notes": list(body.notes),
     }
+    if command.picture is not None:
+        facts["picture"] = str(write_object_picture(body, command.picture))
     reporter.document(facts)
     reporter.say(body.name)
-    for what, said in _in_words(body, spanning):
-        reporter.say(f"  {what:{WIDTH}} {said}")
+    for sentence in _sentences(body, spanning):
+        reporter.say(f"  {sentence}")
+    if command.picture is not None:
+        reporter.say(f"wrote {command.picture}")
+    else:
+        reporter.say("  `--picture FILE.png` draws it.")
     return Exit.GOOD
 
 
-def _in_words(body: Polyhedron, spanning: int | None) -> Iterator[tuple[str, str]]:
-    """Yield the name and value of each fact about a mesh, in words for people."""
-    yield "mesh", f"{len(body.vertices)} vertices, {len(body.triangles)} triangles"
+def _sentences(body: Polyhedron, spanning: int | None) -> Iterator[str]:
+    """Yield the facts about a mesh in sentences."""
+    yield f"The mesh has {len(body.vertices)} vertices and {len(body.triangles)} triangles."
+    yield _on_faces(body)
+    yield (
+        f"It encloses a volume of {CM3 * body.volume:.4g} cm^3, and reaches "
+        f"{MM * body.radius:.4g} mm from its centre of mass, which is at "
+        f"{vector(np.round(MM * body.center_of_mass, 3))} mm."
+    )
+    if spanning is not None:
+        least = "so the constructions of the paper have faces to start from" if spanning else (
+            "so grasps need friction or leaning force cones"
+        )  # fmt: skip
+        yield (
+            f"The normals of {spanning} sets of four faces positively span all directions, {least}."
+        )
+    yield from (f"Note: {note}." for note in body.notes)
+    yield f"The sha256 of its content is {body.content_sha256}."
+
+
+def _on_faces(body: Polyhedron) -> str:
+    """Say in a sentence what the faces of a mesh are."""
     if body.patches is None:
         holed = sum(bool(face.holes) for face in body.faces)
         dented = sum(len(face.pieces) > 1 for face in body.faces)
-        yield "faces", f"{len(body.faces)} planar, {dented} not convex, {holed} with holes"
-    else:
-        spread = math.degrees(max((face.spread for face in body.faces), default=0.0))
-        depth = max((face.depth for face in body.faces), default=0.0)
-        asked = body.patches
-        yield "faces", f"{len(body.faces)} nearly flat patches of a curved surface"
-        yield "their spread", f"{spread:.4g} deg at most, {asked.spread_deg:.4g} deg allowed"
-        yield (
-            "their depth",
-            (f"{depth:.4g} m at most, {asked.depth:.4g} of the object's largest extent allowed"),
+        return (
+            f"Its {len(body.faces)} faces are planar; {dented} of them are not convex, and {holed} "
+            "have holes."
         )
-    yield "volume", f"{body.volume:.6g} m^3"
-    yield "centre of mass", f"{vector(body.center_of_mass)} m"
-    yield "radius about it", f"{body.radius:.6g} m"
-    if spanning is not None:
-        yield "spanning quadruples", f"{spanning} sets of four faces whose normals positively span"
-    yield "sha256 of content", body.content_sha256
-    for note in body.notes:
-        yield "note", note
+    spread = math.degrees(max((face.spread for face in body.faces), default=0.0))
+    depth = max((face.depth for face in body.faces), default=0.0)
+    asked = body.patches
+    return (
+        f"Its surface is curved: fingers may stand on {len(body.faces)} nearly flat patches, which "
+        f"turn by {spread:.2g} deg at most ({asked.spread_deg:.4g} deg allowed) and are "
+        f"{MM * depth:.2g} mm deep at most ({asked.depth:.4g} of its extent allowed)."
+    )
 
 
 def list_objects(_: command_flags.Objects, reporter: Reporter) -> int:

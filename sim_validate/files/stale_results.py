@@ -12,8 +12,10 @@ from pathlib import Path
 from grasp_core.errors import InputError
 
 REPORT, INDEX, GRASPS = "report", "index.html", "grasps"
-STATIC = ("style.css", "gallery.js", "turntable.js")
-FIDELITY, SURVIVAL = "fidelity.svg", "survival.svg"
+STYLE = "style.css"
+STATIC = (STYLE, "gallery.js", "tables.js", "turntable.js")
+CHARTS_OF_INDEX = ("fidelity.svg", "survival.svg")
+"""Files that reports of earlier versions have; the charts now stand in the pages."""
 OF_GRASPS = ("transfer.json", "grasps.json")
 PICTURES, CHARTS, CLIPS = "pictures", "charts", "clips"
 MARK = ".graspproof-report"
@@ -83,9 +85,10 @@ def remove_pages(folder: Path) -> None:
     """Remove the pages of a report, the first page first; its mark stays."""
     _remove(
         chain(
-            (folder / name for name in (INDEX, FIDELITY, SURVIVAL, *STATIC)),
+            (folder / name for name in (INDEX, *CHARTS_OF_INDEX, *STATIC)),
             folder.glob("object-*.js"),
             folder.glob(f"{GRASPS}/*.html"),
+            folder.glob(f"{PICTURES}/*.svg"),
             *(folder.glob(f"{kind}/*.webp") for kind in (PICTURES, CHARTS, CLIPS)),
         )
     )

@@ -21,6 +21,7 @@ from grasp_core.compiled import wait_for
 from grasp_core.kept_loops import is_kept
 from grasp_core.planning.planner import plan
 from grasp_core.quality.ferrari_canny import ferrari_canny
+from grasp_core.quality.wrench_limits import many_limits
 from grasp_core.solvers.nearest_point import least_distance
 from scenes.example_objects import example_object
 
@@ -32,6 +33,13 @@ FRICTION = 0.5
 def _closure(points: Array, normals: Array) -> None:
     force_closure(points, normals, FRICTION)
     critical_friction(points, normals)
+
+
+def _limits(points: Array, normals: Array) -> None:
+    inside = force_closure(points, normals, FRICTION).forces
+    if inside is not None:
+        many_limits(points, normals, FRICTION, np.eye(6), inside, max_normal_force=1.0,
+                    center=np.zeros(3))  # fmt: skip
 
 
 def _last_family(_points: Array, _normals: Array) -> None:
@@ -47,9 +55,10 @@ BESIDE: Mapping[str, Callable[[Array, Array], object]] = {
         lambda points, normals: ferrari_canny(points, normals, FRICTION, torque_scale=1.0)
     ),
     "grasp_core.families.regulus_kernel": _last_family,
+    "grasp_core.quality.wrench_limits_kernel": _limits,
 }
-"""For each kernel to compile beside a plan, in the order in which the plan needs them, a call that
-compiles it."""
+"""For each kernel to compile beside a plan, in the order in which the plan and the pages after it
+need them, a call that compiles it."""
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Draws one grasp: writes the pictures and charts of its page; any process can do the work.
+"""Draws one grasp: its picture and the charts of its page; any process can do the work.
 
 Charts of motion need a trial. The first trial that was not held, or else the weakest wrench, is
 simulated again. This gives bit for bit the motion that was judged, unless the trial was stopped
@@ -8,31 +8,31 @@ early. Clips of an executed grasp show its lift, its worst shake, and a trial in
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
+from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import ContactRegion, Grasp, four
-from scenes.drawing.canvas import own_style_and_sheets, write_figure
 from scenes.drawing.clips import GraphicsError, magnified, write_clip
-from scenes.drawing.pictures import grasp_figure
+from scenes.drawing.flat.svg import svg_of
+from scenes.drawing.pictures import grasp_sheet
 from scenes.drawing.views import best_view
 from scenes.fingertips import FingerSettings
 from sim_validate.execution.filming import film, worth_seeing
 from sim_validate.execution.jobs import ExecutionJob
-from sim_validate.files.stale_results import CHARTS, CLIPS, PICTURES
+from sim_validate.files.stale_results import CLIPS, PICTURES
 from sim_validate.records.executions_json import EXECUTIONS, Executions
 from sim_validate.replaying.from_verdicts import of_verdict
 from sim_validate.replaying.recorded import Wanted
 from sim_validate.replaying.replay import Replayed, replayed
 from sim_validate.reports.agreement import Record
-from sim_validate.reports.margin_charts import margin_figure
-from sim_validate.reports.motion_charts import motion_figure
+from sim_validate.reports.margin_charts import margin_panels
+from sim_validate.reports.motion_charts import motion_panels
 from sim_validate.reports.run_folder import RunFolder
-from sim_validate.reports.wrench_charts import wrench_figure
+from sim_validate.reports.wrench_charts import wrench_panels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,15 +74,15 @@ class FilmedTrial:
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """Paths of a grasp's pictures and charts, relative to the report's folder."""
+    """A grasp's charts as SVG text, and paths of its pictures relative to the report's folder."""
 
     picture: str
-    wrenches: str | None
-    """Path of the chart of wrenches; None if the contacts are not in force closure at this
+    wrenches: tuple[str, ...] = ()
+    """Panels of the chart of wrenches; none if the contacts are not in force closure at this
     friction."""
-    margins: str | None
-    motion: str | None = None
-    """Path of the chart of motion; None if no trial was simulated."""
+    margins: tuple[str, ...] = ()
+    motion: tuple[str, ...] = ()
+    """Panels of the chart of motion; none if no trial was simulated."""
     clip: str | None = None
     trial: str = ""
     """Name of the wrench in the trial that is shown."""
@@ -139,25 +139,17 @@ def draw(task: Task) -> Drawn:
         InputError: The verdict is about other contacts than those of the grasp, or the execution
             has a trial or settings that do not fit the grasp.
     """
-    with own_style_and_sheets():
-        return _drawn(task)
-
-
-def _drawn(task: Task) -> Drawn:
     body, grasp = task.saved.body, task.grasp
     view = best_view(body, grasp)
-    picture = _written(
-        task, PICTURES, "", grasp_figure(body, grasp, task.friction, view=view, legend=False)
-    )
-    drawn = Drawn(picture, None, None)
+    path = task.folder / PICTURES / f"{task.name}.svg"
+    write_text(path, svg_of(grasp_sheet(body, grasp, task.friction, view=view), alone=True))
+    drawn = Drawn(f"{PICTURES}/{path.name}")
     if force_closure(grasp, friction=task.friction).closed:
         largest = largest_push(task.verdict)
-        wrenches = wrench_figure(body, grasp, task.friction, view=view)
-        margins = margin_figure(body, grasp, task.friction, max_normal_force_n=largest)
+        wrenches = wrench_panels(body, grasp, task.friction, view=view)
+        margins = margin_panels(body, grasp, task.friction, max_normal_force_n=largest)
         drawn = replace(
-            drawn,
-            wrenches=_written(task, CHARTS, "-wrenches", wrenches),
-            margins=_written(task, CHARTS, "-margins", margins),
+            drawn, wrenches=tuple(map(svg_of, wrenches)), margins=tuple(map(svg_of, margins))
         )
     if task.verdict is not None:
         drawn = _with_motion(task, task.verdict, drawn)
@@ -168,10 +160,10 @@ def _with_motion(task: Task, verdict: Record, drawn: Drawn) -> Drawn:
     recorded = of_verdict(task.source, task.saved, verdict, Wanted(task.saved.grasps[0].id))
     found = replayed(recorded)
     size = found.scene.layout.grasp_size_m
-    figure = motion_figure(found, recorded.setup.hold.hold_threshold * size)
+    panels = motion_panels(found, recorded.setup.hold.hold_threshold * size)
     drawn = replace(
         drawn,
-        motion=_written(task, CHARTS, "-motion", figure),
+        motion=tuple(map(svg_of, panels)),
         trial=found.name,
         outcome=found.hold.outcome.value,
     )
@@ -213,12 +205,6 @@ def _with_executed(task: Task, executions: Executions, drawn: Drawn) -> Drawn:
             raise InputError(f"{task.source.with_name(EXECUTIONS)}: {found.id}: {error}") from error
         filmed.append(FilmedTrial(f"{CLIPS}/{path.name}", trial.name, trial.fate))
     return replace(drawn, executed=tuple(filmed))
-
-
-def _written(task: Task, kind: str, ending: str, figure: Any) -> str:
-    path = task.folder / kind / f"{task.name}{ending}.webp"
-    write_figure(figure, path)
-    return f"{kind}/{path.name}"
 
 
 def largest_push(verdict: Record | None) -> float:

@@ -1,24 +1,27 @@
 """Charts of simulated over predicted values; points should lie on the line of equal values."""
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.canvas import Around, entitle, figure_with_panels, in_style
-from scenes.drawing.palette import BAD, GOOD, NEUTRAL
+from scenes.drawing.canvas import figure_of
+from scenes.drawing.flat.colours import BAD, GOOD, NEUTRAL
+from scenes.drawing.flat.panels import ROW, Entry, Panel, keyed, marker
+from scenes.drawing.flat.scales import Scale, ticks_between
+from scenes.drawing.flat.sheets import Area, Dots, Line, Mark, Sheet, Words, beside
 from sim_validate.reports.agreement import Agreement
 from sim_validate.validation.wrench_verdict import AGREEMENT
 
-LONG_RANGE = 300.0
-"""Ratio of an axis's ends above which the axis shows only powers of ten."""
+WIDTH, HEIGHT = 360.0, 388.0
+"""Size of a panel [pixels]."""
+PLACE = (70.0, 28.0, 280.0, 280.0)
+"""Left and upper border of what a panel draws in, its width and its height [pixels]."""
 LEAST_SHOWN = 0.5
 """Place of zero on a logarithmic axis, relative to the least value above zero."""
 
 
-@in_style
 def fidelity_figure(agreements: Sequence[Agreement]) -> Any:
     """Draw simulated over predicted values on logarithmic axes.
 
@@ -28,51 +31,45 @@ def fidelity_figure(agreements: Sequence[Agreement]) -> Any:
     Returns:
         A matplotlib figure.
     """
-    around = Around(left=0.2 / len(agreements), below=0.14, between=0.3)
-    width = 4.2 * len(agreements)
-    figure, places = figure_with_panels(width, 3.7, len(agreements), around=around)
-    for axes, agreement in zip(places, agreements, strict=True):
-        _panel(axes, agreement)
-    return figure
+    return figure_of(beside(fidelity_panels(agreements)))
 
 
-def _panel(axes: Any, agreement: Agreement) -> None:
-    entitle(axes, agreement.quantity)
-    axes.set_xlabel("predicted")
-    axes.set_ylabel("simulated")
+def fidelity_panels(agreements: Sequence[Agreement]) -> tuple[Sheet, ...]:
+    """Draw the panels of `fidelity_figure` as sheets of their own."""
+    return tuple(_panel(agreement) for agreement in agreements)
+
+
+def _panel(agreement: Agreement) -> Sheet:
+    name = f"{agreement.quantity}: simulated over predicted"
     pairs = np.array(agreement.pairs).reshape(-1, 2)
     if not (pairs > 0.0).any():
-        axes.text(0.5, 0.5, "none measured", ha="center", transform=axes.transAxes)
-        return
+        panel = Panel(*PLACE, Scale(0.0, 1.0), Scale(0.0, 1.0))
+        nothing = Words(PLACE[0] + 0.5 * PLACE[2], PLACE[1] + 0.5 * PLACE[3], "none measured",
+                        "middle")  # fmt: skip
+        labels = panel.named(agreement.quantity, "predicted", "simulated")
+        return Sheet(WIDTH, HEIGHT, name, (*panel.frame([], []), *labels, nothing))
     pairs = np.maximum(pairs, LEAST_SHOWN * pairs[pairs > 0.0].min())
     ends = np.array([0.7 * pairs.min(), 1.4 * pairs.max()])
-    axes.plot(ends, ends, color=NEUTRAL, linewidth=1.0, label="identity")
-    axes.fill_between(ends, (1.0 - AGREEMENT) * ends, (1.0 + AGREEMENT) * ends, color=NEUTRAL,
-                      alpha=0.25, linewidth=0.0, label=f"within {AGREEMENT:.0%}")  # fmt: skip
+    scale = Scale(float(ends[0]), float(ends[1]), log=True)
+    panel = Panel(*PLACE, scale, scale)
+    labels = [(tick, f"{tick:g}") for tick in ticks_between(scale.low, scale.high)]
+    low, high = (1.0 - AGREEMENT) * ends, (1.0 + AGREEMENT) * ends
+    band = np.vstack([panel.at(ends, low), panel.at(ends, high)[::-1]])
+    marks: list[Mark] = [*panel.frame(labels, labels), Area((band,), NEUTRAL, 0.3)]
+    marks.append(Line((panel.at(ends, ends),), NEUTRAL, 1.0))
+    key = [Entry("identity", NEUTRAL), Entry(f"within {AGREEMENT:.0%}", NEUTRAL, "area")]
     off = np.array(agreement.differ())
-    for chosen, colour, marker, name in ((~off, GOOD, "o", "agree"), (off, BAD, "X", "differ")):
-        if chosen.any():
-            axes.plot(*pairs[chosen].T, marker, color=colour, ms=5, mec="white", mew=0.5,
-                      linestyle="", label=f"{int(chosen.sum())} {name}")  # fmt: skip
-    _scale(axes, ends)
-    axes.legend(loc="upper left")
+    if (~off).any():
+        marks.append(Dots(_seen(panel, pairs[~off]), GOOD, 3.0))
+        key.append(Entry(f"{int((~off).sum())} agree", GOOD, "disc"))
+    if off.any():
+        marks += [marker("cross", place, 5.0, BAD) for place in _seen(panel, pairs[off])]
+        key.append(Entry(f"{int(off.sum())} differ", BAD, "cross"))
+    below, _ = keyed(key, 8.0, HEIGHT - 2.0 * ROW, WIDTH - 8.0)
+    names = panel.named(agreement.quantity, "predicted", "simulated")
+    return Sheet(WIDTH, HEIGHT, name, (*marks, *names, *below))
 
 
-def _scale(axes: Any, ends: Array) -> None:
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter("{x:g}")
-        axis.set_ticks(ticks_between(*ends))
-        axis.set_ticks([], minor=True)
-    axes.set_xlim(*ends)
-    axes.set_ylim(*ends)
-    axes.set_aspect("equal")
-
-
-def ticks_between(low: float, high: float) -> list[float]:
-    """List 1, 2 and 5 times powers of ten in a range, or only powers of ten in a long range."""
-    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    steps = (1.0, 2.0, 5.0) if high < LONG_RANGE * low else (1.0,)
-    found = [step * 10.0**power for power in powers for step in steps]
-    return [value for value in found if low <= value <= high]
+def _seen(panel: Panel, pairs: Array) -> Array:
+    """Find where pairs are on the sheet, those within half a pixel of one another once, (k, 2)."""
+    return np.unique(np.rint(2.0 * panel.at(*pairs.T)), axis=0) / 2.0

@@ -4,6 +4,9 @@ import math
 import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.cones.spanning import angles_between
@@ -32,8 +35,25 @@ ROTATED, MIRRORED = "rotated", "mirrored"
 """Kinds of copies of a grasp, as the pages call them."""
 DRAW_ALL = "graspproof report . --every-copy"
 """Command that draws copies, too."""
-LESS = 1e-9
-"""Size below which a component of a vector is printed as zero, as a share of a given size."""
+Fact: TypeAlias = tuple[str, str, str]
+"""Name, value and meaning of a measured number."""
+FAMILIES = {
+    "concurrent": "the lines of force meet in one point",
+    "pencil": "two pairs of lines, which meet in points of a common line",
+    "regulus": "the lines of force are skew and lie on one ruled surface",
+}
+DISC = "radius of the largest disc that fits each region: there every finger may stand anywhere"
+CRITICAL = "least coefficient with which the contacts are in force closure; 0: none is needed"
+MARGIN = "how far inside their friction cones balanced forces can be, with normal parts of sum 1"
+QUALITY = (
+    "largest wrench resisted in every direction, with normal forces of sum 1 N; torques over the "
+    "object's radius"
+)
+SPAN = (
+    "half-angle of the widest cones around the normals of which any choice of directions "
+    "positively spans space; 0: none do, and the force cones lean"
+)
+FOCUS = "where lines of force meet, in the object's frame"
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +122,7 @@ def grasp_page(
         executed_clips=drawn.executed if drawn else (),
         object_script=object_script,
         facts=list(_facts(run, grasp, verdict)),
-        contacts=list(_contacts(shown, run.saved.body.radius)),
+        contacts=list(_contacts(shown)),
         certified=_certified(run, grasp),
         trials=[] if verdict is None else [_trial(verdict, each) for each in verdict["wrenches"]],
         controls=[] if verdict is None else _controls(verdict["controls"]),
@@ -111,42 +131,47 @@ def grasp_page(
     )
 
 
-def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[tuple[str, str]]:
-    """Yield names and values of the measured numbers in the page's list."""
-    lower, upper = grasp.ferrari_canny
+def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[Fact]:
+    """Yield the measured numbers of the page's list."""
     planned = run.saved.friction
     at_plan = "" if planned == run.friction else f", at friction {planned:g} as planned"
-    yield "Family", grasp.family
-    yield "Faces" if run.saved.body.patches is None else "Patches", ", ".join(map(str, grasp.faces))
+    yield "Family", grasp.family, FAMILIES[grasp.family]
     yield (
-        "Smallest independent disc",
-        (f"{number(MILLI * grasp.radius)} mm{at_plan}" if grasp.radius else "none is claimed"),
-    )
+        "Faces" if run.saved.body.patches is None else "Patches",
+        ", ".join(map(str, grasp.faces)), "numbers of those that the fingers stand on, by finger",
+    )  # fmt: skip
+    disc = f"{number(MILLI * grasp.radius)} mm{at_plan}" if grasp.radius else "none is claimed"
+    yield "Smallest independent disc", disc, DISC
     simulated = None if verdict is None else verdict["critical_friction"]["simulated"]
     in_simulation = "" if simulated is None else f", in simulation {number(simulated)}"
-    yield "Critical friction", f"{number(grasp.critical_friction)}{in_simulation}"
-    yield "Margin of closure", f"{number(grasp.closure_margin)}{at_plan}"
-    yield "Ferrari-Canny quality", f"{number(lower, 5)} to {number(upper, 5)} N{at_plan}"
-    yield "Normals span up to", f"{number(math.degrees(grasp.span_angle), 3)} deg"
+    yield "Critical friction", f"{number(grasp.critical_friction)}{in_simulation}", CRITICAL
+    yield "Margin of closure", f"{number(grasp.closure_margin)}{at_plan}", MARGIN
+    lower, upper = map(number, grasp.ferrari_canny)
+    between = lower if lower == upper else f"{lower} to {upper}"
+    yield "Ferrari-Canny quality", f"{between} N{at_plan}", QUALITY
+    yield "Normals span up to", f"{number(math.degrees(grasp.span_angle))}°", SPAN
     for place, focus in enumerate(grasp.focus_points):
         name = "Point between the lines of pair" if grasp.family == "regulus" else "Focus"
-        yield f"{name} {place}", f"{vector(MILLI * focus, MILLI * run.saved.body.radius)} mm"
+        yield f"{name} {place}", f"({millimetres(focus)}) mm", FOCUS if place == 0 else ""
     if verdict is not None:
-        moved = [trial["displacement_m"] for trial in verdict["wrenches"]]
-        known = [MICRO * each for each in moved if each is not None]
-        yield "Object moved at most", f"{number(max(known, default=None), 2)} µm"
-        if (repeats := verdict.get("robustness")) is not None:
-            low, high = repeats["pass_rate_interval"]
-            yield (
-                "With noise",
-                (
-                    f"held {repeats['held']} of {repeats['trials']} times; "
-                    f"95 % interval {low:.2f} to {high:.2f}"
-                ),
-            )
+        yield from _measured(verdict)
 
 
-def _contacts(grasp: Grasp, radius: float) -> Iterable[Record]:
+def _measured(verdict: Record) -> Iterable[Fact]:
+    """Yield what the simulation found."""
+    moved = [trial["displacement_m"] for trial in verdict["wrenches"]]
+    known = [MICRO * each for each in moved if each is not None]
+    yield (
+        "Object moved at most", f"{number(max(known, default=None), 2)} µm",
+        "while any of the loads below acted",
+    )  # fmt: skip
+    if (repeats := verdict.get("robustness")) is not None:
+        low, high = repeats["pass_rate_interval"]
+        said = f"held {repeats['held']} of {repeats['trials']} times"
+        yield "With noise", said, f"95 % interval of the share held: {low:.2f} to {high:.2f}"
+
+
+def _contacts(grasp: Grasp) -> Iterable[Record]:
     for face, contact, cone, region in zip(
         grasp.faces, grasp.contacts, grasp.force_cones, grasp.regions, strict=True
     ):
@@ -154,9 +179,9 @@ def _contacts(grasp: Grasp, radius: float) -> Iterable[Record]:
         half = math.degrees(cone.half_angle)
         yield {
             "face": face,
-            "position": vector(MILLI * contact.position, MILLI * radius),
-            "normal": vector(contact.normal, 1.0),
-            "cone": f"{half:.1f} deg, leans {lean:.1f} deg",
+            "position": millimetres(contact.position),
+            "normal": ", ".join(f"{part + 0.0:.3f}" for part in np.round(contact.normal, 3)),
+            "cone": f"{half:.1f}°, leans {lean:.1f}°",
             "region": region.kind,
             "disc": NOTHING if region.kind == "point" else number(MILLI * region.inscribed_radius),
         }
@@ -223,7 +248,6 @@ def _commands(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[
         yield execute_command(run.executions, GRASPS, grasp.id)
 
 
-def vector(parts: Array, size: float) -> str:
-    """Write a vector for people; components that are tiny beside a size become zero."""
-    small = LESS * size
-    return ", ".join(f"{0.0 if abs(part) < small else part:.4g}" for part in parts)
+def millimetres(point: Array) -> str:
+    """Write a point for people, to hundredths of millimetres."""
+    return ", ".join(f"{part + 0.0:.2f}" for part in np.round(MILLI * point, 2))

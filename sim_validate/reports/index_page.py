@@ -7,6 +7,7 @@ from typing import Any, cast
 from grasp_core.objects.symmetries import Copies, copies_of
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
+from scenes.drawing.flat.svg import svg_of
 from sim_validate.records.executions_json import Executions
 from sim_validate.reports.agreement import (
     Agreement,
@@ -23,10 +24,11 @@ from sim_validate.reports.executed_grasps import (
     execution_settings,
     said_of_both,
 )
+from sim_validate.reports.fidelity_charts import fidelity_panels
 from sim_validate.reports.grasp_page import MILLI, MIRRORED, Copy
 from sim_validate.reports.pages import page
 from sim_validate.reports.run_folder import RunFolder
-from sim_validate.reports.survival_charts import survival_sentence
+from sim_validate.reports.survival_charts import survival_sentence, survival_sheet
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +98,7 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         tried=bool(verdicts),
         quadrants=quadrants_in(verdicts),
         agreements=found,
+        fidelity=list(map(svg_of, fidelity_panels(found))) if verdicts else [],
         limits=any(each.pairs for each in found[1:]),
         mismatches=[f"{each['id']}: {line}" for each in verdicts for line in each["mismatches"]],
         controls=_controls(verdicts),
@@ -120,6 +123,7 @@ def _executions(executed: Sequence[Executions]) -> Record | None:
     return {
         "runs": [described_executions(each) for each in executed],
         "sentence": survival_sentence(executed),
+        "chart": svg_of(survival_sheet(executed)),
     }
 
 

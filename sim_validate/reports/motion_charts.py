@@ -1,15 +1,29 @@
 """Charts of one trial over time: how far object and fingers moved, and how hard fingers pushed."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.canvas import entitle, figure_with_panels, in_style
-from scenes.drawing.palette import BAD, FINGERS, INK, NEUTRAL
+from scenes.drawing.canvas import figure_of
+from scenes.drawing.flat.colours import BAD, FINGERS, INK, NEUTRAL
+from scenes.drawing.flat.panels import ROW, Entry, Panel, keyed
+from scenes.drawing.flat.scales import Scale, ticks_in
+from scenes.drawing.flat.sheets import Mark, Sheet, beside
 from sim_validate.replaying.replay import Replayed
 
+WIDTH, HEIGHT = 300.0, 316.0
+"""Size of a panel [pixels]."""
+PLACE = (50.0, 28.0, 236.0, 180.0)
+"""Left and upper border of what a panel draws in, its width and its height [pixels]."""
+KEY = 3.0 * ROW + 6.0
+"""Height of the key below a panel [pixels]."""
+SLIPS = (1.0, "slips")
+"""Share of its friction that a finger uses when it slips, and its name."""
+MOST_SHARE = 1.15
+"""Upper end of an axis, relative to the limit on it."""
 MICRO = 1e6
 LEAST_UM = 1e-4
 """Displacement at which the chart's logarithmic axis begins [um]."""
@@ -17,7 +31,6 @@ LEAST_PUSH = 1e-3
 """Share of a finger's largest push below which its use of friction is not shown."""
 
 
-@in_style
 def motion_figure(found: Replayed, threshold_m: float) -> Any:
     """Draw displacement, normal forces and use of friction over the time of one trial.
 
@@ -28,30 +41,75 @@ def motion_figure(found: Replayed, threshold_m: float) -> Any:
     Returns:
         A matplotlib figure. Friction is lowered to the one under test at time zero.
     """
-    figure, (moved, pushed, used) = figure_with_panels(9.0, 2.8, 3)
-    watched, trace = found.watched, found.watched.trace
-    times = trace.times_s
-    moved.plot(times, MICRO * trace.displacements_m, color=INK, label="object")
-    for finger, colour in enumerate(FINGERS[: trace.slips_m.shape[1]]):
-        moved.plot(times, MICRO * trace.slips_m[:, finger], color=colour, linewidth=1.0,
-                   label=f"finger {finger} slid")  # fmt: skip
-    moved.axhline(MICRO * threshold_m, color=BAD, linestyle="--", label="counts as moved")
-    moved.set_yscale("log")
-    moved.minorticks_off()
+    return figure_of(beside(motion_panels(found, threshold_m)))
+
+
+def motion_panels(found: Replayed, threshold_m: float) -> tuple[Sheet, Sheet, Sheet]:
+    """Draw the panels of `motion_figure` as sheets of their own."""
+    watched = found.watched
+    share = friction_used(watched.pushes_n, watched.friction)
+    return (
+        _moved(found, threshold_m),
+        _of_fingers("normal force [N]", watched.times_s, watched.pushes_n[..., 0], None),
+        _of_fingers("share of friction used", watched.times_s, share, SLIPS),
+    )
+
+
+def _moved(found: Replayed, threshold_m: float) -> Sheet:
+    """Draw how far the object moved and each finger slid, on a logarithmic axis."""
+    trace = found.watched.trace
     finite = trace.displacements_m[np.isfinite(trace.displacements_m)]
-    highest = MICRO * max(threshold_m, float(finite.max(initial=0.0)))
-    moved.set_ylim(LEAST_UM, 100.0 * highest)
-    moved.yaxis.set_ticks(10.0 ** np.arange(-4, math.log10(100.0 * highest), 2))
-    moved.yaxis.set_major_formatter("{x:g}")
-    _label(moved, "displacement [µm]")
-    moved.legend(fontsize=7.0, loc="upper left", ncols=2)
-    _forces(pushed, watched.times_s, watched.pushes_n[..., 0])
-    _label(pushed, "normal force [N]")
-    _forces(used, watched.times_s, friction_used(watched.pushes_n, watched.friction))
-    used.axhline(1.0, color=BAD, linestyle="--", label="slips")
-    used.set_ylim(0.0, 1.15)
-    _label(used, "share of friction used")
-    return figure
+    highest = 2.0 * MICRO * max(threshold_m, float(finite.max(initial=0.0)))
+    panel = _panel(trace.times_s, Scale(LEAST_UM, highest, log=True))
+    steps = 10.0 ** np.arange(-4, math.log10(highest), 2)
+    slips = list(zip(FINGERS, trace.slips_m.T, strict=False))
+    marks = [
+        *panel.frame(_seconds(panel.x), [(step, f"{step:g}") for step in steps.tolist()]),
+        *(panel.curve(trace.times_s, MICRO * slip, colour) for colour, slip in slips),
+        panel.curve(trace.times_s, MICRO * trace.displacements_m, INK, 1.8),
+        panel.level(MICRO * threshold_m, BAD),
+    ]
+    key = [
+        Entry("object", INK), Entry("counts as moved", BAD, "dashes"),
+        *(Entry(f"{place} slid", colour) for place, (colour, _) in enumerate(slips)),
+    ]  # fmt: skip
+    return _sheet(panel, "displacement [µm]", marks, key)
+
+
+def _of_fingers(title: str, times: Array, values: Array, limit: tuple[float, str] | None) -> Sheet:
+    """Draw a curve for each finger and, if there is one, a limit with its name."""
+    finite = values[np.isfinite(values)]
+    top = max(1.1 * float(finite.max(initial=0.0)), 1e-9)
+    low = min(0.0, float(finite.min(initial=0.0)))
+    panel = _panel(times, Scale(low, top if limit is None else MOST_SHARE * limit[0]))
+    ticks = [(tick, f"{tick:g}") for tick in ticks_in(panel.y.low, panel.y.high)]
+    curves = list(zip(FINGERS, values.T, strict=False))
+    marks = [
+        *panel.frame(_seconds(panel.x), ticks),
+        *(panel.curve(times, np.where(np.isfinite(each), each, np.nan), colour)
+          for colour, each in curves),
+        panel.upright(0.0, NEUTRAL, dashed=True),
+    ]  # fmt: skip
+    key = [Entry(f"finger {place}", colour) for place, (colour, _) in enumerate(curves)]
+    if limit is not None:
+        marks.append(panel.level(limit[0], BAD))
+        key.append(Entry(limit[1], BAD, "dashes"))
+    return _sheet(panel, title, marks, key)
+
+
+def _panel(times: Array, y: Scale) -> Panel:
+    low, high = float(times.min(initial=0.0)), float(times.max(initial=0.0))
+    return Panel(*PLACE, Scale(low, high if high > low else low + 1.0), y)
+
+
+def _seconds(x: Scale) -> list[tuple[float, str]]:
+    return [(tick, f"{tick:g}") for tick in ticks_in(x.low, x.high, 4)]
+
+
+def _sheet(panel: Panel, title: str, marks: Sequence[Mark], entries: Sequence[Entry]) -> Sheet:
+    below, _ = keyed(entries, 8.0, HEIGHT - KEY, WIDTH - 8.0)
+    names = panel.named(title, "time since friction was lowered [s]", "")
+    return Sheet(WIDTH, HEIGHT, title, (*marks, *names, *below))
 
 
 def friction_used(pushes: Array, friction: Array) -> Array:
@@ -66,14 +124,3 @@ def friction_used(pushes: Array, friction: Array) -> Array:
     pushing = normal > LEAST_PUSH * max(float(normal.max(initial=0.0)), 1e-12)
     safe = np.where(pushing, normal, 1.0) * friction[:, None]
     return np.where(pushing, tangential / safe, np.nan)
-
-
-def _forces(axes: Any, times: Array, values: Array) -> None:
-    for finger, colour in enumerate(FINGERS[: values.shape[1]]):
-        axes.plot(times, values[:, finger], color=colour, label=f"finger {finger}")
-    axes.axvline(0.0, color=NEUTRAL, linewidth=0.8, linestyle=":")
-
-
-def _label(axes: Any, title: str) -> None:
-    entitle(axes, title)
-    axes.set_xlabel("time since friction was lowered [s]")

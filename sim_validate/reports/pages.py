@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from scenes.drawing import pages
+from scenes.drawing.flat.svg import night_style
 
 ASSETS = Path(__file__).parent / "assets"
 """Folder of the templates and scripts of reports."""
@@ -21,3 +22,8 @@ def page(template: str, **values: object) -> str:
 def asset(name: str) -> str:
     """Read the text of a style sheet or script, of reports or of single drawings."""
     return pages.text_of(name, ASSETS)
+
+
+def style() -> str:
+    """Return the style sheet of reports, with the rules for charts on dark screens."""
+    return f"{asset('style.css')}{night_style()}\n"

@@ -8,23 +8,20 @@ from typing import TypeAlias
 
 from grasp_core.checked import function, path_of, switch, whole
 from grasp_core.files.text_files import write_text
-from scenes.drawing.canvas import write_figure
 from scenes.drawing.turntable import as_text, object_data
 from sim_validate.files.stale_results import (
-    FIDELITY,
     GRASPS,
     INDEX,
     MARK,
     REPORT,
     STATIC,
-    SURVIVAL,
+    STYLE,
     remove_pages,
     remove_report,
     require_report_folder,
 )  # fmt: skip
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.reports.drawn_grasps import Drawn, Task, draw, tasks_of
-from sim_validate.reports.fidelity_charts import fidelity_figure
 from sim_validate.reports.grasp_page import (
     MIRRORED,
     ROTATED,
@@ -35,15 +32,11 @@ from sim_validate.reports.grasp_page import (
 )
 from sim_validate.reports.index_page import (
     Shown,
-    agreements,
-    all_executions,
-    all_verdicts,
     cards_of,
     index_page,
 )
-from sim_validate.reports.pages import asset
+from sim_validate.reports.pages import asset, style
 from sim_validate.reports.run_folder import RunFolder, folder_of, runs_in
-from sim_validate.reports.survival_charts import survival_figure
 
 MARKED = "The pages here were written by graspproof, which may replace them.\n"
 FIRST = 4
@@ -52,7 +45,7 @@ again whenever twice as many are drawn, and at the end."""
 
 CARDS_PER_PROCESS = 24
 """Number of cards for which one more process is worth starting: a process that draws takes as long
-to start as eight cards take to draw."""
+to start as a dozen cards take to draw."""
 
 Runs: TypeAlias = tuple[RunFolder, ...]
 
@@ -200,16 +193,12 @@ def _cards(
 
 
 def _shared_files(runs: Runs, out: Path) -> None:
-    """Write what pages share: styles, scripts, drawings of the objects, and charts of all runs."""
+    """Write what pages share: styles, scripts, and drawings of the objects."""
     for name in STATIC:
-        write_text(out / name, asset(name))
+        write_text(out / name, style() if name == STYLE else asset(name))
     for number, run in enumerate(runs):
         data = as_text(object_data(run.saved.body))
         write_text(out / f"object-{number}.js", f"window.graspproofObject = {data};\n")
-    if verdicts := all_verdicts(runs):
-        write_figure(fidelity_figure(agreements(verdicts)), out / FIDELITY)
-    if executions := all_executions(runs):
-        write_figure(survival_figure(executions), out / SURVIVAL)
 
 
 def _neighbours(cards: Sequence[_Card], place: int) -> Neighbours:

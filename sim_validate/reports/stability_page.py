@@ -10,13 +10,17 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from grasp_core.files.text_files import write_text
-from sim_validate.baselines.explain import number
+from scenes.drawing.pages import number
 from sim_validate.reports.pages import asset, page
 
 Line: TypeAlias = Mapping[str, Any]
 PAGE, DATA = "index.html", "report.json"
-COLUMNS = ("test", "grasp", "what became of it", "outcome", "critical friction", "in simulation",
-           "weakest wrench, N", "in simulation", "moved, um", "held with noise")  # fmt: skip
+COLUMNS = ("grasp", "what became of it", "outcome", "critical friction", "simulated",
+           "weakest wrench [N]", "simulated [N]", "moved [µm]", "held with noise",
+           "test")  # fmt: skip
+DIGITS, ALL_DIGITS = 3, 6
+"""Number of digits with which measured numbers are shown, and with which those are that differ but
+look alike with fewer."""
 MEASURED = ("outcome", "critical_friction", "simulated_critical_friction", "limit_n",
             "simulated_limit_n", "displacement_m")  # fmt: skip
 CALM = ("same", "within bands", "stable", "blessed", "survived")
@@ -46,7 +50,11 @@ def _page(lines: Sequence[Line]) -> str:
     return page(
         "stability.html",
         style=asset("style.css"),
-        counts=", ".join(f"{count} {name}" for name, count in sorted(counts.items())),
+        script=asset("tables.js"),
+        counts=[
+            (name, count, name in CALM)
+            for name, count in sorted(counts.items(), key=lambda each: (each[0] in CALM, each[0]))
+        ],
         notes=sorted({line["mesh_note"] for line in lines if line["mesh_note"]}),
         reasons=(
             ("To look at", [row for row in told if not row["calm"]]),
@@ -76,12 +84,15 @@ def _row(line: Line) -> dict[str, Any]:
 
 def _measured(name: str, before: Line, after: Line) -> tuple[str, str]:
     """Write a measured number, and its former value if that differs."""
-    now, was = _said(name, after), _said(name, before)
-    return now, was if before and was != now else ""
+    for digits in (DIGITS, ALL_DIGITS):
+        now, was = _said(name, after, digits), _said(name, before, digits)
+        if now != was:
+            return now, was if before else ""
+    return _said(name, after, DIGITS), ""
 
 
-def _said(name: str, entry: Line) -> str:
+def _said(name: str, entry: Line, digits: int) -> str:
     value = entry.get(name)
     if not entry or isinstance(value, str):
         return value or ""
-    return number(1e6 * value if name == "displacement_m" and value is not None else value)
+    return number(1e6 * value if name == "displacement_m" and value is not None else value, digits)

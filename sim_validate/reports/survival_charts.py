@@ -10,7 +10,7 @@ and the torques of knocks and of shakes about an axis, can put marks below the c
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,22 +18,31 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from scenes.drawing.canvas import LETTERS, Around, figure_with_panels, in_style, legend_line
-from scenes.drawing.palette import FINGERS, GOOD, INK, NEUTRAL
+from scenes.drawing.canvas import figure_of
+from scenes.drawing.flat.colours import BAD, FINGERS, GOOD, INK, NEUTRAL
+from scenes.drawing.flat.panels import ROW, SMALL, Entry, Panel, Shape, keyed, marker
+from scenes.drawing.flat.scales import Scale
+from scenes.drawing.flat.sheets import Area, Line, Mark, Sheet, Words
 from sim_validate.execution import paths
 from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutionTrial
 from sim_validate.records.executions_json import Executions
 
-LOOKS = {
-    "weight": ("s", INK), "misplaced": ("X", NEUTRAL), "lift": ("^", FINGERS[2]),
-    "shake along": ("o", FINGERS[1]), "shake about": ("D", FINGERS[3]), "stop": ("v", FINGERS[0]),
-    "knock": ("P", "#D55E00"),
+WIDTH = 400.0
+"""Width of the chart [pixels]; its height depends on its key."""
+PLACE = (70.0, 28.0, 306.0, 230.0)
+"""Left and upper border of what the chart draws in, its width and its height [pixels]."""
+BELOW = 44.0
+"""Height of the numbers and the name below the axis [pixels]."""
+LOOKS: dict[str, tuple[Shape, str]] = {
+    "weight": ("square", INK), "misplaced": ("cross", NEUTRAL), "lift": ("up", FINGERS[2]),
+    "shake along": ("disc", FINGERS[1]), "shake about": ("diamond", FINGERS[3]),
+    "stop": ("down", FINGERS[0]), "knock": ("plus", BAD),
 }  # fmt: skip
 """Marker and colour of each kind of trial."""
-FILLED = "filled: survived in simulation\nhollow: predicted not to slip"
-"""Explanation of the marks, which stands above the chart's legend."""
+FILLED = ("filled: survived in simulation", "hollow: predicted not to slip")
+"""Explanation of the marks, which stands above the chart's key."""
 STRAIGHT = ("lift", "shake along", "stop")
 """Kinds of trials in which the palm accelerates without turning."""
 TICKS_G = (0.0, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
@@ -162,7 +171,6 @@ def survival_sentence(executed: Sequence[Executions]) -> str:
     )
 
 
-@in_style
 def survival_figure(executed: Sequence[Executions]) -> Any:
     """Draw the share of grasps that survives, by the acceleration of the palm.
 
@@ -172,40 +180,61 @@ def survival_figure(executed: Sequence[Executions]) -> Any:
     Returns:
         A matplotlib figure.
     """
-    multiples, marks = certified_multiples(executed), survivals(executed)
-    ends = [NARROWEST, *multiples, *(1.0 + mark.acceleration_g for mark in marks)]
+    return figure_of(survival_sheet(executed))
+
+
+def survival_sheet(executed: Sequence[Executions]) -> Sheet:
+    """Draw `survival_figure` as a sheet."""
+    multiples, found = certified_multiples(executed), survivals(executed)
+    ends = [NARROWEST, *multiples, *(1.0 + mark.acceleration_g for mark in found)]
     end = min(BEYOND * max(ends), WIDEST)
-    around = Around(left=0.09, right=0.27, below=0.14, above=0.05)
-    figure, (axes,) = figure_with_panels(9.0, 3.7, 1, around=around)
-    _curve(axes, multiples, end)
-    handles = [legend_line(GOOD, "certified in any direction")]
-    handles += [_marked(axes, mark) for mark in marks]
-    _scale(axes, end)
-    axes.legend(handles=handles, title=FILLED, title_fontsize=LETTERS - 1.0, loc="upper left",
-                bbox_to_anchor=(1.03, 1.0), alignment="left")  # fmt: skip
-    return figure
+    panel = Panel(*PLACE, Scale(1.0, end, log=True), Scale(0.0, 1.03))
+    marks = [
+        *panel.frame([(1.0 + tick, f"{tick:g}") for tick in ticks_up_to(end)],
+                     [(share, f"{share:.0%}") for share in SHARES]),
+        *_curve(panel, multiples, end),
+        *(mark for each in found for mark in _marked(panel, each)),
+        *panel.named("survival", "acceleration beside the weight [g]",
+                     "share of grasps that survives"),
+    ]  # fmt: skip
+    key = [Entry("certified in any direction", GOOD)] + [
+        Entry(f"{each.kind}, {each.acceleration_g:.3g} g: {each.survived} of {each.grasps}",
+              LOOKS[each.kind][1], LOOKS[each.kind][0])
+        for each in found
+    ]  # fmt: skip
+    top = PLACE[1] + PLACE[3] + BELOW
+    marks += [Words(8.0, top + (place + 0.5) * ROW, line, size=SMALL)
+              for place, line in enumerate(FILLED)]  # fmt: skip
+    below, rows = keyed(key, 8.0, top + (len(FILLED) + 0.3) * ROW, WIDTH - 8.0)
+    height = top + (len(FILLED) + rows + 0.5) * ROW
+    return Sheet(WIDTH, height, "Share of grasps that survives", (*marks, *below))
 
 
-def _curve(axes: Any, multiples: Array, end: float) -> None:
+def _curve(panel: Panel, multiples: Array, end: float) -> Iterator[Mark]:
     """Draw the share of grasps that are certified for each multiple of the weight."""
+    steps, shares = certified_steps(multiples, end)
+    x = np.append(np.repeat(steps, 2)[1:], end)
+    line = panel.at(x, np.repeat(shares, 2))
+    feet = panel.at(np.array([end, 1.0]), np.zeros(2))
+    yield Area((np.vstack([line, feet]),), GOOD, 0.15)
+    yield Line((line,), GOOD)
+
+
+def certified_steps(multiples: Array, end: float) -> tuple[Array, Array]:
+    """Find where the share of certified grasps drops, and the share from there on, (n,) each."""
     steps = np.concatenate([[1.0], np.sort(multiples[(multiples >= 1.0) & (multiples < end)])])
     shares = (multiples[None] > steps[:, None]).mean(axis=1)
     shares[0] = (multiples >= 1.0).mean()
-    steps, shares = np.append(steps, end), np.append(shares, shares[-1])
-    axes.step(steps, shares, where="post", color=GOOD)
-    axes.fill_between(steps, shares, step="post", color=GOOD, alpha=0.15, linewidth=0.0)
+    return steps, shares
 
 
-def _marked(axes: Any, mark: Survival) -> Any:
-    """Draw the marks of a kind of trial, and return their line of the legend."""
-    marker, colour = LOOKS[mark.kind]
-    place = 1.0 + mark.acceleration_g
-    axes.plot(place, mark.predicted / mark.grasps, marker, mfc="none", mec=colour, ms=11,
-              mew=1.2, clip_on=False, zorder=3)  # fmt: skip
-    axes.plot(place, mark.survived / mark.grasps, marker, color=colour, ms=6,
-              clip_on=False, zorder=4)  # fmt: skip
-    label = f"{mark.kind}, {mark.acceleration_g:.3g} g: {mark.survived} of {mark.grasps}"
-    return legend_line(colour, label, style="", marker=marker)
+def _marked(panel: Panel, mark: Survival) -> Iterator[Mark]:
+    """Draw the marks of a kind of trial: hollow as predicted, filled as simulated."""
+    shape, colour = LOOKS[mark.kind]
+    shares = np.array([mark.predicted, mark.survived]) / mark.grasps
+    places = panel.at(np.full(2, 1.0 + mark.acceleration_g), shares)
+    yield marker(shape, places[0], 6.5, colour, hollow=True)
+    yield marker(shape, places[1], 3.5, colour)
 
 
 def ticks_up_to(end: float) -> list[float]:
@@ -215,15 +244,3 @@ def ticks_up_to(end: float) -> list[float]:
         if 1.0 + tick <= end and math.log((1.0 + tick) / (1.0 + found[-1])) > APART * math.log(end):
             found.append(tick)
     return found
-
-
-def _scale(axes: Any, end: float) -> None:
-    axes.set_xscale("log")
-    axes.set_xlim(1.0, end)
-    axes.set_ylim(0.0, 1.03)
-    ticks = ticks_up_to(end)
-    axes.xaxis.set_ticks([1.0 + tick for tick in ticks], [f"{tick:g}" for tick in ticks])
-    axes.xaxis.set_ticks([], minor=True)
-    axes.yaxis.set_ticks(SHARES, [f"{share:.0%}" for share in SHARES])
-    axes.set_xlabel("acceleration beside the weight [g]")
-    axes.set_ylabel("share of grasps that survives")

@@ -8,6 +8,7 @@ border of W in its weakest direction; in a plane that holds this direction, the 
 line that touches the disc and the projection.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -17,18 +18,30 @@ from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.values import Grasp
-from scenes.drawing.canvas import entitle, figure_with_panels, in_style
-from scenes.drawing.palette import BAD, GOOD, INK
+from scenes.drawing.canvas import figure_of
+from scenes.drawing.flat.colours import BAD, GOOD, INK
+from scenes.drawing.flat.panels import ROW, Entry, Panel, keyed, thinned
+from scenes.drawing.flat.scales import Scale, ticks_in
+from scenes.drawing.flat.sheets import Area, Line, Mark, Sheet, beside, circle, outlined
 from scenes.drawing.pictures import check_drawn
 from scenes.drawing.views import View, best_view
 
+WIDTH, HEIGHT = 300.0, 338.0
+"""Size of a panel [pixels]."""
+PLACE = (62.0, 28.0, 224.0)
+"""Left and upper border of the square in which a panel draws, and its side [pixels]."""
+AROUND = 0.55
+"""Half of the range of an axis, relative to the extent of what is drawn."""
+HATCHES = 7
+"""Number of lines that hatch the disc."""
+CROSS = (((-1.0, 0.0), (1.0, 0.0)), ((0.0, -1.0), (0.0, 1.0)))
+"""The lines of the cross at zero."""
 TURNS = 181
 """Number of points on the border of a shadow; the first is also the last."""
 SMALLEST_NORMAL = np.finfo(np.float64).tiny
 """Least number that is divided by: the smallest of full precision."""
 
 
-@in_style
 def wrench_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None
 ) -> Any:
@@ -46,6 +59,17 @@ def wrench_figure(
     Raises:
         InputError: The grasp does not lie on the body, or the friction is out of range.
     """
+    return figure_of(beside(wrench_panels(body, grasp, friction, view=view)))
+
+
+def wrench_panels(
+    body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None
+) -> tuple[Sheet, Sheet, Sheet]:
+    """Draw the panels of `wrench_figure` as sheets of their own.
+
+    Raises:
+        InputError: The grasp does not lie on the body, or the friction is out of range.
+    """
     check_drawn(body, grasp, friction, view)
     view = view or best_view(body, grasp)
     quality = ferrari_canny(
@@ -54,18 +78,17 @@ def wrench_figure(
     wrenches, radius = quality.wrenches, quality.upper
     right, up = view.axes[0], view.axes[1]
     still = np.zeros(3)
-    figure, (weakest, forces, torques) = figure_with_panels(9.0, 3.1, 3)
-    _shadow(weakest, wrenches, _weakest_plane(wrenches, quality.direction), radius)
-    weakest.axvline(radius, color=BAD, linewidth=1.2, label="limiting facet")
-    weakest.legend(loc="upper left")
     closed = "weakest direction" if radius > 0.0 else "not in force closure: zero is outside"
-    _label(weakest, closed, f"along it [N], quality {radius:.3g}", "across it [N]")
-    _shadow(forces, wrenches, np.array([[*right, *still], [*up, *still]]), radius)
-    _label(forces, "forces", "to the right of the picture [N]", "up [N]")
-    _shadow(torques, wrenches, np.array([[*still, *right], [*still, *up]]), radius)
     scale = f"torques over {1e3 * body.radius:.3g} mm"
-    _label(torques, scale, "to the right of the picture [N]", "up [N]")
-    return figure
+    aside, above = "to the right of the picture [N]", "up [N]"
+    return (
+        _shadow(wrenches, _weakest_plane(wrenches, quality.direction), radius, facet=True, names=(
+            closed, f"along it [N], quality {radius:.3g}", "across it [N]")),
+        _shadow(wrenches, np.array([[*right, *still], [*up, *still]]), radius, names=(
+            "forces", aside, above)),
+        _shadow(wrenches, np.array([[*still, *right], [*still, *up]]), radius, names=(
+            scale, aside, above)),
+    )  # fmt: skip
 
 
 def _weakest_plane(wrenches: WrenchSet, direction: Array) -> Array:
@@ -107,17 +130,40 @@ def shadow_of(wrenches: WrenchSet, plane: Array) -> Array:
     return forces.reshape(TURNS, -1) @ (plane @ wrenches.G).T
 
 
-def _shadow(axes: Any, wrenches: WrenchSet, plane: Array, radius: float) -> None:
+def _shadow(
+    wrenches: WrenchSet, plane: Array, radius: float, *, names: tuple[str, str, str],
+    facet: bool = False,
+) -> Sheet:  # fmt: skip
+    """Draw a projection, with the disc of the largest ball and perhaps the limiting facet."""
     border = shadow_of(wrenches, plane)
-    axes.fill(*border.T, facecolor=GOOD, alpha=0.22, edgecolor=GOOD, linewidth=1.2)
-    angles = np.linspace(0.0, 2.0 * np.pi, TURNS)
-    disc = max(radius, 0.0) * np.stack([np.cos(angles), np.sin(angles)])
-    axes.fill(*disc, facecolor="none", edgecolor=INK, linewidth=1.2, hatch="////")
-    axes.plot([0.0], [0.0], "+", color=INK)
-    axes.set_aspect("equal", adjustable="datalim")
+    ball = max(radius, 0.0)
+    points = np.vstack([border, [[0.0, 0.0], [ball, ball], [-ball, -ball]]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = 0.5 * (low + high)
+    half = max(AROUND * float((high - low).max()), SMALLEST_NORMAL)
+    x, y = (Scale(float(each - half), float(each + half)) for each in middle)
+    panel = Panel(PLACE[0], PLACE[1], PLACE[2], PLACE[2], x, y)
+    disc = circle(np.zeros(2), ball)
+    marks: list[Mark] = [*panel.frame(*(
+        [(tick, f"{tick:g}") for tick in ticks_in(scale.low, scale.high)] for scale in (x, y)
+    ))]  # fmt: skip
+    area = thinned(panel.at(*border.T))
+    marks += [Area((area,), GOOD, 0.25), outlined([area], GOOD), *_hatched(panel, ball)]
+    marks += [outlined([panel.at(*disc.T)], INK, 1.2)]
+    marks += [panel.upright(radius, BAD)] if facet else []
+    center = panel.at(np.zeros(1), np.zeros(1))
+    marks.append(Line(tuple(center + 4.0 * np.array(arm) for arm in CROSS), INK, 1.4))
+    entries = [Entry("can be applied", GOOD, "area"), Entry("largest ball", INK)]
+    entries += [Entry("limiting facet", BAD)] if facet else []
+    key, _ = keyed(entries, 8.0, HEIGHT - 2.0 * ROW, WIDTH - 8.0)
+    return Sheet(WIDTH, HEIGHT, names[0], (*marks, *panel.named(*names), *key))
 
 
-def _label(axes: Any, title: str, across: str, up: str) -> None:
-    entitle(axes, title)
-    axes.set_xlabel(across)
-    axes.set_ylabel(up)
+def _hatched(panel: Panel, radius: float) -> list[Mark]:
+    """Hatch the disc of the largest ball with lines that rise at 45 degrees."""
+    heights = radius * np.linspace(-1.0, 1.0, HATCHES + 2)[1:-1]
+    long = np.sqrt(np.maximum(radius**2 - heights**2, 0.0))
+    ends = np.stack([
+        np.stack([end - heights, end + heights], axis=1) for end in (-long, long)
+    ], axis=1) / math.sqrt(2.0)  # fmt: skip
+    return [Line(tuple(panel.at(*line.T) for line in ends), INK, 0.7)] if radius else []

@@ -319,7 +319,7 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
     assert main(["inspect", "scan.ply", "--unit", "mm"]) == Exit.GOOD
     said = capsys.readouterr().out
     assert "20 nearly flat patches of a curved surface" in said
-    assert "deg at most, 10 deg allowed" in said
+    assert "deg at most (10 deg allowed)" in said
 
 
 def test_a_mesh_is_described_in_words(capsys):
@@ -328,11 +328,23 @@ def test_a_mesh_is_described_in_words(capsys):
     said = capsys.readouterr().out
     assert said.splitlines()[:3] == [
         "wedge",
-        "  mesh                 6 vertices, 8 triangles",
-        "  faces                8 planar, 0 not convex, 0 with holes",
+        "  The mesh has 6 vertices and 8 triangles.",
+        "  Its 8 faces are planar; 0 of them are not convex, and 0 have holes.",
     ]
-    assert re.search(r"volume +0\.000199083 m\^3\n", said)
+    assert (
+        "It encloses a volume of 199.1 cm^3, and reaches 67.74 mm from its centre of mass" in said
+    )
     assert not re.search(r"[{}\[\]']|None|_", said)
+
+
+def test_an_object_is_drawn(here, capsys):
+    assert main(["inspect", "wedge", "--picture", "wedge.svg", "--json"]) == Exit.GOOD
+    assert json.loads(capsys.readouterr().out)["picture"] == "wedge.svg"
+    text = (here / "wedge.svg").read_text()
+    assert text.startswith("<svg ")
+    assert "<text" not in text  # there is no finger
+    assert main(["inspect", "wedge", "--picture", "wedge.doc"]) == Exit.USAGE
+    assert "--picture must end in" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("here")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.drawing.drawings import BAR_LENGTH, MOST_TRIANGLES, drawing_of, glass
+from scenes.drawing.drawings import BAR_LENGTH, MOST_TRIANGLES, drawing_of, finger_size, glass
 from scenes.drawing.ruled_surfaces import rulings
 from scenes.drawing.shapes import Shape, cone_sides, extent_of, ring, tube
 from tests.scenes.meshes import sphere_mesh
@@ -38,7 +38,7 @@ def test_bars_stand_on_their_contacts_and_outside(case):
     for bar, contact in zip(bars, grasp.contacts, strict=True):
         heights = (bar.vertices() - contact.position) @ -contact.normal
         assert heights.min() == pytest.approx(0.0, abs=1e-12)
-        assert heights.max() == pytest.approx(BAR_LENGTH * body.radius)
+        assert heights.max() == pytest.approx(BAR_LENGTH * finger_size(body))
 
 
 def test_force_cones_are_inside_friction_cones(case):

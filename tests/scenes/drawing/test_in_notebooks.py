@@ -11,7 +11,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.drawing import in_notebooks
-from scenes.drawing.shapes import SIDES
+from scenes.drawing.flat.colours import FINGERS
 from tests.grasp_core.curved import curved_body
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -57,7 +57,10 @@ def test_every_family_is_drawn_with_and_without_its_object():
         assert plan[0].family == family
         for value in (plan, plan[0]):
             found, _ = read(value)
-            assert len(list(found.iter(f"{SVG}path"))) >= 4 * (SIDES + 2) + 4 * SIDES  # bars, cones
+            assert len(list(found.iter(f"{SVG}path"))) >= 4 * (2 + 2)  # bars, cones
+            fills = {part.get("fill") for part in found.iter(f"{SVG}path")}
+            fills |= {part.get("fill") for part in found.iter(f"{SVG}g")}
+            assert set(FINGERS) <= fills
 
 
 def test_points_are_where_the_view_shows_them(plan):

@@ -8,17 +8,23 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
+from grasp_core.geometry.polygons import convex_hull
 from scenes.drawing import pictures
 from scenes.drawing.canvas import FORMATS, encoded
-from scenes.drawing.drawings import BAR_RADIUS, drawing_of
+from scenes.drawing.drawings import BAR_RADIUS, drawing_of, finger_size, glass
+from scenes.drawing.flat.colours import BAD, FINGERS, FOCUS, GOOD, INK, SURFACE, rgb
+from scenes.drawing.outlines import Surface, outline
 from scenes.drawing.painting import painted
-from scenes.drawing.palette import BAD, FINGERS, FOCUS, GOOD, INK, LOOKS, SURFACE, rgb
-from scenes.drawing.pictures import draw_grasp, empty_picture, grasp_figure, write_picture
+from scenes.drawing.palette import LOOKS
+from scenes.drawing.pictures import grasp_figure, grasp_sheet, write_picture
 from scenes.drawing.shapes import Shape
 from scenes.drawing.turning_clips import FRAMES, write_turning_clip
 from scenes.drawing.views import FORESHORTENED, View, best_view
+from tests.scenes.drawing.whole import assert_whole
+from tests.scenes.meshes import sphere_mesh
 from tests.sim_validate.rigs import grasps
 
 FRONT = View.of_angles(0.0, 0.0, scenes.example_object("box"))
@@ -74,16 +80,16 @@ def square(nearness, role="region", finger=0):
 
 def test_what_is_in_front_is_drawn_later():
     patches = painted([square(0.3, finger=1), square(-0.3, finger=0)], FRONT, 2.0)
-    assert [patch.colour[:3] for patch in patches] == [rgb(FINGERS[0]), rgb(FINGERS[1])]
+    assert [patch.colour for patch in patches] == [FINGERS[0], FINGERS[1]]
 
 
 def test_lines_are_as_wide_and_as_long_as_they_say():
     ends = np.array([FRONT.center - FRONT.axes[0], FRONT.center + FRONT.axes[0]])
     for role, share in (("friction cone", 1.0), ("line of force", 0.5)):
         parts = painted([Shape(role, 0, lines=(ends,))], FRONT, 2.0)
-        lengths = [np.linalg.norm(part.polygon[1] - part.polygon[0]) for part in parts]
+        lengths = [np.linalg.norm(np.diff(line, axis=0)) for part in parts for line in part.loops]
         assert sum(lengths) == pytest.approx(2.0 * share, rel=0.05)
-        widths = [np.linalg.norm(part.polygon[2] - part.polygon[1]) for part in parts]
+        widths = [part.width for part in parts]
         np.testing.assert_allclose(widths, 0.02 * LOOKS[role].line, rtol=1e-9)
 
 
@@ -109,6 +115,7 @@ def test_colours_can_be_told_apart(viewer, colours):
 @pytest.mark.parametrize("family", ["concurrent", "pencil", "regulus"])
 def test_nothing_is_cut_off(family, legend):
     body, (grasp,) = grasps("tetrahedron", 0.3, 1, (family,), cones="tilted")
+    assert_whole(grasp_sheet(body, grasp, 0.3, legend=legend))
     figure = grasp_figure(body, grasp, 0.3, legend=legend)
     encoded(figure, "png")  # places what it draws
     assert_inside(figure)
@@ -121,21 +128,19 @@ def test_nothing_is_cut_off(family, legend):
 def test_every_finger_is_seen(name, family, monkeypatch):
     """The picture changes where a bar is left out.
 
-    A bar 0.1 by 0.75 object radii that is seen at the worst angle covers 0.033 square radii, of a
-    picture that is at most 3.7 radii wide 0.25 %.
+    A bar 0.1 by 0.75 finger sizes that is seen at the worst angle covers 0.033 square sizes. The
+    finger size is 0.59 radii or more, so in a picture of at most 3.7 radii the bar fills 0.085 %.
     """
     body, (grasp,) = grasps(name, 0.5, 1, (family,), cones="tilted")
     whole = pixels_of(grasp_figure(body, grasp, 0.5, legend=False))
     for finger in range(4):
         shapes = [shape for shape in drawing_of(body, grasp, 0.5)
                   if (shape.role, shape.finger) != ("finger", finger)]  # fmt: skip
-        view = best_view(body, grasp)
-        figure, axes = empty_picture()
         monkeypatch.setattr(pictures, "drawing_of", lambda *_, left=shapes: left)
-        draw_grasp(axes, body, grasp, 0.5, view)
+        figure = grasp_figure(body, grasp, 0.5, legend=False)
         monkeypatch.undo()
         changed = np.abs(whole - pixels_of(figure)).max(axis=2) > 0.15
-        assert changed.mean() > 0.0025
+        assert changed.mean() > 0.0008
 
 
 def pixels_of(figure):
@@ -144,19 +149,8 @@ def pixels_of(figure):
 
 
 def assert_inside(figure):
-    """That every text of a figure is whole, and no label of a tick is on another."""
-    of_ticks = set()
-    for axis in [axis for axes in figure.axes if axes.axison for axis in (axes.xaxis, axes.yaxis)]:
-        low, high = sorted(axis.get_view_interval())
-        shown = [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
-        of_ticks |= {tick.label1 for tick in shown} | {tick.label2 for tick in shown}
-        boxes = [tick.label1.get_window_extent() for tick in shown if tick.label1.get_visible()]
-        assert not any(one.overlaps(two) for one, two in itertools.combinations(boxes, 2))
-    every = set(figure.findobj(match=lambda each: hasattr(each, "get_text")))
-    hidden = {text for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)
-              for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())
-              for text in (tick.label1, tick.label2)} - of_ticks  # fmt: skip
-    texts = [text for text in every - hidden if text.get_text().strip() and text.get_visible()]
+    """That every text of a figure is whole."""
+    texts = [text for axes in figure.axes for text in axes.texts if text.get_text().strip()]
     assert texts
     width, height = figure.canvas.get_width_height()
     for text in texts:
@@ -165,6 +159,49 @@ def assert_inside(figure):
         assert box.y0 >= -1.0
         assert box.x1 <= width + 1.0, text.get_text()
         assert box.y1 <= height + 1.0, text.get_text()
+
+
+def test_a_curved_body_has_an_outline_and_no_seams():
+    """A ball is drawn with no edge; its outline is the circle where the line of sight grazes it."""
+    vertices, triangles = sphere_mesh(3)
+    body = gc.Polyhedron.from_mesh(vertices, triangles, faces="patches")
+    surface, edges = glass(body)
+    assert not edges.lines
+    view = View.of_angles(20.0, 30.0, body)
+    lines = outline(Surface.of(surface.polygons), view.camera)
+    assert len(lines) > 30
+    heights = (lines.reshape(-1, 3) - body.center_of_mass) @ view.axes[2] / body.radius
+    # the camera is nine radii away: the tangents touch at a ninth, here to an edge's length
+    assert np.abs(heights - 1.0 / 9.0).max() < 0.2
+    areas = [patch for patch in painted((surface,), view, 2.0) if not patch.width]
+    assert 2 <= len(areas) <= 14  # two sides, at most seven shades each
+    flat, _ = view.seen(surface.vertices())
+    covered = sum(abs(signed(loop)) for patch in areas for loop in patch.loops)
+    assert covered == pytest.approx(2.0 * abs(signed(convex_hull(flat))), rel=0.35)
+
+
+def signed(loop):
+    x, y = loop.T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def test_a_rod_has_its_two_rims_and_no_sides():
+    turn = 2.0 * np.pi * np.arange(48) / 48
+    ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    vertices = np.vstack([np.column_stack([ring, np.full(48, z)]) for z in (0.0, 20.0)])
+    low, high = np.arange(48), 48 + np.arange(48)
+    after = np.roll(low, -1)
+    triangles = np.vstack([
+        np.column_stack([low, after, high]), np.column_stack([after, np.roll(high, -1), high]),
+        [(0, i + 1, i) for i in range(1, 47)], [(48, 48 + i, 49 + i) for i in range(1, 47)],
+    ])  # fmt: skip
+    body = gc.Polyhedron.from_mesh(vertices, triangles)
+    _, edges = glass(body)
+    assert len(edges.lines) == 96
+    heights = np.array(edges.lines)[..., 2]
+    assert (heights[:, 0] == heights[:, 1]).all()
+    # fingers are in proportion to the rod's thickness, not to its length
+    assert finger_size(body) < 0.4 * body.radius
 
 
 @pytest.mark.parametrize("form", FORMATS)

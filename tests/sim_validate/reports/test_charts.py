@@ -9,8 +9,12 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.wrench_sets import WrenchSet
-from scenes.drawing.canvas import encoded, own_style_and_sheets, write_figure
-from scenes.drawing.pictures import grasp_figure
+from scenes.drawing.canvas import encoded
+from scenes.drawing.flat.colours import BAD, GOOD, LEVELS
+from scenes.drawing.flat.panels import thinned
+from scenes.drawing.flat.scales import ticks_between
+from scenes.drawing.flat.sheets import Area, Dots, Image
+from scenes.drawing.flat.svg import svg_of
 from sim_validate.replaying.recorded import Recorded
 from sim_validate.replaying.replay import replayed
 from sim_validate.reports.agreement import (
@@ -20,12 +24,19 @@ from sim_validate.reports.agreement import (
     limits_in,
     quadrants_in,
 )
-from sim_validate.reports.fidelity_charts import fidelity_figure, ticks_between
-from sim_validate.reports.margin_charts import directions_of_map, margin_figure, on_map
-from sim_validate.reports.motion_charts import friction_used, motion_figure
-from sim_validate.reports.wrench_charts import shadow_of, wrench_figure
+from sim_validate.reports.fidelity_charts import fidelity_panels
+from sim_validate.reports.margin_charts import (
+    directions_of_map,
+    margin_figure,
+    margin_panels,
+    margins,
+    on_map,
+    pixels,
+)
+from sim_validate.reports.motion_charts import friction_used, motion_figure, motion_panels
+from sim_validate.reports.wrench_charts import shadow_of, wrench_figure, wrench_panels
 from sim_validate.simulation.setup import Agenda, Setup
-from tests.scenes.drawing.test_pictures import assert_inside
+from tests.scenes.drawing.whole import assert_whole
 from tests.sim_validate.rigs import grasps
 
 FRICTION = 0.5
@@ -94,10 +105,9 @@ def test_a_map_is_of_unit_vectors_with_x_in_the_middle():
 
 def test_the_map_shows_what_is_resisted(wedge):
     body, grasp = wedge
-    figure = margin_figure(body, grasp, FRICTION, max_normal_force_n=7.0)
+    shown = margins(body, grasp, FRICTION, max_normal_force_n=7.0)
     ways = directions_of_map().reshape(-1, 3)
     rng = np.random.default_rng(0)
-    shown = [axes.collections[0].get_array() for axes in figure.axes[::2]]
     for place in rng.integers(len(ways), size=6):
         for kind, lever, unit in ((0, 1.0, 1.0), (3, body.radius, 1e3)):
             wrench = np.zeros(6)
@@ -114,8 +124,8 @@ def test_without_closure_there_is_no_map(wedge):
     body, grasp = wedge
     with pytest.raises(gc.InputError, match=r"not in force closure at friction 0\.001"):
         margin_figure(body, grasp, 0.001)
-    title = wrench_figure(body, grasp, 0.001).axes[0].get_title()
-    assert "not in force closure" in title
+    titles = [words.text for words in wrench_panels(body, grasp, 0.001)[0].words()]
+    assert any("not in force closure" in title for title in titles)
 
 
 def test_pushes_balance_the_wrench(wedge, trial):
@@ -207,12 +217,14 @@ def test_what_differs_stands_out(unit):
     agreements = [Agreement("a", pairs), Agreement("b", ())]
     assert agreements[0].worst == math.inf
     assert agreements[0].differ() == (False, True, True)
-    (one, two) = fidelity_figure(agreements).axes
-    labels = [text.get_text() for text in one.get_legend().get_texts()]
-    assert {"identity", "1 agree", "2 differ"} <= set(labels)
-    assert two.get_title() == "b"
-    assert [text.get_text() for text in two.texts] == ["none measured"]
-    assert not two.lines
+    one, two = fidelity_panels(agreements)
+    assert {"identity", "1 agree", "2 differ"} <= {words.text for words in one.words()}
+    assert {mark.colour for mark in one.marks if isinstance(mark, Dots)} == {GOOD}
+    assert [mark.fill for mark in one.marks if isinstance(mark, Area)].count(
+        BAD
+    ) == 3  # one in the key
+    assert {"b", "none measured"} <= {words.text for words in two.words()}
+    assert not [mark for mark in two.marks if isinstance(mark, Dots)]
 
 
 def test_a_trial_that_blew_up_is_drawn(trial):
@@ -221,8 +233,11 @@ def test_a_trial_that_blew_up_is_drawn(trial):
     for values in (moved, np.full_like(moved, np.nan)):
         blown = replace(trace, displacements_m=values)
         watched = replace(trial.watched, trace=blown)
-        figure = motion_figure(replace(trial, watched=watched), 1e-5)
-        assert len(encoded(figure, "png")) > 5000
+        sheets = motion_panels(replace(trial, watched=watched), 1e-5)
+        for sheet in sheets:
+            assert_whole(sheet)
+            assert "nan" not in svg_of(sheet)
+        assert len(encoded(motion_figure(replace(trial, watched=watched), 1e-5), "png")) > 5000
 
 
 def test_figures_do_not_depend_on_what_users_have_set(wedge):
@@ -232,48 +247,69 @@ def test_figures_do_not_depend_on_what_users_have_set(wedge):
 
 
 def test_the_scale_of_a_map_ends_at_its_least_and_largest_value(wedge):
-    figure = margin_figure(*wedge, FRICTION)
-    for drawn, scale in zip(figure.axes[::2], figure.axes[1::2], strict=True):
-        values = drawn.collections[0].get_array()
-        assert scale.get_ylim() == (values.min(), values.max())
-        np.testing.assert_array_equal(np.unique(scale.collections[0].get_array()), scale.get_ylim())
+    for sheet, values in zip(
+        margin_panels(*wedge, FRICTION), margins(*wedge, FRICTION), strict=True
+    ):
+        said = [words.text for words in sheet.words()]
+        assert {f"{values.min():.3g}", f"{values.max():.3g}", f"least: {values.min():.3g}"} <= {
+            *said
+        }
+        drawn, scale = (mark.levels for mark in sheet.marks if isinstance(mark, Image))
+        np.testing.assert_array_equal(scale, [range(LEVELS)])
+        inside = drawn[drawn >= 0]
+        # an ellipse fills pi / 4 of its box; pixels on its border count by their middles
+        assert inside.size / drawn.size == pytest.approx(math.pi / 4.0, abs=0.01)
+        assert inside.min() <= 1
+        assert inside.max() >= LEVELS - 2
 
 
-def test_a_figure_that_is_used_again_is_drawn_as_a_new_one(wedge, trial, tmp_path):
-    """Others before it leave nothing behind: no line, text, range or scale."""
-    body, grasp = wedge
-    other = replace(grasp, contacts=grasp.contacts[::-1], faces=grasp.faces[::-1])
-    makers = {
-        "picture": lambda each, mu: grasp_figure(body, each, mu, legend=False),
-        "wrenches": lambda each, mu: wrench_figure(body, each, mu),
-        "margins": lambda each, mu: margin_figure(body, each, mu),
-        "motion": lambda _, mu: motion_figure(trial, mu * 1e-5),
-    }
-    for name, make in makers.items():
-        expected = encoded(make(grasp, FRICTION), "png")
-        with own_style_and_sheets():
-            first = make(other, 0.9)
-            write_figure(first, tmp_path / "first.png")
-            again = make(grasp, FRICTION)
-            assert again is first, name
-            assert make(grasp, FRICTION) is not again
-            write_figure(again, tmp_path / "again.png")
-        assert (tmp_path / "again.png").read_bytes() == expected, name
-        assert (tmp_path / "first.png").read_bytes() != expected, name
-        assert make(grasp, FRICTION) is not again
+def test_the_pixels_of_a_map_are_where_its_directions_are():
+    """A linear function of the direction is interpolated to the square of half a cell."""
+    ways = directions_of_map()
+    way = np.array([0.48, 0.6, 0.64])
+    drawn = pixels(ways @ way, -1.0, 1.0)
+    rows, columns = drawn.shape
+    rng = np.random.default_rng(0)
+    for longitude, latitude in zip(rng.uniform(-3, 3, 50), rng.uniform(-1.4, 1.4, 50), strict=True):
+        x, y = on_map(np.array(longitude), np.array(latitude))
+        flat = math.cos(latitude)
+        value = way @ [flat * math.cos(longitude), flat * math.sin(longitude), math.sin(latitude)]
+        level = drawn[int(0.5 * (1.0 - y) * rows), int(0.25 * (x + 2.0) * columns)]
+        cell = math.pi / 10.0
+        slack = 0.5 * cell**2 / 4.0 + 2.0 * 4.0 / rows  # the curve, and two pixels
+        assert -1.0 + 2.0 * (level + 0.5) / LEVELS == pytest.approx(value, abs=slack)
 
 
-@pytest.mark.parametrize("kind", ["wrenches", "margins", "motion", "fidelity", "one panel"])
+@pytest.mark.parametrize("kind", ["wrenches", "margins", "motion", "fidelity"])
 def test_labels_of_charts_are_whole(kind, wedge, trial):
-    figure = {
-        "wrenches": lambda: wrench_figure(*wedge, FRICTION),
-        "margins": lambda: margin_figure(*wedge, FRICTION),
-        "motion": lambda: motion_figure(trial, 1e-5),
-        "fidelity": lambda: fidelity_figure(
-            [Agreement("critical friction", ((0.013, 0.013), (0.4, 0.41))),
+    pairs = ((0.013, 0.013), (0.4, 0.41))
+    sheets = {
+        "wrenches": lambda: wrench_panels(*wedge, FRICTION),
+        "margins": lambda: margin_panels(*wedge, FRICTION),
+        "motion": lambda: motion_panels(trial, 1e-5),
+        "fidelity": lambda: fidelity_panels(
+            [Agreement("critical friction", pairs), Agreement("b", ((1e-4, 1e-4), (0.5, 0.7))),
              Agreement("largest wrench [N], torques over grasp size", ((3.0, 3.1),))]
         ),
-        "one panel": lambda: fidelity_figure([Agreement("critical friction", ((0.1, 0.1),))]),
     }[kind]()  # fmt: skip
-    encoded(figure, "png")
-    assert_inside(figure)
+    assert len(sheets) >= 2
+    for sheet in sheets:
+        assert_whole(sheet)
+
+
+def test_a_page_takes_less_for_its_charts_than_three_pictures_would(wedge, trial):
+    """Pictures of the same charts took 45 kB."""
+    sheets = [*wrench_panels(*wedge, FRICTION), *margin_panels(*wedge, FRICTION),
+              *motion_panels(trial, 1e-5)]  # fmt: skip
+    assert sum(len(svg_of(sheet)) for sheet in sheets) < 45_000
+
+
+def test_a_thinned_curve_misses_no_point_by_a_fifth_of_a_pixel():
+    x = np.linspace(0.0, 300.0, 500)
+    curve = np.stack([x, 60.0 * np.sin(x / 20.0)], axis=1)
+    kept = thinned(curve)
+    assert 20 < len(kept) < 150
+    drawn = np.interp(x, *kept.T)
+    assert np.abs(drawn - curve[:, 1]).max() < 0.2 * math.hypot(1.0, 3.0)  # across, by its slope
+    straight = np.stack([x, 2.0 * x], axis=1)
+    np.testing.assert_array_equal(thinned(straight), straight[[0, -1]])

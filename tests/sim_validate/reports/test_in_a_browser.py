@@ -8,11 +8,21 @@ import pytest
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.reports.report import write_report
-from tests.browser import CONTRASTS, OWN, READABLE, headless, needs_browser, opened, requests_of
+from sim_validate.reports.stability_page import write_report as write_stability
+from tests.browser import (
+    CLIPPED,
+    CONTRASTS,
+    OWN,
+    READABLE,
+    headless,
+    needs_browser,
+    opened,
+    requests_of,
+)
 from tests.sim_validate.reports.test_report import EVIL, changed
+from tests.sim_validate.reports.test_stability_page import WHY, line
 
 pytestmark = [pytest.mark.slow, needs_browser]
-TEXTS = "h1, h2, p, a, th, td, label, summary, .verdict, figcaption"
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +123,7 @@ def test_filters_and_orders_work(browser, small_report, small_run):
 
 
 PIXELS = """
-const canvas = document.querySelector("canvas");
+const canvas = document.querySelector(".stage > canvas");
 const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
 let sum = 0, drawn = 0;
 for (let at = 0; at < data.length; at += 4) {
@@ -153,25 +163,95 @@ def test_a_page_by_itself_turns(browser, small_run, tmp_path):
     assert requests_of(browser)[0].endswith("a.html")
 
 
-@pytest.mark.parametrize("width", [360, 1200])
-def test_pages_are_as_wide_as_the_screen(browser, small_report, width):
-    for path in pages_of(small_report)[:2]:
-        opened(browser, path, width=width, touch=width < 500)
-        wide = browser.execute_script("return document.documentElement.scrollWidth")
-        assert wide <= width
-        small = browser.execute_script(
-            "return [...document.querySelectorAll('p, td, label')].map((node) => "
-            "parseFloat(getComputedStyle(node).fontSize))"
-        )
-        assert min(small) >= 12.0
+@pytest.fixture(scope="module")
+def shown(small_report, small_run, tmp_path_factory):
+    """The four kinds of pages."""
+    folder = tmp_path_factory.mktemp("shown")
+    asked = ["view", str(small_run / "grasps.json"), "--page", str(folder / "turn.html"), "-q"]
+    assert main(asked) == Exit.GOOD
+    lines = [line(f"c-{i}-5-6-7", "regressed", WHY) for i in range(12)]
+    lines += [line(f"c-{i}-1-2-3", "same") for i in range(12)]
+    return {
+        "index": small_report / "index.html", "grasp": pages_of(small_report)[1],
+        "turntable": folder / "turn.html", "stability": write_stability(folder / "stable", lines),
+    }  # fmt: skip
+
+
+KINDS = ("index", "grasp", "turntable", "stability")
+WIDTHS = (390, 1280, 1600)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_everything_is_on_the_screen(browser, shown, kind, width):
+    """Nothing is cut off, and neither a page nor a table scrolls sideways."""
+    opened(browser, shown[kind], width=width, touch=width < 500)
+    browser.execute_script(
+        "document.querySelectorAll('details').forEach((e) => { e.open = true; })"
+    )
+    assert browser.execute_script("return document.documentElement.scrollWidth") <= width
+    assert browser.execute_script(CLIPPED) == []
+    small = browser.execute_script(
+        "return [...document.querySelectorAll('p, td, label, dd')].map((node) => "
+        "parseFloat(getComputedStyle(node).fontSize))"
+    )
+    assert min(small) >= 12.0
+
+
+def test_what_is_cut_off_is_noticed(browser, shown):
+    """A negative control of the test above."""
+    opened(browser, shown["grasp"], width=1280)
+    browser.execute_script(
+        "document.querySelector('h1').style.marginLeft = '-120px';"
+        "document.querySelector('.panels text').setAttribute('x', '-30')"
+    )
+    said = browser.execute_script(CLIPPED)
+    assert [each.partition(":")[0] for each in said] == ["off the screen", "off its chart"]
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_text_can_be_read_by_day_and_by_night(browser, small_report, dark):
-    for path in pages_of(small_report)[:2]:
-        opened(browser, path, dark=dark)
-        found = browser.execute_script(CONTRASTS, TEXTS)
-        assert len(found) > 40
-        assert [text for contrast, text in found if contrast < READABLE] == []
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_text_can_be_read_by_day_and_by_night(browser, shown, kind, width, dark):
+    opened(browser, shown[kind], width=width, dark=dark, touch=width < 500)
+    browser.execute_script(
+        "document.querySelectorAll('details').forEach((e) => { e.open = true; })"
+    )
+    found = browser.execute_script(CONTRASTS, "body *:not(script):not(style)")
+    assert len(found) > 20
+    assert [text for contrast, text in found if contrast < READABLE] == []
     light = browser.execute_script("return getComputedStyle(document.body).backgroundColor")
     assert (light == "rgb(255, 255, 255)") != dark
+
+
+@pytest.mark.parametrize("width", [1280, 1600])
+def test_the_drawing_that_turns_fits_its_window(browser, shown, width):
+    opened(browser, shown["turntable"], width=width)
+    tall = browser.execute_script("return document.documentElement.scrollHeight")
+    assert tall <= browser.execute_script("return window.innerHeight")
+    said = browser.execute_script("return document.body.innerText")
+    for part in ("friction cone", "force cone", "critical friction", "margin of closure"):
+        assert part in said
+
+
+def test_tables_sort_by_a_heading_and_with_keys(browser, shown):
+    from selenium.webdriver import Keys
+    from selenium.webdriver.common.by import By
+
+    opened(browser, shown["grasp"])
+    table = browser.find_elements(By.CSS_SELECTOR, "table.sorts")[1]
+    buttons = table.find_elements(By.CSS_SELECTOR, "th button")
+    column = [button.text.split()[0] for button in buttons].index("friction")
+
+    def values():
+        cells = table.find_elements(By.CSS_SELECTOR, f"tbody tr > :nth-child({column + 1})")
+        return [float(cell.text) for cell in cells]
+
+    before = values()
+    buttons[column].click()
+    assert values() == sorted(before)
+    assert before != sorted(before)
+    buttons[column].send_keys(Keys.ENTER)
+    assert values() == sorted(before, reverse=True)
+    heading = table.find_elements(By.CSS_SELECTOR, "thead th")[column]
+    assert heading.get_attribute("aria-sort") == "descending"

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
+from scenes.drawing.flat.colours import FINGERS
 from scenes.drawing.painting import DARKEST, LIGHT
-from scenes.drawing.palette import FINGERS
 from scenes.drawing.turntable import UNITS
 from scenes.drawing.views import DISTANCE
 from sim_validate import main as commands
@@ -77,7 +77,8 @@ def test_every_link_leads_to_a_file_of_the_report(small_report):
 def test_nothing_is_asked_of_a_network(small_report):
     for path in small_report.rglob("*"):
         if path.suffix in {".html", ".css", ".js"}:
-            assert not re.search(r"https?:|//[a-z]|@import|url\(", path.read_text())
+            text = re.sub(r"data:[\w/;,+=]*", "", path.read_text())  # pictures within the page
+            assert not re.search(r"https?:|//[a-z]|@import|url\(", text)
     assert all("Content-Security-Policy" in path.read_text()
                for path in small_report.rglob("*.html"))  # fmt: skip
 
@@ -93,11 +94,11 @@ def test_a_page_says_what_the_files_say(small_run, small_report):
             force, torque = np.reshape(trial["wrench"], (2, 3))
             lever = verdict["settings"]["grasp_size_m"]
             size = np.linalg.norm([*force, *(torque / lever)])
-            assert f"{size * trial['simulated_limit']:.4g}" in said
-        assert f"{verdict['critical_friction']['simulated']:.4g}" in said
+            assert f"{size * trial['simulated_limit']:.3g}" in said
+        assert f"{verdict['critical_friction']['simulated']:.3g}" in said
         for name in verdict["controls"]:
             assert name.replace("_", " ") in said
-        assert f"{1e3 * certified['disc_radius_m']:.4g} mm" in said
+        assert f"{1e3 * certified['disc_radius_m']:.3g} mm" in said
         assert certified["proof"]["file"] in said
         assert "held 2 of 2 times" in said
 
@@ -109,7 +110,7 @@ def test_the_first_page_counts(small_run, small_report):
     assert f"3 of 3 held, {controls} of {controls} negative controls were let go" in said
     assert "critical friction: 3 pairs" in said
     assert "largest wrench [N], torques over grasp size: 39 pairs" in said
-    assert (small_report / "fidelity.svg").stat().st_size > 5000
+    assert "39 agree" in said
 
 
 def test_the_drawing_is_that_of_the_grasp(small_run, small_report):
@@ -197,7 +198,7 @@ def test_names_are_escaped(copy, tmp_path):
         assert "\x1b" not in path.read_text()
         assert EVIL.replace("\x1b", " ") in "".join(page.said)
         assert {known.get("src") for tag, known in page.tags if tag == "script"} <= {
-            None, "gallery.js", "../turntable.js", "../object-0.js",
+            None, "gallery.js", "tables.js", "../tables.js", "../turntable.js", "../object-0.js",
         }  # fmt: skip
     assert "contradicts the analysis" in pages[index].said
 
@@ -209,7 +210,7 @@ def test_without_verdicts_grasps_are_shown(copy, tmp_path):
     index = Page(report.index.read_text())
     assert report.grasps == 3
     assert index.said.count("not simulated") == 4  # three cards, and the choice
-    assert not (tmp_path / "out" / "fidelity.svg").exists()
+    assert 'id="fidelity"' not in report.index.read_text()
 
 
 def test_an_interrupted_run_is_called_that(copy, tmp_path):
