@@ -101,10 +101,19 @@ class Motors(ByValue):
         Raises:
             InputError: Shapes or ranges are wrong, or a motor cannot carry the links somewhere.
         """
-        rows = frozen(levers, (None, None), "levers")
-        lengths = np.linalg.norm(frozen(weights, (len(rows), 3), "weights"), axis=1)
-        most = cls(rows, _each(limits, len(rows)), lengths)  # refuses motors that are too weak
-        return cls(rows, most.limits - lengths, np.zeros(len(rows)))
+        strong = cls.of(levers, limits)
+        shape = (len(strong.limits), 3)
+        carried = np.linalg.norm(frozen(weights, shape, "weights"), axis=1)
+        left = strong.limits - carried
+        weak = np.flatnonzero(left < SMALLEST)
+        if weak.size:
+            joint = int(weak[0])
+            raise InputError(
+                f"weights of joint {joint} ask for {carried[joint]:.6g} N m in some orientation, but "
+                f"its limit is {strong.limits[joint]:.6g} N m: the hand cannot carry its own links "
+                "there; give larger limits"
+            )
+        return cls(strong.levers, left, np.zeros(len(left)))
 
     def sound(self, contacts: int) -> bool:
         """Return whether the fields are those of joints for so many contacts."""
