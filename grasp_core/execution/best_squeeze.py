@@ -29,8 +29,9 @@ from grasp_core.errors import NoForcesError, SolverError
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
 from grasp_core.execution.loads import LoadSet
 from grasp_core.execution.squeeze_certificate import ROUNDING, BestSqueeze, no_scale
-from grasp_core.execution.squeeze_rows import Cuts, Survival
+from grasp_core.execution.squeeze_rows import Cuts, Rows, Survival
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.motors import Motors
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import first_best, nearest_optimum
 from grasp_core.values import Contact, Grasp
@@ -44,6 +45,8 @@ ABOVE = 1e-4
 """By how much more than scale one the least push is asked to survive: rows are met to less."""
 AT_REST = 1e-5
 """Share of the friction that the search leaves unused at rest, where rows are met to less."""
+VALUE = 0.25
+"""Value of a program for weak motors, in its own units: optima are told apart by a share of one."""
 SAFE = (1e-9, 1e-8, 1e-7, 1e-6)
 """Shares of the scale that are given away, tried in turn, so that rounding spoils no proof."""
 SMALLER_PUSH = (
@@ -63,6 +66,7 @@ def best_squeeze(  # noqa: PLR0913 - each is a quantity of its own
     max_push_n: float | None = None,
     stiffness: ArrayLike = STIFFNESS_N_PER_M,
     tip_radius_m: ArrayLike = TIP_RADIUS_M,
+    motors: Motors | None = None,
 ) -> BestSqueeze:
     """Find the squeeze that survives most without replanning, in the linear model.
 
@@ -79,6 +83,9 @@ def best_squeeze(  # noqa: PLR0913 - each is a quantity of its own
         stiffness: Stiffness of the fingertips' springs [N/m]: one number, one each, or a symmetric
             matrix each, (k, 3, 3).
         tip_radius_m: Radius of the fingertips [m], one for all or one each.
+        motors: Joints that the contact forces load, with the torques of their motors, which also
+            carry the links at rest and under all loads; None for fingers that are as strong as
+            `max_push_n` says.
 
     Raises:
         InputError: Shapes or ranges are wrong, or the contacts have no stiffness in some motion.
@@ -88,10 +95,12 @@ def best_squeeze(  # noqa: PLR0913 - each is a quantity of its own
     start = unsqueezed(body, contacts, friction, stiffness=stiffness, tip_radius_m=tip_radius_m)
     instance(loads, LoadSet, "loads", "gc.any_direction makes one")
     most = None if max_push_n is None else positive(max_push_n, "max_push_n")
-    return searched(start, loads, most)
+    return searched(start, loads, most, motors)
 
 
-def searched(start: Grip, loads: LoadSet, most: float | None) -> BestSqueeze:
+def searched(
+    start: Grip, loads: LoadSet, most: float | None, motors: Motors | None = None
+) -> BestSqueeze:
     """Find the best squeeze of contacts, (see `best_squeeze`), starting from any squeeze.
 
     Raises:
@@ -99,11 +108,11 @@ def searched(start: Grip, loads: LoadSet, most: float | None) -> BestSqueeze:
         NoForcesError: No squeeze survives the loads, or the grip is unstable under the best one.
         SolverError: A program's answer failed its check.
     """
-    survival = Survival.of(start, loads)
+    survival = Survival.of(start, loads, motors)
     cuts = Cuts.first(len(survival.friction))
     best: _Round | None = None
     for _ in range(ROUNDS):
-        found = _solved(start, loads, survival, cuts, most)
+        found = _solved(start, loads, survival, cuts, most, motors)
         if best is None or found.gap < best.gap:
             best = found
         if found.gap <= (GAP if most else GAP + ABOVE) * found.upper + found.nothing:
@@ -117,7 +126,7 @@ def searched(start: Grip, loads: LoadSet, most: float | None) -> BestSqueeze:
             f"stiffness is {best.grip.least_stiffness:.3g} N/m; use stiffer or larger fingertips, "
             f"or {SMALLER_LOADS if most is None else SMALLER_PUSH}"
         )
-    return _certified(best, loads)
+    return _certified(best, loads, motors)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,7 +142,8 @@ class _Round:
     angles: Array
     """Worst angle of each case, (cases,) [rad]."""
     scales: Array
-    """Scale at which each case slips, then at which each exceeds its limit, (2 cases,)."""
+    """Scale at which each case slips, then at which each exceeds its limit, then at which each
+    joint does under the loads, and at rest, (2 cases + groups joints,)."""
     upper: float
     least: float
     """Scale below which the squeeze is no answer: one where the least push is sought, else zero."""
@@ -160,12 +170,13 @@ class _Round:
 
 
 def _solved(
-    start: Grip, loads: LoadSet, survival: Survival, cuts: Cuts, most: float | None
-) -> _Round:
+    start: Grip, loads: LoadSet, survival: Survival, cuts: Cuts, most: float | None,
+    motors: Motors | None,
+) -> _Round:  # fmt: skip
     """Solve the program with some rows, and judge its squeeze with the response that it has."""
     local, multipliers = _program(survival, cuts, most)
     grip = start.squeezed(np.einsum("kij,kj->ki", start.frames, local))
-    own = Survival.of(grip, loads)
+    own = Survival.of(grip, loads, motors)
     reactions = own.reactions(grip.local_squeeze)
     angles, slips = reactions.worst_angles()
     pushes, swing = reactions.start[:, 0], reactions.swing
@@ -174,7 +185,7 @@ def _solved(
     limits = np.where(pushes <= limit * (1.0 + ROUNDING), limits, -np.inf)
     y, z = multipliers[:-WRENCH], multipliers[-WRENCH:]
     upper = own.bound(cuts, y, z, limit)
-    scales = np.concatenate([slips, limits])
+    scales = np.concatenate([slips, limits, own.joints.scales(grip.local_squeeze).ravel()])
     upper, least = max(upper, float(scales.min())), 0.0 if most else 1.0 + SAFE[-1]
     return _Round(grip, own, cuts, y, z, limit, angles, scales, upper, least)
 
@@ -187,17 +198,32 @@ def _program(survival: Survival, cuts: Cuts, most: float | None) -> tuple[Array,
     k, change = survival.contacts, np.linalg.norm(survival.change, axis=(1, 2))
     used = np.repeat([1.0, 1.0 - AT_REST], k)[: len(change)]  # under the loads, and at rest
     rows = replace(survival, friction=used * survival.friction).rows(cuts)
-    largest = float(change.max())
-    goal = np.append(np.zeros(3 * k), 1.0)
-    if most is None:
-        unit = max(largest, float(np.abs(survival.offset).max()))
-        last, b = (
-            rows.d,
-            (rows.b - (1.0 + ABOVE) * rows.c) / unit,
-        )  # the last unknown is minus the limit
+    unit = most or max(float(change.max()), float(np.abs(survival.offset).max()))
+    program, answer = _optimum(survival, rows, most, unit)
+    # weak motors let loads end far below the limit on pushes, which is no unit for them then
+    if most and survival.joints.rows and 0.0 < answer.value < VALUE:
+        unit *= answer.value / VALUE
+        program, answer = _optimum(survival, rows, most, unit)
+    x = nearest_optimum(program, answer)
+    y = np.maximum(answer.multipliers[: len(rows.b)], 0.0)
+    return unit * x[:-1].reshape(k, 3), np.append(y, answer.multipliers[-WRENCH:])
+
+
+def _optimum(
+    survival: Survival, rows: Rows, most: float | None, unit: float
+) -> tuple[LinearProgram, Optimum]:
+    """Solve the program of some rows with forces in a unit [N].
+
+    Raises:
+        NoForcesError: No squeeze meets the rows.
+        SolverError: The program's answer failed its check.
+    """
+    goal = np.append(np.zeros(survival.G.shape[1]), 1.0)
+    if most is None:  # the last unknown is minus the limit
+        last, b = rows.d, (rows.b - (1.0 + ABOVE) * rows.c) / unit
     else:
-        unit = most
-        last, b = rows.c / largest, rows.b / unit + rows.d
+        largest = float(np.linalg.norm(survival.change, axis=(1, 2)).max())
+        last, b = rows.c / largest, rows.b / unit + most / unit * rows.d
     # the last row: the scale, or minus the limit, is not negative, or not positive
     sign = -1.0 if most else 1.0
     A = np.vstack([np.column_stack([rows.R, last]), sign * goal])
@@ -205,28 +231,28 @@ def _program(survival: Survival, cuts: Cuts, most: float | None) -> tuple[Array,
     program = LinearProgram(goal, A, np.append(b, 0.0), balance, np.zeros(WRENCH))
     answer = maximize(program)
     if not isinstance(answer, Optimum):
-        raise NoForcesError(_refusal(most))
-    x = nearest_optimum(program, answer)
-    y = np.maximum(answer.multipliers[: len(rows.b)], 0.0)
-    return unit * x[:-1].reshape(k, 3), np.append(y, answer.multipliers[-WRENCH:])
+        raise NoForcesError(_refusal(most, strong=not survival.joints.rows))
+    return program, answer
 
 
-def _refusal(most: float | None) -> str:
+def _refusal(most: float | None, *, strong: bool) -> str:
+    within = "" if strong else " within the torques of the joints"
+    stronger = "" if strong else "stronger motors, "
     if most is None:
         return (
-            "no balanced squeeze survives the loads, however hard the fingers push; more friction, "
-            "or contacts in force closure, may allow one"
+            f"no balanced squeeze{within} survives the loads, however hard the fingers push; "
+            f"{stronger}more friction, or contacts in force closure, may allow one"
         )
     return (
-        f"no balanced squeeze with pushes up to {most:.6g} N survives the offset of the loads; "
-        "allow larger pushes, or use more friction"
+        f"no balanced squeeze{within} with pushes up to {most:.6g} N survives the offset of the "
+        f"loads; {'' if strong else 'use stronger motors, '}allow larger pushes, or use more "
+        "friction"
     )
 
 
-def _certified(found: _Round, loads: LoadSet) -> BestSqueeze:
+def _certified(found: _Round, loads: LoadSet, motors: Motors | None) -> BestSqueeze:
     """Prove what a squeeze survives, with the share of `SAFE` that suffices."""
     reactions = found.survival.reactions(found.grip.local_squeeze)
-    k = found.survival.contacts
     for share in SAFE:
         scale = found.reached * (1.0 - share)
         proofs = reactions.multipliers(scale)
@@ -234,14 +260,25 @@ def _certified(found: _Round, loads: LoadSet) -> BestSqueeze:
             break
     else:
         raise SolverError("the proof that the squeeze survives its loads fails our check")
-    loaded = np.concatenate([found.scales[:k], found.scales[len(found.angles) :][:k]])
-    place = first_best(-loaded)
-    contact = place % k
-    direction = (
-        reactions.worst_of(contact, float(found.angles[contact])) if place < k
-        else reactions.change[contact, 0] / reactions.swing[contact]
-    )  # fmt: skip
+    contact, joint, direction = _first_reached(found)
     return BestSqueeze(
         found.grip, loads, found.max_push_n, scale, found.upper, contact, direction, proofs,
-        found.cuts, found.multipliers, found.balance,
+        found.cuts, found.multipliers, found.balance, motors, joint,
     )  # fmt: skip
+
+
+def _first_reached(found: _Round) -> tuple[int, int, Array]:
+    """Find the contact or the joint that ends the scale, the other being -1, and the place z."""
+    local, joints = found.grip.local_squeeze, found.survival.joints
+    reactions = found.survival.reactions(local)
+    k, cases = found.survival.contacts, len(found.angles)
+    slips, limits, torques = np.split(found.scales, [cases, 2 * cases])
+    # only what the loads do counts: nothing grows at rest
+    loaded = np.concatenate([slips[:k], limits[:k], torques[: len(joints.limits)]])
+    place = first_best(-loaded)
+    if place >= 2 * k:
+        return -1, place - 2 * k, joints.worst_of(place - 2 * k, local)
+    contact = place % k
+    if place < k:
+        return contact, -1, reactions.worst_of(contact, float(found.angles[contact]))
+    return contact, -1, reactions.change[contact, 0] / reactions.swing[contact]

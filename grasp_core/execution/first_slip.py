@@ -13,6 +13,13 @@ object by a small step, and the response is taken anew. The steps to the root be
 the root is met to `MET`. A finger with a limit on its push is also checked against it: beyond the
 limit no closed grasp is sure to resist (see `wrench_limits`), so that a first slip with limits is
 never above the closure limit.
+
+Motors may be at the limit of their torques first. With the torque tau_j = (L f + g)_j of a joint
+and its change d_j = (L C w)_j per load, both in the object's axes (see `joint_torques`), that is at
+
+    s = (c_j - sign(d_j) tau_j) / |d_j|,                                                  (2)
+
+and beyond it the finger gives way, although no contact slips.
 """
 
 import math
@@ -28,10 +35,12 @@ from grasp_core.checked import LARGEST, SMALLEST, number, one_of
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.equilibrium import Held, at_rest, rotation, under
 from grasp_core.execution.grips import Grip, check_grip
+from grasp_core.execution.joint_torques import torque_excess, torque_steps
+from grasp_core.quality.motors import Motors, motors_for
 
-Event: TypeAlias = Literal["slip", "push limit", "unstable", "none"]
-"""What ends the growth of a load: a contact slips, a finger reaches its limit, the equilibrium is
-not stable any more, or nothing up to `FARTHEST`."""
+Event: TypeAlias = Literal["slip", "push limit", "torque limit", "unstable", "none"]
+"""What ends the growth of a load: a contact slips, a finger reaches its limit, a joint its torque,
+the equilibrium is not stable any more, or nothing up to `FARTHEST`."""
 Model: TypeAlias = Literal["finite", "linear"]
 """Whether the object's motion is followed, or taken to be small."""
 
@@ -41,6 +50,8 @@ STEP = 0.02
 """Largest motion of the object in one step, in arms' lengths or radians."""
 MET = 1e-9
 """How near the load of first slip is met, relative to it."""
+CORRECTIONS = 6
+"""Most steps back to the torque of a joint; each squares the error."""
 MOST_STEPS = 1000
 SMALLEST_STEP = 1e-6
 """Part of a step at which the equilibrium ends, rather than that Newton's method fails."""
@@ -55,9 +66,9 @@ class FirstSlip(ByValue):
     multiple: float
     """Multiple of the load at which it ends; infinite where nothing happens."""
     event: Event
-    """What happens there: `slip`, `push limit`, `unstable` or `none`."""
+    """What happens there: `slip`, `push limit`, `torque limit`, `unstable` or `none`."""
     contact: int
-    """Index of the contact where it happens; -1 for events of the whole grip."""
+    """Index of the contact where it happens; -1 for events of a joint or of the whole grip."""
     forces: Array
     """Contact forces then, on the object, world axes, (k, 3) [N]."""
     arms: Array
@@ -69,10 +80,33 @@ class FirstSlip(ByValue):
     """Distance that the centre of mass has moved [m]."""
     turn_rad: float
     """Angle that the object has turned [rad]."""
+    joint: int = -1
+    """Index of the joint that reaches its torque; -1 for all other events."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Limits:
+    """What fingers and joints can do."""
+
+    push_n: float
+    motors: Motors
+
+    def torques(self, held: Held, load: Array) -> tuple[Array, Array]:
+        """Compute the torques of the joints, and their change per load, (joints,) [N m] each."""
+        grip, back = held.grip, held.rotation  # rows times R are turned back to the object's axes
+        change = np.einsum("kij,kj->ki", grip.frames, grip.response @ load)
+        return self.motors.torques(grip.squeeze @ back), self.motors.levers @ (
+            change @ back
+        ).ravel()
 
 
 def first_slip(
-    grip: Grip, wrench: ArrayLike, *, model: Model = "finite", max_push_n: float = math.inf
+    grip: Grip,
+    wrench: ArrayLike,
+    *,
+    model: Model = "finite",
+    max_push_n: float = math.inf,
+    motors: Motors | None = None,
 ) -> FirstSlip:
     """Find the smallest multiple of a load at which a contact slips, without replanning.
 
@@ -82,13 +116,16 @@ def first_slip(
             that stay those of the world when the object turns.
         model: `finite` follows the object's motion; `linear` is the closed form of small motions.
         max_push_n: Largest normal force of a finger [N].
+        motors: Joints that the contact forces load, with the torques of their motors. They may be
+            reached before anything slips, which is the event `torque limit`; None for none.
 
     Returns:
         The multiple of the wrench, and what happens there. A grip that is unstable before any load
         has the multiple zero.
 
     Raises:
-        InputError: The wrench is zero, or a contact is not inside its friction cone at rest.
+        InputError: The wrench is zero, a contact is not inside its friction cone at rest, or a
+            joint not within its torque.
         SolverError: The equilibrium could not be followed.
     """
     check_grip(grip)
@@ -100,12 +137,26 @@ def first_slip(
             f"wrench must not be zero: the largest part is from {SMALLEST:g} to {LARGEST:g}, got "
             f"{float(np.abs(load).max()):.6g}"
         )
+    limits = _Limits(max_push_n, motors_for(motors, len(grip.friction)))
     _check_rest(grip, max_push_n)
+    _check_torques(grip, limits.motors)
     if not grip.stable:
         return _ended(at_rest(grip), 0.0, "unstable", -1)
     if model == "linear":
-        return _linear(grip, load, max_push_n)
-    return _finite(grip, load, max_push_n)
+        return _linear(grip, load, limits)
+    return _finite(grip, load, limits)
+
+
+def _check_torques(grip: Grip, motors: Motors) -> None:
+    torques = motors.torques(grip.squeeze)
+    weak = np.flatnonzero(np.abs(torques) > motors.limits * (1.0 + AT_REST))
+    if weak.size:
+        joint = int(weak[0])
+        raise InputError(
+            f"squeeze: joint {joint} of the motors is too weak at rest: the squeeze asks for "
+            f"{abs(torques[joint]):.6g} N m, but its limit is {motors.limits[joint]:.6g} N m; take "
+            "the squeeze from best_squeeze with these motors"
+        )
 
 
 def _check_rest(grip: Grip, max_push_n: float) -> None:
@@ -152,11 +203,19 @@ def _push_steps(local: Array, change: Array, most: float) -> Array:
         return np.where(a > 0.0, left / a, np.inf)
 
 
-def _next_event(grip: Grip, load: Array, most: float) -> tuple[float, Event, int]:
-    """Find the next multiple of a load at which something happens, as the response stays."""
+def _next_event(held: Held, load: Array, most: _Limits) -> tuple[float, Event, int]:
+    """Find the next multiple of a load at which something happens, as the response stays.
+
+    Returns:
+        The further multiple, what happens, and the index of the contact or joint.
+    """
+    grip = held.grip
     local, change = grip.local_squeeze, grip.response @ load
     slips = slip_steps(local, change, grip.friction)
-    limits = _push_steps(local, change, most)
+    limits = _push_steps(local, change, most.push_n)
+    torques = torque_steps(*most.torques(held, load), most.motors.limits)
+    if torques.min(initial=np.inf) < min(limits.min(), slips.min()):
+        return float(torques.min()), "torque limit", int(np.argmin(torques))
     if limits.min() < slips.min():
         return float(limits.min()), "push limit", int(np.argmin(limits))
     if math.isinf(slips.min()):
@@ -164,27 +223,27 @@ def _next_event(grip: Grip, load: Array, most: float) -> tuple[float, Event, int
     return float(slips.min()), "slip", int(np.argmin(slips))
 
 
-def _linear(grip: Grip, load: Array, most: float) -> FirstSlip:
-    multiple, event, contact = _next_event(grip, load, most)
+def _linear(grip: Grip, load: Array, most: _Limits) -> FirstSlip:
     rest = at_rest(grip)
+    multiple, event, place = _next_event(rest, load, most)
     if event == "none":
-        return _ended(rest, multiple, event, contact)
+        return _ended(rest, multiple, event, place)
     motion = multiple * grip.compliance @ load
     local = grip.local_squeeze + multiple * (grip.response @ load)
     forces = np.einsum("kij,kj->ki", grip.frames, local)
     moved = Held(grip.squeezed(forces), motion[:3], rotation(motion[3:]), rest.tips, rest.load)
-    return _ended(moved, multiple, event, contact)
+    return _ended(moved, multiple, event, place)
 
 
-def _finite(start: Grip, load: Array, most: float) -> FirstSlip:
+def _finite(start: Grip, load: Array, most: _Limits) -> FirstSlip:
     held, reached, part = at_rest(start), 0.0, 1.0
     farthest = FARTHEST * float(start.local_squeeze[:, 0].max()) / float(np.abs(load).max())
     for _ in range(MOST_STEPS):
         if not held.grip.stable or part < SMALLEST_STEP:
             return _ended(held, reached, "unstable", -1)
-        further, event, contact = _next_event(held.grip, load, most)
+        further, event, place = _next_event(held, load, most)
         if further <= MET * reached:
-            return _ended(held, reached, event, contact)
+            return _ended(held, reached, event, place)
         step = min(further, part * STEP / _pace(held.grip, load))
         if reached + step > farthest:
             return _ended(held, math.inf, "none", -1)
@@ -204,13 +263,19 @@ def _pace(grip: Grip, load: Array) -> float:
 
 
 def _followed(
-    held: Held, start: Grip, load: Array, multiple: float, most: float
+    held: Held, start: Grip, load: Array, multiple: float, most: _Limits
 ) -> tuple[Held, float]:
     """Follow the equilibrium to a multiple of the load, or back to where a contact slips."""
     held = under(held, start, multiple * load)
-    over = _overshoot(held.grip, load, most)
+    over = _overshoot(held.grip, load, most.push_n)
     if over > 0.0:  # the response grew on the way
         multiple -= over
+        held = under(held, start, multiple * load)
+    for _ in range(CORRECTIONS):
+        excess = torque_excess(*most.torques(held, load), most.motors.limits)
+        if excess <= MET * multiple:
+            break
+        multiple -= excess
         held = under(held, start, multiple * load)
     return held, multiple
 
@@ -230,11 +295,13 @@ def _overshoot(grip: Grip, load: Array, most: float) -> float:
     return float(np.nanmax(back, initial=0.0))
 
 
-def _ended(held: Held, multiple: float, event: Event, contact: int) -> FirstSlip:
+def _ended(held: Held, multiple: float, event: Event, place: int) -> FirstSlip:
+    joint = place if event == "torque limit" else -1
+    contact = place if joint < 0 else -1
     cosine = 0.5 * (float(np.trace(held.rotation)) - 1.0)
     axis = held.rotation - held.rotation.T
     sine = 0.5 * math.hypot(axis[2, 1], axis[0, 2], axis[1, 0])
     return FirstSlip(
         multiple, event, contact, held.forces, held.grip.arms, held.grip.normals,
-        float(np.linalg.norm(held.moved)), math.atan2(sine, cosine),
+        float(np.linalg.norm(held.moved)), math.atan2(sine, cosine), joint,
     )  # fmt: skip

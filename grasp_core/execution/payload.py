@@ -19,9 +19,16 @@ That a hull contains a ball about the origin is shown by its triangles: if they 
 their inner side, and every edge belongs to two of them in opposite directions, then the cones over
 them cover all directions, and the ball of the least distance of their planes is inside.    (2)
 
-With the same limit on pushes the fixed mass is at most the free one where fingertips do not roll,
-as the forces at rest plus their change balance the load at the contacts. Rolling moves the contacts
-by tip radius times turn.
+With the same limits on pushes and torques the fixed mass is at most the free one where fingertips
+do not roll, as the forces at rest plus their change balance the load at the contacts. Rolling moves
+the contacts by tip radius times turn.
+
+Where motors hold the fingertips, S is the set of forces through the centre of mass that contacts
+resist within the torques of the joints, too. These are bounds that are linear in the contact
+forces, and zero meets them: the allowed forces stay a convex set around zero, and so does S, its
+image under a linear map, cut with the wrenches without torque. (1) and (2) ask for no more, with
+h(y) the support under these bounds, (3) of `wrench_limits`. The hand turns with its object, and so
+the weight of its links turns: `Motors.in_any_orientation` has limits that leave room for it.
 """
 
 import importlib
@@ -36,12 +43,14 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.by_value import ByValue
 from grasp_core.checked import positive
 from grasp_core.closure.wrenches import WRENCH
+from grasp_core.errors import InputError
 from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
 from grasp_core.execution.loads import GRAVITY_M_PER_S2, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.fields import is_a, is_indices, is_number, is_tuple_of
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit
 from grasp_core.short_text import summary
 from grasp_core.solvers.ties import first_best, on_grid
@@ -99,8 +108,8 @@ class Payload(ByValue):
     def verify(self) -> bool:
         """Re-check every field in plain arithmetic; False if they are no certificate.
 
-        The free mass is about the contacts and the largest push of `fixed`. Whether the contacts
-        are those of an object can only be checked with it.
+        The free mass is about the contacts, the largest push and the motors of `fixed`. Whether the
+        contacts are those of an object can only be checked with it.
         """
         with np.errstate(all="ignore"):
             return (
@@ -108,6 +117,7 @@ class Payload(ByValue):
                 and is_a(self.free, FreeMass)
                 and self.fixed.verify()
                 and _is_weight(self.fixed)
+                and _turns_with_hand(self.fixed.motors)
                 and is_tuple_of(self.free.rays, WrenchLimit)
                 and is_number(self.free.lower, least=0.0)
                 and is_number(self.free.upper, least=self.free.lower)
@@ -117,9 +127,9 @@ class Payload(ByValue):
             )
 
     def _are_rays(self) -> bool:
-        body = _body(self.fixed.grip, self.fixed.max_push_n)
+        body = _body(self.fixed.grip, self.fixed.max_push_n, self.fixed.motors)
         return all(
-            ray.has_numbers(body.count)
+            ray.has_numbers(body.count, len(body.levers))
             and not ray.wrench[3:].any()
             and abs(np.linalg.norm(ray.wrench) / GRAVITY_M_PER_S2 - 1.0) <= ROUNDING
             and body.attains(ray)
@@ -140,7 +150,7 @@ class Payload(ByValue):
         return self.free.lower <= _least_distance(ends[triangles]) * (1.0 + ROUNDING)
 
 
-def payload(
+def payload(  # noqa: PLR0913 - each is a quantity of its own
     body: Polyhedron,
     contacts: Grasp | Iterable[Contact],
     friction: ArrayLike,
@@ -148,6 +158,7 @@ def payload(
     max_push_n: float,
     stiffness: ArrayLike = STIFFNESS_N_PER_M,
     tip_radius_m: ArrayLike = TIP_RADIUS_M,
+    motors: Motors | None = None,
 ) -> Payload:
     """Find the largest mass that contacts hold in every orientation.
 
@@ -159,20 +170,40 @@ def payload(
         stiffness: Stiffness of the fingertips' springs [N/m]: one number, one each, or a symmetric
             matrix each, (k, 3, 3).
         tip_radius_m: Radius of the fingertips [m], one for all or one each.
+        motors: Joints that the contact forces load, with the torques of their motors, without
+            gravity (see `Motors.in_any_orientation`); None for fingers that are as strong as
+            `max_push_n` says.
 
     Raises:
-        InputError: Shapes or ranges are wrong, or the contacts have no stiffness in some motion.
+        InputError: Shapes or ranges are wrong, the contacts have no stiffness in some motion, or
+            the motors carry links in one orientation only.
         NoForcesError: The grip is unstable under the best squeeze.
         SolverError: A program's answer failed its check.
     """
     start = unsqueezed(body, contacts, friction, stiffness=stiffness, tip_radius_m=tip_radius_m)
     most = positive(max_push_n, "max_push_n")
-    fixed = searched(start, any_direction(1.0), most)
-    return Payload(fixed, _free_mass(_body(start, most)))
+    _check_turning(motors, len(start.friction))
+    fixed = searched(start, any_direction(1.0), most, motors)
+    return Payload(fixed, _free_mass(_body(start, most, motors)))
 
 
-def _body(grip: Grip, max_push_n: float) -> WrenchBody:
-    return WrenchBody(grip.arms, grip.normals, grip.friction, max_push_n)
+def _check_turning(motors: Motors | None, contacts: int) -> None:
+    """Refuse motors that are not those of so many contacts, or that carry links in one way only."""
+    loaded = np.flatnonzero(motors_for(motors, contacts).gravity)
+    if loaded.size:
+        raise InputError(
+            f"motors must have no gravity for a payload, but joint {int(loaded[0])} carries links: "
+            "the hand turns with its object, and so does the weight of its links; give "
+            "gc.Motors.in_any_orientation(levers, limits, weights), which leaves room for it"
+        )
+
+
+def _turns_with_hand(motors: Motors | None) -> bool:
+    return motors is None or not motors.gravity.any()
+
+
+def _body(grip: Grip, max_push_n: float, motors: Motors | None) -> WrenchBody:
+    return WrenchBody(grip.arms, grip.normals, grip.friction, max_push_n, motors)
 
 
 def _free_mass(body: WrenchBody) -> FreeMass:

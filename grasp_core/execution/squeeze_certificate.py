@@ -2,7 +2,7 @@
 
 A multiplier for each contact shows by the S-lemma that the squeeze survives all loads of a set, (4)
 of `worst_loads`. Multipliers of rows that are linear in the squeeze bound what any squeeze with
-this response survives, (3) of `squeeze_rows`.
+this response survives, (4) of `squeeze_rows`. Torques of joints are sums and lengths.
 """
 
 from dataclasses import dataclass
@@ -17,11 +17,12 @@ from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet
 from grasp_core.execution.squeeze_rows import Cuts, Survival
 from grasp_core.fields import is_a, is_array, is_indices, is_number
+from grasp_core.quality.motors import Motors
 
 ROUNDING = 1e-9
 """Slack of pushes and of the upper bound, relative to them."""
 NEAR = 1e-5
-"""Share by which a load larger than the worst makes a contact slip."""
+"""Share by which a load larger than the worst makes a contact slip, or a joint reach its torque."""
 NONE = 1e-9
 """Scale that is none, in pushes over the change of contact forces at scale one."""
 
@@ -43,44 +44,66 @@ class BestSqueeze(ByValue):
     max_push_n: float
     """Largest push of any finger, at rest and under all loads up to the scale [N]."""
     scale: float
-    """Scale of the set's ellipsoid up to which no contact slips and no push exceeds the limit."""
+    """Scale of the set's ellipsoid up to which no contact slips, no push exceeds the limit, and no
+    joint its torque."""
     upper: float
     """Scale that no squeeze with the same response and largest push exceeds."""
     contact: int
-    """Index of the contact that slips, or reaches the limit, first."""
+    """Index of the contact that slips, or reaches the limit, first; -1 where a joint is first."""
     direction: Array
-    """Place z in the ellipsoid, of unit length, of the load that makes it do so, (m,)."""
+    """Place z in the ellipsoid, of unit length, of the load that makes it, or the joint, do so,
+    (m,)."""
     proofs: Array
     """S-lemma multiplier of each case, (cases,) [N^2]: contacts under the loads, then, where the
     loads have an offset, contacts at rest."""
     cuts: Cuts
     """Tangent directions whose rows bound the scale from above."""
     multipliers: Array
-    """Multipliers of these rows, and of the limits on pushes from above and from below in each
-    case, (r + 2 cases,)."""
+    """Multipliers of these rows, of the limits on pushes from above and from below in each case,
+    and of both directions of the joints, under the loads and at rest, (r + 2 cases + joint rows,).
+    """
     balance: Array
     """Multipliers of the balance, (6,)."""
+    motors: Motors | None = None
+    """Joints behind the contacts, with the torques of their motors; None for fingers that are as
+    strong as `max_push_n` says."""
+    joint: int = -1
+    """Index of the joint that reaches its torque first; -1 where a contact is first, or as early.
+    """
 
     @property
     def load(self) -> Array:
         """The worst load at the scale, (6,) [N, N m], torque about the centre of mass."""
         return self.loads.offset + self.scale * self.loads.axes @ self.direction
 
+    @property
+    def torque_shares(self) -> Array:
+        """Largest torque of each joint up to the scale, over its limit, (joints,), if any.
+
+        Joints at one are those that more torque would help. The best squeeze is no harder than it
+        must be, so that contacts mostly slip where joints reach their torques.
+        """
+        survival = Survival.of(self.grip, self.loads, self.motors)
+        return survival.joints.shares(self.grip.local_squeeze, self.scale)
+
     def verify(self) -> bool:
         """Re-check every field in plain arithmetic; False if they are no certificate.
 
-        The check is that the squeeze balances and is stable, that its S-lemma multipliers and
-        pushes prove the scale, that the worst load is one, and that the multipliers of rows prove
-        the upper bound. Whether the contacts are those of an object can only be checked with it.
+        The check is that the squeeze balances and is stable, that its S-lemma multipliers, pushes
+        and torques prove the scale, that the worst load is one, and that the multipliers of rows
+        prove the upper bound. Whether the contacts are those of an object can only be checked with
+        it, and whether the joints are those of a hand only with the hand.
         """
         with np.errstate(all="ignore"):
             if not (self._has_numbers() and self.grip.sound() and self.grip.stable):
                 return False
-            survival = Survival.of(self.grip, self.loads)
+            if not self._has_motors():
+                return False
+            survival = Survival.of(self.grip, self.loads, self.motors)
             return (
                 self._fits(survival)
                 and self._survives(survival)
-                and self._slips(survival)
+                and self._ends(survival)
                 and self._is_bounded(survival)
             )
 
@@ -94,6 +117,11 @@ class BestSqueeze(ByValue):
             and is_number(self.upper, least=self.scale)
         )
 
+    def _has_motors(self) -> bool:
+        if self.motors is None:
+            return True
+        return is_a(self.motors, Motors) and self.motors.sound(len(self.grip.friction))
+
     def _fits(self, survival: Survival) -> bool:
         cases = len(survival.friction)
         angles = self.cuts.angles if is_a(self.cuts, Cuts) else None
@@ -102,27 +130,37 @@ class BestSqueeze(ByValue):
             r > 0
             and is_indices(self.cuts.cases, r)
             and bool(((self.cuts.cases >= 0) & (self.cuts.cases < cases)).all())
-            and is_array(self.multipliers, r + 2 * cases)
+            and is_array(self.multipliers, r + 2 * cases + survival.joints.rows)
             and bool((self.multipliers >= 0.0).all())
             and is_array(self.balance, WRENCH)
             and is_array(self.proofs, cases)
-            and is_a(self.contact, int)
-            and not is_a(self.contact, bool)
-            and 0 <= self.contact < survival.contacts
+            and self._names_one(survival.contacts, len(survival.joints.limits))
             and is_array(self.direction, self.loads.axes.shape[1])
             and abs(float(np.linalg.norm(self.direction)) - 1.0) <= ROUNDING
         )
+
+    def _names_one(self, contacts: int, joints: int) -> bool:
+        """Return whether the fields name a contact or a joint, and not both."""
+        if any(not is_a(place, int) or is_a(place, bool) for place in (self.contact, self.joint)):
+            return False
+        if self.joint == -1:
+            return 0 <= self.contact < contacts
+        return self.contact == -1 and 0 <= self.joint < joints
 
     def _survives(self, survival: Survival) -> bool:
         reactions = survival.reactions(self.grip.local_squeeze)
         pushes = reactions.start[:, 0] + self.scale * reactions.swing
         limited = bool((pushes <= self.max_push_n * (1.0 + ROUNDING)).all())
-        return limited and reactions.survives(self.scale, self.proofs)
+        strong = survival.joints.holds(self.grip.local_squeeze, self.scale)
+        return limited and strong and reactions.survives(self.scale, self.proofs)
 
-    def _slips(self, survival: Survival) -> bool:
+    def _ends(self, survival: Survival) -> bool:
+        further = self.scale * (1.0 + NEAR) + no_scale(survival, self.max_push_n)
+        if self.joint >= 0:
+            place = further * self.direction
+            return survival.joints.is_reached(self.joint, self.grip.local_squeeze, place)
         reactions = survival.reactions(self.grip.local_squeeze)
         start, change = reactions.start[self.contact], reactions.change[self.contact]
-        further = self.scale * (1.0 + NEAR) + no_scale(survival, self.max_push_n)
         normal, *across = (start + further * change @ self.direction).tolist()
         slipping = float(np.hypot(*across)) >= reactions.friction[self.contact] * normal
         return bool(slipping or normal >= self.max_push_n)

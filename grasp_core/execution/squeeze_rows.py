@@ -13,10 +13,15 @@ between 0 and N if
 Where w0 is not zero, the same is asked of the squeeze alone: at rest nothing slips either. These
 are further *cases*, with a = B = 0 and no offset. Squeezes balance, G f = 0.
 
-Multipliers y >= 0 of some rows (1) and of (2), and z of the balance, combine the rows R f + s c <=
-b + N d. If R'y + G'z = r, then for every squeeze that survives the scale s
+Where motors hold the fingertips, their joints stay within their torques, under the loads and, where
+w0 is not zero, at rest, if with the rows of `joint_torques`, (1) there,
 
-    s c.y <= b.y + N d.y - r.f,    |f_i| <= N sqrt(1 + mu_i^2),                           (3)
+    L f + s |L C| <= c - g - L f0,    -L f + s |L C| <= c + g + L f0.                     (3)
+
+Multipliers y >= 0 of some rows (1), of (2) and of (3), and z of the balance, combine the rows R f +
+s c <= b + N d. If R'y + G'z = r, then for every squeeze that survives the scale s
+
+    s c.y <= b.y + N d.y - r.f,    |f_i| <= N sqrt(1 + mu_i^2),                           (4)
 
 which bounds s where c.y > 0. The residual r is zero but for rounding.
 """
@@ -29,13 +34,15 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.by_value import ByValue
 from grasp_core.closure.wrenches import grasp_map, in_frames
 from grasp_core.execution.grips import Grip
+from grasp_core.execution.joint_torques import JointTorques
 from grasp_core.execution.loads import LoadSet
 from grasp_core.execution.worst_loads import Reactions
+from grasp_core.quality.motors import Motors, motors_for
 
 STARTS = 8
 """Tangent directions of each case in the first program."""
 BOUNDING = 1e-6
-"""Least c.y of (3), relative to |c| |y|, that bounds the scale."""
+"""Least c.y of (4), relative to |c| |y|, that bounds the scale."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -63,7 +70,7 @@ class Rows:
     """Rows R f + s c <= b + N d in local squeezes f (3k,), scale s and push limit N."""
 
     R: Array
-    """(rows, 3k): rows (1), then both of (2) for all cases."""
+    """(rows, 3k): rows (1), then both of (2) for all cases, then both of (3) for all joints."""
     c: Array
     """What loads of scale one take, (rows,) [N]."""
     b: Array
@@ -84,17 +91,27 @@ class Survival:
     """The rows (a, B) of each case, (cases, 3, m) [N]."""
     friction: Array
     """Coulomb coefficient of each case, (cases,)."""
+    joints: JointTorques
+    """Torques of the joints, in a group for the cases under the loads, and one for those at rest.
+    """
 
     @classmethod
-    def of(cls, grip: Grip, loads: LoadSet) -> "Survival":
-        """Take the response of a grip at its squeeze."""
+    def of(cls, grip: Grip, loads: LoadSet, motors: Motors | None = None) -> "Survival":
+        """Take the response of a grip at its squeeze.
+
+        Raises:
+            InputError: The motors are not those of so many contacts.
+        """
+        joints = motors_for(motors, len(grip.friction))
         A, mu = grip.response, grip.friction
         offset, change = A @ loads.offset, A @ loads.axes
         if loads.offset.any():
             offset = np.concatenate([offset, np.zeros_like(offset)])
             change = np.concatenate([change, np.zeros_like(change)])
             mu = np.concatenate([mu, mu])
-        return cls(in_frames(grasp_map(grip.arms / grip.size), grip.frames), offset, change, mu)
+        G = in_frames(grasp_map(grip.arms / grip.size), grip.frames)
+        torques = JointTorques.of(joints, grip.frames, offset, change)
+        return cls(G, offset, change, mu, torques)
 
     @property
     def contacts(self) -> int:
@@ -107,9 +124,10 @@ class Survival:
         return Reactions(np.tile(local, (cases, 1)) + self.offset, self.change, self.friction)
 
     def rows(self, cuts: Cuts) -> Rows:
-        """Build the rows (1) at some angles, and all of (2)."""
+        """Build the rows (1) at some angles, and all of (2) and (3)."""
         i, k, count = cuts.cases, self.contacts, len(self.friction)
         r, mu = len(i), self.friction[cuts.cases]
+        levers, taken, room = self.joints.matrix()
         u = np.stack([np.cos(cuts.angles), np.sin(cuts.angles)], axis=1)
         R = np.zeros((r + 2 * count, 3 * k))
         R[np.arange(r), 3 * (i % k)] = -mu
@@ -121,19 +139,19 @@ class Survival:
         lean = np.linalg.norm(nothing.leaning(i, cuts.angles), axis=1)
         n0, t0 = self.offset[:, 0], self.offset[:, 1:]
         left = mu * n0[i] - np.einsum("rj,rj->r", u, t0[i])
-        limits = np.zeros(len(R))
+        limits = np.zeros(len(R) + len(room))
         limits[r : r + count] = 1.0
         return Rows(
-            R, np.concatenate([lean, nothing.swing, nothing.swing]),
-            np.concatenate([left, -n0, n0]), limits,
+            np.vstack([R, levers]), np.concatenate([lean, nothing.swing, nothing.swing, taken]),
+            np.concatenate([left, -n0, n0, room]), limits,
         )  # fmt: skip
 
     def bound(self, cuts: Cuts, multipliers: Array, balance: Array, max_push_n: float) -> float:
-        """Bound by (3) the scale that any squeeze with this response survives; infinite if none.
+        """Bound by (4) the scale that any squeeze with this response survives; infinite if none.
 
         Args:
             cuts: Which rows (1) are combined.
-            multipliers: y of these and of (2), (r + 2 cases,), not negative.
+            multipliers: y of these, of (2) and of (3), (r + 2 cases + joint rows,), not negative.
             balance: z, (6,).
             max_push_n: The limit N on pushes.
         """

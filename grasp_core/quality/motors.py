@@ -25,6 +25,7 @@ from grasp_core.arrays import Array, frozen, real_array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, instance
 from grasp_core.errors import InputError
+from grasp_core.fields import is_array
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -77,6 +78,53 @@ class Motors(ByValue):
         rows = frozen(levers, (None, None), "levers")
         spread = (_each(limits, len(rows)), _each(gravity, len(rows)))
         return cls(rows, *spread)
+
+    @classmethod
+    def in_any_orientation(
+        cls, levers: ArrayLike, limits: ArrayLike, weights: ArrayLike
+    ) -> "Motors":
+        """Make motors that carry their links in every orientation of the hand.
+
+        A hand that turns with its object has the torques g = w_j.d in joint j, with the direction d
+        of gravity. As |w_j.d| <= |w_j|, forces with |L f| <= c_j - |w_j| are allowed in all
+        orientations: these lower limits are those of the motors, and their gravity is zero. Where
+        the object's own torque opposes that of the links, they give away up to twice |w_j|, and
+        nothing where both load the joint alike. Forces that are chosen anew for each orientation
+        hold at most (c_j + |w_j|) / (c_j - |w_j|) times as much as under them, for the worst joint.
+
+        Args:
+            levers: Transposed Jacobian of the contact points, (joints, 3k) [m], object axes.
+            limits: Largest torque of each joint, one for all or one each [N m].
+            weights: Torque of each joint that carries the weight of the links, per unit vector of
+                the direction of gravity, (joints, 3) [N m], object axes.
+
+        Raises:
+            InputError: Shapes or ranges are wrong, or a motor cannot carry the links somewhere.
+        """
+        strong = cls.of(levers, limits)
+        shape = (len(strong.limits), 3)
+        carried = np.linalg.norm(frozen(weights, shape, "weights"), axis=1)
+        left = strong.limits - carried
+        weak = np.flatnonzero(left < SMALLEST)
+        if weak.size:
+            joint = int(weak[0])
+            raise InputError(
+                f"weights of joint {joint} ask for {carried[joint]:.6g} N m in some orientation, but "
+                f"its limit is {strong.limits[joint]:.6g} N m: the hand cannot carry its own links "
+                "there; give larger limits"
+            )
+        return cls(strong.levers, left, np.zeros(len(left)))
+
+    def sound(self, contacts: int) -> bool:
+        """Return whether the fields are those of joints for so many contacts."""
+        joints = len(self.limits) if is_array(self.limits, None) else 0
+        return (
+            is_array(self.limits, joints)
+            and is_array(self.levers, joints, 3 * contacts)
+            and is_array(self.gravity, joints)
+            and bool(((self.limits >= SMALLEST) & (self.limits <= LARGEST)).all())
+            and bool((np.abs(self.gravity) < self.limits).all())
+        )
 
     def torques(self, forces: Array) -> Array:
         """Compute the joint torques (1) under contact forces (k, 3) [N], (joints,)."""

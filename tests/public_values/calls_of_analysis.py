@@ -151,6 +151,13 @@ CALLS = [
         "limits": array(np.ones(2)) | {"zero": np.zeros(2), "negative": -np.ones(2)},
         "gravity": array(np.zeros(2)) | {"more than the motors": np.array([0.0, 1.0])},
     }),
+    Call("gc.Motors.in_any_orientation", lambda: {
+        "levers": LEVERS, "limits": np.ones(2), "weights": 0.1 * np.ones((2, 3)),
+    }, {
+        "levers": array(LEVERS),
+        "limits": each_of(POSITIVE),
+        "weights": array(np.ones((2, 3))) | {"more than the motors": np.ones((2, 3))},
+    }),
     Call("gc.cones_positively_span", lambda: {"axes": TETRA_NORMALS, "half_angles": [0.1] * 4}, {
         "axes": units(TETRA_NORMALS),
         "half_angles": array([0.1] * 4) | {"negative": [-0.1] * 4, "right angles": [2.0] * 4},

@@ -58,6 +58,8 @@ ARGUMENTS = {
     "stiffness": each_of(POSITIVE) | {"not symmetric": np.triu(np.ones((4, 3, 3)))},
     "tip_radius_m": each_of(NOT_NEGATIVE),
 }
+MOTORS = optional(VALUE) | {"of three contacts": gc.Motors.of(np.eye(2, 9), 1.0)}
+CARRYING = gc.Motors.of(np.eye(2, 12), 1.0, 0.5)
 ONE_TRIAL = sv.ExecutionSettings(0.1, trials=("weight",))
 
 CALLS = [
@@ -69,12 +71,17 @@ CALLS = [
         "wrench": array(WRENCH) | {"zero": 0.0 * WRENCH, "tiny": 1e-300 * WRENCH},
         "model": WORD,
         "max_push_n": unless(POSITIVE, "infinite", "huge") | {"less than at rest": 0.5},
+        "motors": MOTORS | {"too weak at rest": gc.Motors.of(squeeze().reshape(1, -1), 1e-6)},
     }),
     Call("gc.best_squeeze", held(loads=gc.any_direction(0.1)), ARGUMENTS | {
         "loads": VALUE,
         "max_push_n": optional(POSITIVE),
+        "motors": MOTORS,
     }),
-    Call("gc.payload", held(max_push_n=10.0), ARGUMENTS | {"max_push_n": POSITIVE}),
+    Call("gc.payload", held(max_push_n=10.0), ARGUMENTS | {
+        "max_push_n": POSITIVE,
+        "motors": MOTORS | {"that carry links": CARRYING},
+    }),
     Call("gc.any_direction", lambda: {"mass_kg": 1.0, "acceleration_m_per_s2": 1.0}, {
         "mass_kg": POSITIVE,
         "acceleration_m_per_s2": NOT_NEGATIVE,

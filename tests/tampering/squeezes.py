@@ -1,11 +1,13 @@
 """What is claimed of squeezes and payloads: by the springs' own equations, grids and programs."""
 
+from types import SimpleNamespace
+
 import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 from tests.tampering.exact_closure import UNIT, conic, contacts_make_sense, locals_of, tangents
-from tests.tampering.wrench_bounds import wrench_limit
+from tests.tampering.wrench_bounds import scaled, torques_of, wrench_limit
 
 GRAVITY = 9.80665
 TURNS = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
@@ -62,28 +64,60 @@ def squeeze(c):
     g = c.grip
     if not sensible(g) or not 0.0 <= c.scale <= c.upper or c.max_push_n < 0.0:
         return False
+    if c.motors is not None and not strong_enough(c.motors, len(g.friction)):
+        return False
     frames, rest, offset, change = responding(g, c.loads)
-    most, mu = c.max_push_n, g.friction
-    slack = 2e-6 * (most + c.scale * np.linalg.norm(change, axis=(1, 2)).max())
+    slack = 2e-6 * (c.max_push_n + c.scale * np.linalg.norm(change, axis=(1, 2)).max())
     states = [(rest + offset, c.scale * change)] + [(rest, 0.0 * change)] * bool(
         c.loads.offset.any()
     )
-    for start, swing in states:
-        across, leaning = start[:, 1:] @ CIRCLE.T, lean(swing, mu)
-        reach = np.linalg.norm(swing[:, 0], axis=1)
-        if (across + leaning - (mu * start[:, 0])[:, None]).max() > slack:
-            return False
-        if (start[:, 0] + reach).max() > most + slack or (start[:, 0] - reach).min() < -slack:
-            return False
-    i, z = c.contact, c.direction
-    if abs(np.linalg.norm(z) - 1.0) > UNIT:
+    if not all(survives(c, start, swing, slack) for start, swing in states):
         return False
-    n, *t = rest[i] + offset[i] + c.scale * change[i] @ z
-    if np.hypot(*t) < mu[i] * n - 20.0 * slack and n < most - 20.0 * slack:
+    if not ends(c, rest + offset, c.scale * change, slack):
         return False
     best = largest_scale(g, frames, offset, change, c)
-    unit = most / np.linalg.norm(change, axis=(1, 2)).max()
+    unit = c.max_push_n / np.linalg.norm(change, axis=(1, 2)).max()
     return bool(c.upper >= best * (1.0 - 1e-4) - 1e-6 * unit)
+
+
+def survives(c, start, swing, slack):
+    """Whether cones, pushes and torques are kept by all forces start + swing z."""
+    mu = c.grip.friction
+    across, leaning = start[:, 1:] @ CIRCLE.T, lean(swing, mu)
+    reach = np.linalg.norm(swing[:, 0], axis=1)
+    torques, room = torques_of(c.motors, c.grip.normals, 1.0)
+    swung = np.linalg.norm(torques @ swing.reshape(len(torques.T), -1), axis=1)
+    return bool(
+        (across + leaning - (mu * start[:, 0])[:, None]).max() <= slack
+        and (start[:, 0] + reach).max() <= c.max_push_n + slack
+        and (start[:, 0] - reach).min() >= -slack
+        and (torques @ start.ravel() + swung - room).max(initial=-1.0) <= slack * hardest(torques)
+    )
+
+
+def ends(c, start, swing, slack):
+    """Whether the worst load takes the contact or the joint that is named to its end."""
+    i, j, z, mu = c.contact, c.joint, c.direction, c.grip.friction
+    if abs(np.linalg.norm(z) - 1.0) > UNIT or (i < 0) == (j < 0):
+        return False
+    torques, room = torques_of(c.motors, c.grip.normals, 1.0)
+    forces = start + swing @ z
+    if j >= 0:
+        left = (room - torques @ forces.ravel())[[j, j + len(room) // 2]].min()
+        return bool(left <= 20.0 * slack * hardest(torques))
+    n, *t = forces[i]
+    return bool(np.hypot(*t) >= mu[i] * n - 20.0 * slack or n >= c.max_push_n - 20.0 * slack)
+
+
+def hardest(torques):
+    """Share of a limit that forces of one newton ask of a joint at most."""
+    return np.abs(torques).sum(axis=1).max(initial=0.0)
+
+
+def strong_enough(motors, count):
+    """Whether motors are some for so many contacts, and carry their links."""
+    fit = motors.levers.shape == (len(motors.limits), 3 * count)
+    return fit and bool((np.abs(motors.gravity) < motors.limits).all())
 
 
 def lean(change, mu):
@@ -95,7 +129,7 @@ def lean(change, mu):
 class Rows:
     """Rows of a linear program in squeeze and scale."""
 
-    def __init__(self, states, mu):
+    def __init__(self, states, mu, torques, room):
         self.states, self.mu, self.A, self.b = states, mu, [], []
         for start, swing in states:
             for i in range(len(mu)):
@@ -104,6 +138,9 @@ class Rows:
                     row[3 * i], row[-1] = sign, np.linalg.norm(swing[i, 0])
                     self.A.append(row)
                     self.b.append((sign > 0.0) - sign * start[i, 0])
+            swung = np.linalg.norm(torques @ swing.reshape(len(torques.T), -1), axis=1)
+            self.A += list(np.column_stack([torques, swung]))
+            self.b += list(room - torques @ start.ravel())
         for j in range(0, 720, 30):
             self.take([np.full(len(mu), j)] * len(states))
 
@@ -138,7 +175,8 @@ def largest_scale(g, frames, offset, change, c):
         for arm, frame in zip(g.arms, frames, strict=True)
         for v in frame.T
     ]
-    rows, scale = Rows(states, g.friction), 0.0
+    torques, room = torques_of(c.motors, g.normals, most)
+    rows, scale = Rows(states, g.friction, torques, room), 0.0
     for _ in range(12):
         answer = linprog(
             np.append(np.zeros(3 * k), -1.0), A_ub=np.array(rows.A), b_ub=np.array(rows.b),
@@ -164,32 +202,41 @@ def payload(c):
     for ray in free.rays:
         if abs(np.linalg.norm(ray.wrench) - GRAVITY) > 1e-7 or ray.wrench[3:].any():
             return False
-        if not wrench_limit(ray, g.arms, g.normals, g.friction, most, np.zeros(3)):
+        claimed = SimpleNamespace(
+            found=ray, positions=g.arms, normals=g.normals, friction=g.friction,
+            max_normal_force=most, center=np.zeros(3), motors=c.fixed.motors,
+        )  # fmt: skip
+        if not wrench_limit(claimed):
             return False
-    inner, outer = bounds(g, most, np.array([ray.wrench[:3] for ray in free.rays]))
+    if c.fixed.motors is not None and c.fixed.motors.gravity.any():
+        return False
+    inner, outer = bounds(g, c.fixed.motors, most, np.array([ray.wrench[:3] for ray in free.rays]))
     slack = 1e-6 * most
     return bool(free.lower <= outer + slack and free.upper >= inner - slack)
 
 
-def bounds(g, most, directions):
+def bounds(g, motors, most, directions):
     """Mass held in every orientation, and the least held in some, by a hull of ends of rays."""
     rng = np.random.default_rng(0)
     d = np.vstack([directions, rng.normal(size=(30, 3))])
     d /= np.linalg.norm(d, axis=1, keepdims=True)
-    held = np.array([ray(g, most, each) for each in d])
+    held = np.array([ray(g, motors, most, each) for each in d])
     if held.min() < 1e-7 * most:
         return 0.0, held.min()
     hull = ConvexHull(held[:, None] * d)
     return max(-hull.equations[:, -1].max(), 0.0), held.min()
 
 
-def ray(g, most, d):
+def ray(g, motors, most, d):
     """Largest mass that contacts hold whose weight points along d."""
     k, size = len(g.arms), np.linalg.norm(g.arms, axis=1).max()
-    A = np.zeros((6 + 4 * k, 3 * k + 1))
+    torques, room = torques_of(motors, g.normals, most)
+    A = np.zeros((6 + 4 * k + len(room), 3 * k + 1))
     A[:6, :-1] = locals_of(g.arms / size, g.normals, g.friction)
     A[:3, -1] = d
     A[6 + np.arange(k), 3 * np.arange(k)] = 1.0
-    A[6 + k :, :-1] = -np.eye(3 * k)
-    b = np.r_[np.zeros(6), np.ones(k), np.zeros(3 * k)]
-    return most * conic(np.append(np.zeros(3 * k), -1.0), A, b, 6, k, k).x[-1] / GRAVITY
+    A[6 + k : -3 * k, :-1] = torques @ scaled(g.friction)
+    A[-3 * k :, :-1] = -np.eye(3 * k)
+    b = np.r_[np.zeros(6), np.ones(k), room, np.zeros(3 * k)]
+    cost = np.append(np.zeros(3 * k), -1.0)
+    return most * conic(cost, A, b, 6, k + len(room), k).x[-1] / GRAVITY

@@ -182,22 +182,29 @@ def held(seed):
 
 
 def best_squeeze(seed):
-    """With and without a limit on pushes, and an offset."""
+    """With and without a limit on pushes, an offset, and motors."""
     rng = np.random.default_rng(seed)
     contacts, springs = held(seed)
     size = contacts[0].radius
     axes = np.diag(np.repeat([0.5, 0.5 * size], 3))[:, : rng.choice([3, 6])]
     loads = gc.LoadSet([0.0, 0.0, -1.0 * (seed % 2), 0.0, 0.0, 0.0], axes)
-    most = None if seed % 3 == 1 else 10.0
+    given = {
+        "max_push_n": None if seed % 3 == 1 else 10.0,
+        "motors": motors(rng, 4, 10.0) if seed // 2 % 2 else None,  # with offsets, and without
+    }
     try:
-        return gc.best_squeeze(*contacts, loads, max_push_n=most, **springs)
+        return gc.best_squeeze(*contacts, loads, **given, **springs)
     except gc.NoForcesError:
         return None
 
 
 def payload(seed):
     contacts, springs = held(seed)
-    return gc.payload(*contacts, max_push_n=10.0, **springs)
+    hand = None
+    if seed % 2:
+        hand = motors(np.random.default_rng(seed), 4, 10.0)
+        hand = gc.Motors.of(hand.levers, hand.limits)
+    return gc.payload(*contacts, max_push_n=10.0, motors=hand, **springs)
 
 
 ProofFile = dataclasses.make_dataclass(

@@ -105,11 +105,11 @@ def wrench_limit(c):
         found.wrench[:3], (found.wrench[3:] - np.cross(middle - c.center, found.wrench[:3])) / size
     )
     k, length = len(x), np.linalg.norm(load)
-    torques, room = _torques(c.motors, n, largest)
+    torques, room = torques_of(c.motors, n, largest)
     A = np.zeros((6 + k + len(room) + 3 * k, 3 * k + 1))
     A[:6, :-1], A[:6, -1] = locals_of(arms, n, mu), load / length
     A[6 + np.arange(k), 3 * np.arange(k)] = 1.0
-    A[6 + k : -3 * k, :-1] = torques @ np.diag(np.ravel([[1.0, m, m] for m in mu]))
+    A[6 + k : -3 * k, :-1] = torques @ scaled(mu)
     A[-3 * k :, :-1] = -np.eye(3 * k)
     solved = conic(
         np.append(np.zeros(3 * k), -1.0),
@@ -130,12 +130,12 @@ def wrench_limit(c):
     return bool(
         found.limit <= best + slack and found.upper >= best - slack and found.limit <= found.upper
         and (across <= mu * along + 1e-6 * weight).all() and along.max() <= 1.0 + 1e-6 * weight
-        and (torques @ _local(f, n) <= room + 1e-6 * weight * strong).all()
+        and (torques @ local_of(f, n) <= room + 1e-6 * weight * strong).all()
         and np.linalg.norm(left) <= 1e-6 * weight and abs(found.facet @ found.wrench + 1.0) <= 1e-6
     )  # fmt: skip
 
 
-def _torques(motors, n, largest):
+def torques_of(motors, n, largest):
     """Rows of both directions of every joint for local unit forces, over limits, and their room."""
     if motors is None:
         return np.zeros((0, 3 * len(n))), np.zeros(0)
@@ -146,7 +146,12 @@ def _torques(motors, n, largest):
     return np.vstack([share, -share]), np.append(1.0 - carried, 1.0 + carried)
 
 
-def _local(f, n):
+def scaled(mu):
+    """From the coordinates of `locals_of` to local forces, (3k, 3k)."""
+    return np.diag(np.ravel([[1.0, m, m] for m in mu]))
+
+
+def local_of(f, n):
     """Forces in the contacts' frames, (3k,)."""
     frames = np.array([np.column_stack([normal, tangents(normal)]) for normal in n])
     return np.einsum("kil,ki->kl", frames, f).ravel()

@@ -222,9 +222,11 @@ def test_nonsense_is_no_certificate():
     tested = 0
     for field in dataclasses.fields(found):
         for value in (None, "a", np.nan, -1.0, np.inf, np.zeros(0), ()):
+            if value is getattr(found, field.name):  # no motors are none
+                continue
             assert dataclasses.replace(found, **{field.name: value}).verify() is False
             tested += 1
-    assert tested == 77
+    assert tested == 90
     for change in (
         {"scale": found.scale * 1.001}, {"upper": found.scale * 0.999},
         {"upper": found.upper * (1.0 - 1e-4)}, {"max_push_n": 9.99},

@@ -7,6 +7,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.execution.payload import GAP
 from tests.grasp_core.execution.held import box, directions, opposed, planned
+from tests.grasp_core.execution.jointed import LEVER_M, hand_of, jaws, pushing
 
 G = 9.80665
 
@@ -95,6 +96,143 @@ def test_the_fixed_mass_is_below_the_free_one_for_many_grasps():
                     assert found.fixed.scale <= found.free.upper
                     tested += 1
     assert tested >= 120
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.9])
+@pytest.mark.parametrize("joints", [pushing, jaws])
+def test_motors_behind_pushes_limit_both_masses_as_the_pushes_that_they_allow(mu, joints):
+    """0.25 N m over the lever are 5 N for a finger with its own joint, for two fingers of a jaw
+    together; by symmetry each of these takes half.
+    """
+    push = 0.25 / LEVER_M * (1.0 if joints is pushing else 0.5)
+    motors = joints(opposed(), 0.25)
+    found = gc.payload(box(), opposed(), mu, max_push_n=10.0, tip_radius_m=0.0, motors=motors)
+    across = 2 * 2 * mu * push / G
+    free = across / np.sqrt(1.0 + 4.0 * mu**2)
+    assert found.free.lower <= free * (1.0 + 1e-6)
+    assert found.free.upper >= free * (1.0 - 1e-6)
+    assert found.free.upper == pytest.approx(free, rel=2e-3)
+    assert found.mass_kg == pytest.approx(across / (np.sqrt(1.0 + mu**2) + mu), rel=1e-4)
+    assert found.verify()
+
+
+def jointed(torque=0.15, weight=0.0, **more):
+    """Payloads of planned grasps with hands at random."""
+    rng = np.random.default_rng(0)
+    for name in ("box", "dodecahedron", "wedge"):
+        body, grasps = planned(name, 2)
+        for grasp in grasps:
+            motors = hand_of(rng, 4, torque, weight)
+            yield (
+                body,
+                grasp,
+                motors,
+                gc.payload(body, grasp, 0.5, max_push_n=10.0, motors=motors, **more),
+            )
+
+
+def test_masses_with_motors_are_proved_and_those_of_many_orientations():
+    """The fixed mass is no larger than the free one, as tips of no radius do not roll."""
+    rng, tested, lowered = np.random.default_rng(0), 0, 0
+    for body, grasp, motors, found in jointed(tip_radius_m=0.0):
+        assert found.verify()
+        assert found.mass_kg <= found.free.upper
+        weights = np.zeros((62, 6))
+        weights[:, :3] = G * np.vstack([orientations(), directions(20, rng)])
+        given = {"max_normal_force": 10.0, "center": body.center_of_mass, "motors": motors}
+        limits = gc.wrench_limits(grasp, None, 0.5, weights, **given)
+        least = min(limit.limit for limit in limits)
+        assert found.free.lower <= least * (1.0 + 1e-6)
+        assert found.free.upper <= found.free.lower * (1.0 + GAP) * (1.0 + 1e-6)
+        slips = [
+            gc.first_slip(
+                found.fixed.grip, weight, model="linear", max_push_n=10.001, motors=motors
+            ).multiple
+            for weight in weights
+        ]
+        assert found.mass_kg <= min(slips)
+        free = gc.payload(body, grasp, 0.5, max_push_n=10.0, tip_radius_m=0.0)
+        assert found.free.upper <= free.free.upper * (1.0 + GAP)
+        assert found.mass_kg <= free.mass_kg * (1.0 + 3e-4)
+        lowered += found.free.upper < 0.9 * free.free.lower
+        tested += len(slips)
+    assert tested == 372
+    assert lowered == 6
+
+
+def test_motors_in_any_orientation_carry_object_and_links_in_every_one():
+    """Both masses are held with the links' own torque in each orientation. What is held there is at
+    most (c + w) / (c - w) times as much (see `Motors.in_any_orientation`).
+    """
+    rng, tested = np.random.default_rng(3), 0
+    for name in ("box", "dodecahedron", "wedge"):
+        body, (grasp, *_) = planned(name, 1)
+        hand = hand_of(rng, 4, 0.15, 0.0)
+        weights = 0.1 * hand.limits[:, None] * rng.normal(size=(len(hand.limits), 3))
+        motors = gc.Motors.in_any_orientation(hand.levers, hand.limits, weights)
+        taken = np.linalg.norm(weights, axis=1)
+        found = gc.payload(body, grasp, 0.5, max_push_n=10.0, motors=motors)
+        given = {"max_normal_force": 10.0, "center": body.center_of_mass}
+        most = float(((hand.limits + taken) / motors.limits).max())
+        for way in orientations():
+            turned = gc.Motors(hand.levers, hand.limits, weights @ way)
+            load = np.append(G * way, np.zeros(3))
+            held, sure = (
+                gc.max_resisted_wrench(grasp, None, 0.5, load, motors=each, **given)
+                for each in (turned, motors)
+            )
+            assert found.free.lower <= held * (1.0 + 1e-6)
+            assert sure <= held * (1.0 + 1e-6)
+            assert held <= most * sure * (1.0 + 1e-6)
+            slip = gc.first_slip(found.fixed.grip, load, model="linear", motors=turned)
+            assert slip.multiple >= found.mass_kg
+            tested += 1
+    assert tested == 126
+
+
+def test_motors_that_carry_links_in_one_orientation_are_refused_with_advice():
+    for carried in (0.01, [0.0, 0.0, 0.01, 0.0]):
+        with pytest.raises(gc.InputError, match=r"no gravity for a payload.*in_any_orientation"):
+            gc.payload(
+                box(), opposed(), 0.4, max_push_n=10.0, motors=pushing(opposed(), 0.25, carried)
+            )
+    with pytest.raises(gc.InputError, match="columns for each of 4 contacts"):
+        gc.payload(box(), opposed(), 0.4, max_push_n=10.0, motors=gc.Motors.of(np.eye(2, 9), 1.0))
+
+
+def test_payloads_of_other_motors_are_no_certificate():
+    motors = pushing(opposed(), 0.25)
+    found = gc.payload(box(), opposed(), 0.4, max_push_n=10.0, motors=motors)
+    plain = gc.payload(box(), opposed(), 0.4, max_push_n=10.0)
+    assert found.verify()
+    for share in (0.999, 1.001):
+        other = gc.Motors.of(motors.levers, share * motors.limits)
+        changed = gc.payload(box(), opposed(), 0.4, max_push_n=10.0, motors=other)
+        assert not dataclasses.replace(found, fixed=changed.fixed).verify()
+        assert not dataclasses.replace(found, free=changed.free).verify()
+    assert not dataclasses.replace(found, free=plain.free).verify()
+    carrying = dataclasses.replace(found.fixed, motors=pushing(opposed(), 0.26, 0.01))
+    assert not dataclasses.replace(found, fixed=carrying).verify()
+
+
+def test_a_payload_with_motors_without_joints_changes_no_bit_and_more_torque_never_holds_less():
+    plain = gc.payload(box(), opposed(), 0.4, max_push_n=10.0)
+    nothing = gc.Motors.of(np.zeros((0, 12)), 1.0)
+    without = gc.payload(box(), opposed(), 0.4, max_push_n=10.0, motors=nothing)
+    assert without.free == plain.free
+    assert dataclasses.replace(without.fixed, motors=None) == plain.fixed
+    rng = np.random.default_rng(5)
+    body, (grasp, *_) = planned("wedge")
+    levers, last = hand_of(rng, 4, 1.0, 0.0).levers, (0.0, 0.0)
+    for torque in (1e-4, 0.01, 0.1, 1.0, 1e4):
+        motors = gc.Motors.of(levers, torque)
+        found = gc.payload(body, grasp, 0.5, max_push_n=10.0, motors=motors)
+        assert found.verify()
+        assert found.mass_kg >= last[0] * (1.0 - 3e-4)
+        assert found.free.upper >= last[1]
+        last = (found.mass_kg, found.free.lower)
+    strong = gc.payload(body, grasp, 0.5, max_push_n=10.0)
+    assert last == pytest.approx((strong.mass_kg, strong.free.lower), rel=1e-3)
 
 
 def test_contacts_that_hold_nothing_have_no_payload():

@@ -1,0 +1,364 @@
+"""Squeezes and slips under motors of limited torque: cases by hand, programs, and brute force."""
+
+import dataclasses
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.linalg import null_space
+from scipy.optimize import linprog, minimize
+
+import grasp_core as gc
+import scenes
+from grasp_core.closure.wrenches import grasp_map, in_frames
+from grasp_core.execution.worst_loads import Reactions
+from tests.grasp_core.execution.held import box, directions, opposed, opposed_grip, planned
+from tests.grasp_core.execution.jointed import LEVER_M, hand_of, jaws, lifting, pushing
+
+G = 9.80665
+ANY = gc.any_direction(1.0)
+LIGHT = gc.LoadSet([0, 0, -0.2, 0, 0, 0], np.diag([0.5, 0.5, 0.5, 0.01, 0.01, 0.01]))
+SHAKEN = gc.LoadSet([0, 0, -2.0, 0, 0, 0], np.diag([0.5, 0.5, 0.5, 0.01, 0.01, 0.01]))
+SIDES = 48
+"""Sides of the pyramids around and inside the friction cones."""
+APART = 0.34
+"""Angle of any direction from the nearest of `many`, at most [rad]; a test checks it."""
+
+
+def squeezed(motors, friction=0.5, loads=ANY, most=10.0, **more):
+    return gc.best_squeeze(
+        box(), opposed(), friction, loads, max_push_n=most, motors=motors, **more
+    )
+
+
+def mass_of(push, mu):
+    """Mass that four opposed fingers carry with pushes up to a limit (see `test_best_squeeze`)."""
+    return 4.0 * mu * push / (G * (np.sqrt(1.0 + mu**2) + mu))
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.8])
+@pytest.mark.parametrize("carried", [0.0, 0.15, -0.15])
+def test_a_joint_behind_a_push_limits_it_as_its_torque_says(friction, carried):
+    """A torque of 0.3 N m, less what the links take of it, over the lever is the largest push.
+
+    What helps the links does not matter, as no finger pulls.
+    """
+    found = squeezed(pushing(opposed(), 0.3, carried), friction, tip_radius_m=0.03)
+    mass = mass_of((0.3 - carried) / LEVER_M, friction)
+    assert mass_of(10.0, friction) > mass
+    assert found.scale == pytest.approx(mass, rel=1e-4)
+    assert found.scale <= mass * (1.0 + 1e-7) <= found.upper * (1.0 + 1e-6)
+    assert found.torque_shares == pytest.approx(1.0, abs=1e-3)
+    assert found.verify()
+
+
+def test_a_jaw_gives_each_of_its_two_fingers_half_of_its_torque():
+    found = squeezed(jaws(opposed(), 0.5), tip_radius_m=0.03)
+    assert found.scale == pytest.approx(mass_of(0.5 / (2 * LEVER_M), 0.5), rel=1e-4)
+    assert found.verify()
+
+
+ACROSS = gc.LoadSet(np.zeros(6), np.array([[0, 0, 1.0, 0, 0, 0]]).T)
+
+
+def test_torques_across_the_pushes_limit_the_load():
+    """Each finger takes a quarter: 0.05 N m along z are one newton, four in all.
+
+    The squeeze is no harder than it must be, so that contacts slip there, too. The least push for a
+    load is that without motors, as long as these are strong enough.
+    """
+    found = squeezed(lifting(4, 0.05), loads=ACROSS, most=20.0)
+    assert found.scale == pytest.approx(4.0, rel=2e-4)
+    assert found.torque_shares == pytest.approx(1.0, abs=2e-4)
+    assert found.grip.local_squeeze[:, 0] == pytest.approx(2.0, rel=1e-3)
+    assert found.verify()
+    least = squeezed(lifting(4, 0.05), loads=ACROSS, most=None)
+    free = squeezed(None, loads=ACROSS, most=None)
+    assert least.max_push_n == pytest.approx(free.max_push_n, rel=1e-4)
+    with pytest.raises(gc.NoForcesError, match="within the torques of the joints survives"):
+        squeezed(lifting(4, 0.05 * 0.24), loads=ACROSS, most=None)
+
+
+def harder():
+    """The same, proved again for a squeeze of 5 N, with which nothing slips before 10 N."""
+    found = squeezed(lifting(4, 0.05), loads=ACROSS, most=20.0)
+    grip, scale = opposed_grip(push=5.0), 4.0 * (1.0 - 1e-9)
+    proofs = Reactions.of(grip, ACROSS).multipliers(scale)
+    return dataclasses.replace(found, grip=grip, scale=scale, proofs=proofs, contact=-1, joint=0)
+
+
+def test_a_joint_may_be_reached_before_anything_slips():
+    found = harder()
+    assert found.verify()
+    for change in (
+        {"joint": -1}, {"joint": 4}, {"contact": 0}, {"joint": -1, "contact": 0},
+        {"joint": True}, {"joint": 0.0}, {"scale": found.scale * 0.9999}, {"scale": 4.001},
+    ):  # fmt: skip
+        assert dataclasses.replace(found, **change).verify() is False, change
+    assert dataclasses.replace(found, direction=-found.direction).verify()  # as bad, by symmetry
+    slip = gc.first_slip(found.grip, found.load, model="linear", motors=found.motors)
+    assert (slip.event, slip.contact, slip.joint) == ("torque limit", -1, 0)
+    assert slip.multiple == pytest.approx(1.0, rel=1e-6)
+
+
+def test_at_rest_joints_are_as_strong_as_under_loads():
+    """The offset relieves the fingers at +x by a newton each, whose joints push with 3 N: at rest
+    they do, and under the offset they keep 2 N, which hold 4 mu times that across.
+    """
+    contacts = opposed()
+    limits = [1.0 if contact.normal[0] > 0.0 else 3.0 * LEVER_M for contact in contacts]
+    loads = gc.LoadSet([-4.0, 0, 0, 0, 0, 0], np.array([[0, 0, 1.0, 0, 0, 0]]).T)
+    found = squeezed(pushing(contacts, limits), 0.5, loads, most=10.0)
+    assert found.scale == pytest.approx(4 * 0.5 * 2.0, rel=1e-4)
+    assert found.verify()
+    assert found.torque_shares.max() == pytest.approx(1.0, abs=1e-4)
+
+
+def hands(loads=(ANY, LIGHT), torques=(0.1, 0.4), names=("box", "dodecahedron", "wedge")):
+    """Squeezes of planned grasps with hands at random."""
+    rng = np.random.default_rng(0)
+    for name in names:
+        body, grasps = planned(name, 2)
+        for grasp in grasps:
+            for each in loads:
+                for torque in torques:
+                    yield body, grasp, each, hand_of(rng, 4, torque, 0.3)
+
+
+def test_squeezes_are_proved_and_sampled_loads_stay_within_cones_and_torques():
+    """500 loads of each set; the gap to the bound is below 3e-4, and the motors count."""
+    rng, tested, lowered = np.random.default_rng(0), 0, 0
+    for body, grasp, loads, motors in hands():
+        found = gc.best_squeeze(body, grasp, 0.5, loads, max_push_n=10.0, motors=motors)
+        assert found.verify()
+        assert found.scale <= found.upper <= found.scale * (1.0 + 3e-4)
+        z = directions(500, rng, loads.axes.shape[1]) * rng.uniform(size=(500, 1)) ** 0.2
+        reactions = Reactions.of(found.grip, loads)
+        local = reactions.start + found.scale * np.einsum("kjm,nm->nkj", reactions.change, z)
+        local = np.concatenate([local, found.grip.local_squeeze[None]])
+        assert (np.linalg.norm(local[..., 1:], axis=2) <= 0.5 * local[..., 0] + 1e-8).all()
+        forces = np.einsum("kij,nkj->nki", found.grip.frames, local)
+        torques = np.array([motors.torques(each) for each in forces])
+        shares = np.abs(torques) / motors.limits
+        assert shares.max() <= 1.0 + 1e-8
+        assert (shares.max(axis=0) <= found.torque_shares + 1e-8).all()
+        free = gc.best_squeeze(body, grasp, 0.5, loads, max_push_n=10.0)
+        lowered += found.scale < 0.9 * free.scale
+        tested += 1
+    assert tested == 24
+    assert lowered >= 12
+
+
+def many():
+    """Corners, middles of edges and middles of faces of an icosahedron, (62, 3)."""
+    corners = scenes.example_object("icosahedron").vertices
+    corners = corners - corners.mean(axis=0)
+    near = 1.1 * min(np.linalg.norm(corners[0] - each) for each in corners[1:])
+    linked = np.linalg.norm(corners[:, None] - corners, axis=2) < near
+    pairs = [(i, j) for i in range(12) for j in range(i) if linked[i, j]]
+    faces = [(*p, m) for p in pairs for m in range(p[1]) if linked[p[0], m] and linked[p[1], m]]
+    found = np.vstack([corners, *[corners[list(one)].sum(axis=0) for one in pairs + faces]])
+    assert len(found) == 62
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+def test_every_direction_is_near_one_of_many():
+    away = directions(20_000, np.random.default_rng(0)) @ many().T
+    assert np.arccos(away.max(axis=1).min()) < APART
+
+
+def by_program(found, motors, most, friction):
+    """The largest scale by a linear program over the squeezes, with `many` loads and pyramids."""
+    grip, count = found.grip, 62
+    k = len(grip.friction)
+    change = np.einsum("kji,ni->nkj", grip.response[..., :3] * G, many())
+    levers = in_frames(motors.levers, grip.frames)
+    turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    sides = np.column_stack([np.full(SIDES, -friction), np.cos(turns), np.sin(turns)])
+    cones = np.kron(np.eye(k), sides)
+    pushes = np.eye(3 * k)[::3]
+    R = np.vstack([cones, pushes, levers, -levers])
+    room = np.concatenate([
+        np.zeros(len(cones)), np.full(k, most),
+        motors.limits - motors.gravity, motors.limits + motors.gravity,
+    ])  # fmt: skip
+    taken = change.reshape(count, -1) @ R.T
+    answer = linprog(
+        np.append(np.zeros(3 * k), -1.0),
+        A_ub=np.column_stack([np.tile(R, (count, 1)), taken.ravel()]), b_ub=np.tile(room, count),
+        A_eq=np.column_stack([in_frames(grasp_map(grip.arms), grip.frames), np.zeros(6)]),
+        b_eq=np.zeros(6), bounds=(None, None),
+    )  # fmt: skip
+    return answer.x[-1]
+
+
+def test_the_scale_lies_between_programs_with_pyramids_and_some_loads():
+    """Fewer loads and pyramids around the cones allow more. All loads are in the hull of `many`
+    over cos(APART), and pyramids of a friction lower by cos(pi / SIDES) lie inside the cones.
+    """
+    tested = 0
+    for body, grasp, loads, motors in hands(loads=(ANY,)):
+        given = {"max_push_n": 10.0, "motors": motors}
+        found = gc.best_squeeze(body, grasp, 0.5, loads, **given)
+        around = by_program(found, motors, 10.0, 0.5)
+        inside = by_program(found, motors, 10.0, 0.5 * np.cos(np.pi / SIDES)) * np.cos(APART)
+        assert inside <= found.upper * (1.0 + 1e-6)
+        assert found.scale <= around * (1.0 + 1e-6)
+        tested += 1
+    assert tested == 12
+
+
+def survived(grip, motors, most):
+    """Scale that a squeeze survives with its own response."""
+    reactions = Reactions.of(grip, ANY)
+    pushes = (most - reactions.start[:, 0]) / reactions.swing
+    forces = np.einsum("kij,kjm->kim", grip.frames, reactions.change)
+    swing = np.linalg.norm(motors.levers @ forces.reshape(-1, 3), axis=1)
+    torques = (motors.limits - np.abs(motors.torques(grip.squeeze))) / swing
+    return min(reactions.worst_angles()[1].min(), pushes.min(), torques.min())
+
+
+def test_no_random_or_searched_squeeze_survives_more():
+    """At stiff fingertips, where the response is nearly the same, none is better by 1 %, and a
+    direct search comes within 1 %.
+    """
+    rng, tested = np.random.default_rng(1), 0
+    for body, grasp, _, motors in list(hands(loads=(ANY,), torques=(0.3,)))[::3]:
+        found = gc.best_squeeze(
+            body, grasp, 0.5, ANY, max_push_n=10.0, stiffness=20_000.0, motors=motors
+        )
+        grip = found.grip
+        N = null_space(in_frames(grasp_map(grip.arms), grip.frames))
+
+        def less(x, grip=grip, N=N, motors=motors):
+            local = (N @ x).reshape(4, 3)
+            held = grip.squeezed(np.einsum("kij,kj->ki", grip.frames, local))
+            return -survived(held, motors, 10.0)
+
+        known = N.T @ grip.local_squeeze.ravel()
+        starts = known + 2.0 * rng.normal(size=(100, N.shape[1]))
+        values = [less(x) for x in starts]
+        assert min(values) >= -1.01 * found.upper
+        near = [known, *starts[np.argsort(values)[:1]]]
+        best = min(minimize(less, x, method="Nelder-Mead").fun for x in near)
+        assert -1.01 * found.scale <= best <= -0.99 * found.scale
+        tested += len(starts)
+    assert tested == 200
+
+
+def test_motors_without_joints_change_no_bit_and_strong_ones_nothing():
+    body, (grasp, *_) = planned("wedge")
+    nothing = gc.Motors.of(np.zeros((0, 12)), 1.0)
+    for loads in (ANY, SHAKEN):
+        for most in (10.0, None):
+            plain = gc.best_squeeze(body, grasp, 0.5, loads, max_push_n=most)
+            without = gc.best_squeeze(body, grasp, 0.5, loads, max_push_n=most, motors=nothing)
+            assert plain.motors is None
+            assert dataclasses.replace(without, motors=None) == plain
+            for strength in (10.0, 1e4, 1e8):
+                strong = hand_of(np.random.default_rng(0), 4, strength)
+                held = gc.best_squeeze(body, grasp, 0.5, loads, max_push_n=most, motors=strong)
+                assert held.scale == pytest.approx(plain.scale, rel=2e-4)
+                assert held.max_push_n == pytest.approx(plain.max_push_n, rel=2e-4)
+                assert held.grip.squeeze == pytest.approx(plain.grip.squeeze, abs=1e-3)
+                assert held.verify()
+
+
+def test_more_torque_never_holds_less_and_weak_motors_hold_in_proportion():
+    """A scale is proved to 3e-4. Below the limit on pushes all is in proportion to the torques,
+    but for the geometric stiffness, which is a hundredth of that of the springs or less.
+    """
+    tested = 0
+    for body, grasp, _, motors in hands(loads=(ANY,), torques=(0.1,)):
+        held = [
+            gc.best_squeeze(
+                body, grasp, 0.5, ANY, max_push_n=10.0, stiffness=1e5,
+                motors=gc.Motors(motors.levers, share * motors.limits, share * motors.gravity),
+            ).scale
+            for share in (1e-4, 1e-2, 0.1, 1.0, 3.0, 10.0)
+        ]  # fmt: skip
+        assert all(more >= less * (1.0 - 3e-4) for less, more in pairwise(held))
+        assert held[1] == pytest.approx(100.0 * held[0], rel=1e-3)
+        tested += 1
+    assert tested == 6
+
+
+def test_squeezes_without_room_at_rest_are_refused():
+    """The offset takes half a newton of each finger along z, the motors have less."""
+    with pytest.raises(gc.NoForcesError, match=r"within the torques .* use stronger motors"):
+        squeezed(lifting(4, 0.4 * LEVER_M), loads=SHAKEN)
+    with pytest.raises(gc.InputError, match="columns for each of 4 contacts, 12 in all"):
+        squeezed(gc.Motors.of(np.eye(2, 9), 1.0))
+
+
+def test_squeezes_of_other_motors_are_no_certificate():
+    motors = pushing(opposed(), 0.3)
+    found = squeezed(motors)
+    weak = gc.Motors(motors.levers, 0.999 * motors.limits, motors.gravity)
+    strong = gc.Motors(motors.levers, 1.001 * motors.limits, motors.gravity)
+    carrying = gc.Motors.of(motors.levers, 0.3, 0.01)
+    for change in (
+        {"motors": weak}, {"motors": strong}, {"motors": None}, {"motors": carrying},
+        {"motors": gc.Motors.of(np.eye(2, 9), 1.0)}, {"motors": "a"}, {"motors": 0.0},
+        {"multipliers": 0.0 * found.multipliers}, {"multipliers": found.multipliers[:-1]},
+        {"scale": found.scale * 1.001}, {"upper": found.scale * 0.999},
+        {"joint": 0}, {"joint": True}, {"joint": 0.0}, {"joint": -2}, {"contact": -1},
+    ):  # fmt: skip
+        assert dataclasses.replace(found, **change).verify() is False, change
+
+
+@pytest.mark.parametrize("model", ["finite", "linear"])
+def test_a_joint_reaches_its_torque_at_the_multiple_of_the_closed_form(model):
+    """Fingers of 5 N share a load F along x: 5 + F / 4 at one side; 0.3 N m are 6 N, at F = 4. The
+    joints at this side are named, and the weight of links moves the multiple.
+    """
+    grip = opposed_grip(push=5.0)
+    along = np.array([-1.0, 0, 0, 0, 0, 0])
+    for carried, multiple in ((0.0, 4.0), (0.02, 2.4), (-0.02, 5.6)):
+        motors = pushing(opposed(), 0.3, carried)
+        found = gc.first_slip(grip, along, model=model, motors=motors)
+        assert (found.event, found.contact) == ("torque limit", -1)
+        assert opposed()[found.joint].normal[0] == 1.0
+        assert found.multiple == pytest.approx(multiple, rel=1e-6)
+        assert motors.torques(found.forces).max() == pytest.approx(0.3, rel=1e-6)
+    free = gc.first_slip(grip, along, model=model)
+    strong = gc.first_slip(grip, along, model=model, motors=pushing(opposed(), 10.0))
+    assert strong == free
+    assert free.joint == -1
+
+
+def test_torques_at_the_end_of_a_load_are_within_all_limits():
+    """In the finite model the hand's levers turn with the object."""
+    rng, ends = np.random.default_rng(2), []
+    for body, grasp, _, hand in hands(loads=(ANY,), torques=(0.3,)):
+        held = gc.best_squeeze(body, grasp, 0.5, ANY, max_push_n=10.0)
+        rest = np.abs(hand.levers @ held.grip.squeeze.ravel())
+        motors = gc.Motors.of(hand.levers, 1.3 * rest + 0.002)
+        for way in directions(4, rng):
+            load = np.append(way, 0.01 * directions(1, rng)[0])
+            linear = gc.first_slip(held.grip, load, model="linear", motors=motors)
+            shares = np.abs(motors.torques(linear.forces)) / motors.limits
+            assert shares.max() <= 1.0 + 1e-6
+            if linear.event == "torque limit":
+                assert shares[linear.joint] == pytest.approx(1.0, abs=1e-6)
+            finite = gc.first_slip(held.grip, load, motors=motors)
+            free = gc.first_slip(held.grip, load)
+            assert finite.multiple <= free.multiple * (1.0 + 1e-6)
+            # forces in the object's axes: its turn is that of the contacts' normals
+            turn = turn_between(held.grip.normals, finite.normals)
+            shares = np.abs(motors.torques(finite.forces @ turn)) / motors.limits
+            assert shares.max() <= 1.0 + 1e-6
+            ends.append(finite.event)
+    assert len(ends) == 24
+    assert ends.count("torque limit") >= 8
+
+
+def turn_between(before, after):
+    """Rotation that takes unit vectors (k, 3) to others."""
+    U, _, V = np.linalg.svd(after.T @ before)
+    return U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
+
+
+def test_a_squeeze_beyond_the_motors_is_refused():
+    with pytest.raises(gc.InputError, match=r"joint 0 of the motors is too weak at rest.* 0\.25 N"):
+        gc.first_slip(opposed_grip(push=5.0), np.ones(6), motors=pushing(opposed(), 0.2))
