@@ -109,9 +109,9 @@ class Motors(ByValue):
         if weak.size:
             joint = int(weak[0])
             raise InputError(
-                f"weights of joint {joint} ask for {carried[joint]:.6g} N m in some orientation, but "
-                f"its limit is {strong.limits[joint]:.6g} N m: the hand cannot carry its own links "
-                "there; give larger limits"
+                f"weights of joint {joint} ask for {carried[joint]:.6g} N m in some orientation, "
+                f"but its limit is {strong.limits[joint]:.6g} N m: the hand cannot carry its own "
+                "links there; give larger limits"
             )
         return cls(strong.levers, left, np.zeros(len(left)))
 

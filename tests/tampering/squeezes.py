@@ -22,7 +22,7 @@ def sensible(g):
         np.abs(g.stiffness - g.stiffness.transpose(0, 2, 1)).max() <= 1e-8 * g.stiffness.max()
     )
     positive = np.linalg.eigvalsh(g.stiffness).min() > 0.0 and g.tip_radius_m.min() >= 0.0
-    size = np.linalg.norm(g.arms, axis=1).max()
+    size = np.linalg.norm(g.arms, axis=1).max() or 1.0  # tampered arms may all be zero
     torque = np.cross(g.arms, g.squeeze).sum(axis=0) / size
     left = np.abs(np.append(g.squeeze.sum(axis=0), torque)).max()
     balanced = left <= 2e-6 * np.linalg.norm(g.squeeze, axis=1).sum()
@@ -169,7 +169,7 @@ def largest_scale(g, frames, offset, change, c):
     unit = most / np.linalg.norm(change, axis=(1, 2)).max()
     states = [(offset / most, change * unit / most)]
     states += [(0.0 * offset, 0.0 * change)] * bool(c.loads.offset.any())
-    size = np.linalg.norm(g.arms, axis=1).max()
+    size = np.linalg.norm(g.arms, axis=1).max() or 1.0  # tampered arms may all be zero
     columns = [
         np.append(v, np.cross(arm, v) / size)
         for arm, frame in zip(g.arms, frames, strict=True)
@@ -229,7 +229,7 @@ def bounds(g, motors, most, directions):
 
 def ray(g, motors, most, d):
     """Largest mass that contacts hold whose weight points along d."""
-    k, size = len(g.arms), np.linalg.norm(g.arms, axis=1).max()
+    k, size = len(g.arms), np.linalg.norm(g.arms, axis=1).max() or 1.0
     torques, room = torques_of(motors, g.normals, most)
     A = np.zeros((6 + 4 * k + len(room), 3 * k + 1))
     A[:6, :-1] = locals_of(g.arms / size, g.normals, g.friction)

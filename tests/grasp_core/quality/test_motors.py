@@ -6,6 +6,8 @@ from scipy.optimize import linprog
 
 import grasp_core as gc
 from grasp_core.closure.wrenches import grasp_map
+from grasp_core.quality.weakest_wrench import SETTLED, weakest_from
+from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches
 from tests.judges import random_contacts
 
 SIDES = 64
@@ -184,3 +186,60 @@ def test_motors_are_refused_where_they_cannot_carry_the_links_or_belong_to_other
     given = {"max_normal_force": 1.0, "motors": gc.Motors.of(np.eye(2, 6), 1.0)}
     with pytest.raises(gc.InputError, match="columns for each of 4 contacts, 12 in all"):
         gc.max_resisted_wrench(positions, normals, 0.5, np.eye(6)[0], **given)
+
+
+def test_motors_in_any_orientation_give_up_what_their_links_ask_in_the_worst():
+    """One joint carries up to 0.05 of its 0.3 N m, the other sqrt(3) / 4 of its newton metre."""
+    weights = np.array([[0.0, -0.03, 0.04], [0.25, 0.25, 0.25]])
+    motors = gc.Motors.in_any_orientation(np.eye(2, 6), [0.3, 1.0], weights)
+    assert motors.limits == pytest.approx([0.25, 1.0 - np.sqrt(3.0) / 4.0])
+    assert not motors.gravity.any()
+    assert gc.Motors.in_any_orientation(np.eye(2, 6), 0.3, 0.0 * weights) == gc.Motors.of(
+        np.eye(2, 6), 0.3
+    )
+    with pytest.raises(gc.InputError, match=r"weights of joint 1 ask for 0\.433013 N m in some"):
+        gc.Motors.in_any_orientation(np.eye(2, 6), 0.4, weights)
+
+
+def test_forces_within_lowered_limits_are_within_all_torques_in_every_orientation():
+    rng = np.random.default_rng(6)
+    hand, weights = hand_of(rng, 4), 0.1 * rng.normal(size=(16, 3))
+    motors = gc.Motors.in_any_orientation(hand.levers, 1.0, weights)
+    ways = rng.normal(size=(2000, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    reached = 0.0
+    for forces in rng.normal(size=(50, 4, 3)):
+        allowed = forces / (np.abs(motors.torques(forces)) / motors.limits).max()
+        torques = motors.torques(allowed) + ways @ weights.T
+        assert np.abs(torques).max() <= 1.0 + 1e-12
+        reached = max(reached, np.abs(torques).max())
+    assert reached >= 0.999
+
+
+def test_the_search_for_the_weakest_wrench_knows_motors():
+    """Its end is proved and settled: the wrench that the last facet faces is hardly weaker.
+
+    None of 250 other wrenches is resisted less.
+    """
+    rng, tested, lowered = np.random.default_rng(7), 0, 0
+    while tested < 4:
+        positions, normals = random_contacts(rng)
+        if not gc.force_closure(positions, normals, 0.6).closed:
+            continue
+        motors = hand_of(rng, 4)
+        body = WrenchBody(positions, normals, np.full(4, 0.6), 3.0, motors)
+        free = WrenchBody(positions, normals, np.full(4, 0.6), 3.0)
+        limits = [body.limit(wrench) for wrench in axis_wrenches(1.0)]
+        found = weakest_from(body, limits, 1.0)
+        given = {"max_normal_force": 3.0, "motors": motors}
+        assert found.verify(positions, normals, 0.6, **given)
+        assert np.linalg.norm(found.wrench) == pytest.approx(1.0)
+        assert found.limit <= min(each.limit for each in limits)
+        facing = body.limit(-found.facet / np.linalg.norm(found.facet))
+        assert found.limit * (1.0 - SETTLED) <= facing.limit <= found.limit * (1.0 + 1e-6)
+        wrenches = rng.normal(size=(250, 6))
+        wrenches /= np.linalg.norm(wrenches, axis=1, keepdims=True)
+        assert found.limit <= min(body.limit(wrench).limit for wrench in wrenches)
+        lowered += found.limit < 0.9 * free.limit(found.wrench).limit
+        tested += 1
+    assert lowered >= 1
