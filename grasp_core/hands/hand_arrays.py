@@ -61,7 +61,7 @@ def hand_arrays(hand: Hand) -> HandArrays:
         shape_rotations=np.array([shape.rotation for shape in shapes]),
         shape_sizes=np.array([shape.half_sizes for shape in shapes]),
         shape_radii=np.array([shape.radius for shape in shapes]),
-        shape_reaches=np.array([np.linalg.norm(s.half_sizes) + s.radius for s in shapes]),
+        shape_reaches=np.array([float(np.linalg.norm(s.half_sizes)) + s.radius for s in shapes]),
         shape_tips=_shape_tips(parts, ends.tolist(), tips),
         pairs=_pairs(where, free),
         ball_links=at,

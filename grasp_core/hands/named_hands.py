@@ -28,7 +28,7 @@ def load_hand(name: str) -> Hand:
     """
     if text(name, "name") not in HANDS:
         raise InputError(
-            f"there is no built-in hand {shown(name)}; write {' or '.join(HANDS)}, or read a file "
-            "with scenes.load_hand(path, fingertips=...)"
+            f"name must be that of a built-in hand, {' or '.join(HANDS)}, got {shown(name)}; "
+            "scenes.load_hand(path, fingertips=...) reads files"
         )
     return HANDS[name]()

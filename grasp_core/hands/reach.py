@@ -147,14 +147,24 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
 
 
 def _check(hand: Hand, body: Polyhedron, grasp: Grasp) -> None:
-    instance(hand, Hand, "hand", "load_hand makes one")
+    check_hand(hand)
     check_body(body)
     instance(grasp, Grasp, "grasp", "plan finds some")
+
+
+def check_hand(hand: Hand) -> Hand:
+    """Check that a value is a hand with enough fingers for a grasp.
+
+    Raises:
+        InputError: It is not.
+    """
+    instance(hand, Hand, "hand", "load_hand makes one")
     if len(hand.fingers) < FINGERS:
         raise InputError(
             f"hand must have at least {FINGERS} fingers, got {len(hand.fingers)}: the grasps here "
             f"have {FINGERS} contacts, and with one finger less they are not proved to hold"
         )
+    return hand
 
 
 def _table(body: Polyhedron, down: ArrayLike | None) -> tuple[Array, float]:

@@ -5,8 +5,8 @@ normals as far as the joints allow. The way in is a straight line of the palm wi
 Both are checked by exact distances; the line at steps of `TICK`.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -27,7 +27,11 @@ STEPS = 30
 TICK, LINE = 0.004, 0.06
 """Distance of the poses that are checked on the way in, and its length [m]."""
 TILT = 0.4
-"""Slope at which other ways in lean from the line towards the contacts' middle."""
+"""Slope at which some ways in lean from the line from the palm to the contacts' middle."""
+LEAST_ALONG = 0.2
+"""Least cosine of the angle between a way in and the line from the palm to the contacts' middle."""
+DIGITS = 9
+"""Digits to which these cosines are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +50,7 @@ def opened(asked: Asked, found: FoundPose) -> Opening:
     joints = _open_joints(asked, found)
     if joints is None:
         return Opening(None, None)
-    for way in _ways(found):
+    for way in _ways(asked, found):
         if _is_free(asked, found, joints, way):
             return Opening(joints, way)
     return Opening(joints, None)
@@ -91,16 +95,21 @@ def _aims(asked: Asked, found: FoundPose) -> Targets:
     return aims._replace(fingers=found.fingers)
 
 
-def _ways(found: FoundPose) -> Iterator[Array]:
-    """Yield unit vectors along which the palm may move in, (3,)."""
+def _ways(asked: Asked, found: FoundPose) -> Array:
+    """Return unit vectors along which the palm may move in, the likeliest first, (n, 3)."""
     middle = found.certificate.positions.mean(axis=0)
-    ahead = middle - found.palm_pose[:3, 3]
+    palm = np.array([shape.position for shape in asked.hand.palm] or [np.zeros(3)]).mean(axis=0)
+    R, origin = found.palm_pose[:3, :3], found.palm_pose[:3, 3]
+    ahead = middle - origin - R @ palm
     ahead /= np.linalg.norm(ahead)
-    yield ahead
-    for axis in found.palm_pose[:3, :3].T:
-        for sign in (1.0, -1.0):
-            leaning = ahead + sign * TILT * axis
-            yield leaning / np.linalg.norm(leaning)
+    steps = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
+    steps = steps[np.abs(steps).max(axis=1) > 0.0]
+    others = (steps / np.linalg.norm(steps, axis=1, keepdims=True)) @ R.T
+    along = others @ ahead
+    order = np.argsort(-along.round(DIGITS), kind="stable")
+    leaning = ahead + TILT * np.vstack([R.T, -R.T])
+    leaning /= np.linalg.norm(leaning, axis=1, keepdims=True)
+    return np.vstack([ahead, leaning, others[order[along[order] > LEAST_ALONG]]])
 
 
 def _is_free(asked: Asked, found: FoundPose, joints: Array, way: Array) -> bool:
