@@ -29,6 +29,10 @@ from grasp_core.execution.payload import Payload as Payload
 from grasp_core.execution.payload import payload as payload
 from grasp_core.execution.squeeze_certificate import BestSqueeze as BestSqueeze
 from grasp_core.forces.contact_forces import contact_forces as contact_forces
+from grasp_core.hands.hand import Hand as Hand
+from grasp_core.hands.named_hands import load_hand as load_hand
+from grasp_core.hands.reach import HandReach as HandReach
+from grasp_core.hands.reach import reach_with as reach_with
 from grasp_core.mesh_files.limits import MeshLimits as MeshLimits
 from grasp_core.objects.face import Face as Face
 from grasp_core.objects.face import PatchLimits as PatchLimits

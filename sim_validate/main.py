@@ -19,6 +19,7 @@ from sim_validate.cli import (
     command_flags,
     dataset_flags,
     execution_flags,
+    hand_flags,
     showing_flags,
     transfer_flags,
 )
@@ -43,6 +44,7 @@ ACTIONS: dict[type[Any], str] = {
     command_flags.Replay: "replay:replay_trial",
     command_flags.Analyze: "analyze:analyze_file",
     transfer_flags.Transfer: "transfer:transfer_file",
+    hand_flags.Reach: "hands.reach:reach_file",
     dataset_flags.Build: "dataset:build_dataset",
     dataset_flags.Import: "dataset:import_dataset",
     dataset_flags.Verify: "dataset:verify_dataset",

@@ -26,7 +26,12 @@ DOORS = {
     "clarabel": "grasp_core/solvers/conic.py",
     "qpsolvers": "grasp_core/solvers/qp.py",
     "scipy.optimize": "grasp_core/solvers/nearest_point.py",
-    "mujoco": ("sim_validate/simulation/engine.py", "scenes/drawing/frames.py"),
+    "mujoco": (
+        "sim_validate/simulation/engine.py",
+        "scenes/drawing/frames.py",
+        "scenes/hand_files/model.py",
+    ),
+    "mujoco_menagerie": "scenes/hand_files/menagerie.py",
     "PIL": "scenes/drawing/frames.py",
     "matplotlib": "scenes/drawing/canvas.py",
     "jinja2": "scenes/drawing/pages.py",

@@ -27,6 +27,7 @@ from sim_validate.cli.flag_groups import (
     Usual,
     Wrench,
 )
+from sim_validate.cli.hand_flags import Reach
 from sim_validate.cli.showing_flags import PICTURES, Report, View
 from sim_validate.cli.transfer_flags import Transfer
 from sim_validate.parallel.processes import available_cores
@@ -263,6 +264,7 @@ Command = (
     | Replay
     | Analyze
     | Transfer
+    | Reach
     | Dataset
     | Baseline
     | Inspect

@@ -43,6 +43,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "transfer plan/grasps.json part-v2.stl --unit mm --out carried",
         "transfer plan/grasps.json part-v2.stl --unit mm --distance-m 0.005 --angle-deg 2",
     ),
+    "reach": (
+        "reach plan/grasps.json --hand allegro --out reached",
+        "reach plan/grasps.json --hand my_hand.xml --fingertips ff,mf,rf,th --table 0 0 -1",
+    ),
     "inspect": ("inspect part.stl --unit mm", "inspect part.stl --unit mm --picture part.png"),
     "objects": ("objects",),
     "doctor": ("doctor",),

@@ -28,6 +28,7 @@ def remove_results(folder: Path) -> None:
     remove_verdicts(folder)
     remove_regions(folder)
     remove_executions(folder)
+    remove_reaches(folder)
     _remove([*_of_grasps(folder / "scenes", ".xml"), *(folder / name for name in OF_GRASPS)])
 
 
@@ -47,6 +48,11 @@ def remove_executions(folder: Path) -> None:
     """Remove the results of executed grasps, and pages that show them."""
     remove_report(folder / REPORT)
     _remove([folder / "executions.json"])
+
+
+def remove_reaches(folder: Path) -> None:
+    """Remove the poses of a hand in grasps."""
+    _remove([folder / "reaches.json"])
 
 
 def _of_grasps(folder: Path, suffix: str) -> list[Path]:

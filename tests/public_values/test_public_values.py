@@ -14,13 +14,15 @@ from grasp_core.short_text import MOST
 from tests.public_values import (
     calls_of_analysis,
     calls_of_execution,
+    calls_of_hands,
     calls_of_simulation,
     calls_of_values,
 )
 
 PACKAGES = {"gc": gc, "scenes": scenes, "sv": sv}
 CALLS = [
-    *calls_of_analysis.CALLS, *calls_of_execution.CALLS, *calls_of_values.CALLS,
+    *calls_of_analysis.CALLS, *calls_of_execution.CALLS, *calls_of_hands.CALLS,
+    *calls_of_values.CALLS,
     *calls_of_simulation.CALLS,
 ]  # fmt: skip
 BY_NAME = {call.name: call for call in CALLS}
@@ -35,6 +37,8 @@ MADE_BY_FUNCTIONS = {
     "gc.FirstSlip": "first_slip",
     "gc.FreeMass": "payload",
     "gc.Grip": "grip",
+    "gc.Hand": "load_hand",
+    "gc.HandReach": "reach_with",
     "gc.Payload": "payload",
     "gc.CertifiedRegions": "certify_regions and load_regions",
     "gc.CarriedContact": "transfer",

@@ -1,0 +1,99 @@
+"""Measures how far a hand is from itself, from an object and from a table: this decides.
+
+Distances are exact, between boxes with rounded edges and triangles. A shape wholly inside the
+object counts as overlapping it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import compiled
+from grasp_core.frames import POSE
+from grasp_core.hands.distances.surface import surface_tree
+from grasp_core.hands.hand import PALM, Hand
+from grasp_core.hands.hand_arrays import hand_arrays
+from grasp_core.hands.kinematics import places
+from grasp_core.hands.loop_values import HandArrays
+from grasp_core.objects.polyhedron import Polyhedron
+
+FAR = 0.02
+"""Distance up to which clearances are measured [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clearances:
+    """Least distances of a hand's parts, negative where they overlap, at most `FAR` [m]."""
+
+    itself: float
+    """Between links that must not overlap."""
+    object: float
+    """From the object, of all shapes but those that share the balls of touching fingertips."""
+    tips: float
+    """From the object, of those shapes: zero where they touch."""
+    table: float
+    """From the table; `FAR` where there is none."""
+
+
+def clearances(  # noqa: PLR0913, PLR0917 - a hand, where it is, and what is around it
+    hand: Hand,
+    body: Polyhedron,
+    joints: Array,
+    palm_pose: Array,
+    fingers: Indices,
+    up: Array | None = None,
+    height: float = 0.0,
+) -> Clearances:
+    """Measure the distances of a hand from itself, an object and a table.
+
+    Args:
+        hand: The hand.
+        body: The object.
+        joints: Joint angles, (j,) [rad].
+        palm_pose: Pose of the palm in the object's frame, (4, 4).
+        fingers: Fingers whose tips touch the object.
+        up: Unit normal of the table, (3,); None for no table.
+        height: Its height along it [m].
+    """
+    arrays, tree = hand_arrays(hand), surface_tree(body)
+    turned, middles = _shapes(hand, arrays, joints, palm_pose)
+    kernel, worst = compiled("grasp_core.hands.distances.collisions_kernel"), np.empty(2, np.int64)
+    touching = np.isin(arrays.shape_tips, fingers)
+    never = np.full(len(touching), -np.inf)
+    apart = [
+        kernel.of_object(arrays, turned, middles, tree, np.where(left_out, never, FAR), worst[:1])
+        for left_out in (touching, ~touching)
+    ]
+    low = FAR if up is None else kernel.of_table(arrays, turned, middles, up, height, worst[:1])
+    own = kernel.of_itself(arrays, turned, middles, FAR, worst)
+    return Clearances(min(own, FAR), apart[0] + FAR, apart[1] + FAR, min(low, FAR))
+
+
+def _shapes(hand: Hand, arrays: HandArrays, joints: Array, palm_pose: Array) -> tuple[Array, Array]:
+    """Return axes and middles of the shapes of a hand in the object's frame."""
+    found = places(hand, joints, palm_pose)
+    turned, middles = np.empty_like(arrays.shape_rotations), np.empty_like(arrays.shape_positions)
+    compiled("grasp_core.hands.distances.collisions_kernel").place_shapes(
+        arrays, palm_pose[:3, :3].copy(), palm_pose[:3, 3].copy(), found.link_rotations[0],
+        found.link_positions[0], turned, middles,
+    )  # fmt: skip
+    return turned, middles
+
+
+def overlapping_pairs(hand: Hand, joints: Array) -> set[tuple[str, str]]:
+    """Return the names of links, in order of the alphabet, that overlap at some joint angles.
+
+    Args:
+        hand: The hand.
+        joints: Joint angles, (j,) [rad].
+    """
+    arrays, kernel = hand_arrays(hand), compiled("grasp_core.hands.distances.collisions_kernel")
+    turned, middles = _shapes(hand, arrays, joints, np.eye(POSE))
+    names = [PALM, *(link.name for link in hand.links)]
+    found, way, point = set[tuple[str, str]](), np.empty(3), np.empty(3)
+    for i, j in arrays.pairs.tolist():
+        if kernel.pair_distance(arrays, turned, middles, i, j, 0.0, way, point) <= 0.0:
+            pair = sorted(names[1 + int(arrays.shape_links[each])] for each in (i, j))
+            found.add((pair[0], pair[1]))
+    return found

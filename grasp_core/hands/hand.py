@@ -1,0 +1,256 @@
+"""Defines a hand: a palm, and fingers that are chains of revolute joints with a ball at the end.
+
+Frames: the palm's frame is the hand's. Each link has a frame whose origin lies on its joint's axis.
+With the angle q of a joint, the link's frame in the frame of the link before it is
+
+    T(q) = (position, rotation) . turn(axis, q).                                          (1)
+
+Shapes for collisions are boxes with rounded edges: all points within `radius` of a box. A radius of
+zero makes it a box, two half-sizes of zero a capsule, three a ball.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, frozen, frozen_each, frozen_units
+from grasp_core.by_value import ByValue
+from grasp_core.checked import instance, number, several, text
+from grasp_core.errors import InputError
+from grasp_core.short_text import counted, summary
+
+LARGEST_SIZE = 2.0
+"""Largest length of a hand [m]: a larger one is in other units."""
+MOST_TURN = 2.0 * np.pi
+"""Largest angle of a joint, in either direction [rad]."""
+FEWEST_FINGERS, MOST_FINGERS = 3, 5
+MOST_LINKS, MOST_SHAPES = 40, 400
+"""Largest numbers of links and shapes of a hand."""
+RIGID_SLACK = 1e-9
+"""How far the rows of a rotation may be from orthonormal: the rounding of ten digits."""
+PALM = "palm"
+"""Name of the palm among the links."""
+
+
+def _rotation(value: ArrayLike, name: str) -> Array:
+    """Check a rotation matrix, (3, 3).
+
+    Raises:
+        InputError: The rows are not orthonormal and right-handed.
+    """
+    turned = frozen(value, (3, 3), name)
+    off = float(np.abs(turned @ turned.T - np.eye(3)).max())
+    if off > RIGID_SLACK or np.linalg.det(turned) < 0.0:
+        raise InputError(
+            f"{name} must be a rotation matrix, right-handed with orthonormal rows, got rows off "
+            f"by {off:.3g}"
+        )
+    return turned
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class LinkShape(ByValue):
+    """All points within `radius` of a box: a box, a capsule or a ball of a link."""
+
+    position: Array
+    """Middle in the link's frame, (3,) [m]."""
+    rotation: Array
+    """Columns are the box's axes in the link's frame, (3, 3)."""
+    half_sizes: Array
+    """Half the box's lengths along its axes, (3,) [m], each zero or more."""
+    radius: float
+    """Distance from the box to the surface [m]."""
+
+    def __post_init__(self) -> None:
+        place = frozen(self.position, (3,), "position", most=LARGEST_SIZE)
+        sizes = frozen(self.half_sizes, (3,), "half_sizes", most=LARGEST_SIZE)
+        object.__setattr__(self, "position", place)
+        object.__setattr__(self, "rotation", _rotation(self.rotation, "rotation"))
+        object.__setattr__(self, "half_sizes", sizes)
+        number(self.radius, "radius", least=0.0, most=LARGEST_SIZE)
+        if sizes.min() < 0.0 or (sizes.max() == 0.0 and self.radius == 0.0):
+            raise InputError(
+                f"half_sizes must be zero or more, and some of them or the radius above zero, got "
+                f"{sizes.tolist()} and {self.radius:g}"
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Joint(ByValue):
+    """A revolute joint: where it is on the link before it, its axis, range and torque limit."""
+
+    name: str
+    position: Array
+    """Origin of the moved link's frame, in the frame of the link before it, (3,) [m]."""
+    rotation: Array
+    """Axes of that frame at the angle zero, (3, 3)."""
+    axis: Array
+    """Unit vector of the axis through the origin, in the moved link's frame, (3,)."""
+    lowest: float
+    """Smallest angle [rad]."""
+    highest: float
+    """Largest angle [rad]."""
+    torque_limit_n_m: float | None = None
+    """Largest torque of the motor in either direction [N m]; None where no source states one."""
+
+    def __post_init__(self) -> None:
+        text(self.name, "name")
+        place = frozen(self.position, (3,), "position", most=LARGEST_SIZE)
+        object.__setattr__(self, "position", place)
+        object.__setattr__(self, "rotation", _rotation(self.rotation, "rotation"))
+        object.__setattr__(self, "axis", frozen_units(self.axis, (3,), "axis"))
+        number(self.lowest, "lowest", least=-MOST_TURN, most=MOST_TURN)
+        number(self.highest, "highest", least=self.lowest, most=MOST_TURN)
+        if self.torque_limit_n_m is not None:
+            number(self.torque_limit_n_m, "torque_limit_n_m", above=0.0, most=1e6)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Link(ByValue):
+    """A part of a finger behind one joint."""
+
+    name: str
+    joint: Joint
+    shapes: tuple[LinkShape, ...]
+    mass_kg: float | None = None
+    """Mass [kg]; None where no source states one."""
+    center_of_mass: Array | None = None
+    """Centre of mass in the link's frame, (3,) [m]; None where no source states one."""
+
+    def __post_init__(self) -> None:
+        text(self.name, "name")
+        instance(self.joint, Joint, "joint")
+        each = partial(instance, kind=LinkShape, name="shapes")
+        object.__setattr__(self, "shapes", several(self.shapes, each, "shapes", "LinkShape values"))
+        if self.mass_kg is not None:
+            number(self.mass_kg, "mass_kg", least=0.0, most=1e3)
+        if self.center_of_mass is not None:
+            place = frozen(self.center_of_mass, (3,), "center_of_mass", most=LARGEST_SIZE)
+            object.__setattr__(self, "center_of_mass", place)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Fingertip(ByValue):
+    """The ball at the end of a finger that touches the object."""
+
+    center: Array
+    """Middle of the ball in the last link's frame, (3,) [m]."""
+    radius: float
+    """Radius of the ball [m]."""
+
+    def __post_init__(self) -> None:
+        middle = frozen(self.center, (3,), "center", most=LARGEST_SIZE)
+        object.__setattr__(self, "center", middle)
+        number(self.radius, "radius", above=0.0, most=LARGEST_SIZE)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class HandFinger(ByValue):
+    """A chain of links from the palm, with a ball on the last of them."""
+
+    name: str
+    links: tuple[Link, ...]
+    tip: Fingertip
+
+    def __post_init__(self) -> None:
+        text(self.name, "name")
+        each = partial(instance, kind=Link, name="links")
+        links = several(self.links, each, "links", "Link values")
+        object.__setattr__(self, "links", links)
+        instance(self.tip, Fingertip, "tip")
+        if not links:
+            raise InputError(f"links of finger {self.name} must be at least one, got none")
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Hand(ByValue):
+    """A palm with three to five fingers, and where its numbers come from."""
+
+    name: str
+    palm: tuple[LinkShape, ...]
+    fingers: tuple[HandFinger, ...]
+    sources: tuple[str, ...] = ()
+    """Where the numbers come from, with licences."""
+    torque_source: str = "no source states torque limits"
+    """Where the torque limits come from."""
+    ignored_pairs: tuple[tuple[str, str], ...] = ()
+    """Names of links that may overlap, besides neighbours in a chain; `palm` is the palm."""
+
+    def __post_init__(self) -> None:
+        text(self.name, "name")
+        text(self.torque_source, "torque_source")
+        for name, kind in (("palm", LinkShape), ("fingers", HandFinger), ("sources", str)):
+            each: Any = partial(instance, kind=kind, name=name)
+            kept = several(getattr(self, name), each, name, f"{kind.__name__} values")
+            object.__setattr__(self, name, kept)
+        if not FEWEST_FINGERS <= len(self.fingers) <= MOST_FINGERS:
+            raise InputError(
+                f"fingers must be {FEWEST_FINGERS} to {MOST_FINGERS}, got {len(self.fingers)}"
+            )
+        shapes = len(self.palm) + sum(len(link.shapes) for link in self.links)
+        if len(self.links) > MOST_LINKS or shapes > MOST_SHAPES:
+            raise InputError(
+                f"a hand must have at most {MOST_LINKS} links and {MOST_SHAPES} shapes, got "
+                f"{len(self.links)} and {shapes}"
+            )
+        names = [PALM, *(link.name for link in self.links)]
+        if len(set(names)) < len(names):
+            raise InputError("names of links must differ from each other and from 'palm'")
+        object.__setattr__(self, "ignored_pairs", _pairs(self.ignored_pairs, set(names)))
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """Return the links of all fingers, finger by finger, from the palm outwards."""
+        return tuple(link for finger in self.fingers for link in finger.links)
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Return the joints in the order of `links`."""
+        return tuple(link.joint for link in self.links)
+
+    @property
+    def ranges(self) -> Array:
+        """Return the lowest and highest angle of each joint, (joints, 2) [rad]."""
+        return np.array([[joint.lowest, joint.highest] for joint in self.joints])
+
+    def with_torque_limits(self, limits_n_m: ArrayLike, source: str) -> "Hand":
+        """Return the hand with other torque limits.
+
+        Args:
+            limits_n_m: One limit for all joints or one each, in the order of `joints` [N m].
+            source: Where they come from.
+
+        Raises:
+            InputError: A limit is not a number above zero.
+        """
+        limits = iter(frozen_each(limits_n_m, len(self.joints), "limits_n_m").tolist())
+        fingers = tuple(
+            replace(finger, links=tuple(
+                replace(link, joint=replace(link.joint, torque_limit_n_m=next(limits)))
+                for link in finger.links
+            ))
+            for finger in self.fingers
+        )  # fmt: skip
+        return replace(self, fingers=fingers, torque_source=text(source, "source"))
+
+    def __repr__(self) -> str:
+        parts = counted(len(self.fingers), "finger"), counted(len(self.joints), "joint")
+        return summary("Hand", self.name, *parts)
+
+
+def _pairs(given: Iterable[Any], names: set[str]) -> tuple[tuple[str, str], ...]:
+    """Check pairs of names of links.
+
+    Raises:
+        InputError: A pair is not two names of links.
+    """
+    each: Any = partial(instance, kind=tuple, name="ignored_pairs")
+    listed: tuple[Any, ...] = several(given, each, "ignored_pairs", "pairs of names")
+    for pair in cast("tuple[tuple[str, ...], ...]", listed):
+        if len(pair) != 2 or not set(pair) <= names:  # noqa: PLR2004 - a pair
+            raise InputError(f"ignored_pairs must be pairs of names of links, got {pair}")
+    return cast("tuple[tuple[str, str], ...]", listed)

@@ -1,0 +1,95 @@
+"""Says where links and fingertips of a hand are, and how fingertips move with the joints.
+
+With origin p_k and axis w_k of joint k, both in the frame of the palm pose, a point x that a finger
+carries moves by
+
+    dx / dq_k = w_k x (x - p_k)                                                           (1)
+
+where k is one of the finger's joints, and by nothing else.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, cross, frozen_copy, real_array
+from grasp_core.compiled import compiled
+from grasp_core.errors import InputError
+from grasp_core.frames import POSE
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand_arrays import hand_arrays
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandPlaces:
+    """Where the parts of a hand are, for n sets of joint angles; read-only arrays."""
+
+    link_rotations: Array
+    """Axes of the links' frames, (n, joints, 3, 3)."""
+    link_positions: Array
+    """Origins of these frames, (n, joints, 3) [m]."""
+    joint_axes: Array
+    """Unit vectors of the joints' axes, (n, joints, 3)."""
+    tips: Array
+    """Middles of the fingertips' balls, (n, fingers, 3) [m]."""
+
+
+def places(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) -> HandPlaces:
+    """Compute where links and fingertips are.
+
+    Args:
+        hand: The hand.
+        joints: Joint angles in the order of `hand.joints`, (j,) or (n, j) [rad].
+        palm_pose: Pose of the palm, (4, 4), or one for each set of angles, (n, 4, 4); None for
+            places in the palm's own frame.
+
+    Raises:
+        InputError: Shapes are wrong.
+    """
+    angles = np.atleast_2d(real_array(joints, "joints"))
+    arrays = hand_arrays(hand)
+    count, length = len(angles), len(arrays.axes)
+    if angles.shape != (count, length):
+        raise InputError(
+            f"joints must have shape ({length},) or (n, {length}), got {np.shape(joints)}"
+        )
+    pose = np.eye(POSE) if palm_pose is None else real_array(palm_pose, "palm_pose")
+    if pose.shape not in {(POSE, POSE), (count, POSE, POSE)}:
+        raise InputError(f"palm_pose must have shape (4, 4) or ({count}, 4, 4), got {pose.shape}")
+    poses = np.ascontiguousarray(np.broadcast_to(pose, (count, POSE, POSE)))
+    R, p = np.empty((count, length, 3, 3)), np.empty((count, length, 3))
+    W = np.empty_like(p)
+    kernel = compiled("grasp_core.hands.kinematics_kernel")
+    kernel.many_chains(
+        arrays.positions, arrays.rotations, arrays.axes, arrays.starts, poses, angles, R, p, W
+    )
+    last = arrays.starts[1:] - 1
+    tips = p[:, last] + np.einsum("nfij,fj->nfi", R[:, last], arrays.tip_centers)
+    return HandPlaces(*(frozen_copy(each) for each in (R, p, W, tips)))
+
+
+def tip_jacobians(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) -> Array:
+    """Compute how the middles of fingertips move with the joints, by (1).
+
+    Args:
+        hand: The hand.
+        joints: See `places`.
+        palm_pose: See `places`.
+
+    Returns:
+        Derivatives, (n, fingers, 3, joints) [m/rad]; zero for the joints of other fingers.
+
+    Raises:
+        InputError: Shapes are wrong.
+    """
+    found = places(hand, joints, palm_pose)
+    starts = hand_arrays(hand).starts
+    J = np.zeros((*found.tips.shape, len(hand.joints)))
+    for finger, (first, end) in enumerate(pairwise(starts)):
+        arms = found.tips[:, finger, None] - found.link_positions[:, first:end]
+        J[:, finger, :, first:end] = np.swapaxes(
+            cross(found.joint_axes[:, first:end], arms), -1, -2
+        )
+    return J

@@ -1,0 +1,181 @@
+"""Looks for a pose in which a hand's fingertips touch an object in a grasp, and nothing overlaps.
+
+From each start, a hand is moved until its fingertips touch and balls that stand for its parts are
+clear of the object. Then fingertips are laid on the surface itself, and exact distances decide.
+Finally force closure is proved with the contacts that are reached.
+"""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.compiled import compiled
+from grasp_core.errors import SolverError, UndecidedError
+from grasp_core.frames import POSE
+from grasp_core.hands.distances.surface import surface_tree
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand_arrays import hand_arrays
+from grasp_core.hands.loop_values import Pose, Targets, Wanted
+from grasp_core.hands.posing.starts import Start, starts
+from grasp_core.hands.posing.targets import is_within, targets
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import FINGERS, Grasp
+
+TOUCHING = 1e-5
+"""Largest gap or overlap of a fingertip that counts as touching [m]: a tenth of the overlap that
+simulators and makers of hands allow."""
+MOST_STEPS = 60
+GOOD_MM, ROUGH_MM, FINE_MM = 0.05, 1.0, 1e-6
+"""Distances from touching at which the search for a pose ends, from which fingertips are laid on
+the surface, and at which they lie on a flat one [mm]."""
+ROOM = 0.0015
+"""Distance beyond the one asked for that the search keeps from the object [m]."""
+PULL = 0.03
+MARGIN, LEAST_MARGIN = 5e-4, 1e-4
+"""Distances from the edges of regions that are sought, and kept when fingertips are laid down [m].
+"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Asked:
+    """What a pose is sought for."""
+
+    hand: Hand
+    body: Polyhedron
+    grasp: Grasp
+    friction: float
+    up: Array
+    """Unit normal of the table, (3,)."""
+    height: float
+    """Its height along it; minus infinity for none [m]."""
+    clearance: float
+    """Least distance of everything from what it must not touch [m], but for links whose tips touch
+    the object: they must only not overlap it."""
+    regions: bool
+    """Whether contacts may be anywhere in their regions."""
+    seed: int
+    most_starts: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundPose:
+    """A pose in which a hand holds an object."""
+
+    fingers: Indices
+    """The finger for each contact, (4,)."""
+    joints: Array
+    """Joint angles, (j,) [rad]."""
+    palm_pose: Array
+    """Pose of the palm in the object's frame, (4, 4)."""
+    certificate: ClosureCertificate
+    """Proof of force closure with the contacts that are reached."""
+    within: tuple[bool, ...]
+    """Whether each contact is in its region, or at the planned contact."""
+    starts: int
+    """Number of starts that were tried."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NoPose:
+    """What was met where no pose was found."""
+
+    tally: Counter[str]
+    """How starts ended: `away` (fingertips do not touch), `limit` (the same, with a joint at a
+    limit), `self`, `object`, `table` (what overlaps), `open` (no force closure)."""
+    starts: int
+
+
+def find_pose(asked: Asked) -> FoundPose | NoPose:
+    """Look for a pose from one start after the other."""
+    found = starts(
+        asked.hand, asked.grasp.positions, asked.grasp.normals, seed=asked.seed,
+        count=asked.most_starts,
+    )  # fmt: skip
+    aims = targets(asked.grasp, regions=asked.regions, up=asked.up, height=asked.height)
+    tally: Counter[str] = Counter()
+    for number, start in enumerate(found, 1):
+        ended = _tried(asked, aims._replace(fingers=start.fingers), start, number)
+        if isinstance(ended, FoundPose):
+            return ended
+        tally[ended] += 1
+    return NoPose(tally, len(found))
+
+
+def _tried(asked: Asked, aims: Targets, start: Start, number: int) -> FoundPose | str:
+    """Move the hand from one start; return a pose, or what is in the way."""
+    arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
+    kernel = compiled("grasp_core.hands.posing.pose_kernel")
+    pose: Pose = kernel.empty_pose(arrays, FINGERS)
+    pose.palm[:], pose.origin[:], pose.q[:] = start.rotation, start.position, start.joints
+    sums = kernel.empty_sums(arrays, aims)
+    room = asked.clearance + ROOM
+    far = Wanted(room, asked.clearance, asked.clearance + ROOM, MARGIN, PULL, True, True)
+    kernel.settle(arrays, tree, aims, far, pose, sums, MOST_STEPS, GOOD_MM)
+    if sums.parts[0] > ROUGH_MM:
+        return _why_away(asked.hand, pose.q)
+    laid = aims._replace(origins=np.array(aims.origins), normals=np.array(aims.normals))
+    near = far._replace(overlaps=False, margin=LEAST_MARGIN, pull=0.0)
+    points = np.empty((FINGERS, 3))
+    if kernel.touch(arrays, tree, laid, near, pose, sums, FINE_MM, points) > TOUCHING:
+        return _why_away(asked.hand, pose.q)
+    if blocked := blocking(asked, pose, start.fingers, asked.clearance):
+        return blocked
+    certificate = _closed(points, laid.normals, asked.friction)
+    if certificate is None:
+        return "open"
+    within = tuple(
+        is_within(aims, k, point, MARGIN) for k, point in enumerate(certificate.positions)
+    )
+    return FoundPose(start.fingers, pose.q, _as_pose(pose), certificate, within, number)
+
+
+def blocking(asked: Asked, pose: Pose, fingers: Indices | None, clearance: float) -> str:
+    """Return what a placed hand overlaps: `self`, `object`, `table`, or nothing.
+
+    Args:
+        asked: The hand and what is around it.
+        pose: The pose, with its shapes placed.
+        fingers: Fingers whose tips touch the object; None if none may.
+        clearance: Least distance of everything else [m]; links whose tips touch need none from the
+            object.
+    """
+    arrays, worst = hand_arrays(asked.hand), np.empty(2, np.int64)
+    kernel = compiled("grasp_core.hands.distances.collisions_kernel")
+    needs = np.full(len(arrays.shape_links), clearance)
+    if fingers is not None:
+        needs[np.isin(arrays.shape_links, arrays.starts[fingers + 1] - 1)] = 0.0
+        needs[np.isin(arrays.shape_tips, fingers)] = -TOUCHING
+    turned, middles = pose.turned, pose.middles
+    if kernel.of_itself(arrays, turned, middles, clearance, worst) < clearance:
+        return "self"
+    if asked.height > -np.inf:
+        low = kernel.of_table(arrays, turned, middles, asked.up, asked.height, worst[:1])
+        if low < clearance:
+            return "table"
+    tree = surface_tree(asked.body)
+    if kernel.of_object(arrays, turned, middles, tree, needs, worst[:1]) < 0.0:
+        return "object"
+    return ""
+
+
+def _why_away(hand: Hand, q: Array) -> str:
+    low, high = hand.ranges.T
+    return "limit" if ((q <= low) | (q >= high)).any() else "away"
+
+
+def _as_pose(pose: Pose) -> Array:
+    found = np.eye(POSE)
+    found[:3, :3], found[:3, 3] = pose.palm, pose.origin
+    return found
+
+
+def _closed(points: Array, normals: Array, friction: float) -> ClosureCertificate | None:
+    """Prove force closure with the contacts that are reached; None if that fails."""
+    try:
+        found = force_closure(points, normals, friction)
+    except (UndecidedError, SolverError):
+        return None
+    return found if found.closed else None

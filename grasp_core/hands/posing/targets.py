@@ -1,0 +1,77 @@
+"""Says where fingertips are to touch: anywhere in their regions, or at the contacts themselves."""
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.frames import plane_tangents
+from grasp_core.hands.loop_values import Targets
+from grasp_core.values import FINGERS, ContactRegion, Grasp
+
+NARROW = 1e-4
+"""Least inscribed radius of a region that is aimed at; in smaller ones the contact is [m]."""
+SHORT = 1e-9
+"""Length below which an edge of a region is left out [m]."""
+
+
+def targets(grasp: Grasp, *, regions: bool, up: Array, height: float) -> Targets:
+    """Say where fingertips are to touch, with finger k at contact k.
+
+    Args:
+        grasp: The grasp.
+        regions: Whether to aim at regions where there are some.
+        up: Unit normal of the table, (3,).
+        height: Its height along it; minus infinity for none [m].
+    """
+    normals = grasp.normals
+    aimed = [regions and _is_wide(region) for region in grasp.regions]
+    rows = [
+        (finger, *row)
+        for finger in range(FINGERS)
+        if aimed[finger]
+        for row in _edges(grasp.regions[finger].polygon, normals[finger])
+    ]
+    return Targets(
+        np.arange(FINGERS, dtype=np.int64),
+        grasp.positions,
+        normals,
+        np.array([plane_tangents(*normal) for normal in normals.tolist()]),
+        np.where(aimed, 0.0, 1.0),
+        np.array([row[0] for row in rows], np.int64),
+        np.array([row[1] for row in rows]).reshape(-1, 3),
+        np.array([row[2] for row in rows]).reshape(-1, 3),
+        np.array(up),
+        height,
+    )
+
+
+def _is_wide(region: ContactRegion) -> bool:
+    return region.kind != "point" and region.inscribed_radius > NARROW
+
+
+def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
+    """Return a point of each edge and the unit vector from it into the convex polygon."""
+    middle, found = polygon.mean(axis=0), list[tuple[Array, Array]]()
+    for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        along = end - start
+        length = float(np.linalg.norm(along))
+        if length > SHORT:
+            inward = np.cross(normal, along)
+            inward *= np.copysign(1.0 / np.linalg.norm(inward), inward @ (middle - start))
+            found.append((start, inward))
+    return found
+
+
+def is_within(targets: Targets, contact: int, position: Array, slack: float) -> bool:
+    """Return whether a position is in the region that one finger aimed at.
+
+    Args:
+        targets: Where fingertips were to touch.
+        contact: Number of the contact.
+        position: The position, (3,) [m].
+        slack: How far outside it may be [m].
+    """
+    if targets.pinned[contact] > 0.0:
+        return bool(np.linalg.norm(position - targets.origins[contact]) <= slack)
+    own = targets.edge_contacts == contact
+    inside = np.einsum("ej,ej->e", position - targets.edge_points[own], targets.edge_inward[own])
+    return bool(inside.min(initial=np.inf) >= -slack)

@@ -1,0 +1,1 @@
+"""Answers what the numbers of known hands are."""

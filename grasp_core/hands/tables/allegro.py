@@ -1,0 +1,99 @@
+"""The Allegro hand of Wonik Robotics, version 3, right: joints, ranges and shapes.
+
+Numbers of the URDF that SimLab publishes (BSD-2-Clause, copyright 2016 SimLab), in the frames of
+MuJoCo Menagerie's model `wonik_allegro` (BSD-2-Clause), whose capsules stand for the fingertips.
+The fingertip is the ball of radius 12 mm at the end of that capsule. The URDF states no efforts and
+Menagerie no torque limits. Menagerie states the mass of the palm and a density of links, but no
+masses of links.
+"""
+
+import math
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link, LinkShape
+from grasp_core.hands.tables.turns import from_quaternion
+
+SOURCES = (
+    "SimLab, allegro_hand_description (BSD-2-Clause, copyright 2016 SimLab): joints, ranges, boxes",
+    "MuJoCo Menagerie, wonik_allegro (BSD-2-Clause): capsules of the fingertips, pairs that may "
+    "overlap",
+)
+TIP_RADIUS = 0.012
+WIDTH_X, WIDTH_Y = 0.0098, 0.01375
+"""Half widths of the links of all fingers [m]."""
+LEAN = 0.08726646255
+"""Turn of the outer fingers against the middle one [rad]."""
+RANGES = ((-0.47, 0.47), (-0.196, 1.61), (-0.174, 1.709), (-0.227, 1.618))
+THUMB_RANGES = ((0.263, 1.396), (-0.105, 1.163), (-0.189, 1.644), (-0.162, 1.719))
+LINKS = ("base", "proximal", "medial", "distal")
+ROLL, BEND, THUMB_ROLL = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)
+Triple = tuple[float, float, float]
+
+
+def _box(middle: Triple, half: Triple) -> LinkShape:
+    return LinkShape(np.array(middle), np.eye(3), np.array(half), 0.0)
+
+
+def _along(half_z: float) -> LinkShape:
+    """Return the box of a link that begins at its joint."""
+    return _box((0.0, 0.0, half_z), (WIDTH_X, WIDTH_Y, half_z))
+
+
+def _capsule(z: float, half: float) -> LinkShape:
+    return LinkShape(np.array([0.0, 0.0, z]), np.eye(3), np.array([0.0, 0.0, half]), TIP_RADIUS)
+
+
+def _finger(  # noqa: PLR0913, PLR0917 - the rows of the table
+    name: str, offsets: tuple[Triple, ...], base: Array, axes: tuple[Triple, ...],
+    ranges: tuple[tuple[float, float], ...], shapes: tuple[tuple[LinkShape, ...], ...], tip: float,
+) -> HandFinger:  # fmt: skip
+    links = tuple(
+        Link(
+            f"{name}_{link}",
+            Joint(f"{name}_j{i}", np.array(offsets[i]), base if i == 0 else np.eye(3),
+                  np.array(axes[i]), *ranges[i]),
+            shapes[i],
+        )
+        for i, link in enumerate(LINKS)
+    )  # fmt: skip
+    return HandFinger(name, links, Fingertip(np.array([0.0, 0.0, tip]), TIP_RADIUS))
+
+
+def _straight(name: str, root: Triple, lean: float) -> HandFinger:
+    base = from_quaternion(math.cos(0.5 * lean), math.sin(0.5 * lean), 0.0, 0.0)
+    shapes = (
+        (_along(0.0082),), (_along(0.027),), (_along(0.0192),),
+        (_along(0.008), _capsule(0.019, 0.01)),
+    )  # fmt: skip
+    offsets = (root, (0.0, 0.0, 0.0164), (0.0, 0.0, 0.054), (0.0, 0.0, 0.0384))
+    return _finger(name, offsets, base, (ROLL, BEND, BEND, BEND), RANGES, shapes, 0.029)
+
+
+def _thumb() -> HandFinger:
+    base = from_quaternion(0.477714, -0.521334, -0.521334, -0.477714)
+    shapes = (
+        (_box((-0.0179, 0.009, 0.0145), (0.0179, 0.017, 0.02275)),), (_along(0.00885),),
+        (_along(0.0257),), (_along(0.0157), _capsule(0.035, 0.008)),
+    )  # fmt: skip
+    offsets = ((-0.0182, 0.019333, -0.045987), (-0.027, 0.005, 0.0399), (0.0, 0.0, 0.0177),
+               (0.0, 0.0, 0.0514))  # fmt: skip
+    return _finger("thumb", offsets, base, (THUMB_ROLL, ROLL, BEND, BEND), THUMB_RANGES, shapes,
+                   0.043)  # fmt: skip
+
+
+def allegro() -> Hand:
+    """Return the right Allegro hand."""
+    return Hand(
+        "allegro",
+        (_box((-0.0093, 0.0, -0.0475), (0.0204, 0.0565, 0.0475)),),
+        (
+            _straight("first", (0.0, 0.0435, -0.001542), -LEAN),
+            _straight("middle", (0.0, 0.0, 0.0007), 0.0),
+            _straight("ring", (0.0, -0.0435, -0.001542), LEAN),
+            _thumb(),
+        ),
+        SOURCES,
+        ignored_pairs=(("palm", "thumb_proximal"),),
+    )

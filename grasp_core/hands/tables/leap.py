@@ -1,0 +1,146 @@
+"""The LEAP hand of Carnegie Mellon University, right: joints, ranges, shapes and masses.
+
+Numbers of MuJoCo Menagerie's model `leap_hand` (MIT, copyright 2023 Ananye Agarwal), which comes
+from dexsuite's URDF. Boxes, masses and centres of mass are those of the model.
+
+The real fingertips are no balls: each is a rubber block 21 mm wide, 24 mm broad and rounded at the
+end. The ball taken for it has the radius 10.4 mm, half the block's width, and touches the block's
+end and both its wide sides; a capsule from the joint's side to the ball stands for the block in
+collisions. Along the axis of the last joint the block is 1.7 mm broader than the ball on each side.
+"""
+
+import numpy as np
+
+from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link, LinkShape
+from grasp_core.hands.tables.turns import from_quaternion
+
+SOURCES = (
+    "MuJoCo Menagerie, leap_hand (MIT, copyright 2023 Ananye Agarwal): joints, ranges, boxes, "
+    "masses, extents of the fingertips' meshes",
+)
+TORQUE_SOURCE = "MuJoCo Playground's model of the hand (Apache-2.0): the motors' current limit"
+TORQUE_LIMIT_N_M = 0.2196
+TIP_RADIUS = 0.0104
+TIP_AT, THUMB_TIP_AT = (-0.0008, -0.0396, 0.0145), (-0.0008, -0.0517, -0.0145)
+"""Middles of the balls in the frames of the last links [m]."""
+DOWN = (0.0, 0.0, -1.0)
+RANGES = ((-0.314, 2.23), (-1.047, 1.047), (-0.506, 1.885), (-0.366, 2.042))
+THUMB_RANGES = ((-0.349, 2.094), (-0.349, 2.094), (-0.47, 2.443), (-1.34, 1.88))
+LINKS, THUMB_LINKS = ("base", "proximal", "medial", "distal"), ("mp", "base", "proximal", "distal")
+FINGERS = ("index", "middle", "ring")
+MASSES_KG, THUMB_MASSES_KG = (0.044, 0.032, 0.037, 0.016), (0.032, 0.003, 0.038, 0.049)
+Row = tuple[float, ...]
+CENTERS = (
+    (-0.022516, 0.033882, 0.016359), (0.0075, -0.0002, -0.011), (0.0054215, -0.029148, 0.015),
+    (-0.0008794, -0.027019, 0.014594),
+)  # fmt: skip
+THUMB_CENTERS = (
+    (0.0075, -0.0002, -0.011), (0.0, 0.0, -0.0070806), (-0.0020593, 0.015912, -0.013733),
+    (0.00096191, -0.024203, -0.014419),
+)  # fmt: skip
+OFFSETS = (
+    (0.0, 0.0, 0.0),
+    (-0.0122, 0.0381, 0.0145),
+    (0.015, 0.0143, -0.013),
+    (0.0, -0.0361, 0.0002),
+)
+ROOTS = ((-0.007, 0.023, -0.0187), (-0.0071, -0.0224, -0.0187), (-0.00709, -0.0678, -0.0187))
+TURNS = ((1.0, 1.0, 1.0, -1.0), (1.0, -1.0, -1.0, 1.0), (1.0, 1.0, -1.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+THUMB_OFFSETS = ((-0.0693, -0.0012, -0.0216), (0.0, 0.0143, -0.013), (0.0, 0.0145, -0.017),
+                 (0.0, 0.0466, 0.0002))  # fmt: skip
+THUMB_TURNS = (
+    (1.0, 0.0, 1.0, 0.0),
+    (1.0, 1.0, -1.0, 1.0),
+    (1.0, -1.0, 0.0, 0.0),
+    (0.0, 0.0, 0.0, 1.0),
+)
+"""Quaternions, not yet of length one."""
+PALM: tuple[Row, ...] = (
+    (-9, 8, -11, 11, 13, 17), (-9, -37, -11, 11, 13, 17), (-9, -82, -11, 11, 13, 17),
+    (-66, -78, -11.5, 29, 10, 23, 0.989016, 0, 0, -0.147806), (-30, -35, -3, 10, 60, 15),
+    (-32, -35, -24, 5, 60, 10, 0.923956, 0, 0.382499, 0), (-48, -33, -11.5, 12, 58, 23),
+    (-78, -53, -11.5, 22, 26, 23), (-98, -9, -6, 2, 18, 17), (-78, -3, 10, 22, 28, 2),
+)  # fmt: skip
+"""Boxes: the middle, then the half-sizes [mm], then the quaternion if the box is turned."""
+BOXES: tuple[tuple[Row, ...], ...] = (
+    (
+        (0, 18, 14.7, 10, 3, 17), (-27, 42, 15, 14, 20, 10), (-26.2, 20, 14.6, 17, 3, 10),
+        (-29.5, 35, 29, 10, 12, 4), (0, 5, 30, 7, 10, 2), (0, 5, -1, 7, 10, 2),
+    ),
+    ((7.5, -0.2, -11, 17, 13, 11),),
+    (
+        (0, -20, 15, 8, 3, 13), (0, -16, 15, 10, 2, 17), (0, -4.5, 30, 7, 10, 2),
+        (0, -4.5, 0, 7, 10, 2), (7.5, -35, 15, 17, 11, 13),
+    ),
+    ((0, -17, 15, 10, 3, 15), (0, -6, 30, 7, 11, 2), (0, -6, -1, 7, 11, 2)),
+)  # fmt: skip
+THUMB_BOXES: tuple[tuple[Row, ...], ...] = (
+    ((-7.5, -0.2, -11, 17, 13, 11),),
+    ((0, 0, -1.5, 9, 16.5, 2), (0, -15, -13, 7, 2, 10), (0, 15, -13, 7, 2, 10)),
+    (
+        (0, 10.5, -14, 10, 20, 12), (0, 31, -15, 10, 2, 16), (0, 42, 1, 7, 10, 2),
+        (0, 42, -29, 7, 10, 2), (-13.5, 17.5, -11.656, 5, 12, 9),
+    ),
+    ((0, -8.5, -15, 10, 18, 12), (0, -29, -14, 10, 2, 15), (15, -17.5, -11.5, 4, 12, 9)),
+)  # fmt: skip
+TIP_FROM, THUMB_TIP_FROM = -0.030, -0.042
+"""Where the capsules of the fingertips begin, along the links' y axes [m]."""
+
+
+def _shape(row: Row) -> LinkShape:
+    quaternion = row[6:] or (1.0, 0.0, 0.0, 0.0)
+    numbers = 1e-3 * np.array(row[:6])
+    return LinkShape(numbers[:3], from_quaternion(*quaternion), numbers[3:], 0.0)
+
+
+def _block(tip: tuple[float, float, float], start: float) -> LinkShape:
+    """Return the capsule from y = start to the fingertip's ball."""
+    x, y, z = tip
+    half = np.array([0.0, 0.5 * abs(start - y), 0.0])
+    return LinkShape(np.array([x, 0.5 * (start + y), z]), np.eye(3), half, TIP_RADIUS)
+
+
+def _finger(  # noqa: PLR0913, PLR0917 - the rows of the table
+    name: str, names: tuple[str, ...], offsets: tuple[tuple[float, float, float], ...],
+    turns: tuple[tuple[float, float, float, float], ...], ranges: tuple[tuple[float, float], ...],
+    boxes: tuple[tuple[Row, ...], ...], masses: tuple[float, ...],
+    centers: tuple[tuple[float, float, float], ...], tip: tuple[float, float, float], start: float,
+) -> HandFinger:  # fmt: skip
+    links = tuple(
+        Link(
+            f"{name}_{link}",
+            Joint(f"{name}_j{i}", np.array(offsets[i]), from_quaternion(*turns[i]), np.array(DOWN),
+                  *ranges[i], TORQUE_LIMIT_N_M),
+            tuple(_shape(row) for row in boxes[i])
+            + ((_block(tip, start),) if i == len(names) - 1 else ()),
+            masses[i],
+            np.array(centers[i]),
+        )
+        for i, link in enumerate(names)
+    )  # fmt: skip
+    return HandFinger(name, links, Fingertip(np.array(tip), TIP_RADIUS))
+
+
+def leap() -> Hand:
+    """Return the right LEAP hand."""
+    fingers = tuple(
+        _finger(name, LINKS, (root, *OFFSETS[1:]), TURNS, RANGES, BOXES, MASSES_KG, CENTERS,
+                TIP_AT, TIP_FROM)
+        for name, root in zip(FINGERS, ROOTS, strict=True)
+    )  # fmt: skip
+    thumb = _finger("thumb", THUMB_LINKS, THUMB_OFFSETS, THUMB_TURNS, THUMB_RANGES, THUMB_BOXES,
+                    THUMB_MASSES_KG, THUMB_CENTERS, THUMB_TIP_AT, THUMB_TIP_FROM)  # fmt: skip
+    bases = [f"{name}_base" for name in FINGERS]
+    return Hand(
+        "leap",
+        tuple(_shape(row) for row in PALM),
+        (*fingers, thumb),
+        SOURCES,
+        TORQUE_SOURCE,
+        ignored_pairs=(
+            *(("palm", f"{name}_{link}") for name in FINGERS for link in ("proximal", "medial")),
+            ("palm", "thumb_base"), ("palm", "thumb_proximal"),
+            *((one, other) for i, one in enumerate(bases) for other in bases[i + 1 :]),
+            *(("thumb_mp", base) for base in bases),
+        ),
+    )  # fmt: skip

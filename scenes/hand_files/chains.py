@@ -1,0 +1,152 @@
+"""Finds the palm and the fingers of a compiled model from its fingertips.
+
+The palm is the last body that all fingertips hang on. Each body below it belongs to the link of the
+nearest joint on the way to a fingertip; what hangs on no such way, and what is above the palm,
+stays where the model's reference pose has it, fixed to the link or palm that carries it.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import shown
+from grasp_core.errors import InputError
+from scenes.hand_files.model import HandModel
+
+WORLD = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Tip:
+    """What a name of a fingertip stands for."""
+
+    name: str
+    body: int
+    geom: int | None
+    """Its geom; None for a site."""
+    site: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Chains:
+    """Joints of fingers, and to which link each body is fixed."""
+
+    palm: int
+    """The palm's body."""
+    tips: tuple[Tip, ...]
+    joints: tuple[tuple[int, ...], ...]
+    """For each finger its joints, from the palm outwards."""
+    owners: tuple[int, ...]
+    """For each body, the joint that moves it, -1 for the palm's, -2 where it is no part of it."""
+
+
+def chains(model: HandModel, fingertips: tuple[str, ...], name: str) -> Chains:
+    """Find the palm and the fingers.
+
+    Args:
+        model: The compiled model.
+        fingertips: Names of sites, geoms or bodies, one for each finger.
+        name: What to call the file in a message.
+
+    Raises:
+        InputError: A name is unknown, or the fingers are no chains of hinges of their own.
+    """
+    tips = tuple(_tip(model, each, name) for each in fingertips)
+    paths = [_path(model, tip.body) for tip in tips]
+    shared = 0
+    while all(len(p) > shared for p in paths) and len({p[shared] for p in paths}) == 1:
+        shared += 1
+    palm = paths[0][shared - 1]
+    found = [tuple(_joints_of(model, body) for body in p[shared:]) for p in paths]
+    joints = tuple(tuple(j for part in parts for j in part) for parts in found)
+    for tip, chain in zip(tips, joints, strict=True):
+        if not chain:
+            raise InputError(
+                f"{name}: no joint moves {tip.name} against the others; name one fingertip for "
+                "each finger"
+            )
+        for joint in chain:
+            if model.joint_kinds[joint] != "hinge":
+                raise InputError(
+                    f"{name}: joint {model.joint_names[joint]} of the finger to {tip.name} must be "
+                    f"a hinge, got {model.joint_kinds[joint]}"
+                )
+    used = [joint for chain in joints for joint in chain]
+    if len(set(used)) < len(used):
+        raise InputError(
+            f"{name}: fingers must have joints of their own; two fingertips share some"
+        )
+    return Chains(palm, tips, joints, _owners(model, palm, set(used)))
+
+
+def _tip(model: HandModel, name: str, file: str) -> Tip:
+    """Find what a name stands for: a site, else a geom, else a body."""
+    if name and name in model.site_names:
+        site = model.site_names.index(name)
+        return Tip(name, int(model.site_bodies[site]), None, site)
+    if name and name in model.geom_names:
+        geom = model.geom_names.index(name)
+        return Tip(name, int(model.geom_bodies[geom]), geom, None)
+    if name and name in model.body_names:
+        body = model.body_names.index(name)
+        own = [g for g in _solid(model) if model.geom_bodies[g] == body]
+        if not own:
+            raise InputError(f"{file}: body {shown(name)} has no geom that collides; name a site")
+        balls = [g for g in own if model.geom_kinds[g] in {"sphere", "capsule"}]
+        return Tip(name, body, (balls or own)[-1], None)
+    known = [each for each in (*model.site_names, *model.geom_names, *model.body_names) if each]
+    raise InputError(
+        f"{file}: there is no site, geom or body {shown(name)}; fingertips are named by these, "
+        f"such as {', '.join(known[-12:])}"
+    )
+
+
+def _solid(model: HandModel) -> list[int]:
+    """Return the geoms that collide with anything."""
+    return [
+        g for g, bits in enumerate(model.geom_bits)
+        if bits.any() and model.geom_kinds[g] not in {"plane", "hfield"}
+    ]  # fmt: skip
+
+
+def _path(model: HandModel, body: int) -> list[int]:
+    """Return the bodies from the world to one."""
+    path = [body]
+    while path[-1] != WORLD:
+        path.append(int(model.parents[path[-1]]))
+    return path[::-1]
+
+
+def _joints_of(model: HandModel, body: int) -> tuple[int, ...]:
+    return tuple(int(j) for j in np.flatnonzero(model.joint_bodies == body))
+
+
+def _owners(model: HandModel, palm: int, used: set[int]) -> tuple[int, ...]:
+    """Find which joint of a finger moves each body."""
+    found = list[int]()
+    for body in range(len(model.parents)):
+        moving = [j for b in _path(model, body) for j in _joints_of(model, b) if j in used]
+        apart = body == WORLD and palm != WORLD  # the floor is no part of a hand
+        found.append(-2 if apart else moving[-1] if moving else -1)
+    return tuple(found)
+
+
+def frames(model: HandModel, found: Chains) -> dict[int, tuple[Array, Array]]:
+    """Return rotation and position of each link's frame in the world at the reference angles.
+
+    A link's frame stands on its joint's axis, turned like the joint's body; that of -1 is the
+    palm's body.
+    """
+    placed = {-1: (model.rotations[found.palm], model.positions[found.palm])}
+    for joint in (joint for chain in found.joints for joint in chain):
+        body = int(model.joint_bodies[joint])
+        R = model.rotations[body]
+        placed[joint] = R, model.positions[body] + R @ model.joint_positions[joint]
+    return placed
+
+
+def neighbours(found: Chains) -> set[tuple[int, int]]:
+    """Return pairs of neighbouring links in the chains."""
+    return {pair for chain in found.joints for pair in pairwise((-1, *chain))}

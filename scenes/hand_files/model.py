@@ -1,0 +1,149 @@
+"""Compiles the text of a hand with MuJoCo and hands out plain arrays: one of MuJoCo's doors."""
+
+# pyright: basic, reportAttributeAccessIssue=false
+# MuJoCo ships no types for its core.
+
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.errors import InputError
+from scenes.hand_files.model_text import ModelText
+
+try:
+    import mujoco  # noqa: TID251 - this is a door
+except (ImportError, RuntimeError, AttributeError, OSError) as error:
+    raise InputError(
+        f"MuJoCo cannot be imported ({error}). If MUJOCO_GL names graphics that are missing, "
+        "unset it; otherwise reinstall the package"
+    ) from error
+
+
+class HandModel(NamedTuple):
+    """What a compiled model says: n bodies, j joints, g geoms, s sites."""
+
+    body_names: tuple[str, ...]
+    geom_names: tuple[str, ...]
+    site_names: tuple[str, ...]
+    joint_names: tuple[str, ...]
+    parents: Indices
+    """Body that each body hangs on, (n,); the world is its own."""
+    positions: Array
+    """Origins of the bodies' frames in the world at the reference joint angles, (n, 3) [m]."""
+    rotations: Array
+    """Their axes, (n, 3, 3)."""
+    masses: Array
+    """Masses of the bodies, (n,) [kg]."""
+    mass_centers: Array
+    """Their centres of mass in the bodies' frames, (n, 3) [m]."""
+    joint_bodies: Indices
+    joint_kinds: tuple[str, ...]
+    """`hinge`, `slide`, `ball` or `free`."""
+    joint_positions: Array
+    """Points on the joints' axes in the bodies' frames, (j, 3) [m]."""
+    joint_axes: Array
+    """Unit vectors in the bodies' frames, (j, 3)."""
+    joint_ranges: Array
+    """Lowest and highest angles; NaN without limits, (j, 2) [rad]."""
+    references: Array
+    """Angles at which the model is drawn, (j,) [rad]; NaN for joints that are no hinges."""
+    torques: Array
+    """Largest torques, NaN where none is stated, (j,) [N m]."""
+    geom_bodies: Indices
+    geom_kinds: tuple[str, ...]
+    geom_sizes: Array
+    geom_boxes: Array
+    """Middle and half-sizes of each geom's box in the geom's frame, (g, 6) [m]."""
+    geom_positions: Array
+    """Origins of the geoms' frames in the bodies', (g, 3) [m]."""
+    geom_rotations: Array
+    """Their axes, (g, 3, 3)."""
+    geom_bits: Indices
+    """Bits that say with what a geom collides: its type and its affinity, (g, 2)."""
+    site_bodies: Indices
+    site_positions: Array
+    site_radii: Array
+    excluded: Indices
+    """Pairs of bodies that the model lets overlap, (e, 2)."""
+
+
+def compiled_hand(text: ModelText, name: str) -> HandModel:
+    """Compile a hand's text.
+
+    Args:
+        text: The text and the files that it names.
+        name: What to call the file in a message.
+
+    Raises:
+        InputError: MuJoCo refuses it.
+    """
+    try:
+        model = mujoco.MjModel.from_xml_string(text.xml, dict(text.files))
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
+        said = " ".join(str(error).split())[:300]
+        raise InputError(f"{name}: MuJoCo cannot compile the file: {said}") from error
+    data = mujoco.MjData(model)
+    data.qpos[:] = model.qpos0
+    mujoco.mj_kinematics(model, data)
+    kinds = tuple(mujoco.mjtJoint(int(kind)).name[6:].lower() for kind in model.jnt_type)
+    hinges = np.array([kind == "hinge" for kind in kinds], bool)
+    limited = hinges & model.jnt_limited.astype(bool)
+    return HandModel(
+        body_names=_names(model, mujoco.mjtObj.mjOBJ_BODY, model.nbody),
+        geom_names=_names(model, mujoco.mjtObj.mjOBJ_GEOM, model.ngeom),
+        site_names=_names(model, mujoco.mjtObj.mjOBJ_SITE, model.nsite),
+        joint_names=_names(model, mujoco.mjtObj.mjOBJ_JOINT, model.njnt),
+        parents=model.body_parentid.astype(np.int64),
+        positions=np.array(data.xpos),
+        rotations=np.array(data.xmat).reshape(-1, 3, 3),
+        masses=np.array(model.body_mass),
+        mass_centers=np.array(model.body_ipos),
+        joint_bodies=model.jnt_bodyid.astype(np.int64),
+        joint_kinds=kinds,
+        joint_positions=np.array(model.jnt_pos),
+        joint_axes=np.array(model.jnt_axis),
+        joint_ranges=np.where(limited[:, None], model.jnt_range, np.nan),
+        references=np.where(hinges, model.qpos0[model.jnt_qposadr], np.nan),
+        torques=_torques(model),
+        geom_bodies=model.geom_bodyid.astype(np.int64),
+        geom_kinds=tuple(mujoco.mjtGeom(int(kind)).name[7:].lower() for kind in model.geom_type),
+        geom_sizes=np.array(model.geom_size),
+        geom_boxes=np.array(model.geom_aabb),
+        geom_positions=np.array(model.geom_pos),
+        geom_rotations=_turns(model.geom_quat),
+        geom_bits=np.column_stack([model.geom_contype, model.geom_conaffinity]).astype(np.int64),
+        site_bodies=model.site_bodyid.astype(np.int64),
+        site_positions=np.array(model.site_pos),
+        site_radii=np.array(model.site_size)[:, 0] if model.nsite else np.empty(0),
+        excluded=np.array(
+            [(int(each) >> 16, int(each) & 0xFFFF) for each in model.exclude_signature], np.int64
+        ).reshape(-1, 2),
+    )
+
+
+def _names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> tuple[str, ...]:
+    return tuple(mujoco.mj_id2name(model, kind, i) or "" for i in range(count))
+
+
+def _turns(quaternions: Array) -> Array:
+    """Return the rotation matrices of unit quaternions, (n, 3, 3)."""
+    found = np.empty((len(quaternions), 9))
+    for quaternion, matrix in zip(quaternions, found, strict=True):
+        mujoco.mju_quat2Mat(matrix, quaternion)
+    return found.reshape(-1, 3, 3)
+
+
+def _torques(model: mujoco.MjModel) -> Array:
+    """Return the smallest torque that limits each joint: its own, or that of its motors."""
+    found = np.full(model.njnt, np.inf)
+    own = model.jnt_actfrclimited.astype(bool)
+    found[own] = np.abs(model.jnt_actfrcrange[own]).max(axis=1)
+    for i in range(model.nu):
+        driven = model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_JOINT
+        gear = abs(float(model.actuator_gear[i, 0]))
+        if driven and model.actuator_forcelimited[i] and gear > 0.0:
+            joint = int(model.actuator_trnid[i, 0])
+            limit = gear * float(np.abs(model.actuator_forcerange[i]).max())
+            found[joint] = min(found[joint], limit)
+    return np.where(np.isfinite(found) & (found > 0.0), found, np.nan)

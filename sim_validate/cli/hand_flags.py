@@ -1,0 +1,52 @@
+"""The flags that say with which hand grasps are to be reached.
+
+This module imports nothing that is slow to load, so that help and usage errors answer at once.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import OmitArgPrefixes, Positional, arg
+
+from sim_validate.cli.flag_bounds import at_least
+from sim_validate.cli.flag_groups import Count, Direction, Friction, Seed, Speech
+from sim_validate.parallel.processes import available_cores
+
+MOST_STARTS = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """Look for poses in which a hand stands in grasps: palm pose and joints, checked exactly."""
+
+    grasps: Positional[Path]
+    """A grasps.json."""
+    hand: str = "allegro"
+    """The hand: allegro, leap, an MJCF or URDF file, or menagerie:NAME for a model of the package
+    mujoco-menagerie."""
+    fingertips: Annotated[str, arg(metavar="NAME,NAME,...")] = ""
+    """For a hand from a file: names of sites, geoms or bodies that are fingertips, separated by
+    commas."""
+    grasp: str | None = None
+    """Id of the only grasp to look at."""
+    table: Annotated[Direction | None, arg(metavar="X Y Z")] = None
+    """Downward direction in the object's frame: the object lies on a table across it, and the hand
+    stays above the table."""
+    contacts_only: bool = False
+    """Touch the planned contacts themselves, not anywhere in the grasps' regions."""
+    clearance_m: Annotated[float, at_least(0.0, up_to=0.02)] = 5e-4
+    """Least distance between all that must not touch [m]."""
+    starts: Annotated[int, at_least(1, up_to=MOST_STARTS)] = 100
+    """Largest number of starts for each grasp."""
+    friction: Friction | None = None
+    """Coulomb coefficient to prove force closure with; if not given, the one planned for."""
+    seed: Seed = 0
+    """Seed of the postures from which the search starts."""
+    limit: Count | None = None
+    """Look at the first so many grasps only."""
+    jobs: Count = field(default_factory=available_cores)
+    """Largest number of processes; results do not depend on it."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+    out: Path | None = None
+    """Folder for reaches.json; if not given, no file is written."""

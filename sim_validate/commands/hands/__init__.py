@@ -1,0 +1,1 @@
+"""Runs the commands about hands; each module has a command's name."""

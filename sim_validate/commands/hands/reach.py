@@ -1,0 +1,99 @@
+"""Runs the command `reach`, which looks for poses in which a hand stands in grasps."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from grasp_core.files.text_files import write_text
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.reach import HandReach, check_hand
+from grasp_core.records.grasps_json import SavedGrasps
+from scenes.hand_files.loading import load_hand
+from sim_validate.cli import hand_flags
+from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
+from sim_validate.files.folder_lock import alone_in
+from sim_validate.files.stale_results import remove_reaches
+from sim_validate.parallel.reaching import ReachJob, reached
+from sim_validate.records.grasps import grasp_with_id
+from sim_validate.records.reaches_json import REACHES, reaches_summary, reaches_to_json
+from sim_validate.records.reaches_schema import AskedRecord
+
+ABSENT = "-"
+
+
+def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
+    """Look for a pose of a hand in each grasp of a file, and write what was found."""
+    names = tuple(name.strip() for name in command.fingertips.split(",") if name.strip())
+    hand = check_hand(load_hand(command.hand, names))
+    saved = saved_grasps(command.grasps, reporter)
+    if saved is None:
+        return Exit.NONE
+    if command.grasp is not None:
+        saved = replace(saved, grasps=(grasp_with_id(command.grasps, saved, command.grasp),))
+    chosen = chosen_grasps(saved, friction=command.friction, seed=None, limit=command.limit)
+    with alone_in(command.out):
+        found, text = _reach(command, hand, chosen, reporter)
+    reporter.text(text)
+    _show(hand, found, reporter)
+    return Exit.GOOD if all(each.reached for each in found) else Exit.NEGATIVE
+
+
+def _reach(
+    command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, reporter: Reporter
+) -> tuple[list[HandReach], str]:
+    """Look for poses, and write what is done even if the run is interrupted."""
+    if command.out is not None:
+        remove_reaches(command.out)
+    jobs = [
+        ReachJob(
+            hand, saved.body, grasp, saved.friction, command.seed, not command.contacts_only,
+            command.table, command.clearance_m, command.starts,
+        )
+        for grasp in saved.grasps
+    ]  # fmt: skip
+    asked: AskedRecord = {
+        "regions": not command.contacts_only,
+        "table_down": command.table,
+        "clearance_m": command.clearance_m,
+        "starts": command.starts,
+        "seed": command.seed,
+    }
+    found: list[HandReach] = []
+    try:
+        with reporter.progress("reaching") as steps:
+            for each in reached(jobs, command.jobs):
+                found.append(each)
+                good = sum(one.reached for one in found)
+                steps.update(len(found), len(jobs), f"({good} reached)")
+    finally:
+        complete = len(found) == len(jobs)
+        text = reaches_to_json(hand, saved.body, saved.friction, asked, found, complete=complete)
+        if command.out is not None and found:
+            path = write_text(command.out / REACHES, text)
+            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+    return found, text
+
+
+def _show(hand: Hand, found: Sequence[HandReach], reporter: Reporter) -> None:
+    shown = found[:TABLE_ROWS]
+    columns = ("grasp", "reached", "fingers", "starts", "opens", "straight way in")
+    reporter.table(f"grasps with the hand {hand.name}", columns, [_row(hand, e) for e in shown])
+    say_cut(len(found), reporter)
+    counts = reaches_summary(found, complete=True)
+    reporter.say(
+        f"{counts['reached']} of {counts['grasps']} grasps were reached; of the others "
+        f"{counts['collision']} met a collision, {counts['limit']} a joint's limit, and for "
+        f"{counts['not_found']} no pose was found; more --starts may find some"
+    )
+    for each in shown:
+        if not each.reached:
+            reporter.warn(f"{each.grasp}: {each.reason}: {each.explanation}")
+
+
+def _row(hand: Hand, each: HandReach) -> tuple[str, ...]:
+    if each.fingers is None:
+        return (each.grasp, "no", ABSENT, str(each.starts), ABSENT, ABSENT)
+    names = " ".join(hand.fingers[int(finger)].name for finger in each.fingers)
+    yes = ("yes" if value is not None else "no" for value in (each.pregrasp, each.approach))
+    return (each.grasp, "yes", names, str(each.starts), *yes)

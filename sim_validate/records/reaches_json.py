@@ -1,0 +1,119 @@
+"""Writes `reaches.json`: in which grasps a hand can stand, with poses, and why not in others."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.files.json_text import text_of
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.reach import HandReach
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.provenance import versions
+from sim_validate.records.reaches_schema import (
+    AskedRecord,
+    PoseRecord,
+    ReachedContactRecord,
+    ReachesFile,
+    ReachesSummary,
+    ReachRecord,
+    Row,
+    Triple,
+)
+from sim_validate.records.verdicts_json import object_record
+
+REACHES = "reaches.json"
+"""Name of the file in a folder of results."""
+SCHEMA = 1
+
+
+def reaches_to_json(
+    hand: Hand, body: Polyhedron, friction: float, asked: AskedRecord, found: Sequence[HandReach],
+    *, complete: bool,
+) -> str:  # fmt: skip
+    """Write the text of `reaches.json`; equal results give equal texts.
+
+    Args:
+        hand: The hand.
+        body: The object.
+        friction: Coulomb coefficient.
+        asked: What was asked for.
+        found: The results, one per grasp.
+        complete: Whether every grasp that was asked for was looked at.
+    """
+    document: ReachesFile = {
+        "schema": SCHEMA,
+        "object": object_record(body),
+        "friction": friction,
+        "hand": {
+            "name": hand.name,
+            "joints": [joint.name for joint in hand.joints],
+            "fingers": [finger.name for finger in hand.fingers],
+            "sources": list(hand.sources),
+            "torque_source": hand.torque_source,
+        },
+        "asked": asked,
+        "summary": reaches_summary(found, complete=complete),
+        "reaches": [_record(hand, each) for each in found],
+        "versions": versions(),
+    }
+    return text_of({**document})
+
+
+def reaches_summary(found: Sequence[HandReach], *, complete: bool) -> ReachesSummary:
+    """Count grasps by how the search ended."""
+    reasons = [each.reason for each in found]
+    return {
+        "grasps": len(found),
+        "reached": reasons.count(""),
+        "limit": reasons.count("limit"),
+        "collision": reasons.count("collision"),
+        "not_found": reasons.count("not found"),
+        "complete": complete,
+    }
+
+
+def _record(hand: Hand, found: HandReach) -> ReachRecord:
+    return {
+        "id": found.grasp,
+        "reached": found.reached,
+        "reason": found.reason,
+        "explanation": found.explanation,
+        "starts": found.starts,
+        "pose": _pose(hand, found),
+    }
+
+
+def _pose(hand: Hand, found: HandReach) -> PoseRecord | None:
+    contacts, certificate = found.contacts, found.certificate
+    if contacts is None or certificate is None or found.palm_pose is None or found.joints is None:
+        return None
+    fingers: list[int] = np.asarray(found.fingers).tolist()
+    listed: list[ReachedContactRecord] = [
+        {
+            "finger": hand.fingers[fingers[k]].name,
+            "position_m": _triple(contact.position),
+            "normal": _triple(contact.normal),
+            "within_region": bool((found.within_regions or ())[k]),
+        }
+        for k, contact in enumerate(contacts)
+    ]
+    first, second, third, last = (_row(row) for row in found.palm_pose)
+    return {
+        "palm_pose": (first, second, third, last),
+        "joints_rad": found.joints.tolist(),
+        "contacts": listed,
+        "closure_margin": certificate.margin,
+        "pregrasp_joints_rad": None if found.pregrasp is None else found.pregrasp.tolist(),
+        "approach": None if found.approach is None else _triple(found.approach),
+    }
+
+
+def _triple(vector: Array) -> Triple:
+    x, y, z = vector.tolist()
+    return x, y, z
+
+
+def _row(row: Array) -> Row:
+    x, y, z, w = row.tolist()
+    return x, y, z, w

@@ -1,0 +1,92 @@
+"""The fields of `reaches.json` with their types, for its writer and for whoever reads it."""
+
+from typing import Annotated, Literal
+
+from pydantic import ConfigDict, Field, with_config
+from typing_extensions import TypedDict
+
+from grasp_core.hands.reach import ReachReason
+from grasp_core.values import FINGERS
+from sim_validate.records.verdicts_schema import Count, Finite, ObjectRecord, Positive
+
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Triple = tuple[Finite, Finite, Finite]
+Row = tuple[Finite, Finite, Finite, Finite]
+
+
+class HandRecord(TypedDict):
+    """Fields about the hand."""
+
+    name: str
+    joints: list[str]
+    fingers: list[str]
+    sources: list[str]
+    torque_source: str
+
+
+class ReachedContactRecord(TypedDict):
+    """Fields about one contact that is reached."""
+
+    finger: str
+    position_m: Triple
+    normal: Triple
+    within_region: bool
+
+
+class PoseRecord(TypedDict):
+    """Fields about a pose in which the hand stands in a grasp."""
+
+    palm_pose: tuple[Row, Row, Row, Row]
+    joints_rad: list[Finite]
+    contacts: Annotated[
+        list[ReachedContactRecord], Field(min_length=FINGERS, max_length=FINGERS)
+    ]  # fmt: skip
+    closure_margin: Finite
+    pregrasp_joints_rad: list[Finite] | None
+    approach: Triple | None
+
+
+class ReachRecord(TypedDict):
+    """Fields about one grasp."""
+
+    id: str
+    reached: bool
+    reason: ReachReason
+    explanation: str
+    starts: Count
+    pose: PoseRecord | None
+
+
+class ReachesSummary(TypedDict):
+    """Numbers of grasps by how the search ended."""
+
+    grasps: Count
+    reached: Count
+    limit: Count
+    collision: Count
+    not_found: Count
+    complete: bool
+
+
+class AskedRecord(TypedDict):
+    """Fields about what was asked for."""
+
+    regions: bool
+    table_down: Triple | None
+    clearance_m: NotNegative
+    starts: Count
+    seed: Count
+
+
+@with_config(ConfigDict(strict=True, extra="forbid"))
+class ReachesFile(TypedDict):
+    """The content of `reaches.json`; type checking holds its writer to it."""
+
+    schema: Literal[1]
+    object: ObjectRecord
+    friction: Positive
+    hand: HandRecord
+    asked: AskedRecord
+    summary: ReachesSummary
+    reaches: list[ReachRecord]
+    versions: dict[str, str]

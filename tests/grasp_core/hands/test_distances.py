@@ -1,0 +1,138 @@
+"""Distances of boxes against points strewn over them, a quadratic program and trimesh."""
+
+import numpy as np
+import pytest
+import scipy.optimize
+import trimesh
+
+import scenes
+from grasp_core.compiled import compiled
+from grasp_core.hands.distances.surface import surface_tree
+
+BOXES, SURFACES = (
+    "grasp_core.hands.distances.boxes_kernel", "grasp_core.hands.distances.surface_kernel",
+)  # fmt: skip
+EXACT = 1e-7
+"""Accuracy of the program that judges: its own tolerance is 1e-15 on squares."""
+
+
+def frame(rng):
+    """A random rotation."""
+    Q, R = np.linalg.qr(rng.normal(size=(3, 3)))
+    Q *= np.sign(np.diag(R))
+    return Q * np.sign(np.linalg.det(Q))
+
+
+def hulls_apart(A, B):
+    """Distance of the hulls of two sets of points: non-negative least squares on their weights.
+
+    Weights of one sum to one by a row that weighs heavily; a second run without rounding is not
+    needed at these sizes.
+    """
+    heavy = 1e4
+    ones, none = np.ones((1, len(A))), np.zeros((1, len(A)))
+    others, zeros = np.ones((1, len(B))), np.zeros((1, len(B)))
+    rows = np.block([[A.T, -B.T], [heavy * ones, zeros], [none, heavy * others]])
+    weights, _ = scipy.optimize.nnls(rows, np.array([0.0, 0.0, 0.0, heavy, heavy]))
+    a, b = weights[: len(A)] / weights[: len(A)].sum(), weights[len(A) :] / weights[len(A) :].sum()
+    return float(np.linalg.norm(a @ A - b @ B))
+
+
+def corners(h, R, middle):
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    return middle + (signs * h) @ R.T
+
+
+def test_boxes_and_triangles_are_as_far_apart_as_a_program_says():
+    rng, kernel = np.random.default_rng(3), compiled(BOXES)
+    apart = 0
+    for _ in range(300):
+        h = rng.uniform(0.1, 1.0, 3) * rng.integers(0, 2, 3)
+        T = rng.normal(size=(3, 3)) + rng.normal(scale=1.5, size=3)
+        found = kernel.box_triangle(h, T, 10.0)
+        true = hulls_apart(corners(h, np.eye(3), np.zeros(3)), T)
+        apart += found > 0.01
+        assert max(found, 0.0) == pytest.approx(true, abs=1e-6)
+    assert 100 < apart < 300
+
+
+def test_boxes_are_as_far_apart_as_a_program_says_and_the_way_and_point_lie_between():
+    rng, kernel = np.random.default_rng(4), compiled(BOXES)
+    way, point, apart = np.empty(3), np.empty(3), 0
+    for _ in range(300):
+        h, g = rng.uniform(0.1, 1.0, (2, 3)) * rng.integers(0, 2, (2, 3))
+        R, middle = frame(rng), rng.normal(scale=1.2, size=3)
+        found = kernel.box_box(h, g, R, middle, 10.0, way, point)
+        true = hulls_apart(corners(h, np.eye(3), np.zeros(3)), corners(g, R, middle))
+        assert max(found, 0.0) == pytest.approx(true, abs=1e-6)
+        if found > 0.01:
+            apart += 1
+            assert np.linalg.norm(way) == pytest.approx(1.0)
+            back = point - found * way  # a point of the first box
+            assert (np.abs(back) <= h + EXACT).all()
+            assert (np.abs(R.T @ (point - middle)) <= g + EXACT).all()
+    assert 100 < apart < 300
+
+
+def test_overlapping_boxes_come_apart_by_the_stated_way_and_no_shorter():
+    rng, kernel = np.random.default_rng(5), compiled(BOXES)
+    way, point, other, seen = np.empty(3), np.empty(3), np.empty(3), 0
+    for _ in range(200):
+        h, g = rng.uniform(0.3, 1.0, (2, 3))
+        R, middle = frame(rng), rng.normal(scale=0.5, size=3)
+        depth = -kernel.box_box(h, g, R, middle, 10.0, way, point)
+        if depth <= 0.0:
+            continue
+        seen += 1
+        moved = middle + 1.0001 * depth * way
+        assert kernel.box_box(h, g, R, moved, 10.0, other, point) > 0.0
+        for direction in rng.normal(size=(20, 3)):
+            near = middle + 0.999 * depth * direction / np.linalg.norm(direction)
+            assert kernel.box_box(h, g, R, near, 10.0, other, point) < 0.0
+    assert seen > 50
+
+
+def is_inside(place, body):
+    """Whether a ray in an odd direction leaves the surface an odd number of times."""
+    way = np.array([0.5772, 0.3141, 0.7549])
+    a, b, c = np.moveaxis(body.vertices[body.triangles], 1, 0)
+    across = np.cross(way, c - a)
+    scale = np.einsum("ti,ti->t", b - a, across)
+    u = np.einsum("ti,ti->t", place - a, across) / scale
+    other = np.cross(place - a, b - a)
+    v, t = other @ way / scale, np.einsum("ti,ti->t", c - a, other) / scale
+    return bool(((u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (t > 0.0)).sum() % 2)
+
+
+@pytest.mark.parametrize("name", ["cross", "mug"])
+def test_nearest_points_are_those_of_trimesh(name):
+    body, rng = scenes.example_object(name), np.random.default_rng(6)
+    tree, kernel, near = surface_tree(body), compiled(SURFACES), np.empty(3)
+    places = rng.uniform(-0.1, 0.1, (200, 3))
+    mesh = trimesh.Trimesh(body.vertices, body.triangles, process=False)
+    _, true, _ = trimesh.proximity.closest_point_naive(mesh, places)
+    for i, place in enumerate(places):
+        t = kernel.nearest(place, 1.0, tree.corners, tree.middles, tree.radii, tree.links, near)
+        assert t >= 0
+        assert np.linalg.norm(near - place) == pytest.approx(true[i], abs=1e-12)
+        if true[i] > 1e-6:
+            wound = kernel.windings(place, tree.corners)
+            assert wound == pytest.approx(1.0 if is_inside(place, body) else 0.0, abs=1e-9)
+    none = kernel.nearest(np.full(3, 9.0), 1.0, tree.corners, tree.middles, tree.radii, tree.links,
+                          near)  # fmt: skip
+    assert none == -1
+
+
+def test_a_box_and_a_surface_are_as_far_apart_as_its_nearest_triangle():
+    body, rng = scenes.example_object("cross"), np.random.default_rng(7)
+    tree, kernel, seen = surface_tree(body), compiled(SURFACES), 0
+    for _ in range(60):
+        h, R, middle = rng.uniform(0.002, 0.02, 3), frame(rng), rng.uniform(-0.12, 0.12, 3)
+        found = kernel.box_surface(
+            h, R, middle, 1.0, tree.corners, tree.middles, tree.radii, tree.links
+        )
+        box = corners(h, R, middle)
+        true = min(hulls_apart(box, T) for T in body.vertices[body.triangles])
+        assert max(found, 0.0) == pytest.approx(true, abs=1e-7)
+        seen += found > 1e-3
+    assert 20 < seen < 60

@@ -1,0 +1,88 @@
+"""The command `reach`: its file, its exit codes, and what it refuses."""
+
+import json
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.files.complaints import record_of
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.main import main
+from sim_validate.records.reaches_schema import ReachesFile
+from tests.grasp_core.hands.gripping import plain_hand
+from tests.hand_models import hand_mjcf
+
+
+@pytest.fixture(scope="module")
+def grasps(tmp_path_factory):
+    """The grasps of a built-in object that fits the hands as it is."""
+    folder = tmp_path_factory.mktemp("reach")
+    assert main(["plan", "l-bracket", "--limit", "3", "--out", str(folder), "-q"]) == Exit.GOOD
+    return folder / "grasps.json"
+
+
+def test_it_writes_poses_that_are_in_force_closure(grasps, tmp_path, capsys):
+    code = main(["reach", str(grasps), "--out", str(tmp_path), "--jobs", "1"])
+    said = capsys.readouterr().out
+    text = (tmp_path / "reaches.json").read_text()
+    record = record_of(ReachesFile, text, "reaches.json", schema=1)
+    summary = record["summary"]
+    assert summary["grasps"] == 3
+    assert summary["complete"]
+    assert summary["reached"] >= 2
+    assert f"{summary['reached']} of 3 grasps were reached" in said
+    assert code == (Exit.GOOD if summary["reached"] == 3 else Exit.NEGATIVE)
+    assert sum(summary[key] for key in ("reached", "limit", "collision", "not_found")) == 3
+    for each in record["reaches"]:
+        assert (each["pose"] is not None) == each["reached"] == (each["reason"] == "")
+        if each["pose"]:
+            contacts = each["pose"]["contacts"]
+            positions = np.array([contact["position_m"] for contact in contacts])
+            normals = np.array([contact["normal"] for contact in contacts])
+            assert gc.force_closure(positions, normals, record["friction"]).closed
+            assert len(each["pose"]["joints_rad"]) == len(record["hand"]["joints"]) == 16
+            assert len({contact["finger"] for contact in contacts}) == 4
+
+
+def test_the_same_command_writes_the_same_text(grasps, tmp_path):
+    for name in ("one", "two"):
+        main(["reach", str(grasps), "--limit", "1", "--out", str(tmp_path / name), "-q"])
+    one, two = ((tmp_path / name / "reaches.json").read_bytes() for name in ("one", "two"))
+    assert one == two
+
+
+def test_a_grasp_that_is_not_reached_is_a_negative_answer(grasps, tmp_path, capsys):
+    """A hand whose fingers all bend the same way cannot enclose anything."""
+    path = tmp_path / "plain.xml"
+    path.write_text(hand_mjcf(plain_hand()))
+    tips = ",".join(f"f{i}_tip" for i in range(4))
+    code = main(["reach", str(grasps), "--hand", str(path), "--fingertips", tips, "--limit", "1",
+                 "--starts", "5", "--json"])  # fmt: skip
+    answer = json.loads(capsys.readouterr().out)
+    assert code == Exit.NEGATIVE
+    (only,) = answer["reaches"]
+    assert only["pose"] is None
+    assert "no pose was found" in only["explanation"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--hand", "nose"], "hand must be allegro, leap"),
+        (["--hand", "allegro", "--fingertips", "a,b,c,d"], "has its own fingertips"),
+        (["--hand", "absent.xml", "--fingertips", "a,b,c,d"], "cannot be read"),
+        (["--grasp", "c-9-9-9-9"], "c-9-9-9-9"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused(words, said, grasps, capsys):
+    assert main(["reach", str(grasps), *words]) in {Exit.INPUT, Exit.USAGE}
+    assert said in capsys.readouterr().err
+
+
+def test_three_fingers_are_refused_before_anything_is_sought(grasps, tmp_path, capsys):
+    path = tmp_path / "three.xml"
+    path.write_text(hand_mjcf(plain_hand(3)))
+    words = ["--hand", str(path), "--fingertips", "f0_tip,f1_tip,f2_tip"]
+    assert main(["reach", str(grasps), *words]) == Exit.INPUT
+    assert "at least 4 fingers, got 3" in capsys.readouterr().err
