@@ -261,9 +261,8 @@ class WrenchBody:
         self.scale = np.array([1.0] * 3 + [self.size] * 3)
         self.frames = contact_frames(normals)
         hard = in_frames(grasp_map(arms / self.size), self.frames)
-        self.lengths = None if torsions is None else torsion_lengths(torsions, friction)
-        soft = self.lengths is not None
-        self.G = with_torques(hard, normals, self.lengths / self.size) if soft else hard
+        self.lengths = lengths = None if torsions is None else torsion_lengths(torsions, friction)
+        self.G = hard if lengths is None else with_torques(hard, normals, lengths / self.size)
         self.bounded = WrenchSet(self.G, friction, "linf")
         self.width = LOCAL if torsions is not None else 3
         levers = in_frames(self.motors.levers, self.frames)

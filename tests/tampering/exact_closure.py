@@ -27,12 +27,12 @@ def unit_arms(x):
     return (arms / size if size > 0.0 else arms), size or 1.0
 
 
-def conic(q, A, b, equalities, nonnegative, cones):
+def conic(q, A, b, equalities, nonnegative, cones, size=3):
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
     kinds = [clarabel.ZeroConeT(equalities), clarabel.NonnegativeConeT(nonnegative)]
-    kinds += [clarabel.SecondOrderConeT(3)] * cones
+    kinds += [clarabel.SecondOrderConeT(size)] * cones
     none, rows = sparse.csc_matrix((len(q), len(q))), sparse.csc_matrix(A)
     return clarabel.DefaultSolver(none, np.array(q), rows, np.array(b), kinds, settings).solve()
 

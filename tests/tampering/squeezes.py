@@ -1,5 +1,7 @@
 """What is claimed of squeezes and payloads: by the springs' own equations, grids and programs."""
 
+from types import SimpleNamespace
+
 import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
@@ -164,7 +166,9 @@ def payload(c):
     for ray in free.rays:
         if abs(np.linalg.norm(ray.wrench) - GRAVITY) > 1e-7 or ray.wrench[3:].any():
             return False
-        if not wrench_limit(ray, g.arms, g.normals, g.friction, most, np.zeros(3)):
+        about = {"center": np.zeros(3), "motors": None, "max_normal_force": most}
+        held = {"positions": g.arms, "normals": g.normals, "friction": g.friction}
+        if not wrench_limit(SimpleNamespace(found=ray, **held, **about)):
             return False
     inner, outer = bounds(g, most, np.array([ray.wrench[:3] for ray in free.rays]))
     slack = 1e-6 * most

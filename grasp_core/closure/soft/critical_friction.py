@@ -44,6 +44,8 @@ NUDGE = 0.4
 """
 INFLATED = (1e-9, 1e-8)
 """Relative amounts by which the friction (1) is raised before its proof, tried in turn."""
+AT_REST = 1e-9
+"""Speed below which a contact counts as at rest, for unit twists."""
 WIDENED = 4.0
 """Factor by which trials go away from a friction at which nothing can be proved."""
 
@@ -61,7 +63,7 @@ class SoftInterval:
     local: Array | None = None
     """Local coordinates that prove closure at `upper`, (k, 4)."""
 
-    def verify(self) -> bool:
+    def proved(self) -> bool:
         """Check both ends in plain arithmetic; an end without proof claims nothing."""
         below = self.twist is not None and _open(self.contacts, self.twist, self.lower)
         above = self.local is not None and _closed(self.contacts, self.local, self.upper)
@@ -95,10 +97,11 @@ class SoftInterval:
 
     def _separated(self, twist: Array) -> float:
         slopes = self.contacts.at_friction(1.0).slopes(twist)
+        slopes = slopes[np.abs(slopes).max(axis=1) > AT_REST * float(np.linalg.norm(twist))]
         along, across = np.minimum(slopes[:, 0], 0.0), np.hypot(slopes[:, 1], slopes[:, 2])
         room = np.sqrt(np.maximum(along**2 - slopes[:, 3] ** 2, 0.0))
         tiny = np.finfo(np.float64).tiny
-        return min(float((room / np.maximum(across, tiny)).min()), LARGEST_FRICTION)
+        return float((room / np.maximum(across, tiny)).min(initial=LARGEST_FRICTION))
 
 
 def needed_friction(contacts: SoftContacts, forces: Array, torques: Array) -> float:
@@ -168,8 +171,10 @@ def _try(found: SoftInterval, friction: float) -> float:
         found.close(*contacts.in_space(local), friction)
     else:
         found.open(twist, friction)
-        if found.lower < friction:
-            answer = decide(contacts)  # contacts that balance by themselves must be left at rest
+    if found.lower < friction < found.upper:
+        # contacts that balance by themselves, with a margin of zero, must be left at rest
+        answer = decide(contacts)
+        if answer.closed is False:
             found.open(answer.twist, friction)
     slides = local[:, 1:3] * contacts.slopes(twist)[:, 1:3]
     # (3), over the logarithm of the friction
