@@ -27,7 +27,9 @@ def unit_arms(x):
     return (arms / size if size > 0.0 else arms), size or 1.0
 
 
-def conic(q, A, b, equalities, nonnegative, cones, size=3):
+def conic(q, A, b, equalities, nonnegative, cones):
+    """Solve a conic program whose last rows are `cones` cones of one dimension."""
+    size = (len(b) - equalities - nonnegative) // max(cones, 1)
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11

@@ -35,7 +35,7 @@ def make_sense(x, n, mu, mu_t):
 
 
 def soft_margin(x, n, mu, mu_t):
-    """Optimum of: largest t with t / mu + |(tangents / mu, torque / mu_t)| <= push; -inf if none."""
+    """The largest t with t / mu + |(tangents / mu, torque / mu_t)| <= push; -inf if none."""
     k = len(x)
     used = np.column_stack([mu >= 0.0, mu > 0.0, mu > 0.0, mu_t > 0.0]).ravel()
     W = soft_locals(x, n / np.linalg.norm(n, axis=1, keepdims=True), mu, mu_t)
@@ -50,7 +50,7 @@ def soft_margin(x, n, mu, mu_t):
     nearest = np.linalg.lstsq(equations, b[: m + 1], rcond=1e-12)[0]
     if np.abs(equations @ nearest - b[: m + 1]).max() > 1e-7:
         return -math.inf
-    found = conic(np.append(np.zeros(4 * k), -1.0), A, b, m + 1, 0, k, size=4)
+    found = conic(np.append(np.zeros(4 * k), -1.0), A, b, m + 1, 0, k)
     if "PrimalInfeasible" in str(found.status):
         return -math.inf
     return scale * found.x[-1] if "Solved" in str(found.status) else math.nan
@@ -125,7 +125,7 @@ def limit(c):
     A[6 + np.arange(k), 4 * np.arange(k)] = 1.0
     A[6 + k :, :-1] = -np.eye(4 * k)
     b = np.r_[np.zeros(6), np.ones(k), np.zeros(4 * k)]
-    solved = conic(np.append(np.zeros(4 * k), -1.0), A, b, 6, k, k, size=4)
+    solved = conic(np.append(np.zeros(4 * k), -1.0), A, b, 6, k, k)
     best = largest * solved.x[-1] / length
     f, m = found.forces / largest, found.torques / largest
     along = np.einsum("ki,ki->k", f, n)

@@ -27,9 +27,8 @@ def quality(q, rng):
     """Bounds of the least support over unit directions, sought by descent from many starts."""
     w = q.wrenches
     k = len(w.friction)
-    if w.G.shape not in ((6, 3 * k), (6, 4 * k)) or w.norm not in ("l1", "linf"):
-        return False
-    if (w.friction < 0.0).any():
+    known = w.G.shape in ((6, 3 * k), (6, 4 * k)) and w.norm in ("l1", "linf")
+    if not known or (w.friction < 0.0).any():
         return False
     for G in w.G.reshape(6, k, -1).transpose(1, 0, 2):
         R, T, torques = G[:3, :3], G[3:, :3], G[:, 3:]
