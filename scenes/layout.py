@@ -105,6 +105,8 @@ class Layout(ByValue):
     """Forces of a gentle grasp in the contact frames, balanced where possible, (k, 3) [N]."""
     approach: Array
     """Starting points of the fingers, relative to their contacts, (k, 3) [m]."""
+    torsion_m: float = 0.0
+    """Torsional coefficient at every contact [m]; zero for hard fingertips."""
 
     @property
     def squeeze_forces(self) -> Array:
@@ -123,6 +125,7 @@ def arrange(
     grasp: Grasp | Sequence[Contact],
     friction: float,
     fingers: FingerSettings | None = None,
+    torsion_m: float = 0.0,
 ) -> Layout:
     """Place object, fingertips and drives for a grasp.
 
@@ -136,6 +139,7 @@ def arrange(
         grasp: A grasp, or contacts of any origin.
         friction: Coulomb coefficient at every contact.
         fingers: How fingertips are built and driven.
+        torsion_m: Torsional coefficient at every contact [m].
 
     Raises:
         InputError: The friction is not positive, or a fingertip is larger than the object.
@@ -164,8 +168,9 @@ def arrange(
         borders=tuple(_border(body, contact) for contact in contacts),
         friction=friction,
         drive=_drive(body, positions, normals, fingers, size),
-        squeeze=SQUEEZE * largest * _pushes(positions, normals, friction),
+        squeeze=SQUEEZE * largest * _pushes(positions, normals, friction, torsion_m),
         approach=to_digits(-RETREAT * size * _ways_in(grasp, normals, fingers)),
+        torsion_m=torsion_m,
     )
 
 
@@ -243,7 +248,7 @@ def _inertia(mass: float, positions: Array, size: float) -> Array:
     return to_digits(0.25 * mass * (axes * levers) @ axes.T)
 
 
-def _pushes(positions: Array, normals: Array, friction: float) -> Array:
+def _pushes(positions: Array, normals: Array, friction: float, torsion_m: float) -> Array:
     """Compute forces in the contact frames, (k, 3), that balance under force closure.
 
     The largest normal part is one. Contacts that are not in force closure push along their normals.
@@ -251,10 +256,12 @@ def _pushes(positions: Array, normals: Array, friction: float) -> Array:
     arms, _, _ = unit_size(positions)
     _, _, margins = deepest_forces(arms[None], normals[None], np.array([friction]))
     try:
-        # a proof takes long, and is not needed where they are open by far
-        forces = (
-            None if margins[0, 1] < OPEN else force_closure(positions, normals, friction).forces
+        # a proof takes long, and is not needed where hard fingers are open by far
+        hopeless = margins[0, 1] < OPEN and not torsion_m
+        found = (
+            None if hopeless else force_closure(positions, normals, friction, torsion_m=torsion_m)
         )
+        forces = None if found is None else found.forces
     except UndecidedError:
         forces = None
     local = np.einsum("kij,ki->kj", contact_frames(normals), normals if forces is None else forces)

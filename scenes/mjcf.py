@@ -100,8 +100,8 @@ def build_scene(
             "and MuJoCo would fill its hollows"
         )
     contacts = grasp if isinstance(grasp, Grasp) else _listed(grasp)
-    layout = arrange(body, contacts, friction, fingers)
     physics = physics or PhysicsSettings()
+    layout = arrange(body, contacts, friction, fingers, physics.torsion_m)
     return Scene(to_text(layout, physics, surface), layout, physics, surface)
 
 
@@ -164,7 +164,7 @@ def _object(world: Element, layout: Layout, contact: dict[str, str], surface: Su
             "group": 1, "rgba": (0.55, 0.62, 0.70, 0.6), "mass": 0.0}  # fmt: skip
     if surface == "mesh":
         touched = {"contype": (1 << len(layout.contacts)) - 1}
-        friction = {"friction": (layout.friction, 0.0, 0.0)}
+        friction = {"friction": (layout.friction, layout.torsion_m, 0.0)}
         add_element(body, "geom", hull | touched | friction | contact)
         return
     add_element(body, "geom", hull | {"contype": 0})
@@ -179,7 +179,7 @@ def _object(world: Element, layout: Layout, contact: dict[str, str], surface: Su
             "quat": quaternion(outward),
             "contype": 1 << finger,
             "conaffinity": 0,
-            "friction": (layout.friction, 0.0, 0.0),
+            "friction": (layout.friction, layout.torsion_m, 0.0),
             "mass": 0.0,
             "group": 3,
             "rgba": (0.9, 0.6, 0.2, 0.3),
@@ -212,7 +212,7 @@ def _finger(world: Element, layout: Layout, contact: dict[str, str], finger: int
         "size": drive.radius_m,
         "contype": 0,
         "conaffinity": 1 << finger,
-        "friction": (layout.friction, 0.0, 0.0),
+        "friction": (layout.friction, layout.torsion_m, 0.0),
         "mass": 0.0,
         "group": 0,
         "rgba": (0.8, 0.25, 0.2, 1.0),

@@ -7,7 +7,8 @@ otherwise creep), hard and constant contact impedance, and a dense Jacobian (the
 solver of MuJoCo 4.0.0 has a bug).
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
+from typing import Any
 
 from grasp_core.arrays import frozen
 from grasp_core.checked import LARGEST, SMALLEST, number, one_of, switch, whole
@@ -55,7 +56,8 @@ class PhysicsSettings:
     solref: tuple[float, float] = (0.004, 1.0)
     solimp: tuple[float, float, float, float, float] = (0.99, 0.99, 0.001, 0.5, 2.0)
     condim: int = 3
-    """Contact dimension of MuJoCo; 3 is a hard fingertip, which transmits no torsional friction."""
+    """Contact dimension of MuJoCo; 3 is a hard fingertip, which transmits no torsional friction,
+    unless `torsion_m` makes it 4."""
     margin: float = 0.0
     gap: float = 0.0
     autoreset: bool = False
@@ -63,6 +65,10 @@ class PhysicsSettings:
     returns to its start, which looks perfectly stable."""
     diagexact: bool = False
     """Whether contact impedances use the exact inertia at each contact."""
+    torsion_m: float = 0.0
+    """Torsional coefficient of every contact [m]: the largest torque about the normal over the
+    normal force, where the contact does not slide; zero is a hard fingertip. Above zero contacts
+    have the dimension 4, and this is the second number of their `friction`."""
 
     def __repr__(self) -> str:
         """Return the settings that differ from the usual ones."""
@@ -81,6 +87,23 @@ class PhysicsSettings:
             switch(getattr(self, name), name)
         if self.condim not in CONTACT_DIMENSIONS:
             raise InputError(f"condim must be one of {CONTACT_DIMENSIONS}, got {self.condim}")
+        self._check_torsion()
+
+    def _check_torsion(self) -> None:
+        if 0.0 < self.torsion_m < LEAST_TORSION_M:
+            raise InputError(
+                f"torsion_m must be 0 or at least {LEAST_TORSION_M:g} m, the smallest friction of "
+                f"MuJoCo, got {self.torsion_m}"
+            )
+        if self.torsion_m and self.condim != WITHOUT_TORSION:
+            raise InputError(
+                f"torsion_m makes contacts of dimension {WITH_TORSION} by itself: leave condim at "
+                f"{WITHOUT_TORSION}, got {self.condim}"
+            )
+
+    def record(self) -> dict[str, Any]:
+        """Return the settings by name; torsion only where there is some, as older files have it."""
+        return {name: value for name, value in asdict(self).items() if name != "torsion_m" or value}
 
     def options(self) -> dict[str, float | int | str | tuple[float, ...]]:
         """Return the attributes of MJCF's `option` element."""
@@ -97,7 +120,7 @@ class PhysicsSettings:
     def contact(self) -> dict[str, float | int | str | tuple[float, ...]]:
         """Return the attributes of each geom that makes contact."""
         return {
-            "condim": self.condim,
+            "condim": WITH_TORSION if self.torsion_m else self.condim,
             "solref": self.solref,
             "solimp": self.solimp,
             "margin": self.margin,
@@ -112,6 +135,9 @@ WORDS = {
     "jacobian": ("dense", "sparse", "auto"),
 }
 CONTACT_DIMENSIONS = (1, 3, 4, 6)
+WITHOUT_TORSION, WITH_TORSION = 3, 4
+LEAST_TORSION_M = 1e-5
+"""Smallest torsional coefficient above zero: MuJoCo raises smaller ones to this value."""
 MOST_ITERATIONS = 10_000
 COUNTS = {
     "iterations": (1, MOST_ITERATIONS),
@@ -134,6 +160,7 @@ RANGES = {
     "viscosity": (0.0, LARGEST),
     "margin": (0.0, 1.0),
     "gap": (0.0, 1.0),
+    "torsion_m": (0.0, 1.0),
 }
 """Least and largest value of each number. Shorter time steps take hours; with longer ones the
 phases of a trial would be shorter than a step."""
@@ -145,7 +172,7 @@ VECTORS = {
     "solimp": (5, LARGEST),
 }
 """Number of components of each vector, and the largest size of a component."""
-CONTACT_SETTINGS = ("solref", "solimp", "condim", "margin", "gap")
+CONTACT_SETTINGS = ("solref", "solimp", "condim", "margin", "gap", "torsion_m")
 CHOSEN_FLAGS = ("autoreset", "diagexact")
 ENABLED_FLAGS = (
     "constraint", "equality", "frictionloss", "limit", "contact", "spring", "damper", "gravity",

@@ -19,7 +19,8 @@ v_i being the velocity of contact i under the twist. Newton's method says where 
 
 A compiled search of the same kind comes first (see `critical_friction_kernel`). The forces and the
 twist that it finds are checked like all others; where there are none, or their interval is not
-narrow, `friction_search` goes program by program, with proofs in rational arithmetic.
+narrow, `friction_search` goes program by program, with proofs in rational arithmetic. With torsion,
+`soft.critical_friction` searches below what hard fingers need.
 """
 
 import math
@@ -36,6 +37,8 @@ from grasp_core.closure.friction_interval import FRICTIONLESS, REPORTED_AS_ZERO,
 from grasp_core.closure.friction_search import FRICTION_ACCURACY, SHAVED, Ends, search_interval
 from grasp_core.closure.margin_program import CHECK_SLACK, deepest_forces
 from grasp_core.closure.proofs import RANK, proves_closure
+from grasp_core.closure.soft.contacts import SoftContacts, contact_torsions
+from grasp_core.closure.soft.critical_friction import friction_interval
 from grasp_core.closure.wrenches import WRENCH, normal_and_tangential
 from grasp_core.compiled import compiled
 from grasp_core.values import Grasp
@@ -51,6 +54,8 @@ SEARCHED = 0.95
 def critical_friction(
     positions: ArrayLike | Grasp,
     normals: ArrayLike | None = None,
+    *,
+    torsion_m: ArrayLike = 0.0,
 ) -> float:
     """Find the least common Coulomb coefficient that is proved enough for force closure.
 
@@ -61,6 +66,8 @@ def critical_friction(
     Args:
         positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
         normals: Unit vectors into the object, (k, 3).
+        torsion_m: Torsional coefficient, one for all contacts or one each, (k,) [m]. It stays as it
+            is whatever the friction; zero is a hard finger.
 
     Returns:
         The upper end: every larger coefficient suffices, by balanced forces inside the cones. It is
@@ -71,7 +78,13 @@ def critical_friction(
         InputError: Shapes or lengths are wrong.
     """
     points, units = contact_arrays(positions, normals)
-    return float(_upper_ends(points[None], units[None])[0])
+    torsions = contact_torsions(torsion_m, np.ones(len(points)))
+    hard = float(_upper_ends(points[None], units[None])[0])
+    if torsions is None or hard == 0.0:
+        return hard
+    contacts = SoftContacts.of(points, units, np.ones(len(points)), torsions)
+    upper = min(friction_interval(contacts, hard).upper, hard)
+    return 0.0 if upper <= REPORTED_AS_ZERO else upper
 
 
 def critical_frictions(

@@ -21,12 +21,15 @@ positive product with y, and no external wrench w with y.w < 0 can be resisted.
 Both answers are certificates: `verify` uses sums, norms and one singular value. Both also bound
 the optimum, forces from below and twists from above (see `proofs`).
 
+Soft contacts also transmit a torque about their normal; `soft` has their cones of four dimensions,
+their program and their proofs.
+
 Source: Sudsang & Ponce 1995, Definition 1 and Proposition 1, with the condition on the rank
 made explicit; the cone program is standard.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,6 +39,9 @@ from grasp_core.by_value import ByValue
 from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions, unit_size
 from grasp_core.closure.decision import decide
 from grasp_core.closure.proofs import margin_ceiling, proved_margin
+from grasp_core.closure.soft import decision as soft_decision
+from grasp_core.closure.soft import proofs as soft_proofs
+from grasp_core.closure.soft.contacts import SoftContacts, are_torsions, contact_torsions
 from grasp_core.closure.wrenches import normal_and_tangential
 from grasp_core.errors import UndecidedError
 from grasp_core.fields import are_frictions, are_units, is_array, is_number
@@ -51,6 +57,10 @@ SUMMED = 1e-9
 wrench at unit size, which is zero."""
 FAR_BELOW = -1e6
 """Margin below which minus infinity is reported: hardly any forces balance."""
+ARRAYS = (
+    "positions", "normals", "friction", "forces", "separating_wrench", "torsion_m", "torques",
+)  # fmt: skip
+"""Fields of a certificate that hold an array."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -78,9 +88,14 @@ class ClosureCertificate(ByValue):
     """If not closed: y = (a, b), (6,), about the frame's origin, with y.w <= 0 for every wrench w
     that the contacts can apply, to within 1e-12 of lengths at unit size; an external wrench w with
     y.w < 0 is not resisted. None otherwise."""
+    torsion_m: Array | None = field(default=None, repr=False)
+    """Torsional coefficient of each contact, (k,) [m]; None if no contact has torsion."""
+    torques: Array | None = field(default=None, repr=False)
+    """If closed, with torsion: torques about the inward normals that balance with the forces, (k,)
+    [m], strictly inside the cones. None otherwise."""
 
     def __post_init__(self) -> None:
-        for name in ("positions", "normals", "friction", "forces", "separating_wrench"):
+        for name in ARRAYS:
             array = getattr(self, name)
             if array is not None:
                 kept = real_array(array, name)
@@ -98,9 +113,8 @@ class ClosureCertificate(ByValue):
                 return False
             if self.closed is True:
                 return self.separating_wrench is None and 0.0 < self.margin <= self.proved()
-            return (
-                self.closed is False and self.forces is None and 0.0 >= self.margin >= self.proved()
-            )
+            no_forces = self.forces is None and self.torques is None
+            return self.closed is False and no_forces and 0.0 >= self.margin >= self.proved()
 
     def separates(self) -> bool:
         """Return whether the wrench separates, whatever the margin.
@@ -115,7 +129,12 @@ class ClosureCertificate(ByValue):
         if count == 0 or not placed:
             return False
         spread = float(np.ptp(self.positions, axis=0).max())
-        return (spread == 0.0 or spread >= SMALLEST_SIZE) and are_frictions(self.friction, count)
+        rubbing = are_frictions(self.friction, count) and (
+            self.torques is None
+            if self.torsion_m is None
+            else are_torsions(self.torsion_m, self.friction)
+        )
+        return (spread == 0.0 or spread >= SMALLEST_SIZE) and rubbing
 
     def proved(self, caution: float = 1.0) -> float:
         """Compute the margin that the fields prove: a lower bound if closed, else an upper one.
@@ -129,6 +148,9 @@ class ClosureCertificate(ByValue):
         arms, center, size = unit_size(self.positions)
         # `verify` asks only for unit length to nine digits, so the directions are taken exactly
         normals = self.normals / np.linalg.norm(self.normals, axis=1, keepdims=True)
+        if self.torsion_m is not None:
+            soft = SoftContacts.of(self.positions, normals, self.friction, self.torsion_m)
+            return self._proved_with_torsion(soft, caution)
         if self.closed:
             forces = self.forces
             if not (is_array(forces, *arms.shape) and _balance(forces, arms, normals)):
@@ -146,6 +168,23 @@ class ClosureCertificate(ByValue):
         ceiling = margin_ceiling(twist, arms, normals, self.friction, caution)
         return -math.inf if ceiling <= FAR_BELOW else ceiling
 
+    def _proved_with_torsion(self, contacts: SoftContacts, caution: float) -> float:
+        """Compute the margin that the fields prove for soft contacts."""
+        if self.closed:
+            forces, torques, count = self.forces, self.torques, len(self.friction)
+            if not (is_array(forces, count, 3) and is_array(torques, count)):
+                return -math.inf
+            local = contacts.local(forces, torques)
+            missed = max(contacts.missed(forces, torques), abs(float(local[:, 0].sum()) - 1.0))
+            if not missed <= SUMMED:
+                return -math.inf
+            return soft_proofs.proved_margin(contacts, local, caution)
+        wrench = self.separating_wrench
+        if not is_array(wrench, 6):
+            return math.inf
+        ceiling = soft_proofs.margin_ceiling(contacts, contacts.at_unit_size(wrench), caution)
+        return -math.inf if ceiling <= FAR_BELOW else ceiling
+
 
 def _balance(forces: Array, arms: Array, normals: Array) -> bool:
     """Return whether forces balance at unit size, (1), and their normal parts sum to 1, (2)."""
@@ -158,13 +197,18 @@ def force_closure(
     positions: ArrayLike | Grasp,
     normals: ArrayLike | None = None,
     friction: ArrayLike = 0.5,
+    *,
+    torsion_m: ArrayLike = 0.0,
 ) -> ClosureCertificate:
-    """Decide force closure of hard-finger contacts under Coulomb friction.
+    """Decide force closure of contacts under Coulomb friction, hard ones or soft ones.
 
     Args:
         positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
         normals: Unit vectors into the object, (k, 3).
         friction: Coulomb coefficient, one for all contacts or one each, (k,).
+        torsion_m: Torsional coefficient, one for all contacts or one each, (k,) [m]: the largest
+            torque about the normal over the normal force, where the contact does not slide. Zero
+            is a hard finger.
 
     Raises:
         InputError: Shapes, lengths or signs are wrong.
@@ -173,6 +217,9 @@ def force_closure(
     """
     points, units = contact_arrays(positions, normals)
     mu = contact_frictions(friction, len(points))
+    torsions = contact_torsions(torsion_m, mu)
+    if torsions is not None:
+        return _with_torsion(points, units, mu, torsions)
     arms, center, size = unit_size(points)
     answer = decide(arms, units, mu)
     if answer.closed is not None:
@@ -184,6 +231,26 @@ def force_closure(
             wrench = _about_origin(answer.twist, center, size)
         found = ClosureCertificate(answer.closed, answer.margin, points, units, mu, forces, wrench)
         # a caution above one leaves room for `verify` to round otherwise on another processor
+        found = replace(found, margin=found.proved(CAUTION))
+        if found.verify():
+            return found
+    raise UndecidedError(_why_undecided(answer.margin))
+
+
+def _with_torsion(
+    points: Array, units: Array, friction: Array, torsions: Array
+) -> ClosureCertificate:
+    contacts = SoftContacts.of(points, units, friction, torsions)
+    answer = soft_decision.decide(contacts)
+    if answer.closed is not None:
+        forces, wrench, torques = None, None, None
+        if answer.closed:
+            forces, torques = contacts.in_space(answer.local / float(answer.local[:, 0].sum()))
+        else:
+            wrench = contacts.about_origin(answer.twist)
+        found = ClosureCertificate(
+            answer.closed, answer.margin, points, units, friction, forces, wrench, torsions, torques
+        )
         found = replace(found, margin=found.proved(CAUTION))
         if found.verify():
             return found

@@ -67,7 +67,7 @@ def margin_program(balance: Array, normals: Array, friction: Array) -> tuple[flo
     free = allowed(friction)
     rows = in_frames(balance, frames)[:, free]
     pushing = np.tile([True, False, False], k)[free]
-    if (departing := _departing_twist(rows, pushing * 1.0)) is not None:
+    if (departing := departing_twist(rows, pushing * 1.0)) is not None:
         return -math.inf, np.zeros((k, 3)), departing
     n = int(free.sum())
     largest = float(friction.max()) or 1.0
@@ -98,7 +98,7 @@ def allowed(friction: Array) -> NDArray[np.bool_]:
     return np.column_stack([np.ones_like(sliding), sliding, sliding]).ravel()
 
 
-def _departing_twist(rows: Array, share: Array) -> Array | None:
+def departing_twist(rows: Array, share: Array) -> Array | None:
     """Find a twist with which every contact leaves along its normal: then no forces balance."""
     sizes = np.maximum(np.linalg.norm(rows, axis=0), SMALLEST_NORMAL)
     scaled: Array = (rows / sizes).T

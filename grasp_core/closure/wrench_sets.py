@@ -14,6 +14,10 @@ the set in the direction y is
 The force of contact i that attains s_i(y) is n_i + mu_i t, with t along the tangential part of its
 velocity; so the circular cones need no pyramid.
 
+Soft contacts have a fourth local component, u = m mu_i / mu_ti for the torque m about the normal
+and the torsional coefficient mu_ti, that is, a torque over the length mu_ti / mu_i. Their cones,
+|(t, u)| <= mu_i n, are circular too, in one dimension more; see `soft.contacts`.
+
 Source: Ferrari & Canny, "Planning optimal grasps" (ICRA 1992), with circular cones.
 """
 
@@ -27,6 +31,7 @@ from grasp_core.arrays import Array, frozen
 from grasp_core.by_value import ByValue
 from grasp_core.checked import one_of, positive, shown
 from grasp_core.closure.contact_arrays import check_spread, contact_arrays, contact_frictions
+from grasp_core.closure.soft.contacts import LOCAL, contact_torsions, torsion_lengths
 from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 from grasp_core.errors import InputError
 from grasp_core.fields import are_frictions, is_a, is_array
@@ -78,12 +83,13 @@ def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
 class WrenchSet(ByValue):
     """The set of wrenches that contacts can apply with bounded normal forces.
 
-    Contact forces are local here: components (normal, tangent, tangent) of each contact in turn.
+    Contact forces are local here: components (normal, tangent, tangent) of each contact in turn,
+    or (normal, tangent, tangent, torque over a length) of soft ones.
     """
 
     G: Array
     """Matrix from local contact forces to their wrench, with torques over the torque scale, (6,
-    3k)."""
+    3k), or (6, 4k) with torsion."""
     friction: Array
     """Coulomb coefficients, (k,)."""
     norm: Norm
@@ -91,7 +97,7 @@ class WrenchSet(ByValue):
     (`linf`)."""
 
     @classmethod
-    def of(
+    def of(  # noqa: PLR0913 - each is a quantity of its own
         cls,
         positions: ArrayLike | Grasp,
         normals: ArrayLike | None,
@@ -100,6 +106,7 @@ class WrenchSet(ByValue):
         center: ArrayLike,
         torque_scale: float,
         norm: Norm = "l1",
+        torsion_m: ArrayLike = 0.0,
     ) -> Self:
         """Make the wrench set of contacts; torques are about `center`, over `torque_scale`.
 
@@ -109,7 +116,13 @@ class WrenchSet(ByValue):
         points, units = contact_arrays(positions, normals)
         one_of(norm, get_args(Norm), "norm")
         arms = scaled_arms(points, center, torque_scale)
-        return cls.at(arms, units, contact_frictions(friction, len(points)), norm)
+        mu = contact_frictions(friction, len(points))
+        hard, torsions = cls.at(arms, units, mu, norm), contact_torsions(torsion_m, mu)
+        if torsions is None:
+            return hard
+        return replace(
+            hard, G=with_torques(hard.G, units, torsion_lengths(torsions, mu) / torque_scale)
+        )
 
     @classmethod
     def at(cls, arms: Array, normals: Array, friction: Array, norm: Norm = "l1") -> Self:
@@ -133,9 +146,10 @@ class WrenchSet(ByValue):
         known = is_a(self.norm, str) and self.norm in get_args(Norm)
         if not (known and k and are_frictions(self.friction, k)):
             return False
-        if not is_array(self.G, WRENCH, 3 * k):
+        if not (is_array(self.G, WRENCH, 3 * k) or is_array(self.G, WRENCH, LOCAL * k)):
             return False
-        frames, turns = self.G.reshape(2, 3, k, 3).transpose(0, 2, 1, 3)
+        each = self.G.reshape(2, 3, k, -1).transpose(0, 2, 1, 3)
+        frames, turns = each[..., :3]
         square = frames @ frames.transpose(0, 2, 1)
         levers = turns @ frames.transpose(0, 2, 1)
         slack = SAME_FRAME * np.maximum(np.abs(levers).max(axis=(1, 2), keepdims=True), 1.0)
@@ -144,7 +158,13 @@ class WrenchSet(ByValue):
             bool((np.abs(square - np.eye(3)) <= SAME_FRAME).all())
             and bool((np.abs(levers + levers.transpose(0, 2, 1)) <= slack).all())
             and float(np.abs(self.G).max()) <= LARGEST_RATIO * LARGEST_RATIO
+            and (self.width != LOCAL or _are_torques(each[..., 3], frames[..., 0]))
         )
+
+    @property
+    def width(self) -> int:
+        """Return the number of local components of a contact: three, or four with torsion."""
+        return self.G.shape[1] // len(self.friction)
 
     @property
     def size(self) -> float:
@@ -157,8 +177,8 @@ class WrenchSet(ByValue):
 
     def supports(self, directions: Array) -> Array:
         """Compute how far the set reaches in several directions (n, 6), its support (1), (n,)."""
-        slopes = (directions @ self.G).reshape(len(directions), -1, 3)
-        each = slopes[:, :, 0] + self.friction * np.hypot(slopes[:, :, 1], slopes[:, :, 2])
+        slopes = (directions @ self.G).reshape(len(directions), -1, self.width)
+        each = slopes[:, :, 0] + self.friction * _across(slopes)
         return each.max(axis=1) if self.norm == "l1" else np.maximum(each, 0.0).sum(axis=1)
 
     def support(self, direction: Array) -> tuple[float, Array]:
@@ -169,10 +189,10 @@ class WrenchSet(ByValue):
         """Compute the largest value of a linear function of local forces, and forces that have it.
 
         Args:
-            slopes: Coefficients of the function, (3k,).
+            slopes: Coefficients of the function, (3k,), or (4k,) with torsion.
         """
-        slopes = slopes.reshape(-1, 3)
-        across = np.hypot(slopes[:, 1], slopes[:, 2])
+        slopes = slopes.reshape(-1, self.width)
+        across = _across(slopes)
         each = slopes[:, 0] + self.friction * across
         forces = np.zeros_like(slopes)
         if self.norm == "l1":
@@ -190,20 +210,23 @@ class WrenchSet(ByValue):
         return float(each[pushing].sum()), forces.ravel()
 
     def edges(self) -> Array:
-        """Return local forces whose wrenches span the same space as the set, (n, 3k)."""
-        k = len(self.friction)
-        frame = np.array([[1.0, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1]])
-        forces = np.zeros((4 * k + 1, k, 3))
+        """Return local forces, one a row, whose wrenches span the same space as the set."""
+        k, width = len(self.friction), self.width
+        ways = 2 * (width - 1)
+        frame = np.zeros((ways, width))
+        frame[:, 0] = 1.0
+        frame[np.arange(ways), 1 + np.arange(ways) // 2] = np.tile([1.0, -1.0], width - 1)
+        forces = np.zeros((ways * k + 1, k, width))
         for i, mu in enumerate(self.friction):
-            forces[4 * i : 4 * i + 4, i] = frame * [1.0, mu, mu]
+            forces[ways * i : ways * i + ways, i] = frame * np.append(1.0, np.full(width - 1, mu))
         # the last row, no force at all, belongs to linf only
-        rows = forces.reshape(-1, 3 * k)
+        rows = forces.reshape(-1, width * k)
         return rows if self.norm == "linf" else rows[:-1]
 
     def holds(self, forces: Array, slack: float) -> bool:
-        """Return whether local forces, (n, 3k), are within cones and bounds, up to a slack."""
-        each = forces.reshape(len(forces), -1, 3)
-        pushes, slides = each[:, :, 0], np.hypot(each[:, :, 1], each[:, :, 2])
+        """Return whether local forces, one a row, are within cones and bounds, up to a slack."""
+        each = forces.reshape(len(forces), -1, self.width)
+        pushes, slides = each[:, :, 0], _across(each)
         if self.norm == "l1":
             bounded = np.abs(pushes.sum(axis=1) - 1.0) <= slack
         else:
@@ -212,38 +235,71 @@ class WrenchSet(ByValue):
         return bool((bounded & in_cones & (pushes.min(axis=1) >= -slack)).all())
 
 
+def with_torques(G: Array, normals: Array, lengths: Array) -> Array:
+    """Add a column to each contact: the wrench of a torque about the normal, a force at a lever.
+
+    Args:
+        G: Matrix on local forces of hard contacts, (6, 3k).
+        normals: Inward unit normals, (k, 3).
+        lengths: The levers, over the torque scale, (k,).
+
+    Returns:
+        The matrix on local forces of soft contacts, (6, 4k).
+    """
+    k = len(normals)
+    every = np.zeros((WRENCH, k, LOCAL))
+    every[:, :, :3] = G.reshape(WRENCH, k, 3)
+    every[3:, :, 3] = (lengths[:, None] * normals).T
+    return every.reshape(WRENCH, LOCAL * k)
+
+
+def _across(local: Array) -> Array:
+    """Compute the lengths of what is not normal in local forces, (..., 3) or (..., 4)."""
+    slides = np.hypot(local[..., 1], local[..., 2])
+    return np.hypot(slides, local[..., 3]) if local.shape[-1] == LOCAL else slides
+
+
+def _are_torques(columns: Array, normals: Array) -> bool:
+    """Return whether columns (2, k, 3) are no force and a torque along the normals (k, 3)."""
+    forces, torques = columns
+    levers = np.einsum("ki,ki->k", torques, normals)
+    missed = np.abs(torques - levers[:, None] * normals).max(axis=1)
+    straight = (missed <= SAME_FRAME * np.maximum(levers, 1.0)).all()
+    return not forces.any() and bool(straight and (levers >= 0.0).all())
+
+
 def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
     """Find the wrench nearest to zero of forces whose normal parts sum to one.
 
     It is found by a cone program that always has a solution.
 
     Returns:
-        Local forces of that wrench, (3k,), which show how near to balance the contacts come; and
+        Local forces of that wrench, which show how near to balance the contacts come; and
         the direction from it to zero, (m,), a twist in which no contact has more support than minus
         the distance. If the distance is positive, it separates the contacts' wrenches from zero.
     """
     m, n = wrenches.G.shape
-    k = n // 3
+    k, width = len(wrenches.friction), wrenches.width
     q = np.append(np.zeros(n), 1.0)
-    share = np.append(np.tile([1.0, 0.0, 0.0], k), 0.0)
+    share = np.append(np.tile(np.eye(width)[0], k), 0.0)
     distance = np.vstack([-q, np.hstack([-wrenches.G / wrenches.size, np.zeros((m, 1))])])
     sides = np.zeros((n, n + 1))
     sides[np.arange(n), np.arange(n)] = -1.0
-    sides[::3, :n:3] = -np.diag(wrenches.friction)
-    pushes = np.hstack([-np.eye(n)[::3], np.zeros((k, 1))])
+    sides[::width, :n:width] = -np.diag(wrenches.friction)
+    pushes = np.hstack([-np.eye(n)[::width], np.zeros((k, 1))])
     # rows: normal parts sum to one, are not negative, distance >= |wrench|, friction cones
     A = np.vstack([share, pushes, distance, sides])
     b = np.append(1.0, np.zeros(len(A) - 1))
-    answer = minimize(ConicProgram(q, A, b, 1, k, (m + 1, *(3,) * k)))
+    answer = minimize(ConicProgram(q, A, b, 1, k, (m + 1, *(width,) * k)))
     facing = answer.z[k + 2 : k + m + 2]
     return _into_cones(answer.x[:n], wrenches.friction), facing
 
 
 def _into_cones(forces: Array, friction: Array) -> Array:
     """Move forces into the cones and scale them so that normal parts sum to one exactly."""
-    each = forces.reshape(-1, 3).copy()
+    each = forces.reshape(len(friction), -1).copy()
     each[:, 0] = np.maximum(each[:, 0], 0.0)
-    across, allowed = np.hypot(each[:, 1], each[:, 2]), friction * each[:, 0]
+    across, allowed = _across(each), friction * each[:, 0]
     outside = across > allowed
     each[outside, 1:] *= (allowed[outside] / across[outside])[:, None]
     return each.ravel() / each[:, 0].sum()

@@ -74,8 +74,8 @@ class FerrariCanny(ByValue):
     polytope: InnerPolytope | None
     """Polytope that proves `lower` if the zero wrench is inside the set; None otherwise."""
     forces: Array | None
-    """Local forces, (3k,), whose wrench is no longer than -`lower`, if the zero wrench is outside
-    the set; None otherwise."""
+    """Local forces, (3k,), or (4k,) with torsion, whose wrench is no longer than -`lower`, if the
+    zero wrench is outside the set; None otherwise."""
 
     def verify(self) -> bool:
         """Check every field again in plain arithmetic, without any solver.
@@ -121,6 +121,7 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
     torque_scale: float,
     norm: Norm = "l1",
     gap: float = GAP,
+    torsion_m: ArrayLike = 0.0,
 ) -> FerrariCanny:
     """Bound the largest wrench that bounded contact forces resist in every direction.
 
@@ -134,6 +135,8 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
         norm: `l1`, normal forces sum to 1 N, or `linf`, each is at most 1 N.
         gap: Wanted (upper - lower) / upper, from 1e-7. Where more simplices would be needed than
             are kept, for very symmetric or many contacts, the bounds are some per cent apart.
+        torsion_m: Torsional coefficient, one for all contacts or one each, (k,) [m]; zero is a hard
+            finger.
 
     Returns:
         Bounds in newtons. Without closure: of `l1`, minus the distance of the zero wrench from the
@@ -145,8 +148,9 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
     """
     number(gap, "gap", least=FINEST_GAP, below=1.0)
     wrenches = WrenchSet.of(
-        positions, normals, friction, center=center, torque_scale=torque_scale, norm=norm
-    )
+        positions, normals, friction, center=center, torque_scale=torque_scale, norm=norm,
+        torsion_m=torsion_m,
+    )  # fmt: skip
     return wrench_set_quality(wrenches, gap)
 
 

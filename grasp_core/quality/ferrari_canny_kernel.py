@@ -33,7 +33,8 @@ class Cones(NamedTuple):
     """The friction cones of the contacts, whose wrenches make up the set."""
 
     G: Array
-    """Matrix from local contact forces to their wrench, (6, 3k), contiguous."""
+    """Matrix from local contact forces to their wrench, (6, 3k), or (6, 4k) with torsion,
+    contiguous."""
     friction: Array
     """Coulomb coefficients, (k,)."""
     linf: bool
@@ -60,7 +61,7 @@ def grow(cones: Cones, edges: Array, limits: Limits) -> tuple[int, Array, Indice
 
     Args:
         cones: Cones of the contact forces.
-        edges: Local forces whose wrenches span what the set spans, (n, 3k), contiguous.
+        edges: Local forces whose wrenches span what the set spans, one a row, contiguous.
         limits: When to stop.
 
     Returns:
@@ -99,14 +100,15 @@ def grow(cones: Cones, edges: Array, limits: Limits) -> tuple[int, Array, Indice
 @loop()
 def _support(cones: Cones, y: Array, force: Array) -> float:
     """Return the support of the set in direction y, and fill in the local forces that attain it."""
-    total, best, at = 0.0, -np.inf, np.empty(3)
+    total, best, at = 0.0, -np.inf, np.zeros(4)
+    width = cones.G.shape[1] // len(cones.friction)
     force.fill(0.0)
     for i in range(len(cones.friction)):
-        for j in range(3):
+        for j in range(width):
             at[j] = 0.0
             for row in range(D):
-                at[j] += y[row] * cones.G[row, 3 * i + j]
-        across = np.sqrt(at[1] * at[1] + at[2] * at[2])
+                at[j] += y[row] * cones.G[row, width * i + j]
+        across = np.sqrt(at[1] * at[1] + at[2] * at[2] + at[3] * at[3])
         reached = at[0] + cones.friction[i] * across
         if cones.linf:
             if reached <= 0.0:
@@ -118,7 +120,9 @@ def _support(cones: Cones, y: Array, force: Array) -> float:
         else:
             continue
         slide = cones.friction[i] / across if across > 0.0 else 0.0
-        force[3 * i], force[3 * i + 1], force[3 * i + 2] = 1.0, slide * at[1], slide * at[2]
+        force[width * i] = 1.0
+        for j in range(1, width):
+            force[width * i + j] = slide * at[j]
     return total if cones.linf else best
 
 

@@ -20,6 +20,10 @@ linear in the forces. With a multiplier m for each joint, (2) of `motors` bounds
 
 for every m, with equality for the multipliers of the program; s_i is the support of cone i in the
 direction that contact i has in its argument.
+
+Soft contacts also transmit a torque m about their normal. It enters as a fourth component of the
+local force, u = m mu / mu_t [N] with the torsional coefficient mu_t, so that the cone is
+|(f_t, u)| <= mu f_n and all of the above stays as it is.
 """
 
 from dataclasses import dataclass, field
@@ -31,7 +35,8 @@ from grasp_core.arrays import Array, frozen, frozen_copy
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, positive
 from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions
-from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.closure.soft.contacts import LOCAL, contact_torsions, torsion_lengths
+from grasp_core.closure.wrench_sets import WrenchSet, with_torques
 from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
@@ -75,8 +80,10 @@ class WrenchLimit(ByValue):
     centre."""
     motor_multipliers: Array = field(default_factory=lambda: frozen_copy(np.zeros(0)))
     """Multipliers m of the joints in (3), (joints,) [1/(N m)]; none where no motors are given."""
+    torques: Array | None = field(default=None, repr=False)
+    """Torques about the inward normals that act with `forces`, (k,) [N m]; None without torsion."""
 
-    def verify(
+    def verify(  # noqa: PLR0913 - each is a quantity of its own
         self,
         positions: ArrayLike | Grasp,
         normals: ArrayLike | None,
@@ -85,6 +92,7 @@ class WrenchLimit(ByValue):
         max_normal_force: float,
         center: ArrayLike = (0.0, 0.0, 0.0),
         motors: Motors | None = None,
+        torsion_m: ArrayLike = 0.0,
     ) -> bool:
         """Check both bounds again in plain arithmetic, for the contacts they refer to.
 
@@ -95,6 +103,7 @@ class WrenchLimit(ByValue):
             max_normal_force: Largest normal force of each contact [N].
             center: Point about which torques are taken, (3,) [m].
             motors: The motors that were given to `wrench_limits`.
+            torsion_m: The torsional coefficients that were given to `wrench_limits`.
 
         Returns:
             Whether both bounds are proved; False if the fields are no certificate.
@@ -104,15 +113,13 @@ class WrenchLimit(ByValue):
         """
         points, units = contact_arrays(positions, normals)
         about = frozen(center, (3,), "center")
-        body = WrenchBody(
-            points - about, units, contact_frictions(friction, len(points)), max_normal_force,
-            motors,
-        )  # fmt: skip
+        body = _body(points - about, units, friction, max_normal_force, motors, torsion_m)
         with np.errstate(all="ignore"):
-            known = self.has_numbers(len(points), len(body.levers))
+            soft = body.lengths is not None
+            known = self.has_numbers(len(points), len(body.levers), soft=soft)
             return known and body.attains(self) and body.bounds(self)
 
-    def has_numbers(self, count: int, joints: int = 0) -> bool:
+    def has_numbers(self, count: int, joints: int = 0, *, soft: bool = False) -> bool:
         """Return whether fields are numbers of the right shapes, for `count` contacts."""
         return (
             is_array(self.wrench, WRENCH)
@@ -120,10 +127,14 @@ class WrenchLimit(ByValue):
             and is_array(self.facet, WRENCH)
             and is_array(self.forces, count, 3)
             and is_array(self.motor_multipliers, joints)
+            and self._has_torques(count, soft=soft)
             and is_number(self.limit, least=0.0)
             and is_number(self.upper)
             and self.limit <= self.upper
         )
+
+    def _has_torques(self, count: int, *, soft: bool) -> bool:
+        return is_array(self.torques, count) if soft else self.torques is None
 
 
 def max_resisted_wrench(  # noqa: PLR0913 - each is a quantity of its own
@@ -135,6 +146,7 @@ def max_resisted_wrench(  # noqa: PLR0913 - each is a quantity of its own
     max_normal_force: float,
     center: ArrayLike = (0.0, 0.0, 0.0),
     motors: Motors | None = None,
+    torsion_m: ArrayLike = 0.0,
 ) -> float:
     """Find the largest multiple of an external wrench that the contacts can resist.
 
@@ -147,6 +159,8 @@ def max_resisted_wrench(  # noqa: PLR0913 - each is a quantity of its own
         center: Point about which torques are taken, (3,) [m].
         motors: Joints that the contact forces load, with the torques of their motors; None for
             fingers that are as strong as `max_normal_force` says.
+        torsion_m: Torsional coefficient, one for all contacts or one each, (k,) [m]; zero is a hard
+            finger. With motors it must be zero.
 
     Raises:
         InputError: Shapes or limits are wrong, or the wrench is zero.
@@ -155,7 +169,7 @@ def max_resisted_wrench(  # noqa: PLR0913 - each is a quantity of its own
     _check_sizes(loads, "wrench")
     return wrench_limits(
         positions, normals, friction, loads, max_normal_force=max_normal_force, center=center,
-        motors=motors,
+        motors=motors, torsion_m=torsion_m,
     )[0].limit  # fmt: skip
 
 
@@ -168,6 +182,7 @@ def wrench_limits(  # noqa: PLR0913 - each is a quantity of its own
     max_normal_force: float,
     center: ArrayLike = (0.0, 0.0, 0.0),
     motors: Motors | None = None,
+    torsion_m: ArrayLike = 0.0,
 ) -> tuple[WrenchLimit, ...]:
     """Find the largest multiple of each wrench that contacts resist, with forces and a bound.
 
@@ -182,6 +197,8 @@ def wrench_limits(  # noqa: PLR0913 - each is a quantity of its own
         center: Point about which torques are taken, (3,) [m].
         motors: Joints that the contact forces load, with the torques of their motors; None for
             fingers that are as strong as `max_normal_force` says.
+        torsion_m: Torsional coefficient, one for all contacts or one each, (k,) [m]; zero is a hard
+            finger. With motors it must be zero.
 
     Raises:
         InputError: Shapes or limits are wrong, or a wrench is zero.
@@ -191,9 +208,7 @@ def wrench_limits(  # noqa: PLR0913 - each is a quantity of its own
     loads = frozen(wrenches, (None, 6), "wrenches")
     _check_sizes(loads, "wrenches")
     about = frozen(center, (3,), "center")
-    body = WrenchBody(
-        points - about, units, contact_frictions(friction, len(points)), max_normal_force, motors
-    )
+    body = _body(points - about, units, friction, max_normal_force, motors, torsion_m)
     return tuple(body.limit(load) for load in loads)
 
 
@@ -224,6 +239,20 @@ def many_limits(  # noqa: PLR0913 - all that limits depend on
     return WrenchBody(positions - center, normals, mu, max_normal_force).limits(wrenches, inside)
 
 
+def _body(
+    arms: Array, normals: Array, friction: ArrayLike, max_normal_force: float,
+    motors: Motors | None, torsion_m: ArrayLike,
+) -> "WrenchBody":  # fmt: skip
+    mu = contact_frictions(friction, len(arms))
+    torsions = contact_torsions(torsion_m, mu)
+    if torsions is not None and motors is not None:
+        raise InputError(
+            "torsion_m must be zero with motors: their levers have no column for the torque of a "
+            "contact; leave one of the two out"
+        )
+    return WrenchBody(arms, normals, mu, max_normal_force, motors, torsions)
+
+
 def _check_sizes(loads: Array, name: str) -> None:
     """Refuse wrenches (n, 6) that are zero, because every multiple of zero is resisted."""
     sizes = np.abs(loads).max(axis=1)
@@ -240,7 +269,7 @@ class WrenchBody:
 
     def __init__(
         self, arms: Array, normals: Array, friction: Array, max_normal_force: float,
-        motors: Motors | None = None,
+        motors: Motors | None = None, torsions: Array | None = None,
     ) -> None:  # fmt: skip
         """Set up the conic program; its last column will hold the wrench in question.
 
@@ -250,6 +279,7 @@ class WrenchBody:
             friction: Coulomb coefficients, (k,).
             max_normal_force: Largest normal force of each contact [N].
             motors: Joints that the forces load; None for none.
+            torsions: Torsional coefficients, (k,) [m], without motors; None for hard fingers.
 
         Raises:
             InputError: The motors are not those of so many contacts.
@@ -263,9 +293,13 @@ class WrenchBody:
         self.size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
         self.scale = np.array([1.0] * 3 + [self.size] * 3)
         self.frames = contact_frames(normals)
-        G = in_frames(grasp_map(arms / self.size), self.frames)
-        self.G, self.bounded = G, WrenchSet(G, friction, "linf")
-        self.levers = in_frames(self.motors.levers, self.frames)
+        hard = in_frames(grasp_map(arms / self.size), self.frames)
+        self.lengths = lengths = None if torsions is None else torsion_lengths(torsions, friction)
+        self.G = hard if lengths is None else with_torques(hard, normals, lengths / self.size)
+        self.bounded = WrenchSet(self.G, friction, "linf")
+        self.width = LOCAL if torsions is not None else 3
+        levers = in_frames(self.motors.levers, self.frames)
+        self.levers = levers if torsions is None else np.zeros((0, LOCAL * k))
         self.A, self.b = self._rows(friction)
 
     def _rows(self, friction: Array) -> tuple[Array, Array]:
@@ -274,18 +308,19 @@ class WrenchBody:
         They are G f + lambda w = 0, then 0 <= normal parts <= 1, then the torques of each joint
         over its limit, both ways, then the cones.
         """
-        k, joints = self.count, len(self.levers)
-        A = np.zeros((WRENCH + 5 * k + 2 * joints, 3 * k + 1))
+        k, joints, width = self.count, len(self.levers), self.width
+        n = width * k
+        A = np.zeros((WRENCH + 2 * k + 2 * joints + n, n + 1))
         A[:WRENCH, :-1] = self.G
         caps, torques = WRENCH + np.arange(2 * k), WRENCH + 2 * k + np.arange(2 * joints)
-        cones = WRENCH + 2 * k + 2 * joints + np.arange(3 * k)
-        A[caps, np.tile(np.arange(0, 3 * k, 3), 2)] = np.repeat([1.0, -1.0], k)
+        cones = WRENCH + 2 * k + 2 * joints + np.arange(n)
+        A[caps, np.tile(np.arange(0, n, width), 2)] = np.repeat([1.0, -1.0], k)
         shares = self.max_normal_force * self.levers / self.motors.limits[:, None]
         A[torques, :-1] = np.vstack([shares, -shares])
-        A[cones, np.arange(3 * k)] = -1.0
-        A[cones[::3], np.arange(0, 3 * k, 3)] = -friction
+        A[cones, np.arange(n)] = -1.0
+        A[cones[::width], np.arange(0, n, width)] = -friction
         carried = self.motors.gravity / self.motors.limits
-        b = [np.zeros(6), np.ones(k), np.zeros(k), 1.0 - carried, 1.0 + carried, np.zeros(3 * k)]
+        b = [np.zeros(6), np.ones(k), np.zeros(k), 1.0 - carried, 1.0 + carried, np.zeros(n)]
         return A, np.concatenate(b)
 
     def limit(self, wrench: Array) -> WrenchLimit:
@@ -298,7 +333,7 @@ class WrenchBody:
         q = np.zeros(A.shape[1])
         q[-1] = -1.0
         k, joints = self.count, len(self.levers)
-        answer = minimize(ConicProgram(q, A, self.b, 6, 2 * (k + joints), (3,) * k))
+        answer = minimize(ConicProgram(q, A, self.b, 6, 2 * (k + joints), (self.width,) * k))
         share = self.max_normal_force / length
         # the equations' multipliers, scaled to (2), and those of the torques alike
         power = -float(answer.z[:6] @ unit)
@@ -306,14 +341,17 @@ class WrenchBody:
         more, less = answer.z[6 + 2 * k : 6 + 2 * (k + joints)].reshape(2, joints)
         multipliers = self.max_normal_force * (more - less) / (power * -self.motors.limits)
         limit = max(share * float(answer.x[-1]), 0.0)
-        local = answer.x[:-1].reshape(k, 3)
+        local = answer.x[:-1].reshape(k, self.width)
         return WrenchLimit(
             wrench=wrench,
             limit=limit,
             upper=max(limit, self._support(facet, multipliers)),
-            forces=self.max_normal_force * np.einsum("kij,kj->ki", self.frames, local),
+            forces=self.max_normal_force * np.einsum("kij,kj->ki", self.frames, local[:, :3]),
             facet=self._about_center(facet / self.scale),
             motor_multipliers=multipliers,
+            torques=None
+            if self.lengths is None
+            else self.max_normal_force * self.lengths * local[:, 3],
         )
 
     def _support(self, twist: Array, multipliers: Array) -> float:
@@ -324,7 +362,7 @@ class WrenchBody:
 
     def attains(self, found: WrenchLimit) -> bool:
         """Return whether the forces are allowed and balance the limit's multiple of the wrench."""
-        shares = np.einsum("kij,ki->kj", self.frames, found.forces) / self.max_normal_force
+        shares = self._shares(found)
         # what is left of (1) after adding the limit's multiple of the wrench
         left = self.G @ shares.ravel()
         left += found.limit / self.max_normal_force * self._about_middle(found.wrench)
@@ -333,6 +371,17 @@ class WrenchBody:
         # rows of torques are met as all rows of the program are, by shares of the motors' limits
         torques = np.abs(self.motors.torques(found.forces)) / self.motors.limits
         return balanced and allowed and bool((torques <= 1.0 + HELD * self._strongest).all())
+
+    def _shares(self, found: WrenchLimit) -> Array:
+        """Return the local forces of a limit over the largest normal force, (k, 3) or (k, 4)."""
+        shares = np.einsum("kij,ki->kj", self.frames, found.forces) / self.max_normal_force
+        if self.lengths is None or found.torques is None:
+            return shares
+        arms, torques = self.lengths, found.torques / self.max_normal_force
+        # a torque that a contact cannot transmit is in no cone
+        lacking = np.where(torques == 0.0, 0.0, np.inf)
+        turns = np.divide(torques, arms, out=lacking, where=arms > 0.0)
+        return np.column_stack([shares, turns])
 
     @property
     def _strongest(self) -> float:
@@ -357,7 +406,7 @@ class WrenchBody:
 
     def limits(self, wrenches: Array, inside: Array) -> Array:
         """Find the largest multiple of each wrench that is resisted, (n,) (see `many_limits`)."""
-        if len(self.levers):  # the compiled code knows no motors
+        if len(self.levers) or self.lengths is not None:  # the compiled code knows neither
             return np.array([self.limit(wrench).limit for wrench in wrenches])
         local = np.einsum("kij,ki->kj", self.frames, inside)
         start = (HALF / local[:, 0].max() * local).ravel()

@@ -141,6 +141,11 @@ def build_held_scene(
             f"physics.gravity must be that of the settings, {layout.gravity.tolist()}, "
             f"got {physics.gravity}"
         )
+    if physics.torsion_m:
+        raise InputError(
+            f"physics.torsion_m must be zero, got {physics.torsion_m}: squeezes and payloads are "
+            "predicted for hard fingertips; leave it out, or simulate the grasp with validate"
+        )
     return HeldScene(held_text(layout, physics), layout, physics)
 
 

@@ -159,6 +159,10 @@ class Fingers:
     stiffness_n_per_m: Usual | None = None
     """Stiffness of the servos that drive a fingertip [N/m]; if not given, it is chosen so that
     similar grasps behave alike."""
+    torsion_m: Annotated[float, at_least(0.0, up_to=1.0)] = 0.0
+    """Torsional coefficient of the fingertips [m]: the largest torque about the normal of a contact
+    over its normal force. Zero is a hard fingertip; a soft one has a fraction of the size of the
+    area that it touches."""
     approach: Annotated[Direction | None, arg(metavar="X Y Z")] = None
     """Direction in which fingers approach in the scene's keyframe; if not given, as planned, or
     else along the normals."""

@@ -15,6 +15,7 @@ from grasp_core.short_text import counted
 from grasp_core.values import Grasp
 from scenes.exports import formats
 from scenes.mjcf import build_scene
+from scenes.physics import PhysicsSettings
 from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.execution_flags import UPRIGHT, Mass, Tips
@@ -102,8 +103,11 @@ def _check(command: command_flags.Scene) -> None:
 def _scaled(command: command_flags.Scene, saved: SavedGrasps, friction: float) -> TextOf:
     """Return a function that writes scenes as `validate` simulates them, with scaled masses."""
     fingers = with_planned_radius(finger_settings(command.fingers), saved.finger)
+    physics = PhysicsSettings(torsion_m=command.fingers.torsion_m)
     return lambda grasp: (
-        build_scene(saved.body, grasp, friction, fingers=fingers, surface=command.surface).xml
+        build_scene(
+            saved.body, grasp, friction, fingers=fingers, physics=physics, surface=command.surface
+        ).xml
     )
 
 

@@ -119,7 +119,7 @@ def _record(grasp: ExecutedGrasp) -> ExecutionRecord:
         "skipped": [] if found is None else [
             {"kind": each.kind, "reason": each.reason} for each in found.skipped
         ],
-        "physics": None if found is None or found.physics is None else asdict(found.physics),
+        "physics": None if found is None or found.physics is None else found.physics.record(),
     }  # fmt: skip
 
 

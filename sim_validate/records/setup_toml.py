@@ -96,10 +96,11 @@ def physics_from_file(path: Path) -> dict[str, Any]:
 
 def tables_of(setup: Setup) -> dict[str, dict[str, Any]]:
     """Write a setup as the TOML tables that would reproduce it."""
-    return {
+    tables = {
         table: {name: getattr(getattr(setup, table), name) for name in names}
         for table, names in OF_USERS.items()
     }
+    return tables | {"physics": setup.physics.record()}
 
 
 def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:

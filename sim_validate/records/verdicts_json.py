@@ -200,7 +200,7 @@ def _settings(verdict: Verdict) -> SettingsRecord:
     layout, setup = verdict.scene.layout, verdict.setup
     fingers = {name: getattr(setup.fingers, name) for name in OF_USERS["fingers"]}
     return {
-        "physics": asdict(setup.physics),
+        "physics": setup.physics.record(),
         "fingers": cast("FingersRecord", fingers),
         "hold": asdict(setup.hold),
         "limit": asdict(setup.limit),

@@ -46,10 +46,12 @@ def of_grasp(
         return replace(found, name=f"{grasp.id} in trial {wanted.trial}")
     if wanted.control is None:
         return found
-    exact = replace(grasp, critical_friction=critical_friction(grasp))
+    exact = replace(grasp, critical_friction=critical_friction(grasp, torsion_m=setup.torsion_m))
     controls = {
         each.name: each
-        for each in negative_controls(saved.body, exact, saved.friction, agenda.seed)
+        for each in negative_controls(
+            saved.body, exact, saved.friction, agenda.seed, setup.torsion_m
+        )
     }
     if wanted.control not in controls:
         raise InputError(

@@ -130,7 +130,7 @@ def _noisy(
             f"{recorded.name}: this repeat has no trial to simulate, because noise made finger "
             f"{case.missed[0]} miss its face"
         )
-    if not force_closure(*stacked(case.contacts), case.friction).closed:
+    if not force_closure(*stacked(case.contacts), case.friction, torsion_m=setup.torsion_m).closed:
         return _opened(body, OPEN, case.contacts, case.friction, setup)
     loads = [(each.name, each.load.wrench) for each in planned]
     rig, heavy = noisy_case(body, case, loads, setup)
@@ -141,7 +141,7 @@ def _opened(
     body: Polyhedron, name: str, contacts: tuple[Contact, ...], friction: float, setup: Setup
 ) -> _Case:
     """Prepare contacts without force closure as a negative control."""
-    certificate = force_closure(*stacked(contacts), friction)
+    certificate = force_closure(*stacked(contacts), friction, torsion_m=setup.torsion_m)
     if certificate.closed:
         raise InputError(
             f"{name}: expected contacts without force closure, but these are force-closed at "

@@ -67,7 +67,7 @@ def released_friction(
     high = protocol.settling_friction * max(predicted, protocol.least_friction)
     # The excess is relative, so a prediction of zero needs a friction to be relative to.
     least = max(predicted, 0.5 * protocol.least_friction)
-    forces = forces_just_above(positions, normals, least)
+    forces = forces_just_above(positions, normals, least, setup.torsion_m)
     forces *= SQUEEZE * setup.fingers.max_normal_force_n
     rig = replace(squeezed(bench, setup, forces, predicted, high).at_rest(high), whole=whole)
 
@@ -106,7 +106,9 @@ def bisected(
     return None
 
 
-def forces_just_above(positions: Array, normals: Array, critical: float) -> Array:
+def forces_just_above(
+    positions: Array, normals: Array, critical: float, torsion_m: float = 0.0
+) -> Array:
     """Find balanced forces that need almost the critical friction, (k, 3), largest push 1 N.
 
     These are the forces nearest to the critical friction with which every finger pushes enough. If
@@ -118,7 +120,7 @@ def forces_just_above(positions: Array, normals: Array, critical: float) -> Arra
     forces = None
     for above in ABOVE:
         try:
-            forces = even_forces(positions, normals, (1.0 + above) * critical)
+            forces = even_forces(positions, normals, (1.0 + above) * critical, torsion_m=torsion_m)
         except (NoForcesError, SolverError):
             continue
         if np.einsum("ki,ki->k", forces, normals).min() >= LEAST_PUSH:

@@ -38,8 +38,9 @@ together, then no contact ever slips or opens, so (1) to (5) hold to the end. Bo
 doubled for what the linear model leaves out (forces that turn with the object weaken springs by up
 to a fifth; the acceleration is a mean over the last sample), and they may use up half of a
 threshold. Contacts near the border of their cones never meet this: their trials run on. Rigid
-fingertips have no springs, and contacts nearly on one line have levers shorter than the grasp size
-that scenes take, so there trials end early only by loss.
+fingertips have no springs, contacts nearly on one line have levers shorter than the grasp size
+that scenes take, and the torques of soft contacts do not show in the servos, so there trials end
+early only by loss.
 
 The same bound tells when an object has settled at high friction before it is lowered.
 """
@@ -272,9 +273,11 @@ class _Springs:
 def _springs(layout: Layout) -> _Springs | None:
     """Return the linear model of a layout; None where it would not bound the motion.
 
-    Contacts must be as far from their closest axis as the layout's grasp size.
+    Contacts must be hard, and as far from their closest axis as the layout's grasp size.
     """
-    if layout.drive.rigid or grasp_size(layout.contacts) < layout.grasp_size_m * (1.0 - SAME):
+    if layout.drive.rigid or layout.torsion_m:
+        return None
+    if grasp_size(layout.contacts) < layout.grasp_size_m * (1.0 - SAME):
         return None
     return _Springs(layout)
 

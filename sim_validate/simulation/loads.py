@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, to_digits
+from grasp_core.arrays import Array, cross, to_digits
 from grasp_core.closure.contact_arrays import contact_frictions, stacked
+from grasp_core.closure.soft.contacts import contact_torsions
 from grasp_core.closure.wrenches import normal_and_tangential
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.weakest_wrench import weakest_from
@@ -32,7 +33,7 @@ class PlannedLoad:
     limit: Load
     """The wrench at its predicted limit, and the finger forces that balance it."""
     required_friction: float
-    """The friction coefficient that the planned forces need."""
+    """The friction coefficient that the planned forces need, with the torques of soft contacts."""
 
 
 def planned_loads(
@@ -53,10 +54,10 @@ def planned_loads(
         agenda: The choice of wrenches to test.
         setup: Settings that hold the largest normal force and the share of the limit to apply.
     """
-    resisted, (_, normals) = _resisted(body, contacts, friction, setup), stacked(contacts)
-    share = setup.hold.load_share
+    resisted = _resisted(body, contacts, friction, setup)
+    need, share = _Need.of(body, contacts, setup), setup.hold.load_share
     relative = [
-        _load(name, found, share * found.limit, idle, normals)
+        _load(name, found, share * found.limit, idle, need)
         for name, found in _relative(resisted, body.radius, agenda)
     ]
     named = [(each.name, each.wrench) for each in agenda.wrenches]
@@ -82,10 +83,8 @@ def loads_as_they_are(
         wrenches: Named wrenches to test, (6,) each [N, N m].
         setup: Settings that hold the largest normal force.
     """
-    resisted, (_, normals) = _resisted(body, contacts, friction, setup), stacked(contacts)
-    return tuple(
-        _load(name, resisted.limit(wrench), 1.0, idle, normals) for name, wrench in wrenches
-    )
+    resisted, need = _resisted(body, contacts, friction, setup), _Need.of(body, contacts, setup)
+    return tuple(_load(name, resisted.limit(wrench), 1.0, idle, need) for name, wrench in wrenches)
 
 
 def _resisted(
@@ -97,6 +96,7 @@ def _resisted(
         normals,
         contact_frictions(friction, len(contacts)),
         setup.fingers.max_normal_force_n,
+        torsions=contact_torsions(setup.torsion_m, contact_frictions(friction, len(contacts))),
     )
 
 
@@ -114,20 +114,57 @@ def _relative(
     return [*zip(AXIS_NAMES, axes, strict=True), (WEAKEST, weakest), *others]
 
 
-def _load(
-    name: str, found: WrenchLimit, multiple: float, idle: Load, normals: Array
-) -> PlannedLoad:
+def _load(name: str, found: WrenchLimit, multiple: float, idle: Load, need: "_Need") -> PlannedLoad:
     """Plan a multiple of a wrench, with forces between those at rest and those at the limit."""
     wrench = to_digits(multiple * found.wrench)
     predicted = found.limit / multiple
     limit = Load(predicted * wrench, to_digits(found.forces))
-    planned = part(idle, limit, 1.0 / predicted) if predicted > 0.0 else Load(wrench, idle.forces)
+    share = 1.0 / predicted if predicted > 0.0 else 0.0
+    planned = part(idle, limit, share) if share else Load(wrench, idle.forces)
     load = Load(wrench, planned.forces)
-    return PlannedLoad(name, load, predicted, limit, _needed(load.forces, normals))
+    return PlannedLoad(
+        name, load, predicted, limit, need.friction(load, found, idle, min(share, 1.0))
+    )
 
 
-def _needed(forces: Array, normals: Array) -> float:
-    """Compute the friction that forces (k, 3) need: the largest ratio of tangential to normal."""
-    along, across = normal_and_tangential(forces, normals)
-    pushing = along > NO_PUSH * along.max()
-    return float(to_digits((across[pushing] / along[pushing]).max()))
+@dataclass(frozen=True, slots=True, eq=False)
+class _Need:
+    """What the contacts of a grasp need to apply forces."""
+
+    arms: Array
+    """Contact points from the centre of mass, (k, 3) [m]."""
+    normals: Array
+    """Inward unit normals, (k, 3)."""
+    torsion_m: float
+
+    @classmethod
+    def of(cls, body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> "_Need":
+        positions, normals = stacked(contacts)
+        return cls(positions - body.center_of_mass, normals, setup.torsion_m)
+
+    def friction(self, load: Load, found: WrenchLimit, idle: Load, share: float) -> float:
+        """Compute the friction that forces need: the largest ratio of tangential to normal.
+
+        With torsion, the normal force counts as far as the torque of the contact leaves it.
+
+        Args:
+            load: The wrench, and the forces planned for it.
+            found: The limit of the wrench.
+            idle: The load without a wrench.
+            share: Share of the forces at the limit in those of the load.
+        """
+        along, across = normal_and_tangential(load.forces, self.normals)
+        pushing = along > NO_PUSH * along.max()
+        along, across = along[pushing], across[pushing]
+        if found.torques is not None:
+            torques = (1.0 - share) * self._torques(idle) + share * found.torques
+            turning = np.abs(torques[pushing]) / self.torsion_m
+            along = np.sqrt(np.maximum(along**2 - turning**2, (NO_PUSH * along) ** 2))
+        return float(to_digits((across / along).max()))
+
+    def _torques(self, load: Load) -> Array:
+        """Compute the torques about the normals, of least norm, that balance a load, (k,) [N m]."""
+        missing = load.wrench[3:] + cross(self.arms, load.forces).sum(axis=0)
+        return np.asarray(
+            np.linalg.lstsq(self.normals.T, -missing, rcond=None)[0], dtype=np.float64
+        )

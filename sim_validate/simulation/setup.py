@@ -93,6 +93,11 @@ class Setup:
         whole(self.threads, "threads", least=1, most=MOST_THREADS)
         number(self.timeout_s, "timeout_s", above=0.0, most=math.inf)
 
+    @property
+    def torsion_m(self) -> float:
+        """Return the torsional coefficient of every contact [m]; zero for hard fingertips."""
+        return self.physics.torsion_m
+
     def scene(self, body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float) -> Scene:
         """Build the MuJoCo scene of a grasp with these settings."""
         return build_scene(
@@ -111,7 +116,8 @@ def _check_model(physics: PhysicsSettings) -> None:
     if physics.condim != HARD_FINGER:
         raise InputError(
             f"physics.condim must be {HARD_FINGER}, got {physics.condim}: predictions are for hard "
-            "fingers, whose contacts have friction and no torsion"
+            "fingers, whose contacts have friction and no torsion; for soft ones give "
+            "physics.torsion_m"
         )
 
 

@@ -55,82 +55,93 @@ class Control(ByValue):
 
 
 def negative_controls(
-    body: Polyhedron, grasp: Grasp, friction: float, seed: int
+    body: Polyhedron, grasp: Grasp, friction: float, seed: int, torsion_m: float = 0.0
 ) -> tuple[Control, ...]:
     """Make the negative controls that exist for a grasp, at most one of each kind.
 
     The kinds are friction below the critical one, fingers removed, a normal flipped, contacts moved
     on their faces, which takes them out of the grasp's region, and the paper's uncorrected
-    constructions on the same faces.
+    constructions on the same faces. With torsion all of them are proved open as soft fingers.
+
+    Args:
+        body: The object.
+        grasp: A grasp in force closure, with its critical friction at this torsion.
+        friction: Coulomb coefficient at every contact.
+        seed: Seed of the displacements that are tried.
+        torsion_m: Torsional coefficient at every contact [m].
     """
     rng = np.random.default_rng(seed)
     candidates = (
-        _low_friction(grasp),
-        _fingers_removed(grasp, friction),
-        _normal_flipped(grasp, friction),
-        _contacts_moved(body, grasp, friction, rng),
-        _uncorrected(body, grasp, friction),
+        _low_friction(grasp, torsion_m),
+        _fingers_removed(grasp, friction, torsion_m),
+        _normal_flipped(grasp, friction, torsion_m),
+        _contacts_moved(body, grasp, friction, torsion_m, rng),
+        _uncorrected(body, grasp, friction, torsion_m),
     )
     return tuple(found for tries in candidates if (found := next(tries, None)) is not None)
 
 
-def _low_friction(grasp: Grasp) -> Iterator[Control]:
+def _low_friction(grasp: Grasp, torsion_m: float) -> Iterator[Control]:
     friction = FRICTION_SHARE * grasp.critical_friction
     if friction >= LEAST_FRICTION:
-        yield from _refuted("low_friction", grasp.contacts, friction)
+        yield from _refuted("low_friction", grasp.contacts, friction, torsion_m)
 
 
-def _fingers_removed(grasp: Grasp, friction: float) -> Iterator[Control]:
+def _fingers_removed(grasp: Grasp, friction: float, torsion_m: float) -> Iterator[Control]:
     """Yield a negative control with one finger fewer, at lower friction if needed, or two fewer.
 
     Without friction no three contacts are in closure, so any three are open below some friction.
-    Two contacts are open at any friction, because the object can always turn about the line between
-    them.
+    Two hard contacts are open at any friction, because the object can always turn about the line
+    between them.
     """
     threes = list(combinations(grasp.contacts, 3))
     for rest in threes:
-        yield from _refuted("fingers_removed", rest, friction)
+        yield from _refuted("fingers_removed", rest, friction, torsion_m)
     for rest in threes:
-        lower = FRICTION_SHARE * _critical(rest)
+        lower = FRICTION_SHARE * _critical(rest, torsion_m)
         if LEAST_FRICTION <= lower <= friction:
-            yield from _refuted("fingers_removed", rest, lower)
+            yield from _refuted("fingers_removed", rest, lower, torsion_m)
     for rest in combinations(grasp.contacts, 2):
-        yield from _refuted("fingers_removed", rest, friction)
+        yield from _refuted("fingers_removed", rest, friction, torsion_m)
 
 
-def _critical(contacts: Sequence[Contact]) -> float:
+def _critical(contacts: Sequence[Contact], torsion_m: float) -> float:
     """The lowest friction at which contacts are force-closed; infinity if it is not known."""
     try:
-        return critical_friction(*stacked(contacts))
+        return critical_friction(*stacked(contacts), torsion_m=torsion_m)
     except (SolverError, UndecidedError):
         return math.inf
 
 
-def _normal_flipped(grasp: Grasp, friction: float) -> Iterator[Control]:
+def _normal_flipped(grasp: Grasp, friction: float, torsion_m: float) -> Iterator[Control]:
     """Flip a normal, so that a finger pulls instead of pushing, as a wrong sign in a file would."""
     for finger, contact in enumerate(grasp.contacts):
         contacts = list(grasp.contacts)
         contacts[finger] = replace(contact, normal=-contact.normal)
-        yield from _refuted("normal_flipped", contacts, friction)
+        yield from _refuted("normal_flipped", contacts, friction, torsion_m)
 
 
-def _uncorrected(body: Polyhedron, grasp: Grasp, friction: float) -> Iterator[Control]:
+def _uncorrected(
+    body: Polyhedron, grasp: Grasp, friction: float, torsion_m: float
+) -> Iterator[Control]:
     """Yield contacts that the paper's printed programs accept, but that are not closed.
 
     They depend on the faces alone, so grasps on the same faces have the same ones.
     """
-    control = _uncorrected_on(body, tuple(sorted(grasp.faces)), friction)
+    control = _uncorrected_on(body, tuple(sorted(grasp.faces)), friction, torsion_m)
     if control is not None:
         yield control
 
 
 @lru_cache(maxsize=KEPT)
-def _uncorrected_on(body: Polyhedron, faces: tuple[int, ...], friction: float) -> Control | None:
+def _uncorrected_on(
+    body: Polyhedron, faces: tuple[int, ...], friction: float, torsion_m: float
+) -> Control | None:
     try:
         for supposed, positions, normals in uncorrected_contacts(body, faces, friction):
             for points in positions[_may_be_open(positions, normals, supposed)]:
                 contacts = [Contact(at, way) for at, way in zip(points, normals, strict=True)]
-                for control in _refuted("uncorrected", contacts, supposed):
+                for control in _refuted("uncorrected", contacts, supposed, torsion_m):
                     return control
     except SolverError:
         pass
@@ -149,7 +160,7 @@ def _may_be_open(positions: Array, normals: Array, friction: float) -> Indices:
 
 
 def _contacts_moved(
-    body: Polyhedron, grasp: Grasp, friction: float, rng: np.random.Generator
+    body: Polyhedron, grasp: Grasp, friction: float, torsion_m: float, rng: np.random.Generator
 ) -> Iterator[Control]:
     pieces = [body.faces[face].pieces for face in grasp.faces]
     for _ in range(SEARCH):
@@ -157,7 +168,7 @@ def _contacts_moved(
             Contact(_near_corner(choice, rng), contact.normal)
             for choice, contact in zip(pieces, grasp.contacts, strict=True)
         ]
-        yield from _refuted("contacts_moved", moved, friction)
+        yield from _refuted("contacts_moved", moved, friction, torsion_m)
 
 
 def _near_corner(pieces: Sequence[Array], rng: np.random.Generator) -> Array:
@@ -167,10 +178,12 @@ def _near_corner(pieces: Sequence[Array], rng: np.random.Generator) -> Array:
     return middle + TOWARD_CORNER * (corner - middle)
 
 
-def _refuted(name: str, contacts: Sequence[Contact], friction: float) -> Iterator[Control]:
+def _refuted(
+    name: str, contacts: Sequence[Contact], friction: float, torsion_m: float
+) -> Iterator[Control]:
     """Yield the negative control if the analysis proves that it is not force-closed."""
     try:
-        certificate = force_closure(*stacked(contacts), friction)
+        certificate = force_closure(*stacked(contacts), friction, torsion_m=torsion_m)
     except UndecidedError:
         return
     if not certificate.closed:

@@ -129,7 +129,7 @@ def noisy_trial(
         return NoisyTrial(number, False, Outcome.LOST_CONTACT, "", reason, ())
     positions, normals = stacked(case.contacts)
     try:
-        certificate = force_closure(positions, normals, case.friction)
+        certificate = force_closure(positions, normals, case.friction, torsion_m=setup.torsion_m)
     except UndecidedError as error:
         return NoisyTrial(number, None, Outcome.ERROR, "", str(error), ())
     if not certificate.closed:

@@ -66,8 +66,10 @@ def validate(
     check_on_faces(body, grasp)
     coefficient(friction)
     agenda, setup = asked_for(agenda, setup)
-    critical = critical_friction(grasp)
-    if not (friction > critical and force_closure(grasp, friction=friction).closed):
+    torsion_m = setup.torsion_m
+    critical = critical_friction(grasp, torsion_m=torsion_m)
+    closed = friction > critical
+    if not (closed and force_closure(grasp, friction=friction, torsion_m=torsion_m).closed):
         raise InputError(
             f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"
         )
@@ -113,7 +115,7 @@ def simulated_critical_friction(
     """
     check_on_faces(body, grasp)
     setup = _given(setup, Setup(), "setup")
-    predicted = critical_friction(grasp)
+    predicted = critical_friction(grasp, torsion_m=setup.torsion_m)
     if not np.isfinite(predicted):
         raise InputError(f"grasp {grasp.id}: no friction gives force closure; choose another grasp")
     friction = max(predicted, setup.friction.least_friction)
@@ -203,7 +205,9 @@ class _Bout:
         """Try the negative controls, if asked for."""
         if not self.agenda.controls:
             return ()
-        found = negative_controls(self.body, self.grasp, self.friction, self.agenda.seed)
+        found = negative_controls(
+            self.body, self.grasp, self.friction, self.agenda.seed, self.setup.torsion_m
+        )
         return tuple(try_control(self.body, each, self.agenda, self.setup) for each in found)
 
     def bounds(self) -> Bounds | None:

@@ -1,5 +1,9 @@
 """Predicted against simulated, with teeth: `python -m tests.benchmarks.fidelity [--quick]`.
 
+`--torsion SHARE` tries some hundred grasps with soft fingertips instead, whose torsional
+coefficient is that share of the object's radius, and finds limits by repeated holds: soft contacts
+yield a little before they turn, which a ramp may read as the limit.
+
 Grasps of all families on several objects, friction 0.2 to 0.8: critical friction, largest wrench in
 random directions, holds inside and outside the predicted limit, negative controls with what other
 tools' rules make of them, bounds that do not know the planned forces, and speed.
@@ -17,8 +21,9 @@ import numpy as np
 import grasp_core as gc
 import scenes
 from grasp_core.closure.contact_arrays import contact_frictions
+from grasp_core.closure.soft.contacts import contact_torsions
 from grasp_core.quality.wrench_limits import WrenchBody
-from scenes.mjcf import build_scene
+from scenes.physics import PhysicsSettings
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.records.verdicts_json import verdicts_to_json
 from sim_validate.simulation.critical_friction import released_friction
@@ -30,7 +35,7 @@ from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.simulation.simulate import Bench
 from sim_validate.simulation.unplanned_bounds import independent_bounds
-from sim_validate.simulation.wrench_limits import part, ramped_limits
+from sim_validate.simulation.wrench_limits import bisected_limits, part, ramped_limits
 from sim_validate.validation.control_trials import try_control
 from sim_validate.validation.controls import negative_controls
 from sim_validate.validation.validation import validate
@@ -43,6 +48,7 @@ OBJECTS = (
 FRICTIONS = (0.2, 0.35, 0.5, 0.8)
 FAMILIES = ("concurrent", "pencil", "regulus", "free")
 QUICK = (("wedge", "chamfered-box", "l-bracket", "random-12-1"), (0.3, 0.6))
+SOFT = (*QUICK[0], "box", "tetrahedron"), (0.2, 0.5)
 EACH = 3
 """Grasps of one family on one object at one friction."""
 DIRECTIONS = 24
@@ -58,6 +64,12 @@ class Case:
     grasp: gc.Grasp
     friction: float
     place: int
+    torsion: float
+    """Torsional coefficient over the object's radius."""
+
+    @property
+    def setup(self):
+        return Setup(physics=PhysicsSettings(torsion_m=self.torsion * self.body.radius))
 
 
 @dataclass(frozen=True)
@@ -75,21 +87,21 @@ class Found:
     bounds: object
 
 
-def cases(objects, frictions, each_family):
+def cases(objects, frictions, each_family, torsion=0.0):
     found = []
     for name, friction, family in product(objects, frictions, FAMILIES):
         body = scenes.example_object(name)
         for grasp in gc.plan(body, friction, families=(family,), limit=each_family).grasps:
-            found.append(Case(body, grasp, friction, len(found)))
+            found.append(Case(body, grasp, friction, len(found), torsion))
     return found
 
 
 def limiting_loads(case, setup, count, seed):
     """Random wrenches at their predicted limits, with the forces that balance them."""
-    body, grasp = case.body, case.grasp
+    body, grasp, mu = case.body, case.grasp, contact_frictions(case.friction, 4)
     resisted = WrenchBody(
-        grasp.positions - body.center_of_mass, grasp.normals,
-        contact_frictions(case.friction, 4), setup.fingers.max_normal_force_n,
+        grasp.positions - body.center_of_mass, grasp.normals, mu,
+        setup.fingers.max_normal_force_n, torsions=contact_torsions(setup.torsion_m, mu),
     )  # fmt: skip
     scale = np.array([1.0] * 3 + [body.radius] * 3)
     drawn = np.random.default_rng(seed).normal(size=(count, 6)) * scale
@@ -99,8 +111,8 @@ def limiting_loads(case, setup, count, seed):
 
 def examine(case):
     """All figures of one grasp."""
-    setup = Setup()
-    scene = build_scene(case.body, case.grasp, case.friction)
+    setup = case.setup
+    scene = setup.scene(case.body, case.grasp, case.friction)
     bench, layout = Bench(scene), scene.layout
     squeeze = np.einsum("kij,kj->ki", layout.frames, layout.squeeze)
     rig = squeezed(bench, setup, squeeze, case.friction)
@@ -108,22 +120,25 @@ def examine(case):
     near = limits[:HELD_DIRECTIONS]
     tried = [part(rig.idle, limit, share) for share in (INSIDE, OUTSIDE) for limit in near]
     ends = [judge(trace, layout, setup.hold).outcome for trace in rig.hold(tried)]
-    critical = gc.critical_friction(case.grasp)
+    critical = gc.critical_friction(case.grasp, torsion_m=setup.torsion_m)
     known = replace(case.grasp, critical_friction=critical)
     agenda = Agenda(rules=tuple(RULES))
     verdicts = [
         try_control(case.body, control, agenda, setup)
-        for control in negative_controls(case.body, known, case.friction, case.place)
+        for control in negative_controls(
+            case.body, known, case.friction, case.place, setup.torsion_m
+        )
     ]
     accepted = Counter(name for each in verdicts for name, yes in each.accepted_by.items() if yes)
     bounds = None
     if case.place % BOUNDED == 0:
         bounds = independent_bounds(case.body, case.grasp, critical, rig, near)
+    measured = bisected_limits(rig, near) if case.torsion else ramped_limits(rig, limits)
     return Found(
         family=case.grasp.family,
         name=case.body.name,
         critical=released_friction(bench, known.positions, known.normals, critical, setup),
-        shares=[limit.share if limit else float("nan") for limit in ramped_limits(rig, limits)],
+        shares=[limit.share if limit else float("nan") for limit in measured],
         inside=ends[: len(near)],
         outside=ends[len(near) :],
         controls=[(each.control.name, each.held, each.let_go) for each in verdicts],
@@ -158,12 +173,14 @@ def report(found):
         "critical_frictions": len(ratios),
         "critical_not_found": int(np.isnan(ratios).sum()),
         "critical_within_half_percent": float((off < 0.005).mean()),
+        "critical_within_1_percent": float((off < 0.01).mean()),
         "critical_worst": float(np.nanmax(off)),
         "tiny_critical_frictions": len(tiny),
         "tiny_that_held": sum(c.simulated == 0.0 for c in tiny),
         "limits": len(shares),
         "limits_not_found": int(np.isnan(shares).sum()),
         "limit_median_error": float(np.nanmedian(wide)),
+        "limit_within_1_percent": float((wide < 0.01).mean()),
         "limit_within_3_percent": float((wide < 0.03).mean()),
         "limit_range": [float(np.nanmin(shares)), float(np.nanmax(shares))],
         "inside": sum(inside.values()),
@@ -228,12 +245,16 @@ def repeats():
 
 def main():
     quick = "--quick" in sys.argv[1:]
-    chosen = cases(*QUICK, 2) if quick else cases(OBJECTS, FRICTIONS, EACH)
+    torsion = float(sys.argv[sys.argv.index("--torsion") + 1]) if "--torsion" in sys.argv else 0.0
+    if torsion:
+        chosen = cases(*SOFT, EACH, torsion)
+    else:
+        chosen = cases(*QUICK, 2) if quick else cases(OBJECTS, FRICTIONS, EACH)
     begun = time.perf_counter()
     found = list(each(examine, chosen, jobs=available_cores()))
     print(f"examined in {time.perf_counter() - begun:.0f} s")
     figures = report(found)
-    if not quick:
+    if not quick and not torsion:
         throughput()
         repeats()
     wrong = [name for name in MUST_BE_ZERO if figures[name]]

@@ -9,6 +9,7 @@ from tests.public_values.bad_values import (
     COUNT,
     FRICTION,
     NOT_NEGATIVE,
+    NOT_NUMBERS,
     PATH,
     POSITIVE,
     SEED,
@@ -31,6 +32,7 @@ FACE_INDICES = SEVERAL | {
     "three": (0, 1, 2), "beyond": (0, 1, 2, 9), "negative": (-1, 1, 2, 3),
     "fraction": (0.5, 1, 2, 3), "bools": (True, 1, 2, 3), "huge": (0, 1, 2, 10**30),
 }  # fmt: skip
+TORSION = each_of(NOT_NUMBERS, "tiny") | {"negative": -0.01, "ten million km": 1e10}
 MOTORS = optional(VALUE) | {"of three contacts": gc.Motors.of(np.eye(2, 9), 1.0)}
 LEVERS = np.eye(2, 12)
 BODY_AND_GRASP = {"body": VALUE, "grasp": VALUE}
@@ -84,9 +86,9 @@ CALLS = [
         "path": PATH | {"nowhere": "no/such/grasps.json"},
     }, succeeds_in="tests/grasp_core/records/test_grasps_files.py"),
     Call("gc.force_closure", two_arrays(friction=0.5), contacts() | {
-        "friction": each_of(FRICTION, "zero", "tiny"),
+        "friction": each_of(FRICTION, "zero", "tiny"), "torsion_m": TORSION,
     }),
-    Call("gc.critical_friction", two_arrays(), contacts()),
+    Call("gc.critical_friction", two_arrays(), contacts() | {"torsion_m": TORSION}),
     Call("gc.critical_friction_interval", two_arrays(), contacts()),
     Call("gc.critical_frictions", many_arrays, contacts(many=True)),
     Call("gc.contact_forces", two_arrays(friction=0.5, wrench=WRENCH), contacts() | {
@@ -121,6 +123,7 @@ CALLS = [
         "friction": each_of(FRICTION, "zero"), "center": CENTERED, "torque_scale": POSITIVE,
         "norm": WORD,
         "gap": POSITIVE | {"one": 1.0, "too fine": 1e-9},
+        "torsion_m": TORSION,
     }),
     Call("gc.quality_ceiling", lambda: {"body": body(), "faces": (0, 1, 2, 3), "parts": 3}, {
         "body": VALUE,
@@ -137,6 +140,7 @@ CALLS = [
         "max_normal_force": POSITIVE,
         "center": array(CENTER),
         "motors": MOTORS,
+        "torsion_m": TORSION,
     }),
     Call("gc.wrench_limits", two_arrays(friction=0.5, wrenches=WRENCH[None], max_normal_force=1.0),
          contacts() | {
@@ -145,6 +149,7 @@ CALLS = [
         "max_normal_force": POSITIVE,
         "center": array(CENTER),
         "motors": MOTORS,
+        "torsion_m": TORSION,
     }),
     Call("gc.Motors", lambda: {"levers": LEVERS, "limits": np.ones(2), "gravity": np.zeros(2)}, {
         "levers": array(LEVERS),

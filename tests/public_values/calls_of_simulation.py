@@ -82,6 +82,7 @@ CALLS = [
         "solref": array([0.004, 1.0]),
         "solimp": array([0.99, 0.99, 0.001, 0.5, 2.0]),
         "condim": AT_LEAST_ONE | {"two": 2, "seven": 7},
+        "torsion_m": NOT_NEGATIVE | {"less than MuJoCo's least friction": 1e-6, "two metres": 2.0},
         "autoreset": SWITCH,
         "diagexact": SWITCH,
     }),

@@ -28,11 +28,13 @@ def unit_arms(x):
 
 
 def conic(q, A, b, equalities, nonnegative, cones):
+    """Solve a conic program whose last rows are `cones` cones of one dimension."""
+    size = (len(b) - equalities - nonnegative) // max(cones, 1)
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
     kinds = [clarabel.ZeroConeT(equalities), clarabel.NonnegativeConeT(nonnegative)]
-    kinds += [clarabel.SecondOrderConeT(3)] * cones
+    kinds += [clarabel.SecondOrderConeT(size)] * cones
     none, rows = sparse.csc_matrix((len(q), len(q))), sparse.csc_matrix(A)
     return clarabel.DefaultSolver(none, np.array(q), rows, np.array(b), kinds, settings).solve()
 

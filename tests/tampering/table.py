@@ -17,7 +17,7 @@ from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.regions.certify_regions import certify_regions
 from sim_validate.records.regions import SHAPES, proof_arrays, regions_of
 from tests.judges import random_contacts
-from tests.tampering import exact_closure, on_planes, squeezes, wrench_bounds
+from tests.tampering import exact_closure, on_planes, soft_contacts, squeezes, wrench_bounds
 
 SIZES = (1e-3, 0.1, 1.0, 100.0)
 FRICTIONS = (0.0, 0.05, 0.3, 0.5, 1.0, 3.0)
@@ -48,6 +48,24 @@ def placed(rng):
 def closure(seed):
     try:
         return gc.force_closure(*placed(np.random.default_rng(seed)))
+    except gc.UndecidedError:
+        return None
+
+
+def soft(rng):
+    """Contacts of which some have torsion, with frictions above zero where they have."""
+    x, n, mu = placed(rng)
+    mu = np.full(len(x), mu) if np.ndim(mu) == 0 else mu
+    size = float(np.ptp(x, axis=0).max())
+    mu_t = size * rng.choice([0.0, 0.01, 0.1, 0.5], size=len(x))
+    mu_t[int(rng.integers(len(x)))] = 0.1 * size
+    return x, n, np.where(mu_t > 0.0, np.maximum(mu, 0.05), mu), mu_t
+
+
+def soft_closure(seed):
+    x, n, mu, mu_t = soft(np.random.default_rng(seed))
+    try:
+        return gc.force_closure(x, n, mu, torsion_m=mu_t)
     except gc.UndecidedError:
         return None
 
@@ -85,6 +103,16 @@ def quality(seed):
     return gc.ferrari_canny(
         x, n, mu, center=x.mean(axis=0), torque_scale=size, norm=rng.choice(["l1", "linf"]).item(),
         gap=0.1,
+    )  # fmt: skip
+
+
+def soft_quality(seed):
+    rng = np.random.default_rng(seed)
+    x, n, mu, mu_t = soft(rng)
+    size = float(np.ptp(x, axis=0).max())
+    return gc.ferrari_canny(
+        x, n, mu, center=x.mean(axis=0), torque_scale=size, norm=rng.choice(["l1", "linf"]).item(),
+        gap=0.1, torsion_m=mu_t,
     )  # fmt: skip
 
 
@@ -139,11 +167,12 @@ class Limited:
     max_normal_force: Any
     center: Any
     motors: Any
+    torsion_m: Any = 0.0
 
     def verify(self):
         return self.found.verify(
-            self.positions, self.normals, self.friction,
-            max_normal_force=self.max_normal_force, center=self.center, motors=self.motors,
+            self.positions, self.normals, self.friction, max_normal_force=self.max_normal_force,
+            center=self.center, motors=self.motors, torsion_m=self.torsion_m,
         )  # fmt: skip
 
 
@@ -160,6 +189,18 @@ def wrench_limit(seed):
     }
     (found,) = gc.wrench_limits(x, n, mu, load[None], **given)
     return Limited(found, x, n, mu, largest, center, given["motors"])
+
+
+def soft_wrench_limit(seed):
+    rng = np.random.default_rng(seed)
+    x, n, mu, mu_t = soft(rng)
+    size, largest = float(np.ptp(x, axis=0).max()), float(10.0 ** rng.uniform(-1, 2))
+    center = x.mean(axis=0) + size * rng.normal(size=3)
+    load = rng.normal(size=6) * np.repeat([1.0, size], 3)
+    (found,) = gc.wrench_limits(
+        x, n, mu, load[None], max_normal_force=largest, center=center, torsion_m=mu_t
+    )
+    return Limited(found, x, n, mu, largest, center, None, mu_t)
 
 
 def motors(rng, count, largest):
@@ -237,6 +278,11 @@ TABLE = {
         wrench_limit,
         lambda c, _: wrench_bounds.wrench_limit(c),
     ),
+    "a closure certificate with torsion": Row(
+        soft_closure, lambda c, _: soft_contacts.closure(c), 2.0
+    ),
+    "a quality with torsion": Row(soft_quality, wrench_bounds.quality),
+    "a wrench limit with torsion": Row(soft_wrench_limit, lambda c, _: soft_contacts.limit(c)),
     "BestSqueeze": Row(best_squeeze, lambda c, _: squeezes.squeeze(c), 0.8),
     "Payload": Row(payload, lambda c, _: squeezes.payload(c), 0.4),
     "proof file of regions": Row(

@@ -18,7 +18,7 @@ from tests.tampering.on_planes import drawn, piece
 
 
 def support(G, mu, norm, y):
-    slopes = (y @ G).reshape(-1, 3)
+    slopes = (y @ G).reshape(len(mu), -1)
     each = slopes[:, 0] + mu * np.linalg.norm(slopes[:, 1:], axis=1)
     return each.max() if norm == "l1" else np.maximum(each, 0.0).sum()
 
@@ -27,10 +27,15 @@ def quality(q, rng):
     """Bounds of the least support over unit directions, sought by descent from many starts."""
     w = q.wrenches
     k = len(w.friction)
-    if w.G.shape != (6, 3 * k) or (w.friction < 0.0).any() or w.norm not in ("l1", "linf"):
+    known = w.G.shape in ((6, 3 * k), (6, 4 * k)) and w.norm in ("l1", "linf")
+    if not known or (w.friction < 0.0).any():
         return False
-    for i in range(k):
-        R, T = w.G[:3, 3 * i : 3 * i + 3], w.G[3:, 3 * i : 3 * i + 3]
+    for G in w.G.reshape(6, k, -1).transpose(1, 0, 2):
+        R, T, torques = G[:3, :3], G[3:, :3], G[:, 3:]
+        turned = torques[3:] - R[:, :1] * (R[:, 0] @ torques[3:])  # none but about the normal
+        straight = np.abs(turned).max(initial=0.0) <= 1e-8 * (1 + np.abs(torques).max(initial=0.0))
+        if torques[:3].any() or not straight or (R[:, 0] @ torques[3:] < 0.0).any():
+            return False
         S = T @ R.T
         skew = np.abs(S + S.T).max() <= 1e-8 * (1 + abs(S).max())
         if not skew or np.abs(R.T @ R - np.eye(3)).max() > 1e-8:
@@ -53,7 +58,7 @@ def _allowed(q):
         and (abs(np.linalg.norm(q.polytope.normals, axis=1) - 1.0) > UNIT).any()
     ):
         return False
-    each = forces.reshape(len(forces), -1, 3)
+    each = forces.reshape(len(forces), len(q.wrenches.friction), -1)
     across = np.linalg.norm(each[:, :, 1:], axis=2)
     pushes = each[:, :, 0]
     summed = abs(pushes.sum(axis=1) - 1.0) if q.wrenches.norm == "l1" else pushes.max(axis=1) - 1.0

@@ -79,7 +79,7 @@ def certificates(
         trusted(
             ClosureCertificate, closed=closed, margin=margin, positions=points[i],
             normals=units[i], friction=mu, forces=forces[i] if closed else None,
-            separating_wrench=None if closed else wrenches[i],
+            separating_wrench=None if closed else wrenches[i], torsion_m=None, torques=None,
         )
         if closed or separated
         else None

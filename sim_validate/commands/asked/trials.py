@@ -4,6 +4,7 @@ from pathlib import Path
 
 from grasp_core.planning.reach import Finger
 from scenes.fingertips import FingerSettings
+from scenes.physics import PhysicsSettings
 from sim_validate.cli import flag_groups
 from sim_validate.cli.flag_bounds import FlagsError
 from sim_validate.records.setup_toml import setup_from_file
@@ -65,6 +66,7 @@ def _setup(testing: flag_groups.Testing, planned: Finger | None) -> Setup:
     """Build simulation settings from the flags; a setup file overrides them."""
     setup = Setup(
         fingers=with_planned_radius(finger_settings(testing.fingers), planned),
+        physics=PhysicsSettings(torsion_m=testing.fingers.torsion_m),
         surface=testing.surface,
         timeout_s=testing.timeout_s,
     )

@@ -6,6 +6,9 @@ With mu the friction and N the normal force of a contact:
   whatever the direction;
 * a box between two pairs of fingers slips when it is pulled with more than 4 mu N, whatever the
   direction across the normals;
+* with the torsional coefficient mu_t, a box between two such pairs, each finger a lever a from the
+  line through the middle of both faces, turns about that line at the torque
+  4 N sqrt((mu a)^2 + mu_t^2);
 * a grasp under a part of the load that it resists does not creep;
 * fingers on two opposite faces a distance w apart, offset by h along them, hold down to the
   friction h / w;
@@ -47,6 +50,8 @@ from sim_validate.simulation.wrench_limits import (
 AZIMUTHS_DEG = (0.0, 22.5, 45.0, 67.5)
 SLIP_TOLERANCE = 0.005
 """Largest error of the load at which a box slips, relative to the load that statics predicts."""
+LEAST_LEVER = 0.05
+"""Least lever of the fingers on a box that is twisted, in widths of the box."""
 CREEP_LIMIT = 1e-4
 """Fastest creep allowed under load, in grasp sizes per second; good settings show a twentieth of
 it."""
@@ -68,8 +73,8 @@ BLOW_UP = 1e14
 def known_answers(case: Case) -> tuple[Check, ...]:
     """Check the simulator on all known cases, on the surface that the settings name."""
     return (
-        *_incline(case), *_pulled_box(case), *_offset_fingers(case), _creep(case), _hidden(case),
-        *solver_gaps(case), _blow_up(case),
+        *_incline(case), *_pulled_box(case), *_twisted_box(case), *_offset_fingers(case),
+        _creep(case), _hidden(case), *solver_gaps(case), _blow_up(case),
     )  # fmt: skip
 
 
@@ -114,6 +119,40 @@ def _pulled_box(case: Case) -> list[Check]:
     return [
         *_slips(f"{name}, by holds", bisected_limits(rig, limits)),
         *_slips(f"{name}, by ramps", ramped_limits(rig, limits)),
+    ]
+
+
+def _twisted_box(case: Case) -> list[Check]:
+    """Twist a box that soft fingers hold on two opposite faces, and check when it turns."""
+    friction, torsion_m = case.friction, case.setup.torsion_m
+    if not torsion_m:
+        return []
+    body = case.body("box")
+    length, width, _ = np.ptp(body.vertices, axis=0)
+    # where both parts resist alike, if that is on the faces and apart enough
+    lever = min(max(torsion_m / friction, LEAST_LEVER * width), width / 4.0)
+    sides = [(s, t) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
+    contacts = [
+        Contact(np.array([s * length / 2, t * lever, 0.0]), np.array([-s, 0.0, 0.0]))
+        for s, t in sides
+    ]
+    push = PUSH * case.setup.fingers.max_normal_force_n
+    forces = push * np.array([contact.normal for contact in contacts])
+    rig = case.squeezed(body, contacts, forces, friction)
+    each = math.hypot(friction * lever, torsion_m)
+    # a point of the limit surface: sliding and turning as fast as one rigid body does
+    slides = push * friction**2 * lever / each
+    limit = Load(
+        np.array([0, 0, 0, 4.0 * push * each, 0, 0]),
+        forces - np.array([[0.0, 0.0, t * slides] for _, t in sides]),
+    )
+    name = "twist at which a held box turns, over 4 N sqrt((mu a)^2 + mu_t^2)"
+    tolerance = (1.0 - SLIP_TOLERANCE, 1.0 + SLIP_TOLERANCE)
+    ways = {"holds": bisected_limits, "ramps": ramped_limits}
+    found = {way: search(rig, [limit])[0] for way, search in ways.items()}
+    return [
+        Check(f"{name}, by {way}", math.nan if at is None else at.share, *tolerance)
+        for way, at in found.items()
     ]
 
 

@@ -1,0 +1,190 @@
+"""Finds the critical friction of soft contacts whose torsional coefficients stay as they are.
+
+Solved: the least common Coulomb coefficient from which on contacts with given torsion are in force
+closure. Their cones grow with it, so the threshold is unique. Balancing forces and torques bound it
+from above by the friction they need, a separating twist from below by the friction up to which it
+separates, with the notation of `contacts`:
+
+    mu  <=  max_i |t_i| / sqrt(n_i^2 - (m_i / mu_t)^2),                                 (1)
+    mu  >=  min_i sqrt((n_i.v_i)^2 - (mu_t w_i)^2) / |tangential part of v_i|.          (2)
+
+Both are checked by `proofs` at the friction that is kept. With all r_i = 1 the program of
+`decision` has the margin V as optimum, and friction enters it through the balance only, whose
+multiplier is the twist:
+
+    dV / dmu  =  sum v_i.t_i / mu,                                                      (3)
+
+so Newton's method says where to try next. Hard fingers need no less, so the search begins below
+their critical friction.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.closure.soft.contacts import SoftContacts
+from grasp_core.closure.soft.decision import decide, margin_program
+from grasp_core.closure.soft.proofs import margin_ceiling, proved_margin
+from grasp_core.errors import SolverError
+
+LEAST_FRICTION = 1e-6
+"""Smallest friction that is tried, as for hard contacts."""
+ACCURACY = 5e-8
+"""Width of the final interval relative to its upper end, as for hard contacts."""
+FIRST_TRIAL = 0.5
+MOST_TRIALS = 80
+"""Largest number of trials: ten are usual."""
+HALVING = 6
+"""Number of trials after which the interval is halved once, whatever Newton's method suggests."""
+NUDGE = 0.4
+"""Share of the accuracy by which trials pass the expected threshold, to close in from both sides.
+"""
+INFLATED = (1e-9, 1e-8)
+"""Relative amounts by which the friction (1) is raised before its proof, tried in turn."""
+AT_REST = 1e-9
+"""Speed below which a contact counts as at rest, for unit twists."""
+WIDENED = 4.0
+"""Factor by which trials go away from a friction at which nothing can be proved."""
+
+
+@dataclass(slots=True)
+class SoftInterval:
+    """Friction up to `lower`, without force closure, and from `upper` on, with force closure."""
+
+    contacts: SoftContacts
+    """The contacts, at any friction."""
+    lower: float
+    upper: float
+    twist: Array | None = None
+    """Twist that separates at `lower`, at unit size, (6,)."""
+    local: Array | None = None
+    """Local coordinates that prove closure at `upper`, (k, 4)."""
+
+    def proved(self) -> bool:
+        """Check both ends in plain arithmetic; an end without proof claims nothing."""
+        below = self.twist is not None and _open(self.contacts, self.twist, self.lower)
+        above = self.local is not None and _closed(self.contacts, self.local, self.upper)
+        unclaimed = self.twist is None and self.lower == 0.0
+        return (below or unclaimed) and (above or self.local is None)
+
+    @property
+    def narrow(self) -> bool:
+        """Whether the interval is as narrow as asked for."""
+        return self.upper - self.lower <= ACCURACY * self.lower or self.upper <= LEAST_FRICTION
+
+    def close(self, forces: Array, torques: Array, friction: float) -> None:
+        """Lower the upper end to the friction that forces need, or at which they were found."""
+        contacts = self.contacts
+        needed = needed_friction(contacts, forces, torques)
+        for tried in (*(needed * (1.0 + more) for more in INFLATED), friction):
+            tried = max(tried, LEAST_FRICTION)
+            if not tried <= min(friction, self.upper):
+                continue
+            local = contacts.at_friction(tried).local(forces, torques)
+            if _closed(contacts, local, tried):
+                self.upper, self.local = tried, local
+                return
+
+    def open(self, twist: Array, friction: float) -> None:
+        """Raise the lower end to the friction up to which a twist separates, or at least did."""
+        for tried in (self._separated(twist), friction):
+            if self.lower < tried < self.upper and _open(self.contacts, twist, tried):
+                self.lower, self.twist = tried, twist
+                return
+
+    def _separated(self, twist: Array) -> float:
+        slopes = self.contacts.at_friction(1.0).slopes(twist)
+        slopes = slopes[np.abs(slopes).max(axis=1) > AT_REST * float(np.linalg.norm(twist))]
+        along, across = np.minimum(slopes[:, 0], 0.0), np.hypot(slopes[:, 1], slopes[:, 2])
+        room = np.sqrt(np.maximum(along**2 - slopes[:, 3] ** 2, 0.0))
+        tiny = np.finfo(np.float64).tiny
+        return float((room / np.maximum(across, tiny)).min(initial=LARGEST_FRICTION))
+
+
+def needed_friction(contacts: SoftContacts, forces: Array, torques: Array) -> float:
+    """Compute the friction (1) that forces (k, 3) and torques (k,) need; infinite if none allows.
+
+    Args:
+        contacts: The contacts, at any friction.
+        forces: Contact forces.
+        torques: Torques about the normals, with lengths in metres.
+    """
+    local = contacts.at_friction(1.0).local(forces, torques)
+    room = np.maximum(local[:, 0], 0.0) ** 2 - local[:, 3] ** 2
+    across = np.hypot(local[:, 1], local[:, 2])
+    if ((room <= 0.0) & (across > 0.0)).any():
+        return math.inf
+    return float(np.sqrt(across**2 / np.where(room > 0.0, room, 1.0)).max())
+
+
+def friction_interval(contacts: SoftContacts, highest: float) -> SoftInterval:
+    """Find the interval of the critical friction, as narrow as accuracy or proofs allow.
+
+    Args:
+        contacts: Soft contacts at any positive friction.
+        highest: A friction from which on the contacts are closed without torsion; infinite if there
+            is none. The upper end is not sought above it.
+    """
+    found = SoftInterval(contacts, 0.0, math.inf)
+    start = 2.0 * highest if highest < 0.5 * LARGEST_FRICTION else LARGEST_FRICTION
+    _try(found, start)
+    trial, away = min(FIRST_TRIAL, 0.5 * highest), 0.0
+    for count in range(MOST_TRIALS):
+        if found.narrow or not math.isfinite(found.upper):
+            break
+        root = _try(found, max(trial, LEAST_FRICTION))
+        if found.lower < trial < found.upper:
+            # nothing is proved at the trial, probably the threshold: close in from both sides
+            away = max(WIDENED * away, NUDGE * ACCURACY * trial)
+            above = trial + away if trial + away < found.upper else found.upper
+            below = max(trial - away, found.lower)
+            _try(found, above)
+            _try(found, max(below, LEAST_FRICTION))
+            if found.upper <= above and found.lower >= below:
+                break
+            continue
+        trial, away = _next(found, root, trial, halve=count % HALVING == HALVING - 1), 0.0
+    return found
+
+
+def _next(found: SoftInterval, root: float, trial: float, *, halve: bool) -> float:
+    lower, upper = found.lower, found.upper
+    if lower < root < upper and not halve:
+        past = NUDGE * ACCURACY * root + (root - trial) ** 2 / root
+        if upper - root > root - lower:
+            return root + min(past, 0.5 * (upper - root))
+        return root - min(past, 0.5 * (root - lower))
+    return math.sqrt(lower * upper) if lower > 0.0 else 0.1 * upper
+
+
+def _try(found: SoftInterval, friction: float) -> float:
+    """Move the ends as far as the program's answer at a friction proves; return Newton's root."""
+    contacts = found.contacts.at_friction(friction)
+    try:
+        margin, local, twist = margin_program(contacts.matrix, np.ones(len(contacts.friction)))
+    except SolverError:
+        return math.nan
+    if margin > 0.0:
+        found.close(*contacts.in_space(local), friction)
+    else:
+        found.open(twist, friction)
+    if found.lower < friction < found.upper:
+        # contacts that balance by themselves, with a margin of zero, must be left at rest
+        answer = decide(contacts)
+        if answer.closed is False:
+            found.open(answer.twist, friction)
+    slides = local[:, 1:3] * contacts.slopes(twist)[:, 1:3]
+    # (3), over the logarithm of the friction
+    slope = float(slides.sum())
+    return friction * (1.0 - margin / slope) if slope > 0.0 and math.isfinite(margin) else math.nan
+
+
+def _closed(contacts: SoftContacts, local: Array, friction: float) -> bool:
+    return proved_margin(contacts.at_friction(friction), local) > 0.0
+
+
+def _open(contacts: SoftContacts, twist: Array, friction: float) -> bool:
+    return margin_ceiling(contacts.at_friction(friction), twist) <= 0.0

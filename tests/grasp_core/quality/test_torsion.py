@@ -1,0 +1,168 @@
+"""Wrench limits and Ferrari-Canny quality with torsion, beside hand-worked cases and programs."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import grasp_core as gc
+from grasp_core.closure.wrench_sets import WrenchSet
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
+
+CASES = 20
+SIDES = 16
+LARGEST = 10.0
+OPPOSITE = np.array([[-0.05, 0, 0], [0.05, 0, 0]]), np.array([[1.0, 0, 0], [-1, 0, 0]])
+
+
+def ball_edges():
+    """Unit vectors whose hull is inside the unit ball and holds the ball of `INRADIUS`."""
+    angles, steps = 2.0 * np.pi * np.arange(SIDES) / SIDES, np.pi / (SIDES // 2)
+    tilts = steps * (np.arange(SIDES // 2) + 0.5)
+    ring = [
+        [np.sin(tilt) * np.cos(a), np.sin(tilt) * np.sin(a), np.cos(tilt)]
+        for tilt, a in itertools.product(tilts, angles)
+    ]
+    return np.array([*ring, [0, 0, 1.0], [0, 0, -1.0]])
+
+
+INRADIUS = np.cos(np.pi / SIDES + np.pi / (SIDES // 2))
+"""No direction is farther from an edge than half a step around and half a step of tilt; so the hull
+of the edges has a support of at least the cosine of that in every direction."""
+
+
+def limit_by_program(x, n, mu, mu_t, load, edges):
+    """The largest multiple with forces and torques along edges of each cone."""
+    columns = []
+    for point, normal, friction, torsion in zip(x, n, mu, mu_t, strict=True):
+        tangents = np.linalg.svd(normal[None])[2][1:]
+        f = normal + friction * edges[:, :2] @ tangents
+        columns.append(np.hstack([f, np.cross(point, f) + np.outer(torsion * edges[:, 2], normal)]))
+    W = np.vstack(columns).T
+    pushes = np.kron(np.eye(len(x)), np.ones(len(edges)))
+    found = linprog(
+        np.append(np.zeros(W.shape[1]), -1.0),
+        A_ub=np.hstack([pushes, np.zeros((len(x), 1))]), b_ub=np.full(len(x), LARGEST),
+        A_eq=np.column_stack([W, load]), b_eq=np.zeros(6), bounds=(0, None),
+    )  # fmt: skip
+    return found.x[-1]
+
+
+def drawn(rng, count):
+    x, n = random_contacts(rng, count, 0.5)
+    mu_t = rng.choice([0.0, 0.05, 0.4], size=count)
+    mu_t[0] = 0.2
+    return x, n, rng.uniform(0.2, 0.8, size=count), mu_t
+
+
+def test_two_opposite_fingers_hold_a_twist_and_a_force_as_their_cones_say():
+    """A twist about the line: 2 mu_t N. A force across it: 2 mu N. Both at once: an ellipse."""
+    twist, pull, both = gc.wrench_limits(
+        *OPPOSITE, 0.5, [[0, 0, 0, 1, 0, 0], [0, 1, 0, 0, 0, 0], [0, 1, 0, 0.01, 0, 0]],
+        max_normal_force=LARGEST, torsion_m=0.01,
+    )  # fmt: skip
+    assert twist.limit == pytest.approx(2 * 0.01 * LARGEST, rel=1e-6)
+    assert twist.torques == pytest.approx([-0.1, 0.1], rel=1e-6)
+    assert pull.limit == pytest.approx(2 * 0.5 * LARGEST, rel=1e-6)
+    # at the multiple l each finger carries l / 2 N and l / 200 N m: (l / 10)^2 (1 + 1/4) = 1
+    assert both.limit == pytest.approx(LARGEST / np.sqrt(1.25), rel=1e-6)
+    for found in (twist, pull, both):
+        assert found.verify(*OPPOSITE, 0.5, max_normal_force=LARGEST, torsion_m=0.01)
+        assert not found.verify(*OPPOSITE, 0.5, max_normal_force=LARGEST)
+        missing = replace(found, torques=None)
+        assert not missing.verify(*OPPOSITE, 0.5, max_normal_force=LARGEST, torsion_m=0.01)
+    for found in (twist, both):  # the pull needs no torsion
+        assert not found.verify(*OPPOSITE, 0.5, max_normal_force=LARGEST, torsion_m=0.009)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_limits_lie_between_those_of_pyramids_inside_and_around_the_cones(count):
+    rng = np.random.default_rng(count)
+    inside, more = ball_edges(), 0
+    for _ in range(CASES):
+        x, n, mu, mu_t = drawn(rng, count)
+        load = rng.normal(size=6)
+        (found,) = gc.wrench_limits(x, n, mu, load[None], max_normal_force=LARGEST, torsion_m=mu_t)
+        assert found.verify(x, n, mu, max_normal_force=LARGEST, torsion_m=mu_t)
+        lower = limit_by_program(x, n, mu, mu_t, load, inside)
+        upper = limit_by_program(x, n, mu, mu_t, load, inside / INRADIUS)
+        # conic and linear programs are good to some 1e-7 of the largest force
+        assert lower - 1e-6 * LARGEST <= found.limit <= found.upper <= upper + 1e-6 * LARGEST
+        hard = gc.max_resisted_wrench(x, n, mu, load, max_normal_force=LARGEST)
+        assert found.limit >= hard - 1e-6 * LARGEST
+        more += found.limit > 1.01 * hard
+    assert more >= CASES // 4
+
+
+def test_forces_and_torques_drawn_from_the_cones_never_pass_the_support():
+    rng = np.random.default_rng(3)
+    for norm, count in itertools.product(("l1", "linf"), (2, 3, 4)):
+        x, n, mu, mu_t = drawn(rng, count)
+        wrenches = WrenchSet.of(
+            x, n, mu, center=np.zeros(3), torque_scale=0.7, norm=norm, torsion_m=mu_t
+        )
+        assert wrenches.sound()
+        y = rng.normal(size=6)
+        pushes = rng.uniform(size=(2000, count))
+        pushes /= pushes.sum(axis=1, keepdims=True) if norm == "l1" else 1.0
+        ways = rng.normal(size=(2000, count, 3))
+        ways /= np.linalg.norm(ways, axis=2, keepdims=True)
+        power = np.zeros(2000)
+        for i, (point, normal) in enumerate(zip(x, n, strict=True)):
+            tangents = np.linalg.svd(normal[None])[2][1:]
+            f = normal + mu[i] * ways[:, i, :2] @ tangents
+            torque = np.cross(point, f) + np.outer(mu_t[i] * ways[:, i, 2], normal)
+            power += pushes[:, i] * (f @ y[:3] + torque @ y[3:] / 0.7)
+        support, forces = wrenches.support(y)
+        assert power.max() <= support + 1e-12 * wrenches.size
+        assert y @ wrenches.G @ forces == pytest.approx(support, rel=1e-12)
+        assert wrenches.holds(forces[None], 1e-12)
+
+
+def test_the_quality_of_two_opposite_fingers_is_the_twist_they_hold():
+    """With torques over 0.1 m: l1 gives mu_t / 0.1 for the twist, the weakest direction of all."""
+    found = gc.ferrari_canny(*OPPOSITE, 0.5, torque_scale=0.1, torsion_m=0.01)
+    assert found.verify()
+    assert found.lower <= 0.1 <= found.upper * (1 + 1e-9)
+    assert found.upper == pytest.approx(0.1, rel=1e-4)
+    hard = gc.ferrari_canny(*OPPOSITE, 0.5, torque_scale=0.1)
+    # the supports of a set without extent along the twist are zero but for rounding
+    assert hard.upper <= 1e-12
+
+
+def test_no_drawn_direction_has_less_support_than_the_quality():
+    rng = np.random.default_rng(8)
+    inside = 0
+    for _ in range(5):
+        _, _, mu, mu_t = drawn(rng, 4)
+        x, n = TETRA_CENTERS + 0.2 * rng.normal(size=(4, 3)), TETRA_NORMALS
+        found = gc.ferrari_canny(
+            x, n, mu, center=x.mean(axis=0), torque_scale=1.0, gap=0.05, torsion_m=mu_t
+        )
+        assert found.verify()
+        y = rng.normal(size=(5000, 6))
+        y /= np.linalg.norm(y, axis=1, keepdims=True)
+        assert found.wrenches.supports(y).min() >= found.lower - 1e-12
+        inside += found.lower > 0.0
+    assert inside >= 2
+
+
+def test_torsion_of_zero_changes_no_field():
+    rng = np.random.default_rng(2)
+    x, n, mu, _ = drawn(rng, 4)
+    load = rng.normal(size=(3, 6))
+    plain = gc.wrench_limits(x, n, mu, load, max_normal_force=LARGEST)
+    assert plain == gc.wrench_limits(x, n, mu, load, max_normal_force=LARGEST, torsion_m=0.0)
+    assert all(found.torques is None for found in plain)
+    quality = gc.ferrari_canny(x, n, mu, torque_scale=1.0)
+    assert quality == gc.ferrari_canny(x, n, mu, torque_scale=1.0, torsion_m=np.zeros(4))
+
+
+def test_torsion_and_motors_together_are_refused():
+    motors = gc.Motors(np.ones((2, 6)), np.ones(2), np.zeros(2))
+    with pytest.raises(gc.InputError, match="torsion_m must be zero with motors"):
+        gc.wrench_limits(
+            *OPPOSITE, 0.5, np.eye(6), max_normal_force=LARGEST, motors=motors, torsion_m=0.01
+        )
