@@ -26,9 +26,9 @@ from sim_validate.datasets.quarantine import left_out_from
 from sim_validate.files.toml_tables import tables_of_toml
 from sim_validate.records.executions_json import executions_from_json, executions_to_json
 from sim_validate.records.regions_schema import RegionsFile
-from sim_validate.records.saved_transfer import transfer_from_json
 from sim_validate.records.setup_toml import setup_from_tables, tables_of
-from sim_validate.records.transfer_json import transfer_to_json
+from sim_validate.records.transfers.saved_transfer import transfer_from_json
+from sim_validate.records.transfers.transfer_json import transfer_to_json
 from sim_validate.records.verdicts_schema import VerdictsFile
 from sim_validate.records.wrenches import wrenches_from_json
 from sim_validate.simulation.setup import Setup

@@ -12,7 +12,7 @@ from scenes.example_objects import example_object
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.records.grasps import read_grasps
-from sim_validate.records.transfer_schema import TransferFile
+from sim_validate.records.transfers.transfer_schema import TransferFile
 from tests.bad_input.mesh_texts import obj
 from tests.changed_parts import with_face_moved, with_hole
 

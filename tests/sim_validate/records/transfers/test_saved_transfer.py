@@ -10,8 +10,8 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.files.text_files import write_text
-from sim_validate.records.saved_transfer import transfer_from_json
-from sim_validate.records.transfer_json import transfer_to_json
+from sim_validate.records.transfers.saved_transfer import transfer_from_json
+from sim_validate.records.transfers.transfer_json import transfer_to_json
 from tests.changed_parts import with_face_moved, with_hole
 
 METRES, RADIANS = 0.5e-12, math.radians(0.5e-9)

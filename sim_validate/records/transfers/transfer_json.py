@@ -10,7 +10,7 @@ from grasp_core.transferring.contacts import CarriedContact
 from grasp_core.transferring.face_changes import FaceChange
 from grasp_core.transferring.judging import FRICTION_BAND, QUALITY_BAND, GraspFigures
 from grasp_core.transferring.transfer import CarriedGrasp, Transfer
-from sim_validate.records.transfer_schema import (
+from sim_validate.records.transfers.transfer_schema import (
     CarriedContactRecord,
     CarriedGraspRecord,
     FaceChangeRecord,

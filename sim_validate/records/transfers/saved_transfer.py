@@ -19,8 +19,8 @@ from grasp_core.transferring.contacts import CarriedContact
 from grasp_core.transferring.face_changes import FaceChange, in_words
 from grasp_core.transferring.judging import CHANGES, Change, GraspFigures
 from grasp_core.values import Contact
-from sim_validate.records.transfer_json import MM, MM2, SCHEMA, TRANSFER
-from sim_validate.records.transfer_schema import (
+from sim_validate.records.transfers.transfer_json import MM, MM2, SCHEMA, TRANSFER
+from sim_validate.records.transfers.transfer_schema import (
     CarriedContactRecord,
     CarriedGraspRecord,
     FaceChangeRecord,
