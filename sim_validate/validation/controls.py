@@ -135,7 +135,7 @@ def _uncorrected(
 
 @lru_cache(maxsize=KEPT)
 def _uncorrected_on(
-    body: Polyhedron, faces: tuple[int, ...], friction: float, torsion_m: float
+    body: Polyhedron, faces: tuple[int, ...], friction: float, torsion_m: float = 0.0
 ) -> Control | None:
     try:
         for supposed, positions, normals in uncorrected_contacts(body, faces, friction):
