@@ -13,6 +13,8 @@ ASSETS = Path(__file__).parent / "assets"
 """Folder of the templates, styles and scripts of single drawings."""
 NOTHING = "-"
 """Text that stands for a missing number."""
+MILLION = 1e6
+"""Size from which numbers are written with a power of ten."""
 
 
 def filled(template: str, folder: Path = ASSETS, **values: object) -> str:
@@ -55,5 +57,8 @@ def _printed(value: object) -> object:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """Write a number for people; a missing one becomes a dash."""
-    return NOTHING if value is None else f"{value:.{digits}g}"
+    """Write a number for people, without powers of ten below a million; None is a dash."""
+    if value is None:
+        return NOTHING
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+0" in text and abs(value) < MILLION else text

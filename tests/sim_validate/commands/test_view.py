@@ -42,7 +42,7 @@ def test_files_are_written_and_listed(planned, tmp_path, capsys):
     shown = json.loads(capsys.readouterr().out)
     first = json.loads(planned.read_text())["grasps"][0]["id"]
     assert shown == {"id": first, "files": [str(picture), str(page)]}
-    assert picture.read_text().startswith("<?xml")
+    assert picture.read_text().startswith("<svg ")
     assert f"<h1>{first}</h1>" in page.read_text()
 
 
