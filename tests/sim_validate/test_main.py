@@ -318,7 +318,7 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
     assert 0.0 < facts["largest_spread_deg"] <= 10.0
     assert main(["inspect", "scan.ply", "--unit", "mm"]) == Exit.GOOD
     said = capsys.readouterr().out
-    assert "20 nearly flat patches of a curved surface" in said
+    assert "Its surface is curved: fingers may stand on 20 nearly flat" in said
     assert "deg at most (10 deg allowed)" in said
 
 
