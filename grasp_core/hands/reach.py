@@ -46,7 +46,7 @@ class HandReach(ByValue):
     reason: ReachReason
     """Why no pose was found; empty where one was."""
     explanation: str
-    """The same in a sentence; empty where a pose was found."""
+    """Reason why no pose was found, as a sentence; empty where one was found."""
     starts: int
     """Number of starts that were tried."""
     clearance_m: float

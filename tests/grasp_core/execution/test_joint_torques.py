@@ -80,7 +80,7 @@ def test_torques_across_the_pushes_limit_the_load():
 
 
 def harder():
-    """The same, proved again for a squeeze of 5 N, with which nothing slips before 10 N."""
+    """A joint is named first where a squeeze of 5 N lets nothing slip before 10 N."""
     found = squeezed(lifting(4, 0.05), loads=ACROSS, most=20.0)
     grip, scale = opposed_grip(push=5.0), 4.0 * (1.0 - 1e-9)
     proofs = Reactions.of(grip, ACROSS).multipliers(scale)

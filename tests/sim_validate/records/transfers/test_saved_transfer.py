@@ -18,7 +18,7 @@ METRES, RADIANS = 0.5e-12, math.radians(0.5e-9)
 """Half of the last digit that the file keeps of distances in millimetres and of angles in degrees;
 what turns them into metres and radians adds a rounding in the sixteenth digit."""
 AREA = 0.5e-15
-"""The same of square millimetres [m^2]."""
+"""Areas in square millimetres are read back to this many square metres."""
 SAME = 1e-15
 
 
