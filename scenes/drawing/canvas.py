@@ -21,7 +21,7 @@ from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.files.whole_files import replacing, write_parts
 from scenes.drawing.flat.colours import INK, LEVELS, ramp_bytes
-from scenes.drawing.flat.sheets import Area, Dots, Image, Line, Mark, Sheet, Words
+from scenes.drawing.flat.sheets import Area, Dots, Image, Line, Mark, Sheet, Words, closed
 from scenes.drawing.flat.svg import svg_of
 
 Given = ParamSpec("Given")
@@ -107,7 +107,7 @@ def _draw(axes: Any, mark: Mark, zorder: int) -> None:
     match mark:
         case Area():
             paths, patches = _part("path"), _part("patches")
-            loops = [paths.Path(loop, closed=True) for loop in map(_closed, mark.loops)]
+            loops = [paths.Path(loop, closed=True) for loop in map(closed, mark.loops)]
             whole = paths.Path.make_compound_path(*loops)
             axes.add_patch(
                 patches.PathPatch(
@@ -140,10 +140,6 @@ def _draw(axes: Any, mark: Mark, zorder: int) -> None:
             levels = np.ma.masked_less(mark.levels, 0)
             axes.imshow(levels, cmap=colours, vmin=0, vmax=LEVELS, extent=ends, zorder=zorder,
                         aspect="auto", interpolation="nearest")  # fmt: skip
-
-
-def _closed(loop: Array) -> Array:
-    return np.vstack([loop, loop[:1]])
 
 
 @in_style

@@ -16,10 +16,12 @@ from grasp_core.checked import coefficient
 from grasp_core.cones.spanning import angles_between
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.values import Grasp
+from grasp_core.values import Contact, Grasp
+from scenes.drawing.flat.sheets import closed
+from scenes.drawing.hands.posed_hands import PosedHand, hand_shapes
 from scenes.drawing.outlines import feature_edges
 from scenes.drawing.ruled_surfaces import between, rulings
-from scenes.drawing.shapes import Shape, closed, cone_rim, cone_sides, tube
+from scenes.drawing.shapes import Shape, cone_rim, cone_sides, tube
 from scenes.drawing.views import Extent
 
 BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
@@ -66,6 +68,30 @@ def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, 
         shapes += _finger(body, grasp, finger, math.atan(friction))
     shapes += _family(body, grasp)
     return (*shapes, Shape("contact", points=grasp.positions))
+
+
+def drawing_with_hand(
+    body: Polyhedron, grasp: Grasp, friction: float, held: PosedHand
+) -> tuple[Shape, ...]:
+    """List the shapes that show an object in a hand: no bars, and cones where the hand touches.
+
+    Args:
+        body: The object.
+        grasp: A grasp on the faces of `body`.
+        friction: Coulomb coefficient of the friction cones.
+        held: The hand in its pose.
+
+    Raises:
+        InputError: The friction is not positive, or the grasp is not on this object.
+    """
+    coefficient(friction)
+    check_on_faces(body, grasp)
+    shapes = [*glass(body)]
+    for finger, contact in enumerate(held.contacts):
+        shapes.append(_friction_cone(body, contact, finger, math.atan(friction)))
+    for finger in range(len(grasp.contacts)):
+        shapes += _region(grasp, finger)
+    return (*shapes, *hand_shapes(held), Shape("contact", points=held.positions))
 
 
 def drawing_alone(extent: Extent, grasp: Grasp) -> tuple[Shape, ...]:
@@ -138,26 +164,33 @@ def coarse(vertices: Array, triangles: Indices) -> Array:
 
 def _finger(body: Extent, grasp: Grasp, finger: int, half_angle: float) -> list[Shape]:
     contact, cone = grasp.contacts[finger], grasp.force_cones[finger]
-    tip, length = contact.position, CONE_LENGTH * finger_size(body)
     straight, *region = _bar_and_region(body, grasp, finger)
-    rim = cone_rim(tip, contact.normal, half_angle, length)
-    spokes = [np.array([tip, corner]) for corner in rim[::5]]
-    shapes = [straight, Shape("friction cone", finger, lines=(closed(rim), *spokes))]
+    shapes = [straight, _friction_cone(body, contact, finger, half_angle)]
     lean = float(angles_between(cone.axis, contact.normal))
     if lean + cone.half_angle <= half_angle + SLACK_RAD:
         shapes.append(_force_cone(body, grasp, finger))
     return [*shapes, *region]
 
 
+def _friction_cone(body: Extent, contact: Contact, finger: int, half_angle: float) -> Shape:
+    tip = contact.position
+    rim = cone_rim(tip, contact.normal, half_angle, CONE_LENGTH * finger_size(body))
+    spokes = [np.array([tip, corner]) for corner in rim[::5]]
+    return Shape("friction cone", finger, lines=(closed(rim), *spokes))
+
+
 def _bar_and_region(body: Extent, grasp: Grasp, finger: int) -> list[Shape]:
     """Return a finger's bar and, where it is more than a point, its region."""
     tip, ways = grasp.contacts[finger].position, grasp.approach_directions
     inward = grasp.contacts[finger].normal if ways is None else ways[finger]
+    straight = Shape("finger", finger, polygons=bar(tip, inward, finger_size(body)))
+    return [straight, *_region(grasp, finger)]
+
+
+def _region(grasp: Grasp, finger: int) -> list[Shape]:
+    """Return a finger's region, or nothing where it is a point."""
     region = grasp.regions[finger].polygon
-    shapes = [Shape("finger", finger, polygons=bar(tip, inward, finger_size(body)))]
-    if len(region) >= POLYGON:
-        shapes.append(Shape("region", finger, polygons=(region,)))
-    return shapes
+    return [Shape("region", finger, polygons=(region,))] if len(region) >= POLYGON else []
 
 
 def bar(tip: Array, inward: Array, size: float) -> tuple[Array, ...]:

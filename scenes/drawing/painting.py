@@ -144,7 +144,7 @@ def _cone(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
 
 
 FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Patch]]] = {
-    "object": _glass, "finger": _solid, "force cone": _cone,
+    "object": _glass, "finger": _solid, "hand": _solid, "fingertip": _solid, "force cone": _cone,
 }  # fmt: skip
 """How the polygons of some roles are drawn; those of the others are drawn one by one."""
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from scenes.drawing.flat.colours import FINGERS, FOCUS, GLASS, INK, SURFACE
+from scenes.drawing.flat.colours import FINGERS, FOCUS, GLASS, HAND, INK, SURFACE
 from scenes.drawing.shapes import Role, Shape
 
 
@@ -35,10 +35,12 @@ LOOKS: dict[Role, Look] = {
     "plane": Look(fill=0.16, line=0.3),
     "ruled surface": Look(fill=0.1, line=0.1, opacity=0.5),
     "contact": Look(dot=1.2),
+    "hand": Look(fill=1.0, shaded=True),
+    "fingertip": Look(fill=1.0, shaded=True),
 }
 OF_ROLES: dict[Role, str] = {
     "object": GLASS, "edge": INK, "focus": FOCUS, "plane": SURFACE, "ruled surface": SURFACE,
-    "contact": INK,
+    "contact": INK, "hand": HAND, "fingertip": HAND,
 }  # fmt: skip
 
 

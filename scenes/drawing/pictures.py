@@ -9,14 +9,25 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.checked import coefficient, instance, path_of, switch
+from grasp_core.errors import InputError
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.reach import HandReach
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from scenes.drawing.canvas import figure_of, format_of, write_sheet
-from scenes.drawing.drawings import BAR_LENGTH, drawing_of, finger_size, glass
+from scenes.drawing.drawings import (
+    BAR_LENGTH,
+    drawing_of,
+    drawing_with_hand,
+    finger_size,
+    glass,
+)
 from scenes.drawing.flat.colours import FINGERS, NEUTRAL
 from scenes.drawing.flat.panels import ROW, Entry, keyed, thinned
-from scenes.drawing.flat.sheets import Area, Dots, Line, Mark, Sheet, numbered
+from scenes.drawing.flat.sheets import Area, Dots, Line, Mark, Sheet, closed, numbered
+from scenes.drawing.hands.hand_views import view_of_hand
+from scenes.drawing.hands.posed_hands import PosedHand, numbers_behind, posed_hand
 from scenes.drawing.painting import Patch, painted
 from scenes.drawing.palette import LOOKS, colour_of
 from scenes.drawing.shapes import Role, Shape, extent_of
@@ -41,8 +52,11 @@ NUMBER_BEYOND = 0.12
 """Distance of a finger's number from the end of its bar, in finger sizes."""
 EXPLAINED: tuple[Role, ...] = (
     "finger", "friction cone", "force cone", "region", "line of force", "focus", "plane",
-    "ruled surface",
+    "ruled surface", "hand",
 )  # fmt: skip
+"""Roles that have an entry in the key."""
+WHOLE: tuple[Role, ...] = ("hand", "fingertip")
+"""Roles that are drawn whole, however far from the object they are."""
 
 
 def write_picture(
@@ -52,8 +66,10 @@ def write_picture(
     friction: float = 0.5,
     *,
     view: View | None = None,
+    hand: Hand | None = None,
+    reach: HandReach | None = None,
 ) -> Path:
-    """Draw a grasp in the style of the paper, and write the picture to a file.
+    """Draw a grasp in the style of the paper, or with the hand in it, and write it to a file.
 
     Args:
         body: The object.
@@ -61,14 +77,18 @@ def write_picture(
         path: Path of the picture; its ending (png, svg, pdf, webp, jpg) says the format.
         friction: Coulomb coefficient of the friction cones.
         view: The view to draw from; None chooses the best one.
+        hand: A hand to draw in place of straight fingers, with `reach`.
+        reach: The pose in which it stands in the grasp, as `gc.reach_with` finds it.
 
     Raises:
-        InputError: The ending is unknown, the grasp does not lie on the body, or the friction is
-            out of range.
+        InputError: The ending is unknown, the grasp does not lie on the body, the friction is out
+            of range, or `reach` holds no pose of this hand in this grasp.
     """
     path = path_of(path, "path")
     format_of(path)
-    return write_sheet(grasp_sheet(body, grasp, friction, view=view, legend=True), path)
+    held = held_by(hand, reach, grasp)
+    sheet = grasp_sheet(body, grasp, friction, view=view, legend=True, held=held)
+    return write_sheet(sheet, path)
 
 
 def write_object_picture(body: Polyhedron, path: Path) -> Path:
@@ -84,21 +104,22 @@ def write_object_picture(body: Polyhedron, path: Path) -> Path:
 
 def grasp_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
-    legend: bool = True,
+    legend: bool = True, hand: Hand | None = None, reach: HandReach | None = None,
 ) -> Any:  # fmt: skip
-    """Draw a grasp in the style of the paper, as a matplotlib figure.
+    """Draw a grasp as `write_picture` does, as a matplotlib figure.
 
     Raises:
-        InputError: The grasp does not lie on the body, or the friction is out of range.
+        InputError: As for `write_picture`.
     """
-    return figure_of(grasp_sheet(body, grasp, friction, view=view, legend=legend))
+    held = held_by(hand, reach, grasp)
+    return figure_of(grasp_sheet(body, grasp, friction, view=view, legend=legend, held=held))
 
 
 def grasp_sheet(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
-    legend: bool = False, steady: bool = False,
+    legend: bool = False, steady: bool = False, held: PosedHand | None = None,
 ) -> Sheet:  # fmt: skip
-    """Draw a grasp in the style of the paper.
+    """Draw a grasp in the style of the paper, or with the hand in it.
 
     Args:
         body: The object.
@@ -107,18 +128,21 @@ def grasp_sheet(
         view: The view to draw from; None chooses the best one.
         legend: Whether a key stands below the picture.
         steady: Whether to choose a scale that suits every view, as clips that turn need.
+        held: The hand to draw in place of straight fingers; None for none.
 
     Raises:
         InputError: The grasp does not lie on the body, or the friction is out of range.
     """
     check_drawn(body, grasp, friction, view)
     switch(legend, "legend")
-    shapes = drawing_of(body, grasp, friction)
-    view = view or best_view(body, grasp)
-    sheet = sheet_of(
-        shapes, body, view, f"Grasp {grasp.id} of {body.name}",
-        numbers=number_places(body, grasp), side=SIDE, steady=steady,
-    )  # fmt: skip
+    name = f"Grasp {grasp.id} of {body.name}"
+    if held is None:
+        shapes, numbers = drawing_of(body, grasp, friction), number_places(body, grasp)
+        view = view or best_view(body, grasp)
+    else:
+        shapes, numbers = drawing_with_hand(body, grasp, friction, held), numbers_behind(held)
+        view, name = view or view_of_hand(body, held), f"{name} with the hand {held.hand.name}"
+    sheet = sheet_of(shapes, body, view, name, numbers=numbers, side=SIDE, steady=steady)
     if not legend:
         return sheet
     marks, rows = keyed(_entries(shapes), 20.0, SIDE, SIDE - 30.0)
@@ -165,7 +189,7 @@ def _moved(patch: Patch, place: Callable[[Array], Array], scale: float) -> Mark:
     if patch.width:
         return Line(loops, patch.colour, round(scale * patch.width, 3), patch.opacity)
     if sum(map(len, loops)) > MANY:
-        loops = tuple(thinned(np.vstack([loop, loop[:1]]))[:-1] for loop in loops)
+        loops = tuple(thinned(closed(loop))[:-1] for loop in loops)
     return Area(tuple(loop for loop in loops if len(loop) >= POLYGON), patch.colour, patch.opacity)
 
 
@@ -195,6 +219,23 @@ def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | No
         instance(view, View, "view", "View.of_angles makes one")
 
 
+def held_by(hand: Hand | None, reach: HandReach | None, grasp: Grasp) -> PosedHand | None:
+    """Take a hand in its pose from what a user gave; None if nothing was given.
+
+    Raises:
+        InputError: Only one of the two is given, or they do not fit each other and the grasp.
+    """
+    if hand is None and reach is None:
+        return None
+    if hand is None or reach is None:
+        missing = "hand" if hand is None else "reach"
+        raise InputError(
+            f"hand and reach must be given together, got no {missing}: "
+            "reach = gc.reach_with(hand, body, grasp, friction)"
+        )
+    return posed_hand(hand, reach, grasp)
+
+
 def number_places(body: Extent, grasp: Grasp) -> Array:
     """Return where the fingers' numbers are written, behind their bars, (4, 3) [m]."""
     ways = grasp.normals if grasp.approach_directions is None else grasp.approach_directions
@@ -210,7 +251,9 @@ def frame_around(
     """
     points = np.vstack([extent_of(shapes), numbers])
     distances = np.linalg.norm(points - body.center_of_mass, axis=1)
-    near = distances <= FARTHEST * body.radius
+    whole = [np.full(len(shape.vertices()), shape.role in WHOLE) for shape in shapes]
+    hand = np.concatenate([*whole, np.full(len(numbers), any(each.any() for each in whole))])
+    near = (distances <= FARTHEST * body.radius) | hand
     if view is None:
         half = (1.0 + 2.0 * MARGIN) * float(distances[near].max())
         return np.full(2, -half), np.full(2, half)

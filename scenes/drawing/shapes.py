@@ -12,7 +12,7 @@ from grasp_core.solvers.ties import SAME_SHARE, first_best
 
 Role: TypeAlias = Literal[
     "object", "edge", "finger", "friction cone", "force cone", "region", "line of force", "focus",
-    "plane", "ruled surface", "contact",
+    "plane", "ruled surface", "contact", "hand", "fingertip",
 ]  # fmt: skip
 SIDES = 20
 """Number of corners of the polygons that replace circles."""
@@ -48,11 +48,6 @@ class Shape:
 def extent_of(shapes: Iterable[Shape]) -> Array:
     """Return all points of several shapes, (n, 3) [m]."""
     return np.vstack([shape.vertices() for shape in shapes])
-
-
-def closed(loop: Array) -> Array:
-    """Repeat the first corner of a polygon at its end, to draw its border as a line, (k + 1, 3)."""
-    return np.vstack([loop, loop[:1]])
 
 
 def ring(center: Array, axis: Array, radius: float) -> Array:

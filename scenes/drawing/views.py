@@ -101,15 +101,24 @@ def _axes(azimuth: float, elevation: float) -> Array:
 
 def best_view(body: Polyhedron, grasp: Grasp) -> View:
     """Choose a view that keeps contacts and fingers apart and shows few faces edge-on."""
+    _, axes = views_at(ELEVATIONS)
+    return _clearest(body, grasp, 0.5 * edge_on(body, axes))
+
+
+def edge_on(body: Polyhedron, axes: Array) -> Array:
+    """Return the share of an object's surface that is seen nearly as lines in each view, (n,).
+
+    Args:
+        body: The object.
+        axes: Axes of the views, (n, 3, 3).
+    """
     areas = np.array([face.area for face in body.faces])
-    _, axes = _views()
-    lines = (np.abs(axes[:, 2] @ body.normals.T) < EDGE_ON) @ areas / areas.sum()
-    return _clearest(body, grasp, 0.5 * lines)
+    return (np.abs(axes[:, 2] @ body.normals.T) < EDGE_ON) @ areas / areas.sum()
 
 
 def view_alone(extent: Extent, grasp: Grasp) -> View:
     """Choose a view that keeps the contacts and fingers of a grasp apart."""
-    angles, _ = _views()
+    angles, _ = views_at(ELEVATIONS)
     return _clearest(extent, grasp, np.zeros(len(angles)))
 
 
@@ -117,10 +126,10 @@ def _clearest(body: Extent, grasp: Grasp, faults: Array) -> View:
     """Return the view with fingers best apart, less the faults (n,) of each view."""
     outward = -grasp.normals if grasp.approach_directions is None else -grasp.approach_directions
     ends = grasp.positions + body.radius * outward
-    angles, axes = _views()
+    angles, axes = views_at(ELEVATIONS)
     towards = axes[:, 2]
     fingers = towards @ outward.T
-    apart = _least_gaps(axes, np.vstack([grasp.positions, ends]), body) / body.radius
+    apart = least_gaps(axes, np.vstack([grasp.positions, ends]), body) / body.radius
     pointing = np.maximum(np.abs(fingers) - FORESHORTENED, 0.0).sum(axis=1)
     in_front = (fingers > SAME_MERIT).mean(axis=1)
     merits = apart + 0.1 * in_front - 2.0 * pointing - faults
@@ -128,14 +137,14 @@ def _clearest(body: Extent, grasp: Grasp, faults: Array) -> View:
 
 
 @cache
-def _views() -> tuple[list[tuple[int, int]], Array]:
-    """Return the angles of the views to choose from [deg], and their axes, (n, 3, 3)."""
-    angles = [(azimuth, elevation) for elevation in ELEVATIONS for azimuth in AZIMUTHS]
+def views_at(elevations: tuple[int, ...]) -> tuple[list[tuple[int, int]], Array]:
+    """Return the angles of views from all around at elevations [deg], and their axes, (n, 3, 3)."""
+    angles = [(azimuth, elevation) for elevation in elevations for azimuth in AZIMUTHS]
     axes = [_axes(math.radians(azimuth), math.radians(elevation)) for azimuth, elevation in angles]
     return angles, np.array(axes)
 
 
-def _least_gaps(axes: Array, points: Array, body: Extent) -> Array:
+def least_gaps(axes: Array, points: Array, body: Extent) -> Array:
     """Return the smallest distance between any two points (p, 3) in each picture, (n,) [m]."""
     turned = (points - body.center_of_mass) @ axes.transpose(0, 2, 1)
     flat = turned[..., :2] * _enlarged(turned[..., 2], DISTANCE * body.radius)[..., None]

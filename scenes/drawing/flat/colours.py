@@ -16,6 +16,8 @@ from grasp_core.arrays import Array, Indices
 FINGERS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7")
 """Colour of each finger, which its cones, region, line of force and curves share."""
 INK, GLASS, FOCUS, SURFACE = "#30363d", "#8296ab", "#D55E00", "#0072B2"
+HAND = "#b9b0a4"
+"""Colour of a hand's links: warm and muted, so that it is neither a finger's nor the object's."""
 GOOD, BAD, NEUTRAL = "#0072B2", "#D55E00", "#686e77"
 PAPER = "#ffffff"
 """Colour of the ground, on which labels stand."""

@@ -124,9 +124,14 @@ def circle(center: Array, radius: float) -> Array:
     return center + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
+def closed(loop: Array) -> Array:
+    """Repeat the first corner of a polygon at its end, to draw its border as a line, (k + 1, d)."""
+    return np.vstack([loop, loop[:1]])
+
+
 def outlined(loops: Iterable[Array], colour: str, width: float = 1.4) -> Line:
     """Draw the borders of loops, each closed."""
-    return Line(tuple(np.vstack([loop, loop[:1]]) for loop in loops), colour, width)
+    return Line(tuple(map(closed, loops)), colour, width)
 
 
 def numbered(center: Array, radius: float, text: str, colour: str) -> tuple[Mark, ...]:

@@ -1,0 +1,1 @@
+"""What does a hand look like in the pose in which it stands in a grasp?"""

@@ -1,0 +1,174 @@
+"""Places a hand in the pose in which it stands in a grasp, and makes the shapes that show it.
+
+Every part is a convex solid, so that pictures draw it as its outline and the sides that face the
+viewer. Long parts are cut into pieces about as long as they are thick: parts are drawn in the order
+of the depths of their middles, which is the right order for parts of like size.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from grasp_core.arrays import Array, frozen, frozen_indices
+from grasp_core.checked import instance
+from grasp_core.errors import InputError
+from grasp_core.frames import POSE
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand_arrays import hand_arrays
+from grasp_core.hands.kinematics import places
+from grasp_core.hands.reach import HandReach
+from grasp_core.values import Contact, Grasp
+from scenes.drawing.hands.rounded_boxes import rounded_box
+from scenes.drawing.shapes import Role, Shape
+
+LONG, LEAST = 1.2, 2.5
+"""Length of a piece of a part in thicknesses of the part, but at least so many radii of the hand's
+largest fingertip."""
+MOST_PIECES = 6
+"""Largest number of pieces along one axis of a part."""
+OVERLAP = 0.02
+"""How far a piece reaches into the next one, as a share of its length, so that no gap is seen."""
+NUMBER_BEYOND = 2.9
+"""Distance of a finger's number from its contact, through the middle of the fingertip, in the
+fingertip's radii."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosedHand:
+    """A hand in a pose in which its fingertips touch an object."""
+
+    hand: Hand
+    joints: Array
+    """Joint angles in the order of `hand.joints`, (j,) [rad]."""
+    palm_pose: Array
+    """Pose of the palm in the object's frame, (4, 4)."""
+    fingers: tuple[int, ...]
+    """The hand's finger at each contact."""
+    contacts: tuple[Contact, ...]
+    """Where these fingers touch."""
+
+    def __post_init__(self) -> None:
+        instance(self.hand, Hand, "hand", "load_hand makes one")
+        used = frozen_indices(self.fingers, (len(self.contacts),), "fingers")
+        object.__setattr__(self, "fingers", tuple(used.tolist()))
+        joints, known = len(self.hand.joints), range(len(self.hand.fingers))
+        object.__setattr__(self, "joints", frozen(self.joints, (joints,), "joints"))
+        object.__setattr__(self, "palm_pose", frozen(self.palm_pose, (POSE, POSE), "palm_pose"))
+        if len(set(self.fingers)) < len(self.fingers) or not set(self.fingers) <= set(known):
+            raise InputError(
+                f"fingers must be different fingers of the hand, numbered from 0 to {known[-1]}, "
+                f"got {list(self.fingers)}"
+            )
+
+    @property
+    def tips(self) -> Array:
+        """Return the middles of the fingertips at the contacts, (contacts, 3) [m]."""
+        return places(self.hand, self.joints, self.palm_pose).tips[0, list(self.fingers)]
+
+    @property
+    def tip_radii(self) -> Array:
+        """Return the radii of these fingertips, (contacts,) [m]."""
+        return np.array([self.hand.fingers[finger].tip.radius for finger in self.fingers])
+
+    @property
+    def positions(self) -> Array:
+        """Return the places of the contacts, (contacts, 3) [m]."""
+        return np.array([contact.position for contact in self.contacts]).reshape(-1, 3)
+
+
+def posed_hand(hand: Hand, reach: HandReach, grasp: Grasp) -> PosedHand:
+    """Take the pose from what `reach_with` found.
+
+    Raises:
+        InputError: The result has no pose, or is about another hand or another grasp.
+    """
+    instance(hand, Hand, "hand", "load_hand makes one")
+    instance(reach, HandReach, "reach", "reach_with finds one")
+    if (reach.hand, reach.grasp) != (hand.name, grasp.id):
+        raise InputError(
+            f"reach must be about the hand {hand.name} and the grasp {grasp.id}, got "
+            f"{reach.hand} and {reach.grasp}"
+        )
+    joints, pose, used, contacts = reach.joints, reach.palm_pose, reach.fingers, reach.contacts
+    if joints is None or pose is None or used is None or contacts is None:
+        raise InputError(f"reach must hold a pose to draw, got none: {reach.explanation}")
+    return PosedHand(hand, joints, pose, tuple(used.tolist()), contacts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandParts:
+    """The rounded boxes of which a hand is made, in the object's frame."""
+
+    middles: Array
+    """Middles of the boxes, (n, 3) [m]."""
+    axes: Array
+    """Columns are the boxes' axes, (n, 3, 3)."""
+    half_sizes: Array
+    """Half the boxes' lengths along these axes, (n, 3) [m]."""
+    radii: Array
+    """Distances from the boxes to the surfaces, (n,) [m]."""
+    contacts: tuple[int | None, ...]
+    """The contact at which a part touches, for the parts that are fingertips."""
+
+
+def parts_of(held: PosedHand) -> HandParts:
+    """Place the parts of a hand; a fingertip is its ball, or the capsule that ends in the ball."""
+    arrays = hand_arrays(held.hand)
+    at = places(held.hand, held.joints, held.palm_pose)
+    R = np.concatenate([at.link_rotations[0], held.palm_pose[None, :3, :3]])  # the palm's is -1
+    p = np.concatenate([at.link_positions[0], held.palm_pose[None, :3, 3]])
+    tips = arrays.shape_tips.tolist()
+    first_ball = len(tips) - len(held.hand.fingers)
+    kept = np.array([n for n, tip in enumerate(tips) if n < first_ball or tips.count(tip) == 1])
+    links = arrays.shape_links[kept]
+    contact_of = {finger: contact for contact, finger in enumerate(held.fingers)}
+    return HandParts(
+        p[links] + np.einsum("nij,nj->ni", R[links], arrays.shape_positions[kept]),
+        R[links] @ arrays.shape_rotations[kept],
+        arrays.shape_sizes[kept],
+        arrays.shape_radii[kept],
+        tuple(contact_of.get(tips[n]) for n in kept.tolist()),
+    )
+
+
+def hand_shapes(held: PosedHand) -> tuple[Shape, ...]:
+    """Return the shapes of a hand in the object's frame, fingertips in the colours of contacts."""
+    parts, shapes = parts_of(held), list[Shape]()
+    least = LEAST * max(finger.tip.radius for finger in held.hand.fingers)
+    for n, contact in enumerate(parts.contacts):
+        role: Role = "hand" if contact is None else "fingertip"
+        for sides in _pieces(parts.half_sizes[n], float(parts.radii[n]), least):
+            placed = tuple(parts.middles[n] + side @ parts.axes[n].T for side in sides)
+            shapes.append(Shape(role, contact, polygons=placed))
+    return tuple(shapes)
+
+
+def _pieces(half: Array, radius: float, least: float) -> Iterator[tuple[Array, ...]]:
+    """Yield the sides of a rounded box, cut into pieces about as long as the box is thick.
+
+    Args:
+        half: Half-sizes of the box, (3,) [m].
+        radius: Distance from the box to the surface [m].
+        least: Least length of a piece [m].
+    """
+    lengths = 2.0 * (half + radius)
+    piece = max(LONG * float(lengths.min()), least)
+    counts = np.clip(np.rint(lengths / piece), 1, MOST_PIECES).astype(int)
+    counts[half == 0.0] = 1
+    steps = 2.0 * half / counts
+    for place in product(*map(range, counts.tolist())):
+        at = np.array(place)
+        outer = np.array([at == 0, at == counts - 1])
+        spare = OVERLAP * steps * ~outer
+        yield rounded_box(
+            -half + steps * at - spare[0], -half + steps * (at + 1) + spare[1], radius, outer
+        )
+
+
+def numbers_behind(held: PosedHand) -> Array:
+    """Return where the numbers of the fingers are written, behind the tips, (contacts, 3) [m]."""
+    places = held.positions
+    ways = (held.tips - places) / held.tip_radii[:, None]
+    return places + NUMBER_BEYOND * held.tip_radii[:, None] * ways
