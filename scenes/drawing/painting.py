@@ -143,9 +143,11 @@ def _cone(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
         yield Patch((part,), float(near.mean()), colour_of(shape), look.fill)
 
 
+SOLIDS: tuple[Role, ...] = ("finger", "hand", "fingertip")
+"""Roles whose shapes are convex bodies that nothing shines through."""
 FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Patch]]] = {
-    "object": _glass, "finger": _solid, "hand": _solid, "fingertip": _solid, "force cone": _cone,
-}  # fmt: skip
+    "object": _glass, "force cone": _cone, **dict.fromkeys(SOLIDS, _solid),
+}
 """How the polygons of some roles are drawn; those of the others are drawn one by one."""
 
 

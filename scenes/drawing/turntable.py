@@ -17,13 +17,18 @@ from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import path_of
 from grasp_core.files.whole_files import write_parts
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
-from scenes.drawing.drawings import drawing_of, glass
+from scenes.drawing.drawings import drawing_of, drawing_with_hand, glass
+from scenes.drawing.hands.hand_views import view_of_hand
+from scenes.drawing.hands.posed_hands import PosedHand, numbers_behind
 from scenes.drawing.pages import filled, number, text_of
+from scenes.drawing.painting import SOLIDS
 from scenes.drawing.palette import LOOKS, colour_of
-from scenes.drawing.pictures import check_drawn, number_places
-from scenes.drawing.shapes import Shape
+from scenes.drawing.pictures import check_drawn, held_by, number_places
+from scenes.drawing.shapes import Role, Shape
 from scenes.drawing.views import best_view
 
 UNITS = 1000.0
@@ -61,8 +66,11 @@ class Turntable(ByValue):
         )
 
 
-def show(body: Polyhedron, grasp: Grasp, friction: float = 0.5) -> Turntable:
-    """Draw a grasp on its object so that it can be turned with the mouse.
+def show(
+    body: Polyhedron, grasp: Grasp, friction: float = 0.5, *, hand: Hand | None = None,
+    reach: HandReach | None = None,
+) -> Turntable:  # fmt: skip
+    """Draw a grasp on its object, or with a hand, so that it can be turned with the mouse.
 
     A notebook shows the drawing at the end of a cell; elsewhere `show(...).write("grasp.html")`
     writes it as a page.
@@ -71,12 +79,16 @@ def show(body: Polyhedron, grasp: Grasp, friction: float = 0.5) -> Turntable:
         body: The object.
         grasp: A grasp on the faces of `body`.
         friction: Coulomb coefficient of the friction cones.
+        hand: A hand to draw in place of straight fingers, with `reach`.
+        reach: The pose in which it stands in the grasp, as `gc.reach_with` finds it.
 
     Raises:
-        InputError: The grasp does not lie on the body, or the friction is out of range.
+        InputError: The grasp does not lie on the body, the friction is out of range, or `reach`
+            holds no pose of this hand in this grasp.
     """
     check_drawn(body, grasp, friction, None)
-    return Turntable(body.name, grasp.id, turntable_page(body, grasp, friction))
+    held = held_by(hand, reach, grasp)
+    return Turntable(body.name, grasp.id, turntable_page(body, grasp, friction, held))
 
 
 def object_data(body: Polyhedron) -> list[dict[str, Any]]:
@@ -84,17 +96,38 @@ def object_data(body: Polyhedron) -> list[dict[str, Any]]:
     return _data(glass(body), body)
 
 
-def grasp_data(body: Polyhedron, grasp: Grasp, friction: float) -> dict[str, Any]:
-    """Return the drawing of a grasp without the object, and the view in which it is first seen."""
-    beyond = drawing_of(body, grasp, friction)[len(glass(body)) :]
+def grasp_data(
+    body: Polyhedron, grasp: Grasp, friction: float, held: PosedHand | None = None
+) -> dict[str, Any]:
+    """Return the drawing of a grasp without the object, and the view in which it is first seen.
+
+    With a hand, the reader first sees what the picture with the hand shows, and can have the bars
+    and lines of the paper's picture shown, too.
+    """
+    plain = len(glass(body))
+    planned = drawing_of(body, grasp, friction)[plain:]
+    if held is None:
+        view, numbers = best_view(body, grasp), number_places(body, grasp)
+        shapes, hidden = planned, set[Role]()
+    else:
+        view, numbers = view_of_hand(body, held), numbers_behind(held)
+        shown = drawing_with_hand(body, grasp, friction, held)[plain:]
+        seen = {shape.role for shape in shown}
+        more = [shape for shape in planned if shape.role not in seen]
+        shapes, hidden = (*shown, *more), {shape.role for shape in more}
     return {
-        "shapes": _data(beyond, body),
-        "numbers": _whole(number_places(body, grasp), body),
-        "axes": np.round(best_view(body, grasp).axes, 4).tolist(),
+        "shapes": _data(shapes, body),
+        "numbers": _whole(numbers, body),
+        "axes": np.round(view.axes, 4).tolist(),
+        "middle": _whole(view.center, body),
+        "distance": round(UNITS * view.distance / body.radius),
+        "hidden": sorted(hidden),
     }
 
 
-def turntable_page(body: Polyhedron, grasp: Grasp, friction: float) -> str:
+def turntable_page(
+    body: Polyhedron, grasp: Grasp, friction: float, held: PosedHand | None = None
+) -> str:
     """Write a page that needs no other file and on which a reader can rotate a grasp."""
     return filled(
         "turntable.html",
@@ -102,12 +135,18 @@ def turntable_page(body: Polyhedron, grasp: Grasp, friction: float) -> str:
         object=body.name,
         family=grasp.family,
         friction=friction,
-        facts=_facts(body, grasp),
+        facts=[*_facts(body, grasp), *([] if held is None else [_in_hand(held)])],
         style=text_of("style.css"),
         script=text_of("turntable.js"),
         object_drawing=as_text(object_data(body)),
-        drawing=as_text(grasp_data(body, grasp, friction)),
+        drawing=as_text(grasp_data(body, grasp, friction, held)),
     )
+
+
+def _in_hand(held: PosedHand) -> tuple[str, str, str]:
+    """Say which fingers of a hand are at the contacts."""
+    names = ", ".join(held.finger_names)
+    return (f"fingers of {held.hand.name}", names, "that touch, by finger of the grasp")
 
 
 def _facts(body: Polyhedron, grasp: Grasp) -> list[tuple[str, str, str]]:
@@ -155,11 +194,13 @@ def _shape(shape: Shape, body: Polyhedron) -> dict[str, Any]:
         "opacity": look.opacity,
         "shaded": look.shaded,
         "dashed": look.dashed,
+        "solid": shape.role in SOLIDS,
         "polygons": [_whole(polygon, body) for polygon in shape.polygons] if look.fill else [],
         "lines": [_whole(line, body) for line in shape.lines] if look.line else [],
         "points": _whole(points, body),
     }
 
 
-def _whole(points: Array, body: Polyhedron) -> list[list[int]]:
+def _whole(points: Array, body: Polyhedron) -> Any:
+    """Write points in units of the drawing, as lists of any depth."""
     return np.rint(UNITS / body.radius * (points - body.center_of_mass)).astype(int).tolist()

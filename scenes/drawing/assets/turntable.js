@@ -3,7 +3,6 @@
 // with a depth of their own, and the farthest are drawn first; smooth edges are drawn where they
 // are the outline of the object.
 (() => {
-  const DISTANCE = 9000; // of the camera; lengths are thousandths of the object's radius
   const LIGHT = [-0.398, 0.697, 0.597];
   const DARKEST = 0.55;
   const PIECE = 180, DASH = 70; // of lines
@@ -12,10 +11,11 @@
   const read = (id) => JSON.parse(document.getElementById(id).textContent);
   const drawing = read("drawing");
   const shapes = [...(window.graspproofObject || read("object")), ...drawing.shapes];
+  const DISTANCE = drawing.distance; // of the camera; lengths are thousandths of the object's radius
   let axes = drawing.axes;
   const SMOOTH = Math.cos(20 * Math.PI / 180); // up to this angle edges are not drawn, but outlines
   const LABEL = 11; // radius of a number's circle, in pixels
-  const off = new Set();
+  const off = new Set(drawing.hidden);
 
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -24,9 +24,17 @@
   const mixed = (a, b, share) => a.map((value, i) => value + share * (b[i] - value));
 
   const hypot = (point) => Math.hypot(...point);
+  // All turns about the middle of what is drawn: the object's, or that of the object in a hand.
+  const centred = (points) => points.map((point) => minus(point, drawing.middle));
+  for (const shape of shapes) {
+    shape.polygons = shape.polygons.map(centred);
+    shape.lines = shape.lines.map(centred);
+    shape.points = centred(shape.points);
+  }
+  drawing.numbers = centred(drawing.numbers);
   let farthest = 1; // what a view must hold, from whichever side
   for (const shape of shapes) {
-    if (shape.role !== "finger" && shape.role !== "object") continue;
+    if ((!shape.solid && shape.role !== "object") || off.has(shape.role)) continue;
     for (const polygon of shape.polygons) {
       for (const point of polygon) farthest = Math.max(farthest, hypot(point));
     }
@@ -43,7 +51,7 @@
       const length = hypot(normal) || 1;
       return normal.map((part) => part / length);
     });
-    if (shape.role === "finger") shape.normals = outwards(shape);
+    if (shape.solid) shape.normals = outwards(shape);
     shape.folds = shape.role === "object" ? folds(shape) : [];
   }
 
@@ -122,7 +130,7 @@
       yield { near, flat: shape.polygons.map((polygon) => seen(polygon[1])), colour };
       return;
     }
-    const solid = shape.role === "finger"; // its outline covers the seams between its sides
+    const solid = shape.solid; // its outline covers the seams between its sides
     const all = solid ? shape.polygons.flat().map(seen) : [];
     if (solid) yield { near: mean(all), flat: hull(all), colour: tinted(shape, shape.normals[0], 1) };
     for (let place = 0; place < shape.polygons.length; place++) {
@@ -281,7 +289,7 @@
   const choices = document.querySelector(".stage .shown");
   for (const role of new Set(shapes.map((shape) => shape.role))) {
     if (role === "contact" || role === "edge") continue;
-    const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: true });
+    const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: !off.has(role) });
     box.addEventListener("change", () => {
       if (box.checked) off.delete(role); else off.add(role);
       draw();

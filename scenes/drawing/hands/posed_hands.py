@@ -68,6 +68,11 @@ class PosedHand:
         return places(self.hand, self.joints, self.palm_pose).tips[0, list(self.fingers)]
 
     @property
+    def finger_names(self) -> tuple[str, ...]:
+        """Return the name of the hand's finger at each contact."""
+        return tuple(self.hand.fingers[finger].name for finger in self.fingers)
+
+    @property
     def tip_radii(self) -> Array:
         """Return the radii of these fingertips, (contacts,) [m]."""
         return np.array([self.hand.fingers[finger].tip.radius for finger in self.fingers])
