@@ -34,6 +34,9 @@ class View:
     clip: Annotated[Path, ends_in(*CLIPS)] | None = None
     """Write a clip (webp, gif) of the fingers closing, rendered by MuJoCo; without graphics the
     clip shows the picture turning."""
+    hand: bool = True
+    """Show the hand of the reaches.json beside the grasps, where it reaches the grasp, in the
+    picture and on the page."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 

@@ -4,6 +4,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,9 @@ from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, has_display, write_clip
-from scenes.drawing.pictures import write_picture
+from scenes.drawing.canvas import write_sheet
+from scenes.drawing.hands.posed_hands import PosedHand
+from scenes.drawing.pictures import grasp_sheet
 from scenes.drawing.turning_clips import write_turning_clip
 from scenes.drawing.turntable import turntable_page
 from scenes.fingertips import FingerSettings
@@ -23,7 +26,8 @@ from sim_validate.cli import showing_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.records.grasps import grasp_with_id, read_grasps
-from sim_validate.reports.run_folder import GRASPS
+from sim_validate.reports.reached_grasps import held_in, why_not_held
+from sim_validate.reports.run_folder import GRASPS, reaches_beside
 from sim_validate.simulation.setup import with_planned_radius
 
 COMING, RESTING = 60, 20
@@ -49,7 +53,12 @@ def view_grasp(command: showing_flags.View, reporter: Reporter) -> int:
         _in_viewer(_scene(saved, grasp, friction), grasp, reporter)
         reporter.document({"id": grasp.id, "files": []})
         return Exit.GOOD
-    files = [str(path) for path in _written(command, saved, grasp, friction, reporter)]
+    reaches = reaches_beside(path, saved) if command.hand else None
+    held = held_in(reaches, grasp)
+    if reaches is not None and held is None:
+        reporter.warn(f"the hand is not shown: {why_not_held(reaches, grasp)}")
+    shown = _Shown(saved, grasp, friction, held)
+    files = [str(path) for path in _written(command, shown, reporter)]
     reporter.document({"id": grasp.id, "files": files})
     return Exit.GOOD
 
@@ -82,16 +91,28 @@ def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
         )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shown:
+    """What is written to files."""
+
+    saved: SavedGrasps
+    grasp: Grasp
+    friction: float
+    held: PosedHand | None
+    """The hand in the grasp, for pictures and pages."""
+
+
 def _written(
-    command: showing_flags.View, saved: SavedGrasps, grasp: Grasp, friction: float,
-    reporter: Reporter,
+    command: showing_flags.View, shown: _Shown, reporter: Reporter
 ) -> Iterator[Path]:  # fmt: skip
+    saved, grasp, friction = shown.saved, shown.grasp, shown.friction
     body = saved.body
     if command.picture is not None:
-        yield write_picture(body, grasp, command.picture, friction)
+        sheet = grasp_sheet(body, grasp, friction, legend=True, held=shown.held)
+        yield write_sheet(sheet, command.picture)
         reporter.say(f"wrote {command.picture}")
     if command.page is not None:
-        yield write_text(command.page, turntable_page(body, grasp, friction))
+        yield write_text(command.page, turntable_page(body, grasp, friction, shown.held))
         reporter.say(f"wrote {command.page}")
     if command.clip is not None:
         try:

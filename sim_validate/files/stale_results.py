@@ -51,7 +51,8 @@ def remove_executions(folder: Path) -> None:
 
 
 def remove_reaches(folder: Path) -> None:
-    """Remove the poses of a hand in grasps."""
+    """Remove the poses of a hand in grasps, and pages that show them."""
+    remove_report(folder / REPORT)
     _remove([folder / "reaches.json"])
 
 

@@ -5,11 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.files.json_text import text_of
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
+from grasp_core.values import Grasp
+from sim_validate.records.hands.hand_model import model_record
 from sim_validate.records.reaches_schema import (
     AskedRecord,
     PoseRecord,
@@ -29,7 +32,7 @@ SCHEMA = 1
 
 def reaches_to_json(
     hand: Hand, body: Polyhedron, friction: float, asked: AskedRecord, found: Sequence[HandReach],
-    *, complete: bool,
+    *, complete: bool, grasps: Sequence[Grasp],
 ) -> str:  # fmt: skip
     """Write the text of `reaches.json`; equal results give equal texts.
 
@@ -40,7 +43,9 @@ def reaches_to_json(
         asked: What was asked for.
         found: The results, one per grasp.
         complete: Whether every grasp that was asked for was looked at.
+        grasps: The grasps that were asked for.
     """
+    planned = {grasp.id: contacts_sha256(grasp.contacts) for grasp in grasps}
     document: ReachesFile = {
         "schema": SCHEMA,
         "object": object_record(body),
@@ -51,10 +56,11 @@ def reaches_to_json(
             "fingers": [finger.name for finger in hand.fingers],
             "sources": list(hand.sources),
             "torque_source": hand.torque_source,
+            "model": model_record(hand),
         },
         "asked": asked,
         "summary": reaches_summary(found, complete=complete),
-        "reaches": [_record(hand, each) for each in found],
+        "reaches": [_record(hand, each, planned[each.grasp]) for each in found],
         "versions": versions(),
     }
     return text_of({**document})
@@ -73,9 +79,10 @@ def reaches_summary(found: Sequence[HandReach], *, complete: bool) -> ReachesSum
     }
 
 
-def _record(hand: Hand, found: HandReach) -> ReachRecord:
+def _record(hand: Hand, found: HandReach, planned: str) -> ReachRecord:
     return {
         "id": found.grasp,
+        "contacts_sha256": planned,
         "reached": found.reached,
         "reason": found.reason,
         "explanation": found.explanation,

@@ -1,12 +1,13 @@
 """The fields of `reaches.json` with their types, for its writer and for whoever reads it."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NotRequired
 
 from pydantic import ConfigDict, Field, with_config
 from typing_extensions import TypedDict
 
 from grasp_core.hands.reach import ReachReason
 from grasp_core.values import FINGERS
+from sim_validate.records.hands.hand_model import ModelRecord
 from sim_validate.records.verdicts_schema import Count, Finite, ObjectRecord, Positive
 
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -22,6 +23,8 @@ class HandRecord(TypedDict):
     fingers: list[str]
     sources: list[str]
     torque_source: str
+    model: NotRequired[ModelRecord]
+    """Absent in files of versions that did not draw hands."""
 
 
 class ReachedContactRecord(TypedDict):
@@ -50,6 +53,8 @@ class ReachRecord(TypedDict):
     """Fields about one grasp."""
 
     id: str
+    contacts_sha256: NotRequired[str]
+    """Hash of the planned contacts; absent in files of versions that did not draw hands."""
     reached: bool
     reason: ReachReason
     explanation: str

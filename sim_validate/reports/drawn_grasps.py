@@ -18,6 +18,7 @@ from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import ContactRegion, Grasp, four
 from scenes.drawing.clips import GraphicsError, magnified, write_clip
 from scenes.drawing.flat.svg import svg_of
+from scenes.drawing.hands.posed_hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
 from scenes.drawing.views import best_view
 from scenes.fingertips import FingerSettings
@@ -31,6 +32,7 @@ from sim_validate.replaying.replay import Replayed, replayed
 from sim_validate.reports.agreement import Record
 from sim_validate.reports.margin_charts import margin_panels
 from sim_validate.reports.motion_charts import motion_panels
+from sim_validate.reports.reached_grasps import held_in
 from sim_validate.reports.run_folder import RunFolder
 from sim_validate.reports.wrench_charts import wrench_panels
 
@@ -47,6 +49,8 @@ class Task:
     """Record of the grasp's certified regions, if it has any."""
     executions: Executions | None
     """The execution of this grasp alone, if it was executed."""
+    held: PosedHand | None
+    """The hand in the grasp; None if there is none, or it does not reach the grasp."""
     source: Path
     """Path of the file with the verdict, which error messages name."""
     folder: Path
@@ -77,6 +81,8 @@ class Drawn:
     """A grasp's charts as SVG text, and paths of its pictures relative to the report's folder."""
 
     picture: str
+    hand: str = ""
+    """Path of the picture with the hand in the grasp; empty if there is none."""
     wrenches: tuple[str, ...] = ()
     """Panels of the chart of wrenches; none if the contacts are not in force closure at this
     friction."""
@@ -105,6 +111,7 @@ def tasks_of(
             verdict=run.verdicts.get(grasp.id),
             regions=run.shaded.get(grasp.id),
             executions=_own(run, grasp),
+            held=held_in(run.reaches, grasp),
             source=run.verdicts_path,
             folder=folder,
             name=f"{prefix}{grasp.id}",
@@ -143,7 +150,7 @@ def draw(task: Task) -> Drawn:
     view = best_view(body, grasp)
     path = task.folder / PICTURES / f"{task.name}.svg"
     write_text(path, svg_of(grasp_sheet(body, grasp, task.friction, view=view), alone=True))
-    drawn = Drawn(f"{PICTURES}/{path.name}")
+    drawn = _with_hand(task, Drawn(f"{PICTURES}/{path.name}"))
     if force_closure(grasp, friction=task.friction).closed:
         largest = largest_push(task.verdict)
         wrenches = wrench_panels(body, grasp, task.friction, view=view)
@@ -154,6 +161,16 @@ def draw(task: Task) -> Drawn:
     if task.verdict is not None:
         drawn = _with_motion(task, task.verdict, drawn)
     return _with_executed(task, task.executions, drawn) if task.clip and task.executions else drawn
+
+
+def _with_hand(task: Task, drawn: Drawn) -> Drawn:
+    """Draw the hand in the grasp, if there is one."""
+    if task.held is None:
+        return drawn
+    path = task.folder / PICTURES / f"{task.name}-hand.svg"
+    sheet = grasp_sheet(task.saved.body, task.grasp, task.friction, held=task.held)
+    write_text(path, svg_of(sheet, alone=True))
+    return replace(drawn, hand=f"{PICTURES}/{path.name}")
 
 
 def _with_motion(task: Task, verdict: Record, drawn: Drawn) -> Drawn:

@@ -28,6 +28,7 @@ from sim_validate.reports.executed_grasps import (
     said_of_both,
 )
 from sim_validate.reports.pages import page
+from sim_validate.reports.reached_grasps import held_in, reach_commands, reach_section
 from sim_validate.reports.run_folder import GRASPS, RunFolder
 
 MILLI, MICRO = 1e3, 1e6
@@ -119,6 +120,7 @@ def grasp_page(
         drawn=drawn,
         push=largest_push(verdict),
         executed=execution_section(run.executions, run.executed(grasp.id)),
+        reached=reach_section(run.reaches, grasp),
         executed_clips=drawn.executed if drawn else (),
         object_script=object_script,
         facts=list(_facts(run, grasp, verdict)),
@@ -127,7 +129,9 @@ def grasp_page(
         trials=[] if verdict is None else [_trial(verdict, each) for each in verdict["wrenches"]],
         controls=[] if verdict is None else _controls(verdict["controls"]),
         commands=[*_commands(run, grasp, verdict), *([DRAW_ALL] if kin.first else [])],
-        drawing=as_text(grasp_data(run.saved.body, shown, run.friction)),
+        drawing=as_text(
+            grasp_data(run.saved.body, shown, run.friction, held_in(run.reaches, grasp))
+        ),
     )
 
 
@@ -246,6 +250,7 @@ def _commands(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[
             yield f"graspproof replay . {asked} --control {shlex.quote(name)} --out replay"
     if run.executions is not None and run.executed(grasp.id) is not None:
         yield execute_command(run.executions, GRASPS, grasp.id)
+    yield from reach_commands(run.reaches, grasp, GRASPS)
 
 
 def millimetres(point: Array) -> str:

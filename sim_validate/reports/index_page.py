@@ -27,6 +27,11 @@ from sim_validate.reports.executed_grasps import (
 from sim_validate.reports.fidelity_charts import fidelity_panels
 from sim_validate.reports.grasp_page import MILLI, MIRRORED, Copy
 from sim_validate.reports.pages import page
+from sim_validate.reports.reached_grasps import (
+    described_reaches,
+    reach_settings,
+    said_of_reach,
+)
 from sim_validate.reports.run_folder import RunFolder
 from sim_validate.reports.survival_charts import survival_sentence, survival_sheet
 
@@ -63,7 +68,8 @@ def cards_of(run: RunFolder, *, every_copy: bool) -> tuple[Copies, ...]:
         found = run.executed(grasp.id)
         said = said_of_both(run.verdicts.get(grasp.id), run.executions, found)
         executed = execution_row(found)["said"] if run.executions else None
-        ended.setdefault((said, executed), []).append(place)
+        reached = said_of_reach(run.reaches, grasp)[0]
+        ended.setdefault((said, executed, reached), []).append(place)
     cards = list[Copies]()
     for places in ended.values():
         for card in copies_of(run.saved.body, [grasps[place] for place in places]):
@@ -91,6 +97,7 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         runs=[_described(run) for run in runs],
         cards=cards,
         waiting=waiting,
+        hands=any(run.reaches is not None for run in runs),
         choices={
             name: sorted({str(card[name]) for card in cards})
             for name in ("object", "family", "verdict")
@@ -151,6 +158,7 @@ def _card(shown: Shown) -> dict[str, Any]:
         "quality": grasp.ferrari_canny[0],
         "critical_friction": grasp.critical_friction,
         "executed": execution_row(executed) if shown.run.executions else None,
+        "reached": said_of_reach(shown.run.reaches, grasp) if shown.run.reaches else None,
         "weakest": None if verdict is None else _weakest(verdict),
     }
 
@@ -176,6 +184,7 @@ def _described(run: RunFolder) -> dict[str, Any]:
         )
         said += "" if run.summary.get("complete", True) else "; the run was interrupted"
     said += "."
+    said += f" {described_reaches(run.reaches)}" if run.reaches else ""
     if run.left_out:
         said += (
             f" {len(run.saved.grasps)} are shown, those with problems among them; "
@@ -207,6 +216,8 @@ def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
             yield table, str(values)
     if run.executions is not None:
         yield from execution_settings(run.executions)
+    if run.reaches is not None:
+        yield from reach_settings(run.reaches)
     for name, version in (versions() if first is None else first["versions"]).items():
         yield f"version of {name}", str(version)
 

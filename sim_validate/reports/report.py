@@ -220,4 +220,4 @@ def _pages_of(card: _Card, drawn: Drawn, out: Path, around: Neighbours) -> Shown
         kin = Kin(first=Copy(first.id, card.page, copy.kind))
         text = grasp_page(card.run, grasps[copy.id], None, card.script, Neighbours(), kin)
         write_text(out / copy.page, text)
-    return Shown(card.run, first, card.page, drawn.picture, card.copies)
+    return Shown(card.run, first, card.page, drawn.hand or drawn.picture, card.copies)

@@ -1,4 +1,4 @@
-"""Reads the folder of a run: its grasps, verdicts, executions and regions."""
+"""Reads the folder of a run: its grasps, verdicts, executions, regions, and a hand's poses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,6 +12,8 @@ from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.records.executions_json import EXECUTIONS, Executions, load_executions
 from sim_validate.records.grasps import read_grasps
+from sim_validate.records.hands.saved_reaches import SavedReaches, read_reaches
+from sim_validate.records.reaches_json import REACHES
 from sim_validate.records.regions import REGIONS
 from sim_validate.records.regions import SCHEMA as REGIONS_SCHEMA
 from sim_validate.records.regions_schema import RegionsFile
@@ -26,7 +28,7 @@ SCHEMAS = {VERDICTS: VERDICTS_SCHEMA, REGIONS: REGIONS_SCHEMA}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunFolder:
-    """What `plan`, `validate`, `execute` and `regions` have written into one folder."""
+    """What `plan`, `validate`, `execute`, `regions` and `reach` have written into one folder."""
 
     path: Path
     saved: SavedGrasps
@@ -42,6 +44,8 @@ class RunFolder:
     """Friction for which the regions are certified; None if there are none."""
     executions: Executions | None
     """Grasps as a robot executes them; None if the file does not exist."""
+    reaches: SavedReaches | None = None
+    """Where a hand stands in the grasps; None if the file does not exist."""
     left_out: int = 0
     """Number of grasps in the files that `saved` leaves out."""
 
@@ -123,7 +127,35 @@ def _run(path: Path) -> RunFolder:
         regions=_by_id(path / REGIONS, regions, saved),
         regions_friction=None if certified is None else certified["friction"],
         executions=_executions(path / EXECUTIONS, saved),
+        reaches=reaches_beside(path / GRASPS, saved),
     )
+
+
+def reaches_beside(grasps: Path, saved: SavedGrasps) -> SavedReaches | None:
+    """Read where a hand stands in grasps from the folder of their file.
+
+    Args:
+        grasps: The file with the grasps.
+        saved: What it holds.
+
+    Returns:
+        None if the folder has no reaches.json.
+
+    Raises:
+        InputError: The file is invalid, or about another object or other grasps.
+    """
+    path = grasps.with_name(REACHES)
+    if not path.is_file():
+        return None
+    found, record = read_reaches(path)
+    _check_object(path, record["object"]["content_sha256"], saved)
+    own = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
+    listed = [
+        (each["id"], each.get("contacts_sha256", own.get(each["id"], "")))
+        for each in record["reaches"]
+    ]  # fmt: skip
+    _check_contacts(path, listed, saved)
+    return found
 
 
 def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping[str, Record]:

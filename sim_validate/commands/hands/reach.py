@@ -1,5 +1,6 @@
 """Runs the command `reach`, which looks for poses in which a hand stands in grasps."""
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -18,6 +19,7 @@ from sim_validate.parallel.reaching import ReachJob, reached
 from sim_validate.records.grasps import grasp_with_id
 from sim_validate.records.reaches_json import REACHES, reaches_summary, reaches_to_json
 from sim_validate.records.reaches_schema import AskedRecord
+from sim_validate.reports.run_folder import GRASPS
 
 ABSENT = "-"
 
@@ -36,6 +38,7 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
         found, text = _reach(command, hand, chosen, reporter)
     reporter.text(text)
     _show(hand, found, reporter)
+    _say_where_to_look(command, reporter)
     return Exit.GOOD if all(each.reached for each in found) else Exit.NEGATIVE
 
 
@@ -68,7 +71,9 @@ def _reach(
                 steps.update(len(found), len(jobs), f"({good} reached)")
     finally:
         complete = len(found) == len(jobs)
-        text = reaches_to_json(hand, saved.body, saved.friction, asked, found, complete=complete)
+        text = reaches_to_json(
+            hand, saved.body, saved.friction, asked, found, complete=complete, grasps=saved.grasps
+        )
         if command.out is not None and found:
             path = write_text(command.out / REACHES, text)
             reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
@@ -89,6 +94,18 @@ def _show(hand: Hand, found: Sequence[HandReach], reporter: Reporter) -> None:
     for each in shown:
         if not each.reached:
             reporter.warn(f"{each.grasp}: {each.reason}: {each.explanation}")
+
+
+def _say_where_to_look(command: hand_flags.Reach, reporter: Reporter) -> None:
+    """Say which command draws the hand in the grasps, where their file is beside the poses."""
+    out, grasps = command.out, command.grasps
+    file = grasps / GRASPS if grasps.is_dir() else grasps
+    if out is None or not (out / GRASPS).is_file() or not file.samefile(out / GRASPS):
+        reporter.say(
+            f"give the folder of {GRASPS} as --out to have the hand drawn by `graspproof report`"
+        )
+        return
+    reporter.say(f"see the hand in the grasps: graspproof report {shlex.quote(str(out))}")
 
 
 def _row(hand: Hand, each: HandReach) -> tuple[str, ...]:

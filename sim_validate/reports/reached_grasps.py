@@ -1,0 +1,147 @@
+"""Says where a hand stands in grasps, or why not, on cards and on the pages about grasps."""
+
+import shlex
+from collections.abc import Iterable, Sequence
+
+from grasp_core.hands.named_hands import HANDS
+from grasp_core.hands.reach import HandReach
+from grasp_core.short_text import counted
+from grasp_core.values import Grasp
+from scenes.drawing.hands.posed_hands import PosedHand, posed_hand
+from scenes.drawing.pages import number
+from sim_validate.records.hands.saved_reaches import SavedReaches
+from sim_validate.reports.agreement import GOOD, QUIET, Record
+
+MILLI = 1e3
+STARTS, SEED, CLEARANCE_M = 100, 0, 5e-4
+"""Values that `graspproof reach` takes where nothing else is asked for."""
+REASONS = {"collision": "a collision", "limit": "a joint's limit", "not found": "no pose found"}
+"""Words for what was in the way."""
+CLEARANCE = "least distance asked for between all that must not touch: links, palm, object, table"
+FINGERS = "that touch at the grasp's contacts, by finger of the grasp"
+WITHIN = "where the fingertips touch; force closure is proved again with these contacts"
+OPENING = "joint angles at which the fingers are 3 to 15 mm open, with the palm where it is"
+WAY = "over 60 mm, with open fingers and nothing in the way"
+
+
+def held_in(reaches: SavedReaches | None, grasp: Grasp) -> PosedHand | None:
+    """Return the hand in the pose in which it stands in a grasp.
+
+    Returns:
+        None where no hand was asked for, it does not reach the grasp, or it cannot be drawn.
+    """
+    reach = reach_of(reaches, grasp)
+    if reaches is None or reaches.hand is None or reach is None or not reach.reached:
+        return None
+    return posed_hand(reaches.hand, reach, grasp)
+
+
+def reach_of(reaches: SavedReaches | None, grasp: Grasp) -> HandReach | None:
+    """Return what was found for a grasp; None where no hand was asked for."""
+    return None if reaches is None else reaches.found.get(grasp.id)
+
+
+def why_not_held(reaches: SavedReaches, grasp: Grasp) -> str:
+    """Say why there is no hand to draw in a grasp."""
+    found = reach_of(reaches, grasp)
+    if found is None:
+        return f"reaches.json holds nothing about {grasp.id}; `graspproof reach` looks for a pose"
+    return reaches.missing if found.reached else f"{grasp.id}: {found.explanation}"
+
+
+def said_of_reach(reaches: SavedReaches | None, grasp: Grasp) -> tuple[str, str]:
+    """Say in words whether the hand reaches a grasp, with the tone; nothing without a hand."""
+    if reaches is None:
+        return "", QUIET
+    found, name = reach_of(reaches, grasp), reaches.hand_name
+    if found is None:
+        return f"{name}: not asked", QUIET
+    if not found.reached:
+        return f"{name}: not reached, {REASONS[found.reason]}", QUIET
+    return f"{name}: reached, {_where(found)}", GOOD
+
+
+def _where(found: HandReach) -> str:
+    """Say how many contacts are in regions, of those that are reached."""
+    within = found.within_regions or ()
+    inside = sum(within)
+    if inside == len(within):
+        return "within regions"
+    return f"{inside} of {len(within)} contacts within regions"
+
+
+def described_reaches(reaches: SavedReaches | None) -> str:
+    """Say in one sentence how many grasps a hand reaches, and whether it can be drawn."""
+    if reaches is None:
+        return ""
+    asked = counted(len(reaches.found), "grasp")
+    said = f"The hand {reaches.hand_name} reaches {reaches.reached} of {asked}"
+    said += "." if reaches.complete else "; the search was interrupted."
+    return f"{said} {reaches.missing}".strip()
+
+
+def reach_settings(reaches: SavedReaches) -> Iterable[tuple[str, str]]:
+    """Yield names and values of everything that was asked for."""
+    yield "hand.name", reaches.hand_name
+    yield "hand.friction", f"{reaches.friction:g}"
+    yield from ((f"hand.{name}", str(value)) for name, value in reaches.asked.items())
+
+
+def reach_section(reaches: SavedReaches | None, grasp: Grasp) -> Record | None:
+    """Build the section about the hand in a grasp; None where no hand was asked for."""
+    found = reach_of(reaches, grasp)
+    if reaches is None or found is None:
+        return None
+    said, tone = said_of_reach(reaches, grasp)
+    return {
+        "hand": reaches.hand_name,
+        "said": said.partition(": ")[2],
+        "tone": tone,
+        "facts": list(_facts(reaches, found)),
+        "explanation": found.explanation,
+        "missing": reaches.missing if found.reached else "",
+    }
+
+
+def _facts(reaches: SavedReaches, found: HandReach) -> Iterable[tuple[str, str, str]]:
+    """Yield name, value and meaning of what is known about the hand in a grasp."""
+    if found.reached:
+        names = ", ".join(f"{k}: {name}" for k, name in enumerate(reaches.finger_names(found)))
+        yield "Fingers used", names, FINGERS
+        within = found.within_regions or ()
+        yield "Contacts within regions", f"{sum(within)} of {len(within)}", WITHIN
+        margin = number(reaches.margins[found.grasp])
+        yield "Margin of closure there", margin, f"at friction {number(reaches.friction)}"
+    yield "Least clearance", f"{number(MILLI * found.clearance_m)} mm", CLEARANCE
+    if found.reached:
+        yield "Fingers open", _found(found.pregrasp), OPENING
+        yield "Straight way in", _found(found.approach), WAY
+    yield "Starts tried", str(found.starts), "postures from which a pose was sought"
+
+
+def _found(value: object) -> str:
+    return "none found" if value is None else "found"
+
+
+def reach_commands(reaches: SavedReaches | None, grasp: Grasp, path: str) -> Sequence[str]:
+    """Write the shell command that seeks the pose again; none for a hand from a file.
+
+    Args:
+        reaches: What was asked for.
+        grasp: The grasp.
+        path: Path of the file with the grasp.
+    """
+    if reaches is None or reaches.hand_name not in HANDS or grasp.id not in reaches.found:
+        return []
+    asked = reaches.asked
+    words = ["graspproof", "reach", path, "--hand", reaches.hand_name, "--grasp", grasp.id]
+    words += ["--friction", repr(reaches.friction)]
+    for flag, value, usual in (
+        ("--starts", asked["starts"], STARTS), ("--seed", asked["seed"], SEED),
+        ("--clearance-m", asked["clearance_m"], CLEARANCE_M),
+    ):  # fmt: skip
+        words += [] if value == usual else [flag, repr(value)]
+    down = asked["table_down"]
+    words += [] if down is None else ["--table", *map(repr, down)]
+    words += [] if asked["regions"] else ["--contacts-only"]
+    return [shlex.join(words)]
