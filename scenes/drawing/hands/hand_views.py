@@ -72,9 +72,9 @@ def _hidden(points: Array, cameras: Array, parts: HandParts) -> Array:
     """Tell which points (p, 3) the parts of a hand hide from cameras (v, 3), (v, p).
 
     A ray is inside a box where it is between the two planes of each pair: from the last entry to
-    the first exit.
+    the first exit. For a rounded box the box in it is taken, which a contact on it is outside of.
     """
-    sizes = INSIDE * (parts.half_sizes + parts.radii[:, None])
+    sizes = INSIDE * (parts.half_sizes + parts.radii[:, None] / np.sqrt(3.0))
     hides = np.zeros((len(cameras), len(points)), dtype=bool)
     for middle, turned, half in zip(parts.middles, parts.axes, sizes, strict=True):
         starts = (points - middle) @ turned

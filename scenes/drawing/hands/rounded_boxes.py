@@ -35,7 +35,8 @@ def rounded_box(low: Array, high: Array, radius: float, outer: Array) -> tuple[A
             where it is cut.
 
     Returns:
-        Flat sides in the axes of the box, corners in order, (k, 3) each [m].
+        Flat sides in the axes of the box, (k, 3) each [m], corners counter-clockwise as seen from
+        outside.
     """
     first, last = (_ends(row) for row in np.asarray(outer, dtype=bool))
     sides = _sides(_ends(high > low), radius > 0.0, first, last)
@@ -85,8 +86,8 @@ def _around() -> Iterator[Indices]:
     """Yield the corners of the sides around the poles, and of those between them."""
     rows, columns = _grid()[0].shape[:2]
     places = np.arange(rows * columns).reshape(rows, columns)
-    yield places[0, ::-1]
-    yield places[-1]
+    yield places[0]
+    yield places[-1, ::-1]
     for i, j in product(range(rows - 1), range(columns)):
         k = (j + 1) % columns
         yield places[[i, i + 1, i + 1, i], [j, j, k, k]]

@@ -98,9 +98,8 @@ def _show(hand: Hand, found: Sequence[HandReach], reporter: Reporter) -> None:
 
 def _say_where_to_look(command: hand_flags.Reach, reporter: Reporter) -> None:
     """Say which command draws the hand in the grasps, where their file is beside the poses."""
-    out, grasps = command.out, command.grasps
-    file = grasps / GRASPS if grasps.is_dir() else grasps
-    if out is None or not (out / GRASPS).is_file() or not file.samefile(out / GRASPS):
+    out = command.out
+    if out is None or not (out / GRASPS).is_file() or not command.grasps.samefile(out / GRASPS):
         reporter.say(
             f"give the folder of {GRASPS} as --out to have the hand drawn by `graspproof report`"
         )
