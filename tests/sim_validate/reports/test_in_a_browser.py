@@ -19,6 +19,7 @@ from tests.browser import (
     opened,
     requests_of,
 )
+from tests.scenes.drawing.hands.standing import GRASP, run_with_hand
 from tests.sim_validate.reports.test_report import EVIL, changed
 from tests.sim_validate.reports.test_stability_page import WHY, line
 
@@ -154,6 +155,28 @@ def test_the_grasp_turns_zooms_and_hides_its_parts(browser, small_report):
     assert errors_of(browser) == []
 
 
+def test_a_hand_turns_and_can_be_hidden(browser, shown):
+    from selenium.webdriver import Keys
+    from selenium.webdriver.common.by import By
+
+    opened(browser, shown["hand"])
+    canvas = browser.find_element(By.TAG_NAME, "canvas")
+    pictures = [browser.execute_script(PIXELS)]
+    canvas.send_keys(Keys.ARROW_LEFT)
+    pictures.append(browser.execute_script(PIXELS))
+    boxes = {label.text.strip(): label.find_element(By.TAG_NAME, "input")
+             for label in browser.find_elements(By.CSS_SELECTOR, ".stage label")}  # fmt: skip
+    assert {name for name, box in boxes.items() if not box.is_selected()} >= {"finger", "focus"}
+    boxes["hand"].click()
+    pictures.append(browser.execute_script(PIXELS))
+    boxes["finger"].click()
+    pictures.append(browser.execute_script(PIXELS))
+    assert len({picture[0] for picture in pictures}) == len(pictures)
+    assert pictures[2][1] < 0.7 * pictures[1][1]  # links and palm are most of what is drawn
+    assert pictures[3][1] > pictures[2][1]
+    assert errors_of(browser) == []
+
+
 def test_a_page_by_itself_turns(browser, small_run, tmp_path):
     asked = ["view", str(small_run / "grasps.json"), "--page", str(tmp_path / "a.html"), "-q"]
     assert main(asked) == Exit.GOOD
@@ -165,7 +188,8 @@ def test_a_page_by_itself_turns(browser, small_run, tmp_path):
 
 @pytest.fixture(scope="module")
 def shown(small_report, small_run, tmp_path_factory):
-    """The four kinds of pages."""
+    """The four kinds of pages, and those of a report with a hand."""
+    held = write_report(run_with_hand(tmp_path_factory.mktemp("hand")), jobs=1).index.parent
     folder = tmp_path_factory.mktemp("shown")
     asked = ["view", str(small_run / "grasps.json"), "--page", str(folder / "turn.html"), "-q"]
     assert main(asked) == Exit.GOOD
@@ -174,10 +198,11 @@ def shown(small_report, small_run, tmp_path_factory):
     return {
         "index": small_report / "index.html", "grasp": pages_of(small_report)[1],
         "turntable": folder / "turn.html", "stability": write_stability(folder / "stable", lines),
+        "hands": held / "index.html", "hand": held / "grasps" / f"{GRASP}.html",
     }  # fmt: skip
 
 
-KINDS = ("index", "grasp", "turntable", "stability")
+KINDS = ("index", "grasp", "turntable", "stability", "hands", "hand")
 WIDTHS = (390, 1280, 1600)
 
 
