@@ -17,7 +17,6 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.files.whole_files import replacing, write_parts
 from scenes.drawing.flat.colours import INK, LEVELS, ramp_bytes

@@ -146,7 +146,9 @@ def _cone(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
 SOLIDS: tuple[Role, ...] = ("finger", "hand", "fingertip")
 """Roles whose shapes are convex bodies that nothing shines through."""
 FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Patch]]] = {
-    "object": _glass, "force cone": _cone, **dict.fromkeys(SOLIDS, _solid),
+    "object": _glass,
+    "force cone": _cone,
+    **dict.fromkeys(SOLIDS, _solid),
 }
 """How the polygons of some roles are drawn; those of the others are drawn one by one."""
 

@@ -59,7 +59,7 @@ WHOLE: tuple[Role, ...] = ("hand", "fingertip")
 """Roles that are drawn whole, however far from the object they are."""
 
 
-def write_picture(
+def write_picture(  # noqa: PLR0913 - one keyword for each thing that may be asked
     body: Polyhedron,
     grasp: Grasp,
     path: str | Path,
@@ -102,7 +102,7 @@ def write_object_picture(body: Polyhedron, path: Path) -> Path:
     return write_sheet(sheet_of(glass(body), body, view, body.name, side=SIDE), path)
 
 
-def grasp_figure(
+def grasp_figure(  # noqa: PLR0913 - one keyword for each thing that may be asked
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
     legend: bool = True, hand: Hand | None = None, reach: HandReach | None = None,
 ) -> Any:  # fmt: skip
@@ -115,7 +115,7 @@ def grasp_figure(
     return figure_of(grasp_sheet(body, grasp, friction, view=view, legend=legend, held=held))
 
 
-def grasp_sheet(
+def grasp_sheet(  # noqa: PLR0913 - one keyword for each thing that may be asked
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
     legend: bool = False, steady: bool = False, held: PosedHand | None = None,
 ) -> Sheet:  # fmt: skip

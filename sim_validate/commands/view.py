@@ -14,8 +14,8 @@ from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
-from scenes.drawing.clips import GraphicsError, has_display, write_clip
 from scenes.drawing.canvas import write_sheet
+from scenes.drawing.clips import GraphicsError, has_display, write_clip
 from scenes.drawing.hands.posed_hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
 from scenes.drawing.turning_clips import write_turning_clip

@@ -12,7 +12,7 @@ from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
-from sim_validate.records.hands.hand_model import model_record
+from sim_validate.records.hand_model import model_record
 from sim_validate.records.reaches_schema import (
     AskedRecord,
     PoseRecord,
@@ -30,7 +30,7 @@ REACHES = "reaches.json"
 SCHEMA = 1
 
 
-def reaches_to_json(
+def reaches_to_json(  # noqa: PLR0913 - the parts of the file
     hand: Hand, body: Polyhedron, friction: float, asked: AskedRecord, found: Sequence[HandReach],
     *, complete: bool, grasps: Sequence[Grasp],
 ) -> str:  # fmt: skip

@@ -7,7 +7,7 @@ from typing_extensions import TypedDict
 
 from grasp_core.hands.reach import ReachReason
 from grasp_core.values import FINGERS
-from sim_validate.records.hands.hand_model import ModelRecord
+from sim_validate.records.hand_model import ModelRecord
 from sim_validate.records.verdicts_schema import Count, Finite, ObjectRecord, Positive
 
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]

@@ -9,7 +9,7 @@ from grasp_core.short_text import counted
 from grasp_core.values import Grasp
 from scenes.drawing.hands.posed_hands import PosedHand, posed_hand
 from scenes.drawing.pages import number
-from sim_validate.records.hands.saved_reaches import SavedReaches
+from sim_validate.records.saved_reaches import SavedReaches
 from sim_validate.reports.agreement import GOOD, QUIET, Record
 
 MILLI = 1e3

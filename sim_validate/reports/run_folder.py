@@ -12,11 +12,11 @@ from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.records.executions_json import EXECUTIONS, Executions, load_executions
 from sim_validate.records.grasps import read_grasps
-from sim_validate.records.hands.saved_reaches import SavedReaches, read_reaches
 from sim_validate.records.reaches_json import REACHES
 from sim_validate.records.regions import REGIONS
 from sim_validate.records.regions import SCHEMA as REGIONS_SCHEMA
 from sim_validate.records.regions_schema import RegionsFile
+from sim_validate.records.saved_reaches import SavedReaches, read_reaches
 from sim_validate.records.verdicts_schema import SCHEMA as VERDICTS_SCHEMA
 from sim_validate.records.verdicts_schema import VerdictsFile
 from sim_validate.reports.agreement import BAD, Record, said_of

@@ -83,5 +83,5 @@ def _hidden(points: Array, cameras: Array, parts: HandParts) -> Array:
         ways = np.where(np.abs(ways) < TINY, TINY, ways)
         one, two = (-half - starts) / ways, (half - starts) / ways
         enters, leaves = np.minimum(one, two).max(axis=2), np.maximum(one, two).min(axis=2)
-        hides |= (leaves > np.maximum(enters, 0.0))
+        hides |= leaves > np.maximum(enters, 0.0)
     return hides

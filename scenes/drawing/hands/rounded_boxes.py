@@ -1,17 +1,19 @@
 """Makes the flat sides of a box with rounded edges: all points within a radius of a box.
 
 The sides are those of a coarse ball whose eight octants are moved apart to the corners of the box.
-With degrees of latitude and longitude on the ball, the borders of the octants occur twice, once for
-the corner on either side: what lies between the two is a side of the box or a part of a round edge.
-Where the box or the radius has no size, sides without area are left out. So the same rule makes
-boxes, capsules and balls.
+The points of the ball are at equal steps of latitude and longitude, and those on the border of two
+octants occur twice, once for the corner on either side: what lies between the two is a side of the
+box or a part of a round edge. Where the box or the radius has no size, sides without area are left
+out. So the same rule makes boxes, capsules and balls.
 """
 
 from collections.abc import Iterator
 from functools import cache
 from itertools import product
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 
@@ -20,11 +22,13 @@ STEPS = 3
 FEWEST_CORNERS = 3
 SAME = 1e-9
 """Distance below which corners of a box of size 1 are one: far above rounding."""
-Ends = tuple[bool, bool, bool]
+Truths: TypeAlias = NDArray[np.bool_]
+"""Array of truths, of any shape."""
+Ends: TypeAlias = tuple[bool, bool, bool]
 """A truth about each axis of a box."""
 
 
-def rounded_box(low: Array, high: Array, radius: float, outer: Array) -> tuple[Array, ...]:
+def rounded_box(low: Array, high: Array, radius: float, outer: Truths) -> tuple[Array, ...]:
     """Make the sides of a rounded box, or of a piece of one that is cut across its axes.
 
     Args:
@@ -38,13 +42,13 @@ def rounded_box(low: Array, high: Array, radius: float, outer: Array) -> tuple[A
         Flat sides in the axes of the box, (k, 3) each [m], corners counter-clockwise as seen from
         outside.
     """
-    first, last = (_ends(row) for row in np.asarray(outer, dtype=bool))
+    first, last = _ends(outer[0]), _ends(outer[1])
     sides = _sides(_ends(high > low), radius > 0.0, first, last)
     corners = _corners(low, high, radius, first, last)
     return tuple(corners[side] for side in sides)
 
 
-def _ends(row: Array) -> Ends:
+def _ends(row: Truths) -> Ends:
     x, y, z = row.tolist()
     return x, y, z
 
@@ -85,7 +89,7 @@ def _sides(long: Ends, rounded: bool, first: Ends, last: Ends) -> tuple[Indices,
 def _around() -> Iterator[Indices]:
     """Yield the corners of the sides around the poles, and of those between them."""
     rows, columns = _grid()[0].shape[:2]
-    places = np.arange(rows * columns).reshape(rows, columns)
+    places: Indices = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
     yield places[0]
     yield places[-1, ::-1]
     for i, j in product(range(rows - 1), range(columns)):
@@ -100,8 +104,8 @@ def _without_repeats(side: Indices, corners: Array) -> Indices:
 
 
 @cache
-def _grid() -> tuple[Array, Array]:
-    """Return unit vectors over a ball, from its upper pole to its lower one, and their octants.
+def _grid() -> tuple[Array, Truths]:
+    """Return the points of a ball, from its upper pole to its lower one, and their octants.
 
     Returns:
         Unit vectors, (rows, columns, 3), and whether each belongs to the upper half along each
@@ -120,4 +124,3 @@ def _grid() -> tuple[Array, Array]:
         axis=-1,
     )
     return ways, signs > 0.0
-

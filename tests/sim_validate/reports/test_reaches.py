@@ -12,7 +12,7 @@ from scenes.drawing.turntable import UNITS
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.records.hands.saved_reaches import read_reaches
+from sim_validate.records.saved_reaches import read_reaches
 from sim_validate.reports.report import write_report
 from sim_validate.reports.run_folder import runs_in
 from tests.scenes.drawing.hands.standing import (
@@ -135,6 +135,7 @@ def test_the_command_of_the_page_seeks_the_pose_again(report, monkeypatch):
 
 def test_a_hand_of_an_earlier_version_is_found_by_its_name(tmp_path):
     """Files without the hand's parts: the built-in hand is taken, if its fingertips touch."""
+
     def older(record):
         del record["hand"]["model"]
         for each in record["reaches"]:
@@ -149,6 +150,7 @@ def without_model(name):
     def change(record):
         record["hand"]["name"] = name
         del record["hand"]["model"]
+
     return change
 
 

@@ -102,7 +102,7 @@ def three():
     tips = replace(pose, fingers=used, contacts=tuple(
         Contact([0.0, 0.0, float(n)], [0.0, 0.0, 1.0]) for n in range(3)
     )).tips  # fmt: skip
-    contacts = tuple(Contact(tip + [0.008, 0.0, 0.0], [1.0, 0.0, 0.0]) for tip in tips)
+    contacts = tuple(Contact(tip + np.array([0.008, 0.0, 0.0]), [1.0, 0.0, 0.0]) for tip in tips)
     return PosedHand(hand, np.zeros(8), np.eye(4), used, contacts)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
 from grasp_core.files.text_files import read_text
@@ -19,7 +20,7 @@ from grasp_core.hands.kinematics import places
 from grasp_core.hands.named_hands import HANDS, load_hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.values import Contact
-from sim_validate.records.hands.hand_model import hand_of_model
+from sim_validate.records.hand_model import hand_of_model
 from sim_validate.records.reaches_json import SCHEMA
 from sim_validate.records.reaches_schema import (
     AskedRecord,
@@ -60,8 +61,8 @@ class SavedReaches:
 
     def finger_names(self, reach: HandReach) -> tuple[str, ...]:
         """Return the name of the finger at each contact; none for a grasp that is not reached."""
-        used = () if reach.fingers is None else reach.fingers.tolist()
-        return tuple(self.fingers[finger] for finger in used)
+        used = () if reach.fingers is None else reach.fingers
+        return tuple(self.fingers[int(finger)] for finger in used)
 
 
 def read_reaches(path: Path) -> tuple[SavedReaches, ReachesFile]:
@@ -141,7 +142,7 @@ def _contacts(pose: PoseRecord) -> tuple[Contact, ...]:
     )  # fmt: skip
 
 
-def _array(values: Sequence[float] | None) -> np.ndarray | None:
+def _array(values: Sequence[float] | None) -> Array | None:
     return None if values is None else np.array(values)
 
 
@@ -178,7 +179,7 @@ def _touches(hand: Hand, reached: Sequence[HandReach]) -> bool:
     for each in reached:
         if each.fingers is None or each.contacts is None or each.joints is None:
             continue
-        used = each.fingers.tolist()
+        used = [int(finger) for finger in each.fingers]
         tips = places(hand, each.joints, each.palm_pose).tips[0, used]
         radii = np.array([hand.fingers[finger].tip.radius for finger in used])
         touched = np.array([contact.position for contact in each.contacts])

@@ -5,6 +5,7 @@ A file that holds them can be drawn without the file or the table that the hand 
 
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field
 from typing_extensions import TypedDict
 
@@ -103,7 +104,7 @@ def hand_of_model(
         HandFinger(
             each["name"],
             tuple(map(_link_of, each["links"])),
-            Fingertip(each["tip_center_m"], each["tip_radius_m"]),
+            Fingertip(np.array(each["tip_center_m"]), each["tip_radius_m"]),
         )
         for each in record["fingers"]
     )  # fmt: skip
@@ -122,9 +123,8 @@ def _shape(shape: LinkShape) -> ShapeRecord:
 
 
 def _shape_of(record: ShapeRecord) -> LinkShape:
-    return LinkShape(
-        record["position_m"], record["rotation"], record["half_sizes_m"], record["radius_m"]
-    )  # fmt: skip
+    place, turned, half = record["position_m"], record["rotation"], record["half_sizes_m"]
+    return LinkShape(np.array(place), np.array(turned), np.array(half), record["radius_m"])
 
 
 def _link(link: Link) -> LinkRecord:
@@ -147,13 +147,14 @@ def _link(link: Link) -> LinkRecord:
 
 
 def _link_of(record: LinkRecord) -> Link:
-    own = record["joint"]
+    own, center = record["joint"], record["center_of_mass_m"]
     joint = Joint(
-        own["name"], own["position_m"], own["rotation"], own["axis"], own["lowest_rad"],
-        own["highest_rad"], own["torque_limit_n_m"],
+        own["name"], np.array(own["position_m"]), np.array(own["rotation"]), np.array(own["axis"]),
+        own["lowest_rad"], own["highest_rad"], own["torque_limit_n_m"],
     )  # fmt: skip
     shapes = tuple(map(_shape_of, record["shapes"]))
-    return Link(record["name"], joint, shapes, record["mass_kg"], record["center_of_mass_m"])
+    middle = None if center is None else np.array(center)
+    return Link(record["name"], joint, shapes, record["mass_kg"], middle)
 
 
 def _triple(vector: Array) -> Triple:

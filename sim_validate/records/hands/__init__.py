@@ -1,1 +1,0 @@
-"""How is a hand, and where it stands in grasps, read from a file?"""
