@@ -30,6 +30,7 @@ from sim_validate.reports.motion_charts import motion_figure
 from sim_validate.reports.survival_charts import survival_figure
 from sim_validate.reports.wrench_charts import wrench_figure
 from sim_validate.simulation.setup import Agenda, Setup
+from tests.scenes.drawing.hands.standing import standing
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
 BENCHMARKS = FOLDER.parent / "benchmarks.md"
@@ -64,6 +65,12 @@ def families():
 def grasp():
     """One grasp, with all that its picture explains."""
     return grasp_figure(*best("wedge", "pencil", FRICTION), FRICTION)
+
+
+def hand():
+    """A hand that stands in a grasp, from a stored pose."""
+    body, grasp, held, reach = standing()
+    return grasp_figure(body, grasp, FRICTION, hand=held, reach=reach)
 
 
 def regions():
@@ -155,7 +162,7 @@ def kept_by_distance():
 
 PICTURES: dict[str, Callable[[], object]] = {
     make.__name__: make
-    for make in (families, grasp, regions, wrenches, margins, motion, fidelity, survival, misplaced)
+    for make in (families, grasp, hand, regions, wrenches, margins, motion, fidelity, survival, misplaced)
 }
 
 

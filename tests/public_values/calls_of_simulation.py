@@ -26,6 +26,7 @@ from tests.public_values.call import Call, body, grasp, of_grasp, plan, scene
 WRENCH = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 CENTER = np.zeros(3)
 BODY_AND_GRASP = {"body": VALUE, "grasp": VALUE}
+IN_HAND = {"hand": optional(VALUE), "reach": optional(VALUE)}
 CALLS = [
     Call("scenes.build_scene", of_grasp(), {
         "body": VALUE,
@@ -52,13 +53,14 @@ CALLS = [
         },
     }),
     Call("scenes.grasp_figure", of_grasp(friction=0.5), BODY_AND_GRASP | {
-        "friction": FRICTION, "view": optional(VALUE), "legend": SWITCH,
+        "friction": FRICTION, "view": optional(VALUE), "legend": SWITCH, **IN_HAND,
     }),
-    Call("scenes.show", of_grasp(), BODY_AND_GRASP | {"friction": FRICTION}),
+    Call("scenes.show", of_grasp(), BODY_AND_GRASP | {"friction": FRICTION} | IN_HAND),
     Call("scenes.write_picture", of_grasp(path="a.png"), BODY_AND_GRASP | {
         "path": PATH | {"unknown ending": "a.gif", "no ending": "a"},
         "friction": FRICTION,
         "view": optional(VALUE),
+        **IN_HAND,
     }, succeeds_in="tests/scenes/drawing/test_pictures.py"),
     Call("scenes.FingerSettings", dict, {
         "max_normal_force_n": POSITIVE,

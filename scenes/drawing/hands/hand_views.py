@@ -25,12 +25,14 @@ from scenes.drawing.views import (
     views_at,
 )
 
-ELEVATIONS = (18, 28, 40, 60, 0, -18, -28, -40, -60)
+ELEVATIONS = (18, 28, 40, 0, -18, -28, -40)
 """Elevations of the views to choose from [deg]; of equally good ones the first is taken."""
 HIDDEN = 4.0
 """Fault of a view in which the hand hides all contacts."""
 BEHIND = 1.0
 """Fault of a view in which the hand hides all of the object's faces that it could show."""
+ALONG = 0.8
+"""Fault of a view along the way from the middle of the hand to the object: fingers look short."""
 EDGE_ON = 0.5
 """Fault of a view in which all of the object's faces are seen nearly as lines."""
 TINY = 1e-12
@@ -64,7 +66,9 @@ def view_of_hand(body: Polyhedron, held: PosedHand) -> View:
     hidden = _hidden(held.positions, cameras, parts).mean(axis=1)
     apart = least_gaps(axes, np.vstack([held.positions, numbers_behind(held)]), extent)
     merits = apart / body.radius - HIDDEN * hidden - BEHIND * covered
-    merits -= EDGE_ON * edge_on(body, axes)
+    way = body.center_of_mass - parts.middles.mean(axis=0)
+    along = np.abs(axes[:, 2] @ way) / max(float(np.linalg.norm(way)), TINY)
+    merits -= EDGE_ON * edge_on(body, axes) + ALONG * along
     return View.of_angles(*angles[first_best(merits, SAME_MERIT)], extent)
 
 

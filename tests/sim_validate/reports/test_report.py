@@ -128,13 +128,17 @@ def test_the_drawing_is_that_of_the_grasp(small_run, small_report):
     assert [shape["role"] for shape in drawn] == ["object", "edge"]
 
 
-def test_colours_and_camera_are_the_same_everywhere():
+def test_colours_and_camera_are_the_same_everywhere(small_report):
     style, script = asset("style.css"), asset("turntable.js")
     for finger, colour in enumerate(FINGERS):
         assert f".finger{finger} {{ background: {colour}; }}" in style
-    said = dict(re.findall(r"const (DISTANCE|DARKEST) = ([\d.]+);", script))
-    assert float(said["DISTANCE"]) == DISTANCE * UNITS
-    assert float(said["DARKEST"]) == DARKEST
+    (darkest,) = re.findall(r"const DARKEST = ([\d.]+);", script)
+    assert float(darkest) == DARKEST
+    (path, *_) = sorted((small_report / "grasps").iterdir())
+    drawing = json.loads(Page(path.read_text()).data["drawing"])
+    assert drawing["distance"] == DISTANCE * UNITS
+    assert drawing["middle"] == [0, 0, 0]
+    assert drawing["hidden"] == []
     (light,) = re.findall(r"const LIGHT = \[(.*)\];", script)
     np.testing.assert_allclose([float(part) for part in light.split(",")], LIGHT, atol=1e-3)
 
