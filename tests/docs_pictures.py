@@ -162,7 +162,18 @@ def kept_by_distance():
 
 PICTURES: dict[str, Callable[[], object]] = {
     make.__name__: make
-    for make in (families, grasp, hand, regions, wrenches, margins, motion, fidelity, survival, misplaced)
+    for make in (
+        families,
+        grasp,
+        hand,
+        regions,
+        wrenches,
+        margins,
+        motion,
+        fidelity,
+        survival,
+        misplaced,
+    )
 }
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from grasp_core.arrays import Array
 from grasp_core.checked import coefficient, instance, path_of, switch
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.reach import HandReach
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
@@ -32,6 +31,9 @@ from scenes.drawing.painting import Patch, painted
 from scenes.drawing.palette import LOOKS, colour_of
 from scenes.drawing.shapes import Role, Shape, extent_of
 from scenes.drawing.views import Extent, View, best_view
+
+if TYPE_CHECKING:
+    from grasp_core.hands.reach import HandReach
 
 SIDE = 500
 """Width of a picture, and its height without the key [pixels]."""
@@ -67,7 +69,7 @@ def write_picture(  # noqa: PLR0913 - one keyword for each thing that may be ask
     *,
     view: View | None = None,
     hand: Hand | None = None,
-    reach: HandReach | None = None,
+    reach: "HandReach | None" = None,
 ) -> Path:
     """Draw a grasp in the style of the paper, or with the hand in it, and write it to a file.
 
@@ -104,7 +106,7 @@ def write_object_picture(body: Polyhedron, path: Path) -> Path:
 
 def grasp_figure(  # noqa: PLR0913 - one keyword for each thing that may be asked
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
-    legend: bool = True, hand: Hand | None = None, reach: HandReach | None = None,
+    legend: bool = True, hand: Hand | None = None, reach: "HandReach | None" = None,
 ) -> Any:  # fmt: skip
     """Draw a grasp as `write_picture` does, as a matplotlib figure.
 
@@ -219,7 +221,7 @@ def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | No
         instance(view, View, "view", "View.of_angles makes one")
 
 
-def held_by(hand: Hand | None, reach: HandReach | None, grasp: Grasp) -> PosedHand | None:
+def held_by(hand: Hand | None, reach: "HandReach | None", grasp: Grasp) -> PosedHand | None:
     """Take a hand in its pose from what a user gave; None if nothing was given.
 
     Raises:

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from grasp_core.by_value import ByValue
 from grasp_core.checked import path_of
 from grasp_core.files.whole_files import write_parts
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from scenes.drawing.drawings import drawing_of, drawing_with_hand, glass
@@ -30,6 +29,9 @@ from scenes.drawing.palette import LOOKS, colour_of
 from scenes.drawing.pictures import check_drawn, held_by, number_places
 from scenes.drawing.shapes import Role, Shape
 from scenes.drawing.views import best_view
+
+if TYPE_CHECKING:
+    from grasp_core.hands.reach import HandReach
 
 UNITS = 1000.0
 """Number of units of length in one object radius."""
@@ -68,7 +70,7 @@ class Turntable(ByValue):
 
 def show(
     body: Polyhedron, grasp: Grasp, friction: float = 0.5, *, hand: Hand | None = None,
-    reach: HandReach | None = None,
+    reach: "HandReach | None" = None,
 ) -> Turntable:  # fmt: skip
     """Draw a grasp on its object, or with a hand, so that it can be turned with the mouse.
 

@@ -17,6 +17,7 @@ STATIC = (STYLE, "gallery.js", "tables.js", "turntable.js")
 CHARTS_OF_INDEX = ("fidelity.svg", "survival.svg")
 """Files that reports of earlier versions have; the charts now stand in the pages."""
 OF_GRASPS = ("transfer.json", "grasps.json")
+REACHES = "reaches.json"
 PICTURES, CHARTS, CLIPS = "pictures", "charts", "clips"
 MARK = ".graspproof-report"
 ID = re.compile(r"[cprf](-\d+){4}[\w-]*", re.ASCII)
@@ -53,7 +54,7 @@ def remove_executions(folder: Path) -> None:
 def remove_reaches(folder: Path) -> None:
     """Remove the poses of a hand in grasps, and pages that show them."""
     remove_report(folder / REPORT)
-    _remove([folder / "reaches.json"])
+    _remove([folder / REACHES])
 
 
 def _of_grasps(folder: Path, suffix: str) -> list[Path]:

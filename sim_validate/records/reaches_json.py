@@ -25,8 +25,6 @@ from sim_validate.records.reaches_schema import (
 )
 from sim_validate.records.verdicts_json import object_record
 
-REACHES = "reaches.json"
-"""Name of the file in a folder of results."""
 SCHEMA = 1
 
 

@@ -2,15 +2,18 @@
 
 import shlex
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from grasp_core.hands.named_hands import HANDS
-from grasp_core.hands.reach import HandReach
 from grasp_core.short_text import counted
 from grasp_core.values import Grasp
 from scenes.drawing.hands.posed_hands import PosedHand, posed_hand
 from scenes.drawing.pages import number
-from sim_validate.records.saved_reaches import SavedReaches
 from sim_validate.reports.agreement import GOOD, QUIET, Record
+
+if TYPE_CHECKING:
+    from grasp_core.hands.reach import HandReach
+    from sim_validate.records.saved_reaches import SavedReaches
 
 MILLI = 1e3
 STARTS, SEED, CLEARANCE_M = 100, 0, 5e-4
@@ -24,7 +27,7 @@ OPENING = "joint angles at which the fingers are 3 to 15 mm open, with the palm 
 WAY = "over 60 mm, with open fingers and nothing in the way"
 
 
-def held_in(reaches: SavedReaches | None, grasp: Grasp) -> PosedHand | None:
+def held_in(reaches: "SavedReaches | None", grasp: Grasp) -> PosedHand | None:
     """Return the hand in the pose in which it stands in a grasp.
 
     Returns:
@@ -36,12 +39,12 @@ def held_in(reaches: SavedReaches | None, grasp: Grasp) -> PosedHand | None:
     return posed_hand(reaches.hand, reach, grasp)
 
 
-def reach_of(reaches: SavedReaches | None, grasp: Grasp) -> HandReach | None:
+def reach_of(reaches: "SavedReaches | None", grasp: Grasp) -> "HandReach | None":
     """Return what was found for a grasp; None where no hand was asked for."""
     return None if reaches is None else reaches.found.get(grasp.id)
 
 
-def why_not_held(reaches: SavedReaches, grasp: Grasp) -> str:
+def why_not_held(reaches: "SavedReaches", grasp: Grasp) -> str:
     """Say why there is no hand to draw in a grasp."""
     found = reach_of(reaches, grasp)
     if found is None:
@@ -49,7 +52,7 @@ def why_not_held(reaches: SavedReaches, grasp: Grasp) -> str:
     return reaches.missing if found.reached else f"{grasp.id}: {found.explanation}"
 
 
-def said_of_reach(reaches: SavedReaches | None, grasp: Grasp) -> tuple[str, str]:
+def said_of_reach(reaches: "SavedReaches | None", grasp: Grasp) -> tuple[str, str]:
     """Say in words whether the hand reaches a grasp, with the tone; nothing without a hand."""
     if reaches is None:
         return "", QUIET
@@ -61,7 +64,7 @@ def said_of_reach(reaches: SavedReaches | None, grasp: Grasp) -> tuple[str, str]
     return f"{name}: reached, {_where(found)}", GOOD
 
 
-def _where(found: HandReach) -> str:
+def _where(found: "HandReach") -> str:
     """Say how many contacts are in regions, of those that are reached."""
     within = found.within_regions or ()
     inside = sum(within)
@@ -70,7 +73,7 @@ def _where(found: HandReach) -> str:
     return f"{inside} of {len(within)} contacts within regions"
 
 
-def described_reaches(reaches: SavedReaches | None) -> str:
+def described_reaches(reaches: "SavedReaches | None") -> str:
     """Say in one sentence how many grasps a hand reaches, and whether it can be drawn."""
     if reaches is None:
         return ""
@@ -80,14 +83,14 @@ def described_reaches(reaches: SavedReaches | None) -> str:
     return f"{said} {reaches.missing}".strip()
 
 
-def reach_settings(reaches: SavedReaches) -> Iterable[tuple[str, str]]:
+def reach_settings(reaches: "SavedReaches") -> Iterable[tuple[str, str]]:
     """Yield names and values of everything that was asked for."""
     yield "hand.name", reaches.hand_name
     yield "hand.friction", f"{reaches.friction:g}"
     yield from ((f"hand.{name}", str(value)) for name, value in reaches.asked.items())
 
 
-def reach_section(reaches: SavedReaches | None, grasp: Grasp) -> Record | None:
+def reach_section(reaches: "SavedReaches | None", grasp: Grasp) -> Record | None:
     """Build the section about the hand in a grasp; None where no hand was asked for."""
     found = reach_of(reaches, grasp)
     if reaches is None or found is None:
@@ -103,7 +106,7 @@ def reach_section(reaches: SavedReaches | None, grasp: Grasp) -> Record | None:
     }
 
 
-def _facts(reaches: SavedReaches, found: HandReach) -> Iterable[tuple[str, str, str]]:
+def _facts(reaches: "SavedReaches", found: "HandReach") -> Iterable[tuple[str, str, str]]:
     """Yield name, value and meaning of what is known about the hand in a grasp."""
     if found.reached:
         names = ", ".join(f"{k}: {name}" for k, name in enumerate(reaches.finger_names(found)))
@@ -123,7 +126,7 @@ def _found(value: object) -> str:
     return "none found" if value is None else "found"
 
 
-def reach_commands(reaches: SavedReaches | None, grasp: Grasp, path: str) -> Sequence[str]:
+def reach_commands(reaches: "SavedReaches | None", grasp: Grasp, path: str) -> Sequence[str]:
     """Write the shell command that seeks the pose again; none for a hand from a file.
 
     Args:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import InputError
@@ -10,17 +11,19 @@ from grasp_core.files.complaints import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.execution.jobs import ExecutedGrasp
+from sim_validate.files.stale_results import REACHES
 from sim_validate.records.executions_json import EXECUTIONS, Executions, load_executions
 from sim_validate.records.grasps import read_grasps
-from sim_validate.records.reaches_json import REACHES
 from sim_validate.records.regions import REGIONS
 from sim_validate.records.regions import SCHEMA as REGIONS_SCHEMA
 from sim_validate.records.regions_schema import RegionsFile
-from sim_validate.records.saved_reaches import SavedReaches, read_reaches
 from sim_validate.records.verdicts_schema import SCHEMA as VERDICTS_SCHEMA
 from sim_validate.records.verdicts_schema import VerdictsFile
 from sim_validate.reports.agreement import BAD, Record, said_of
 from sim_validate.simulation.hold_verdict import Outcome
+
+if TYPE_CHECKING:
+    from sim_validate.records.saved_reaches import SavedReaches
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"
 SCHEMAS = {VERDICTS: VERDICTS_SCHEMA, REGIONS: REGIONS_SCHEMA}
@@ -44,7 +47,7 @@ class RunFolder:
     """Friction for which the regions are certified; None if there are none."""
     executions: Executions | None
     """Grasps as a robot executes them; None if the file does not exist."""
-    reaches: SavedReaches | None = None
+    reaches: "SavedReaches | None" = None
     """Where a hand stands in the grasps; None if the file does not exist."""
     left_out: int = 0
     """Number of grasps in the files that `saved` leaves out."""
@@ -131,7 +134,7 @@ def _run(path: Path) -> RunFolder:
     )
 
 
-def reaches_beside(grasps: Path, saved: SavedGrasps) -> SavedReaches | None:
+def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
     """Read where a hand stands in grasps from the folder of their file.
 
     Args:
@@ -147,6 +150,8 @@ def reaches_beside(grasps: Path, saved: SavedGrasps) -> SavedReaches | None:
     path = grasps.with_name(REACHES)
     if not path.is_file():
         return None
+    from sim_validate.records.saved_reaches import read_reaches  # runs without a hand need none
+
     found, record = read_reaches(path)
     _check_object(path, record["object"]["content_sha256"], saved)
     own = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}

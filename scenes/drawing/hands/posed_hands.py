@@ -8,6 +8,7 @@ of the depths of their middles, which is the right order for parts of like size.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,10 +19,12 @@ from grasp_core.frames import POSE
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays
 from grasp_core.hands.kinematics import places
-from grasp_core.hands.reach import HandReach
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.hands.rounded_boxes import rounded_box
 from scenes.drawing.shapes import Role, Shape
+
+if TYPE_CHECKING:
+    from grasp_core.hands.reach import HandReach
 
 LONG, LEAST = 1.2, 2.5
 """Length of a piece of a part in thicknesses of the part, but at least so many radii of the hand's
@@ -83,12 +86,14 @@ class PosedHand:
         return np.array([contact.position for contact in self.contacts]).reshape(-1, 3)
 
 
-def posed_hand(hand: Hand, reach: HandReach, grasp: Grasp) -> PosedHand:
+def posed_hand(hand: Hand, reach: "HandReach", grasp: Grasp) -> PosedHand:
     """Take the pose from what `reach_with` found.
 
     Raises:
         InputError: The result has no pose, or is about another hand or another grasp.
     """
+    from grasp_core.hands.reach import HandReach  # drawings without a hand need no search for one
+
     instance(hand, Hand, "hand", "load_hand makes one")
     instance(reach, HandReach, "reach", "reach_with finds one")
     if (reach.hand, reach.grasp) != (hand.name, grasp.id):

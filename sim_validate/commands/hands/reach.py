@@ -14,10 +14,10 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
 from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.stale_results import remove_reaches
+from sim_validate.files.stale_results import REACHES, remove_reaches
 from sim_validate.parallel.reaching import ReachJob, reached
 from sim_validate.records.grasps import grasp_with_id
-from sim_validate.records.reaches_json import REACHES, reaches_summary, reaches_to_json
+from sim_validate.records.reaches_json import reaches_summary, reaches_to_json
 from sim_validate.records.reaches_schema import AskedRecord
 from sim_validate.reports.run_folder import GRASPS
 
