@@ -72,10 +72,19 @@ def read_reaches(path: Path) -> tuple[SavedReaches, ReachesFile]:
         InputError: The file cannot be read, or a field of it is wrong.
     """
     try:
-        record = record_of(ReachesFile, read_text(path), path.name, schema=SCHEMA)
-        return _saved(record), record
+        return reaches_from_json(read_text(path))
     except InputError as error:
         raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
+
+
+def reaches_from_json(text: str) -> tuple[SavedReaches, ReachesFile]:
+    """Read the poses of a hand from the text of `reaches.json`, and the record that holds them.
+
+    Raises:
+        InputError: A field is wrong, or contradicts another one.
+    """
+    record = record_of(ReachesFile, text, "reaches.json", schema=SCHEMA)
+    return _saved(record), record
 
 
 def _saved(record: ReachesFile) -> SavedReaches:

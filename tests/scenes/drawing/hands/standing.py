@@ -75,15 +75,20 @@ def not_reached(grasp):
 
 def run_with_hand(folder):
     """Write a run of two grasps, of which the hand reaches the first, and return its folder."""
+    gc.save_grasps(folder / "grasps.json", small_plan())
+    (folder / "reaches.json").write_text(reaches_text())
+    return folder
+
+
+@cache
+def reaches_text():
+    """The text of the reaches.json of that run."""
     body, grasp, hand, reach = standing()
     plan = small_plan()
-    gc.save_grasps(folder / "grasps.json", plan)
     (other,) = (each for each in plan if each.id != grasp.id)
     asked = {"regions": True, "table_down": None, "clearance_m": CLEARANCE, "starts": 100,
              "seed": 0}  # fmt: skip
     found = [reach if each is grasp else not_reached(other) for each in plan]
-    text = reaches_to_json(
+    return reaches_to_json(
         hand, body, FRICTION, asked, found, complete=True, grasps=list(plan.grasps)
     )
-    (folder / "reaches.json").write_text(text)
-    return folder
