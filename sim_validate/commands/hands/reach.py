@@ -38,7 +38,7 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
         found, text = _reach(command, hand, chosen, reporter)
     reporter.text(text)
     _show(hand, found, reporter)
-    _say_where_to_look(command, reporter)
+    say_where_to_look(command, reporter)
     return Exit.GOOD if all(each.reached for each in found) else Exit.NEGATIVE
 
 
@@ -96,7 +96,7 @@ def _show(hand: Hand, found: Sequence[HandReach], reporter: Reporter) -> None:
             reporter.warn(f"{each.grasp}: {each.reason}: {each.explanation}")
 
 
-def _say_where_to_look(command: hand_flags.Reach, reporter: Reporter) -> None:
+def say_where_to_look(command: hand_flags.Reach, reporter: Reporter) -> None:
     """Say which command draws the hand in the grasps, where their file is beside the poses."""
     out = command.out
     if out is None or not (out / GRASPS).is_file() or not command.grasps.samefile(out / GRASPS):

@@ -7,7 +7,10 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.files.complaints import record_of
+from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.cli.hand_flags import Reach
+from sim_validate.commands.hands.reach import say_where_to_look
 from sim_validate.main import main
 from sim_validate.records.reaches_schema import ReachesFile
 from tests.grasp_core.hands.gripping import plain_hand
@@ -32,6 +35,7 @@ def test_it_writes_poses_that_are_in_force_closure(grasps, tmp_path, capsys):
     assert summary["complete"]
     assert summary["reached"] >= 2
     assert f"{summary['reached']} of 3 grasps were reached" in said
+    assert "give the folder of grasps.json as --out" in said
     assert code == (Exit.GOOD if summary["reached"] == 3 else Exit.NEGATIVE)
     assert sum(summary[key] for key in ("reached", "limit", "collision", "not_found")) == 3
     for each in record["reaches"]:
@@ -43,6 +47,13 @@ def test_it_writes_poses_that_are_in_force_closure(grasps, tmp_path, capsys):
             assert gc.force_closure(positions, normals, record["friction"]).closed
             assert len(each["pose"]["joints_rad"]) == len(record["hand"]["joints"]) == 16
             assert len({contact["finger"] for contact in contacts}) == 4
+
+
+def test_it_says_which_command_shows_the_hand(grasps, tmp_path, capsys):
+    for out, expected in ((grasps.parent, f"graspproof report {grasps.parent}\n"),
+                          (tmp_path, "give the folder"), (None, "give the folder")):  # fmt: skip
+        say_where_to_look(Reach(grasps, out=out), Reporter())
+        assert expected in capsys.readouterr().out
 
 
 def test_the_same_command_writes_the_same_text(grasps, tmp_path):
