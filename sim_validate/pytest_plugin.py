@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from sim_validate.baselines.source_file import Source
+    from sim_validate.baselines.parts.source_file import Source
     from sim_validate.baselines.suite_toml import Suite
     from sim_validate.execution.verdict import Execution
     from sim_validate.validation.grasp_verdict import Verdict
@@ -167,7 +167,7 @@ class GraspItem(_SuiteItem):
     def runtest(self) -> None:
         """Fail if the grasp is worse, gone, missing or new, or cannot be compared."""
         from grasp_core.errors import GraspError
-        from sim_validate.baselines.changed_part import ChangedPartError
+        from sim_validate.baselines.parts.changed_part import ChangedPartError
         from sim_validate.baselines.compare import Status, failing
         from sim_validate.baselines.entries import plain, properties_of
         from sim_validate.baselines.explain import explained

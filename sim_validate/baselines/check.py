@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from sim_validate.baselines.changed_part import Present
+from sim_validate.baselines.parts.changed_part import Present
 from sim_validate.baselines.compare import Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.entries import Baseline
 from sim_validate.baselines.measure import Measured, Report, measured, with_planned_fingers

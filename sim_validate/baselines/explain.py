@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
-from sim_validate.baselines.changed_part import Present
+from sim_validate.baselines.parts.changed_part import Present
 from sim_validate.baselines.check import Checked
 from sim_validate.baselines.entries import Entry
 from sim_validate.baselines.executions import not_survived

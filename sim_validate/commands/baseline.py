@@ -6,14 +6,14 @@ from dataclasses import replace
 
 from grasp_core.files.text_files import write_text
 from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
-from sim_validate.baselines.changed_part import IfChanged, Present, present, testable
+from sim_validate.baselines.parts.changed_part import IfChanged, Present, present, testable
 from sim_validate.baselines.check import Checked, check
 from sim_validate.baselines.compare import Finding, Status, failing
 from sim_validate.baselines.entries import fields_of
 from sim_validate.baselines.junit import junit_text
 from sim_validate.baselines.measure import complete, measured, seen_from
 from sim_validate.baselines.settings import How, of_settings, setup_for
-from sim_validate.baselines.source_file import source_of
+from sim_validate.baselines.parts.source_file import source_of
 from sim_validate.cli import baseline_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit

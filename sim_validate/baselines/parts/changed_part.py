@@ -19,7 +19,7 @@ from grasp_core.records.grasps_json import RECORDED, SavedGrasps
 from grasp_core.transferring.changed_part import fitting_unit, load_changed_part
 from grasp_core.transferring.like_faces import ANGLE_DEG, WIDEST_DEG, check_planar
 from grasp_core.transferring.transfer import Transfer, transfer
-from sim_validate.baselines.source_file import Source
+from sim_validate.baselines.parts.source_file import Source
 
 TABLE = "changed_part"
 """Name of the table of `IfChanged` in a `*.grasps.toml` file."""
