@@ -181,11 +181,11 @@ class GraspItem(_SuiteItem):
             raise
         (finding,) = done.findings
         files, same = (suite.baseline, suite.grasps), finding.status is Status.SAME
-        why = "" if same else explained(done, files, suite.present)
+        why = "" if same else explained(done, files, suite.compared)
         before, after = plain(finding.before), plain(finding.after)
         self.user_properties.append(("status", finding.status.value))
         self.user_properties += properties_of(after or {}).items()
-        _note(self, finding.id, finding.status.value, why, (before, after), suite.present.mesh)
+        _note(self, finding.id, finding.status.value, why, (before, after), suite.compared.mesh)
         if finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE):
             raise UnstableError(f"{why}\n  to accept the change: pytest --grasp-bless {self.path}")
 

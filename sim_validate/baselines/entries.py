@@ -19,6 +19,7 @@ from sim_validate.baselines.executions import (
     execution_entry,
     rounded,
 )
+from sim_validate.baselines.parts.recorded_part import RecordedPart
 from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.setup import WEAKEST
@@ -118,6 +119,9 @@ class Baseline:
     """Hash that tells how the processor rounds."""
     entries: tuple[Entry, ...]
     """Entries of the grasps, sorted by id."""
+    part: RecordedPart | None = None
+    """The part that it was written on; None where that is the one that the grasps were planned on,
+    and then no file mentions it."""
 
     def __post_init__(self) -> None:
         """Refuse a baseline with two entries for one grasp."""

@@ -113,6 +113,15 @@ class Suite:
         return present(self.saved, self.grasps, self.source, self.changed_part)
 
     @cached_property
+    def compared(self) -> Present:
+        """Return the grasps on their part as it is now, compared with the part of the baseline.
+
+        Raises:
+            InputError: The baseline is missing, or a file or a changed part is refused.
+        """
+        return self.present.against(self.kept.part, self.kept.content_sha256)
+
+    @cached_property
     def kept(self) -> Baseline:
         """Read the baseline of the suite.
 
@@ -149,7 +158,7 @@ class Suite:
             InputError: A file or a changed part is refused.
             UnfaithfulError: The simulator fails its checks on cases with known answers.
         """
-        now, before = self.present, self.kept
+        now, before = self.compared, self.kept
         done = check_one(before, now, self.where, self._how(before), name)
         return demanded(done) if self.survives else done
 
@@ -168,7 +177,8 @@ class Suite:
         if before is not None:
             how = with_planned_fingers(how, before, now.saved)
         limit = before and before.limit
-        found = complete(measured(testable(now, limit), (self.where, limit), how, 1, silent))
+        done = measured(testable(now, limit), (self.where, limit), how, 1, silent)
+        found = complete(done, now.recorded)
         write_baseline(self.baseline, found)
         return found
 

@@ -43,7 +43,7 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     with reporter.progress("simulating") as steps:
         tested = testable(now, command.limit)
         done = measured(tested, (about, command.limit), how, command.jobs, steps.update)
-    found = complete(done)
+    found = complete(done, now.recorded)
     write_baseline(command.out, found)
     held = sum(entry.held for entry in found.entries)
     reporter.say(f"wrote {command.out}: {held} of {len(found.entries)} grasps held")
@@ -59,6 +59,7 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     saved = read_grasps(path)
     source = source_of(saved, path, [command.baseline.parent], command.changed.object)
     now = present(saved, path, source, _asked(command.changed))
+    now = now.against(before.part, before.content_sha256)
     how = of_settings(before.settings, str(command.baseline))
     if command.setup is not None:
         how = replace(how, setup=setup_from_file(command.setup, how.setup))
@@ -72,7 +73,7 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     _say_mesh(now, reporter)
     if command.bless:
         testable(now, before.limit)
-        write_baseline(command.baseline, complete(done.measured))
+        write_baseline(command.baseline, complete(done.measured, now.recorded))
         reporter.say(f"wrote {command.baseline}")
         return Exit.GOOD
     return exit_code(done.findings, strict=command.strict)

@@ -14,11 +14,13 @@ from grasp_core.checked import number, one_of, switch
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import settings_of
 from grasp_core.files.strict_json import shown
-from grasp_core.objects.polyhedron import UNITS_M
+from grasp_core.objects.polyhedron import UNITS_M, Polyhedron
 from grasp_core.records.grasps_json import RECORDED, SavedGrasps
 from grasp_core.transferring.changed_part import fitting_unit, load_changed_part
-from grasp_core.transferring.like_faces import ANGLE_DEG, WIDEST_DEG, check_planar
+from grasp_core.transferring.like_faces import ANGLE_DEG, WIDEST_DEG, check_planar, likeness
 from grasp_core.transferring.transfer import Transfer, transfer
+from sim_validate.baselines.parts.moves import Moves, moves_since_baseline, moves_since_planning
+from sim_validate.baselines.parts.recorded_part import RecordedPart, recorded_part
 from sim_validate.baselines.parts.source_file import Source
 
 TABLE = "changed_part"
@@ -90,6 +92,21 @@ class Present:
     """How they were carried over; None where the part is as it was."""
     unit: str = ""
     """Unit of length of the changed part's file; empty where the part is as it was."""
+    asked: IfChanged = CARRY
+    """What to do if the part has changed."""
+    since: Moves | None = None
+    """How faces moved since the baseline was written on a changed part; None where they are
+    compared with those of the planned part."""
+
+    @property
+    def planned(self) -> Polyhedron:
+        """Return the part that the grasps were planned on."""
+        return self.saved.body if self.carried is None else self.carried.old
+
+    @property
+    def recorded(self) -> RecordedPart | None:
+        """Return what a baseline must keep of the part; None where it is the planned one."""
+        return None if self.carried is None else recorded_part(self.carried.old, self.carried.new)
 
     @property
     def gone(self) -> dict[str, str]:
@@ -100,16 +117,27 @@ class Present:
     @property
     def change(self) -> str:
         """Say which faces moved and by how much; empty where the part is as it was."""
-        if self.carried is None or self.source.file is None:
+        if self.source.file is None or not self.moves.faces:
             return ""
-        return f"{self.source.file} has changed: {self.carried.faces_in_words}"
+        return f"{self.source.file} has changed{self.moves.since}: {self.moves.in_words}"
+
+    @property
+    def moves(self) -> Moves:
+        """Return how faces moved, since the baseline where it tells, or else since planning."""
+        if self.since is not None:
+            return self.since
+        return Moves() if self.carried is None else moves_since_planning(self.carried)
 
     @property
     def note(self) -> str:
         """Say what readers must know about the mesh that is tested; empty if nothing."""
         if not self.change:
             return self.source.note
-        return f"{self.change}; its grasps were carried over to it"
+        return (
+            self.change
+            if self.carried is None
+            else f"{self.change}; its grasps were carried over to it"
+        )
 
     @property
     def mesh(self) -> Source:
@@ -139,6 +167,31 @@ class Present:
     def _with(self, carried: Transfer) -> "Present":
         return replace(self, saved=_tested(self.saved, carried), carried=carried)
 
+    def against(self, part: RecordedPart | None, content_sha256: str) -> "Present":
+        """Measure how faces moved from where they were when a baseline was written.
+
+        Args:
+            part: The changed part that the baseline was written on; None if it does not tell, as
+                where it was written on the planned one.
+            content_sha256: Hash of the mesh that the baseline was written on.
+
+        Raises:
+            InputError: The baseline's mesh is refused.
+        """
+        planned = self.planned
+        if self.source.file is None or part is None:
+            return self
+        if part.planned_sha256 != planned.content_sha256:
+            return self
+        now = self.saved.body
+        if now.content_sha256 == content_sha256:
+            return replace(self, since=Moves())
+        if self.asked.refuse:
+            return self
+        rule = likeness(planned, self.asked.distance_m, self.asked.angle_deg)
+        then = part.body(planned.name, content_sha256)
+        return replace(self, since=moves_since_baseline(then, planned, now, rule))
+
 
 def present(saved: SavedGrasps, path: Path, source: Source, asked: IfChanged = CARRY) -> Present:
     """Carry grasps over to their part as it is now; they stay as they are if it has not changed.
@@ -153,7 +206,7 @@ def present(saved: SavedGrasps, path: Path, source: Source, asked: IfChanged = C
         ChangedPartError: The part has changed, and that is refused or cannot be judged.
     """
     if not source.changed or source.file is None:
-        return Present(saved, source)
+        return Present(saved, source, asked=asked)
     if asked.refuse:
         raise ChangedPartError(
             f"{source.file}: this is not the mesh that {path} was planned on: the mesh has changed "
@@ -162,7 +215,7 @@ def present(saved: SavedGrasps, path: Path, source: Source, asked: IfChanged = C
             "name the right file with `object` in a *.grasps.toml"
         )
     unit, carried = _carried(saved, path, source.file, asked)
-    return Present(_tested(saved, carried), source, carried, unit)
+    return Present(_tested(saved, carried), source, carried, unit, asked)
 
 
 def _carried(saved: SavedGrasps, path: Path, file: Path, asked: IfChanged) -> tuple[str, Transfer]:

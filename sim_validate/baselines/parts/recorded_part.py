@@ -6,8 +6,6 @@ shape of the baseline at hand, moves of faces are measured from where they were 
 was written, which is what a user has accepted.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass as plain_dataclass
 from typing import Annotated
 
 from pydantic import Field
@@ -16,8 +14,6 @@ from pydantic.dataclasses import dataclass
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.records.grasps_json import RECORDED
-from grasp_core.transferring.face_changes import FaceChange, face_changes
-from grasp_core.transferring.like_faces import Likeness
 from sim_validate.baselines.executions import STRICT
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -73,32 +69,3 @@ def recorded_part(planned: Polyhedron, tested: Polyhedron) -> RecordedPart | Non
         vertices_m=tuple((x, y, z) for x, y, z in rows),
         triangles=tuple((a, b, c) for a, b, c in tested.triangles.tolist()),
     )
-
-
-@plain_dataclass(frozen=True, slots=True)
-class ChangesSince:
-    """How the faces of a part moved since a baseline was written on it."""
-
-    faces: tuple[FaceChange, ...]
-    """What became of each face that the part had then."""
-    numbers: Mapping[int, int]
-    """Numbers on the planned part, by which ids of grasps call faces, of the faces of then."""
-
-
-def changes_since(
-    then: Polyhedron, planned: Polyhedron, now: Polyhedron, rule: Likeness
-) -> ChangesSince:
-    """Compare a part with what it was when its baseline was written.
-
-    Args:
-        then: The part of the baseline.
-        planned: The part that the grasps were planned on.
-        now: The part as it is now.
-        rule: How near, and how little turned, a face must be to be the same one.
-    """
-    numbers = {
-        change.new: change.old
-        for change in face_changes(planned, then, rule)
-        if change.new is not None
-    }
-    return ChangesSince(face_changes(then, now, rule), numbers)

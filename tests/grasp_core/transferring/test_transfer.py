@@ -61,7 +61,8 @@ def test_contacts_of_a_moved_face_move_with_it_and_the_others_stay(box, by_mm):
     assert [change.old for change in moved] == [face]
     assert moved[0].distance == pytest.approx(1e-3 * by_mm, abs=1e-12)
     way = "outward" if by_mm > 0.0 else "inward"
-    assert str(moved[0]) == f"face 3 moved {abs(by_mm):.2f} mm {way}"
+    place = "(facing +z at z = 25 mm)"
+    assert str(moved[0]) == f"face 3 {place} moved {abs(by_mm):.2f} mm {way}"
     seen = 0
     for each in found.grasps:
         shift = each.grasp.positions - each.old.positions
@@ -90,10 +91,11 @@ def test_a_face_that_moved_too_far_is_named_with_finger_face_and_distance(box):
         assert lost.contact is None
         assert lost.distance == pytest.approx(2e-3, abs=1e-12)
         assert each.reason == (
-            f"finger {finger} has lost face 3: the nearest like face, 3 of the changed part, is "
-            "2.00 mm away, more than 1.50 mm"
+            f"finger {finger} has lost face 3 (facing +z at z = 25 mm): the nearest face like it, "
+            "face 3 in the numbering of the changed part (facing +z at z = 27 mm), is 2.00 mm "
+            "away, more than 1.50 mm"
         )
-    assert "face 3 moved 2.00 mm outward" in found.faces_in_words
+    assert "face 3 (facing +z at z = 25 mm) moved 2.00 mm outward" in found.faces_in_words
     exactly = gc.transfer(body, with_face_moved(body, 3, 2e-3), grasps, FRICTION, distance=2e-3)
     assert not exactly.count("gone")
 
@@ -112,7 +114,11 @@ def test_a_face_that_turned_too_far_is_lost():
         assert all((each.contacts[each.old.faces.index(3)].contact is None) is lost
                    for each in on_top)  # fmt: skip
         if lost:
-            assert "no face of the changed part is within 5 deg of it" in on_top[0].reason
+            reason = on_top[0].reason
+            assert "no face of the changed part is within 5 deg of it" in reason
+            assert f"is turned by {slope:.2f} deg" in reason
+            assert f"turned {slope:.2f} deg, too far to be the same face" in found.faces_in_words
+            assert "new face" not in found.faces_in_words
         else:
             assert f"turned {slope:.2f} deg" in found.faces_in_words
 

@@ -24,6 +24,7 @@ from tests.sim_validate.plugin.project import copied, run_pytest
 
 TOP = 3
 """The highest face of the part."""
+FACE = "face 3 (facing +z at z = 25 mm)"
 
 
 @pytest.fixture(scope="module")
@@ -80,13 +81,13 @@ def test_grasps_are_carried_over_to_a_changed_part_and_it_is_said_how_it_changed
     code, said = run_pytest(project, "--grasp-report", "report")
     assert code == 0, said
     assert "1 passed" in said
-    assert f"{part} has changed: face 3 moved 1.00 mm outward" in " ".join(said.split())
+    assert f"{part} has changed: {FACE} moved 1.00 mm outward" in " ".join(said.split())
     assert "its grasps were carried over to it" in " ".join(said.split())
     line = line_in(project / "report")
     assert line["status"] == "within bands"
-    assert f"same on the changed part: {part} has changed: face 3 moved 1.00 mm" in line["why"]
+    assert f"same on the changed part: {part} has changed: {FACE} moved 1.00 mm" in line["why"]
     assert line["mesh_file"] == str(part)
-    assert "face 3 moved 1.00 mm outward" in line["mesh_note"]
+    assert f"{FACE} moved 1.00 mm outward" in line["mesh_note"]
     assert line["before"]["contacts_sha256"] != line["after"]["contacts_sha256"]
 
 
@@ -99,10 +100,9 @@ def test_a_grasp_that_the_changed_part_does_not_have_fails_and_is_gone(project):
     assert "1 failed" in said
     line = line_in(project / "report")
     assert line["status"] == "gone"
-    assert (
-        "has lost face 3: the nearest like face, 3 of the changed part, is 1.00 mm away, " in said
-    )
-    assert "face 3 moved 1.00 mm outward" in line["why"]
+    assert f"has lost {FACE}: the nearest face like it, face 3 in the numbering of" in said
+    assert "(facing +z at z = 26 mm), is 1.00 mm away, more than 0.50 mm" in said
+    assert f"{FACE} moved 1.00 mm outward" in line["why"]
     assert "graspproof transfer" in said
 
 
@@ -133,7 +133,7 @@ def test_a_grasp_that_is_worse_fails_and_the_face_that_moved_is_named(project):
     assert code == 1
     assert ": regressed" in said
     assert "worse on the changed part: " in said
-    assert "face 3 moved 1.00 mm outward" in said
+    assert f"{FACE} moved 1.00 mm outward" in said
 
 
 def test_blessing_a_changed_part_writes_its_hash_and_then_everything_is_the_same(project):
@@ -151,7 +151,106 @@ def test_blessing_a_changed_part_writes_its_hash_and_then_everything_is_the_same
     suite = suite_from_toml(project / "part.grasps.toml")
     (finding,) = suite.tested(suite.ids[0]).findings
     assert finding.status is Status.WITHIN
-    assert "face 3 moved 1.50 mm outward" in finding.reasons[0]
+    moved = "face 3 (facing +z at z = 26 mm) moved 0.50 mm outward"
+    assert f"part.obj has changed since its baseline was written: {moved}" in finding.reasons[0]
+
+
+def test_a_blessed_part_is_not_said_to_have_changed(project):
+    edited(project)
+    assert run_pytest(project, "--grasp-bless")[0] == 0
+    code, said = run_pytest(project, "--grasp-report", "report")
+    assert code == 0, said
+    assert "changed" not in said
+    assert line_in(project / "report")["mesh_note"] == ""
+
+
+def test_the_planned_part_put_back_after_a_blessed_change_is_judged_like_any_other(project, capsys):
+    """It is the one shape on which grasps need not be carried over."""
+    part = project / "part.obj"
+    original = part.read_text()
+    edited(project)
+    assert run_pytest(project, "--grasp-bless")[0] == 0
+    write_text(part, original)
+    code, said = run_pytest(project, "--grasp-report", "report")
+    assert code == 0, said
+    line = line_in(project / "report")
+    assert line["status"] == "within bands"
+    moved = "face 3 (facing +z at z = 26 mm) moved 1.00 mm inward"
+    assert f"{part} has changed since its baseline was written: {moved}" in line["mesh_note"]
+    assert "same on the changed part" in line["why"]
+    baseline = str(project / "part.baseline.json")
+    assert main(["baseline", "check", baseline]) == Exit.GOOD
+    said = " ".join(capsys.readouterr().out.split())
+    assert "1 within bands" in said
+    assert moved in said
+    record = json.loads((project / "part.baseline.json").read_text())
+    record["grasps"][0].update(limit_n=1e3)
+    write_text(project / "part.baseline.json", json.dumps(record))
+    code, said = run_pytest(project)
+    assert code == 1
+    assert "worse on the changed part: " in said
+
+
+def test_the_planned_part_put_back_is_refused_where_every_change_is(project):
+    part = project / "part.obj"
+    original = part.read_text()
+    edited(project)
+    assert run_pytest(project, "--grasp-bless")[0] == 0
+    write_text(part, original)
+    refusing(project)
+    code, said = run_pytest(project)
+    assert code == 1
+    assert "not comparable" in said
+
+
+def test_grasps_that_are_planned_again_are_not_compared_with_a_blessed_change(project):
+    """Then the ids may name other contacts, so the baseline is of another object."""
+    part = edited(project)
+    assert run_pytest(project, "--grasp-bless")[0] == 0
+    edited(project)
+    body = gc.load_polyhedron(part, unit="mm")
+    name = json.loads((project / "grasps.json").read_text())["grasps"][0]["id"]
+    plan = gc.plan(body, 0.5, families=("concurrent",))
+    plan = dataclasses.replace(plan, grasps=(plan[name],))
+    write_text(project / "grasps.json", plan_to_json(body, plan))
+    code, said = run_pytest(project)
+    assert code == 1
+    assert "the object is another one" in said
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"vertices_m": [[0.0, 0.0, 0.0]]}, "part: expected the mesh of a solid"),
+        ({"triangles": [[0, 1, 99]]}, "part: expected the mesh of a solid"),
+        ({"triangles": "all"}, "part.triangles: "),
+        ({"vertices_m": None}, "part.vertices_m: "),
+    ],
+)
+def test_the_part_in_a_baseline_is_checked(project, changed, said):
+    edited(project)
+    suite_from_toml(project / "part.grasps.toml").bless()
+    edited(project)
+    path = project / "part.baseline.json"
+    record = json.loads(path.read_text())
+    record["part"].update(changed)
+    write_text(path, json.dumps(record))
+    suite = suite_from_toml(project / "part.grasps.toml")
+    with pytest.raises(gc.InputError, match=said):
+        _ = suite.compared
+
+
+def test_a_part_in_a_baseline_that_is_not_the_recorded_one_is_refused(project):
+    edited(project)
+    suite_from_toml(project / "part.grasps.toml").bless()
+    edited(project)
+    path = project / "part.baseline.json"
+    record = json.loads(path.read_text())
+    for vertex in record["part"]["vertices_m"]:
+        vertex[0] += 0.001
+    write_text(path, json.dumps(record))
+    with pytest.raises(gc.InputError, match="not the one that its content_sha256 says"):
+        _ = suite_from_toml(project / "part.grasps.toml").compared
 
 
 def test_a_grasp_that_was_gone_when_it_was_blessed_stays_gone_without_a_failure(project):
@@ -258,11 +357,11 @@ def test_commands_carry_grasps_over_and_name_the_face(project, capsys):
     assert main(["baseline", "check", baseline]) == Exit.GOOD
     said = " ".join(capsys.readouterr().out.split())
     assert "1 within bands" in said
-    assert "part.obj has changed: face 3 moved 1.00 mm outward" in said
+    assert f"part.obj has changed: {FACE} moved 1.00 mm outward" in said
     assert main(["baseline", "check", baseline, "--distance-m", "0.0005"]) == Exit.NEGATIVE
     said = " ".join(capsys.readouterr().out.split())
     assert "1 gone" in said
-    assert "face 3 moved 1.00 mm outward" in said
+    assert f"{FACE} moved 1.00 mm outward" in said
     assert main(["baseline", "record", grasps, "-o", baseline, "-q"]) == Exit.GOOD
     capsys.readouterr()
     assert main(["baseline", "check", baseline]) == Exit.GOOD
