@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from sim_validate.baselines.parts.changed_part import Present
 from sim_validate.baselines.compare import Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.entries import Baseline
 from sim_validate.baselines.measure import Measured, Report, measured, with_planned_fingers
+from sim_validate.baselines.parts.changed_part import Present
 from sim_validate.baselines.settings import How
 from sim_validate.validation.grasp_verdict import Verdict
 

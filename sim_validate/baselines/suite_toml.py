@@ -13,6 +13,14 @@ from grasp_core.errors import InputError
 from grasp_core.files.strict_json import place, shown
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
+from sim_validate.baselines.check import Checked, check_one, demanded, silent
+from sim_validate.baselines.entries import Baseline
+from sim_validate.baselines.measure import (
+    complete,
+    measured,
+    seen_from,
+    with_planned_fingers,
+)
 from sim_validate.baselines.parts.changed_part import (
     CARRY,
     IfChanged,
@@ -22,16 +30,8 @@ from sim_validate.baselines.parts.changed_part import (
     testable,
 )
 from sim_validate.baselines.parts.changed_part import TABLE as CHANGED
-from sim_validate.baselines.check import Checked, check_one, demanded, silent
-from sim_validate.baselines.entries import Baseline
-from sim_validate.baselines.measure import (
-    complete,
-    measured,
-    seen_from,
-    with_planned_fingers,
-)
-from sim_validate.baselines.settings import How, noise_from_table, of_settings, setup_for
 from sim_validate.baselines.parts.source_file import Source, source_of
+from sim_validate.baselines.settings import How, noise_from_table, of_settings, setup_for
 from sim_validate.execution.asked import TABLE, AskedExecution, asked_execution
 from sim_validate.files.toml_tables import read_tables
 from sim_validate.records.grasps import read_grasps

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 from grasp_core.files.text_files import write_text
 from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
-from sim_validate.baselines.parts.changed_part import IfChanged, Present, present, testable
 from sim_validate.baselines.check import Checked, check
 from sim_validate.baselines.compare import Finding, Status, failing
 from sim_validate.baselines.entries import fields_of
 from sim_validate.baselines.junit import junit_text
 from sim_validate.baselines.measure import complete, measured, seen_from
-from sim_validate.baselines.settings import How, of_settings, setup_for
+from sim_validate.baselines.parts.changed_part import IfChanged, Present, present, testable
 from sim_validate.baselines.parts.source_file import source_of
+from sim_validate.baselines.settings import How, of_settings, setup_for
 from sim_validate.cli import baseline_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
@@ -120,8 +120,8 @@ def _show(done: Checked, reporter: Reporter) -> None:
 
 
 def _why(finding: Finding) -> str:
-    """Join the reasons why a grasp changed, and the differences that the reasons do not name."""
-    more = [text for text in finding.differences if text not in finding.reasons]
+    """Join the reasons why a grasp changed, and further differences beyond their bands."""
+    more = [text for text in finding.beyond if text not in finding.reasons]
     return "; ".join([*finding.reasons, *more])
 
 

@@ -149,6 +149,11 @@ class Present:
         found = () if self.carried is None else self.carried.grasps
         return next((each.grasp.id for each in found if each.old.id == name and each.grasp), None)
 
+    def planned_faces(self, name: str) -> tuple[int, ...]:
+        """Return the faces of the planned part that a grasp of the file touches."""
+        grasps = self.saved.grasps if self.carried is None else [e.old for e in self.carried.grasps]
+        return next((grasp.faces for grasp in grasps if grasp.id == name), ())
+
     def first(self, limit: int | None) -> "Present":
         """Return only the first grasps of the file, up to a limit."""
         if self.carried is None:

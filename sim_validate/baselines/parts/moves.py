@@ -39,26 +39,14 @@ class Moves:
             faces: Their numbers on the planned part.
         """
         wanted = {*faces}
-        listed = sorted(
-            (number, change)
+        names = (
+            change.old if self.numbers is None else self.numbers.get(change.old)
             for change in self.faces
-            if (number := self._number(change)) in wanted and number is not None
-            if change.moved or change.reshaped
+            if change.moved
         )
-        moved = [number for number, change in listed if change.moved]
-        reshaped = [number for number, change in listed if not change.moved]
-        said = [f"{_faces(group)}, which {word}"
-                for group, word in ((moved, "moved"), (reshaped, "has another outline"
-                                     if len(reshaped) == 1 else "have other outlines"))
-                if group]  # fmt: skip
-        return " and ".join(said)
-
-    def _number(self, change: FaceChange) -> int | None:
-        return change.old if self.numbers is None else self.numbers.get(change.old)
-
-
-def _faces(numbers: list[int]) -> str:
-    return f"{'face' if len(numbers) == 1 else 'faces'} {', '.join(map(str, numbers))}"
+        moved = sorted(name for name in names if name in wanted)
+        many = "face" if len(moved) == 1 else "faces"
+        return f"{many} {', '.join(map(str, moved))}, which moved" if moved else ""
 
 
 def moves_since_planning(carried: Transfer) -> Moves:

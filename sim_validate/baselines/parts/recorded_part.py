@@ -1,9 +1,9 @@
 """Keeps the shape of the part that a baseline was written on, where it is not the planned one.
 
 A file of grasps holds the shape that they were planned on. Once a baseline is written on a changed
-part, that shape is neither the part of the baseline nor, in general, that of the next test. With the
-shape of the baseline at hand, moves of faces are measured from where they were when the baseline
-was written, which is what a user has accepted.
+part, that shape is neither the part of the baseline nor, in general, that of the next test. With
+the shape of the baseline at hand, moves of faces are measured from where they were when the
+baseline was written, which is what a user has accepted.
 """
 
 from typing import Annotated

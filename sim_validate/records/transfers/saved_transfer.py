@@ -90,7 +90,7 @@ class SavedTransfer(ByValue, ById[SavedCarriedGrasp]):
 
     @property
     def faces_in_words(self) -> str:
-        """Say which faces moved and by how much, such as `face 3 (..) moved 1.00 mm outward`."""
+        """Say in one line where faces are that moved, and by how much."""
         return in_words(self.faces, self.added)
 
     def __repr__(self) -> str:

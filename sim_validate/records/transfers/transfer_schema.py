@@ -1,9 +1,9 @@
 """The fields of `transfer.json` with their types, for its writer and for whoever reads it."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NotRequired
 
 from pydantic import ConfigDict, Field, with_config
-from typing_extensions import NotRequired, TypedDict
+from typing_extensions import TypedDict
 
 from grasp_core.transferring.judging import Change
 from grasp_core.values import FINGERS

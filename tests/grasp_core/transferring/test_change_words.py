@@ -103,7 +103,7 @@ def test_a_face_that_was_cut_off_is_gone():
 def _prism(sides):
     turn = 2.0 * np.pi * np.arange(sides) / sides
     ring = 0.03 * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(sides)])
-    hull = trimesh.convex.convex_hull(np.vstack([ring, ring + [0.0, 0.0, 0.04]]))
+    hull = trimesh.convex.convex_hull(np.vstack([ring, ring + np.array([0.0, 0.0, 0.04])]))
     return hull.vertices, hull.faces
 
 

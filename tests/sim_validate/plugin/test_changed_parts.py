@@ -12,9 +12,9 @@ import grasp_core as gc
 from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
-from sim_validate.baselines.parts.changed_part import ChangedPartError
 from sim_validate.baselines.compare import Status
 from sim_validate.baselines.grasp_cases import grasp_cases
+from sim_validate.baselines.parts.changed_part import ChangedPartError
 from sim_validate.baselines.parts.source_file import Source, source_of
 from sim_validate.baselines.suite_toml import suite_from_toml
 from sim_validate.cli.exit_codes import Exit
@@ -83,6 +83,8 @@ def test_grasps_are_carried_over_to_a_changed_part_and_it_is_said_how_it_changed
     assert "1 passed" in said
     assert f"{part} has changed: {FACE} moved 1.00 mm outward" in " ".join(said.split())
     assert "its grasps were carried over to it" in " ".join(said.split())
+    (name,) = json.loads((project / "grasps.json").read_text())["grasps"]
+    assert f"  {name['id']} same; touches face 3, which moved\n" in said
     line = line_in(project / "report")
     assert line["status"] == "within bands"
     assert f"same on the changed part: {part} has changed: {FACE} moved 1.00 mm" in line["why"]
@@ -118,6 +120,10 @@ def test_a_grasp_that_is_better_fails_only_where_that_is_strict(project):
     line = line_in(project / "report")
     assert line["status"] == "improved"
     assert "better on the changed part: " in line["why"]
+    assert "told" not in line
+    better = f"  {line['grasp']} better than in the baseline: critical_friction: 0.2 -> 0."
+    (told,) = [text for text in said.splitlines() if text.startswith(better)]
+    assert told.endswith("; touches face 3, which moved")
     toml = project / "part.grasps.toml"
     write_text(toml, "strict = true\n" + toml.read_text())
     assert run_pytest(project)[0] == 1
@@ -133,6 +139,10 @@ def test_a_grasp_that_is_worse_fails_and_the_face_that_moved_is_named(project):
     assert code == 1
     assert ": regressed" in said
     assert "worse on the changed part: " in said
+    failure = said[said.index(": regressed") : said.index("meshes of grasps")]
+    assert failure.count("has changed") == 1
+    assert "critical_friction: " not in failure
+    assert "N predicted, not measured in simulation" in failure
     assert f"{FACE} moved 1.00 mm outward" in said
 
 
@@ -141,6 +151,7 @@ def test_blessing_a_changed_part_writes_its_hash_and_then_everything_is_the_same
     grasps = (project / "grasps.json").read_text()
     code, said = run_pytest(project, "--grasp-bless")
     assert code == 0, said
+    assert f"wrote {project / 'part.baseline.json'}: 1 of 1 grasp held" in said
     record = json.loads((project / "part.baseline.json").read_text())
     assert record["content_sha256"] == gc.load_polyhedron(part, unit="mm").content_sha256
     assert (project / "grasps.json").read_text() == grasps
