@@ -51,8 +51,8 @@ def in_words(
         way = ", ".join(map(in_mm, shift.tolist()))
         said.insert(0, f"it is as if the whole part were shifted by ({way}) mm")
     kept = [change for change in listed if change.reshaped and not change.moved]
-    smaller = [change.old for change in kept if change.new_area < change.old_area]
-    larger = [change.old for change in kept if change.new_area > change.old_area]
+    smaller = [change for change in kept if change.new_area < change.old_area]
+    larger = [change for change in kept if change.new_area > change.old_area]
     said += [f"{_together(group, names)} became {word}"
              for group, word in ((smaller, "smaller"), (larger, "larger")) if group]  # fmt: skip
     likely = {change.likely for change in listed}
@@ -85,15 +85,20 @@ def common_shift(changes: Sequence[FaceChange], added: Sequence[int] = ()) -> Ar
 
 
 def _named(change: FaceChange, names: Mapping[int, int]) -> str:
-    number = names.get(change.old)
-    return change.in_words("a newer face" if number is None else f"face {number}", number)
+    return change.in_words(_name(change, names), names.get(change.old))
 
 
-def _together(faces: Sequence[int], names: Mapping[int, int]) -> str:
-    """Name some faces, such as `faces 1, 2`."""
-    known = sorted(names[face] for face in faces if face in names)
+def _name(change: FaceChange, names: Mapping[int, int]) -> str:
+    return f"face {names[change.old]}" if change.old in names else "a newer face"
+
+
+def _together(faces: Sequence[FaceChange], names: Mapping[int, int]) -> str:
+    """Name some faces, such as `faces 1, 2`; one alone with its place."""
+    if len(faces) == 1:
+        return faces[0].called(_name(faces[0], names))
+    known = sorted(names[face.old] for face in faces if face.old in names)
     if not known:
         return counted(len(faces), "newer face")
     listed = ", ".join(map(str, known[:MOST_NAMED]))
     more = len(faces) - min(len(known), MOST_NAMED)
-    return f"{'face' if len(faces) == 1 else 'faces'} {listed}{f' and {more} more' if more else ''}"
+    return f"faces {listed}{f' and {more} more' if more else ''}"

@@ -81,21 +81,39 @@ def _carried(
         return CarriedContact(finger, face, place.part.face, place.contact, place.distance, turn)
     reason = (
         f"{lost}: the nearest face like it, {_on(new, near)}, is {MM * near.distance:.2f} mm away, "
-        f"more than {MM * rule.distance:.2f} mm"
+        f"more than {MM * rule.distance:.2f} mm{_nearer(new, contact, near.distance, rule)}"
     )
     return CarriedContact(finger, face, None, None, near.distance, turn, reason)
+
+
+def _nearer(new: Polyhedron, contact: Contact, distance: float, rule: Likeness) -> str:
+    """Name the face that a contact was on, if it turned too far; empty if no such face is near."""
+    near = nearest_at_any_distance(new, contact.position, contact.normal, _wide(rule))
+    if near is None or near.distance >= distance - rule.same:
+        return ""
+    return (
+        f"; nearer, {MM * near.distance:.2f} mm away, is {_on(new, near)}, but turned by "
+        f"{_degrees(contact, near)}, more than {math.degrees(rule.angle):.4g} deg"
+    )
+
+
+def _wide(rule: Likeness) -> Likeness:
+    return replace(rule, angle=math.radians(WIDEST_DEG))
+
+
+def _degrees(contact: Contact, near: Nearest) -> str:
+    return f"{math.degrees(_angle(contact, near)):.2f} deg"
 
 
 def _turned(new: Polyhedron, contact: Contact, rule: Likeness) -> str:
     """Say that no face is like that of a contact, and which one it may have become."""
     said = f"no face of the changed part is within {math.degrees(rule.angle):.4g} deg of it"
-    wide = replace(rule, angle=math.radians(WIDEST_DEG))
-    near = nearest_at_any_distance(new, contact.position, contact.normal, wide)
+    near = nearest_at_any_distance(new, contact.position, contact.normal, _wide(rule))
     if near is None:
         return said
     return (
         f"{said}; the nearest one within {WIDEST_DEG:g} deg, {_on(new, near)}, is turned by "
-        f"{math.degrees(_angle(contact, near)):.2f} deg and {MM * near.distance:.2f} mm away"
+        f"{_degrees(contact, near)} and {MM * near.distance:.2f} mm away"
     )
 
 

@@ -90,8 +90,7 @@ class FaceChange:
             number: Its number in that numbering; the number on the changed part is said if it is
                 another one. None if it has none.
         """
-        if self.normal is not None and self.center is not None:
-            named += f" ({place_in_words(self.normal, self.center)})"
+        named = self.called(named)
         if self.likely is not None:
             turn = f"turned {math.degrees(self.likely_turn):.2f} deg"
             return f"{named} {turn}, too far to be the same face"
@@ -103,6 +102,12 @@ class FaceChange:
         if not said and self.reshaped:
             said = [f"has {MM2 * (self.new_area - self.old_area):+.4g} mm2 of area"]
         return f"{named} {' and '.join(said) or 'is as it was'}"
+
+    def called(self, named: str) -> str:
+        """Return a name of the face with its place, such as `face 3 (facing +z at z = 25 mm)`."""
+        if self.normal is None or self.center is None:
+            return named
+        return f"{named} ({place_in_words(self.normal, self.center)})"
 
 
 def _motions(change: FaceChange) -> Iterable[str]:

@@ -69,7 +69,7 @@ def check_one(before: Baseline, now: Present, where: str, how: How, name: str) -
 
 def _carried(now: Present) -> Carried | None:
     """Say what a comparison must know of a part that is not the planned or the recorded one."""
-    known = now.carried is not None or now.since is not None
+    known = now.carried is not None or now.since is not None or bool(now.change)
     return Carried(now.change, now.gone) if known else None
 
 

@@ -119,6 +119,9 @@ class Baseline:
     """Hash that tells how the processor rounds."""
     entries: tuple[Entry, ...]
     """Entries of the grasps, sorted by id."""
+    unit: str | None = None
+    """Unit of length of the mesh file; None where there is none, or it was not known, and then no
+    file mentions it."""
     part: RecordedPart | None = None
     """The part that it was written on; None where that is the one that the grasps were planned on,
     and then no file mentions it."""

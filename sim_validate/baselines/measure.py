@@ -12,7 +12,7 @@ from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
 from sim_validate.baselines.entries import Baseline, Entry, entry_of
 from sim_validate.baselines.executions import tried_execution
-from sim_validate.baselines.parts.recorded_part import RecordedPart
+from sim_validate.baselines.parts.changed_part import Present
 from sim_validate.baselines.settings import How, settings_of
 from sim_validate.execution.asked import AskedExecution
 from sim_validate.execution.jobs import ExecutedGrasp, ExecutionJob
@@ -123,19 +123,19 @@ def _try(job: Job) -> Verdict | str:
         return str(error)
 
 
-def complete(found: Measured, part: RecordedPart | None) -> Baseline:
+def complete(found: Measured, now: Present) -> Baseline:
     """Return the baseline of a measurement in which every grasp could be simulated.
 
     Args:
         found: The measurement.
-        part: The part that was measured; None if it is the one that the grasps were planned on.
+        now: The grasps on their part as it was measured.
 
     Raises:
         InputError: A grasp could not be simulated.
     """
     if found.refused:
         raise InputError("; ".join(found.refused.values()))
-    return replace(found.baseline, part=part)
+    return replace(found.baseline, part=now.recorded, unit=now.file_unit)
 
 
 def with_planned_fingers(how: How, before: Baseline, saved: SavedGrasps) -> How:

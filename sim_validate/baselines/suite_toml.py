@@ -21,15 +21,9 @@ from sim_validate.baselines.measure import (
     seen_from,
     with_planned_fingers,
 )
-from sim_validate.baselines.parts.changed_part import (
-    CARRY,
-    IfChanged,
-    Present,
-    if_changed,
-    present,
-    testable,
-)
-from sim_validate.baselines.parts.changed_part import TABLE as CHANGED
+from sim_validate.baselines.parts.changed_part import Present, present, testable
+from sim_validate.baselines.parts.if_changed import CARRY, IfChanged, if_changed
+from sim_validate.baselines.parts.if_changed import TABLE as CHANGED
 from sim_validate.baselines.parts.source_file import Source, source_of
 from sim_validate.baselines.settings import How, noise_from_table, of_settings, setup_for
 from sim_validate.execution.asked import TABLE, AskedExecution, asked_execution
@@ -119,7 +113,7 @@ class Suite:
         Raises:
             InputError: The baseline is missing, or a file or a changed part is refused.
         """
-        return self.present.against(self.kept.part, self.kept.content_sha256)
+        return self.present.against(self.kept)
 
     @cached_property
     def kept(self) -> Baseline:
@@ -178,7 +172,7 @@ class Suite:
             how = with_planned_fingers(how, before, now.saved)
         limit = before and before.limit
         done = measured(testable(now, limit), (self.where, limit), how, 1, silent)
-        found = complete(done, now.recorded)
+        found = complete(done, now)
         write_baseline(self.baseline, found)
         return found
 

@@ -67,7 +67,8 @@ def test_one_moved_face_or_a_scaled_part_is_no_shift():
 def test_a_pocket_and_a_chamfer_are_so_many_new_faces():
     body = example_object("box")
     round_hole = with_hole(body, 3, body.faces[3].centroid, 4e-3, depth=5e-3)
-    assert in_words(*changes_of(body, round_hole)) == "face 3 became smaller; 25 new faces"
+    said = in_words(*changes_of(body, round_hole))
+    assert said == "face 3 (facing +z at z = 25 mm) became smaller; 25 new faces"
     cut = in_words(*changes_of(body, with_chamfer(body, 3, 0, 4e-3)))
     assert cut.startswith("faces 0, ")
     assert cut.endswith(" became smaller; 1 new face")

@@ -123,6 +123,37 @@ def test_a_face_that_turned_too_far_is_lost():
             assert f"turned {slope:.2f} deg" in found.faces_in_words
 
 
+def test_a_turned_face_is_named_before_a_like_one_far_away():
+    """The longer leg's end of a bracket turns, and the shorter leg's inner side is like it."""
+    body = example_object("l-bracket")
+    plan = gc.plan(body, FRICTION)
+    ends = [index for index, face in enumerate(body.faces)
+            if np.isclose(np.abs(face.normal), 1.0, atol=1e-9).any()]  # fmt: skip
+    seen = 0
+    for end in ends:
+        axis = int(np.abs(body.normals[end]).argmax())
+        like = [each for each in ends if body.normals[each] @ body.normals[end] > 0.999]
+        outer = max(like, key=lambda each: -body.normals[end] @ body.faces[each].centroid)
+        if len(like) < 2 or outer != end:
+            continue
+        on = np.isclose(body.vertices[:, axis], body.faces[end].centroid[axis])
+        vertices, other = body.vertices.copy(), (axis + 1) % 3
+        sign = math.copysign(1.0, -body.normals[end][axis])
+        least = vertices[on, other].min()
+        vertices[on, axis] -= sign * math.tan(math.radians(20.0)) * (vertices[on, other] - least)
+        try:
+            new = gc.Polyhedron.from_mesh(vertices, body.triangles, faces="planar")
+        except gc.MeshError:
+            continue
+        grasps = [grasp for grasp in plan.grasps if end in grasp.faces][:5]
+        for each in gc.transfer(body, new, grasps, FRICTION).grasps:
+            lost = each.contacts[each.old.faces.index(end)]
+            assert lost.contact is None
+            assert ", but turned by 20.00 deg, more than 5 deg" in lost.reason
+            seen += 1
+    assert seen >= 3
+
+
 def test_a_contact_in_a_new_hole_goes_to_its_rim(box):
     body, grasps = box
     grasp = grasps[0]

@@ -346,6 +346,57 @@ def test_where_there_is_no_part_it_is_said_that_a_copy_was_tested(project):
     assert line["mesh_note"].startswith(note)
 
 
+def test_a_missing_part_fails_where_that_is_asked_for(project):
+    toml = project / "part.grasps.toml"
+    write_text(toml, toml.read_text() + '[changed_part]\nmissing = "fail"\n')
+    assert run_pytest(project)[0] == 0
+    (project / "part.obj").unlink()
+    code, said = run_pytest(project, "--grasp-report", "report")
+    assert code == 1
+    assert "the mesh file that its grasps were planned from, 'part'" in said
+    assert "is missing" in said
+    assert line_in(project / "report")["status"] == "not comparable"
+    with pytest.raises(ChangedPartError, match="is missing"):
+        grasp_cases(project, ["grasps.json"], {"changed_part": {"missing": "fail"}})
+
+
+def rescaled(project, by, digits):
+    part = project / "part.obj"
+    rows = [row.split() for row in part.read_text().splitlines()]
+    for row in rows:
+        if row[0] == "v":
+            row[1:] = [f"{by * float(number):.{digits}g}" for number in row[1:]]
+    return write_text(part, "\n".join(map(" ".join, rows)) + "\n")
+
+
+@pytest.mark.parametrize("digits", [15, 8])
+def test_a_part_saved_in_another_unit_is_said_to_be(project, digits):
+    """With fifteen digits the solid is the very same one, with eight nearly."""
+    part = project / "part.obj"
+    write_text(part, part.read_text().replace("\n", "\n# edited\n", 1))
+    edited(project, 1.0 / 3.0)  # so that no number is round
+    assert run_pytest(project, "--grasp-bless")[0] == 0
+    assert json.loads((project / "part.baseline.json").read_text())["unit"] == "mm"
+    rescaled(project, 1e-3, digits)
+    code, said = run_pytest(project, "--grasp-report", "report")
+    assert code == 0, said
+    note = line_in(project / "report")["mesh_note"]
+    assert "its numbers are 0.001 times what they were, so it is taken to be in m now" in note
+    toml = project / "part.grasps.toml"
+    write_text(toml, toml.read_text() + '[changed_part]\nunit = "m"\n')
+    assert "its numbers" not in run_pytest(project)[1]
+
+
+def test_a_shifted_part_is_said_to_be_shifted(project):
+    part = project / "part.obj"
+    rows = [row.split() for row in part.read_text().splitlines()]
+    for row in rows:
+        if row[0] == "v":
+            row[1] = repr(float(row[1]) + 1.0)
+    write_text(part, "\n".join(map(" ".join, rows)) + "\n")
+    assert "it is as if the whole part were shifted by (1, 0, 0) mm; face" in run_pytest(project)[1]
+
+
 def test_blessing_commands_and_markers_refuse_a_changed_part_too(project, capsys):
     edited(project)
     refusing(project)
@@ -412,6 +463,7 @@ def test_a_part_whose_unit_is_not_clear_asks_for_it(project):
         ("refuse = 1", "changed_part.refuse: expected true or false"),
         ("angle_deg = 90", "angle_deg must be a number"),
         ('unit = "ft"', "unit must be one of"),
+        ('missing = "skip"', "missing must be one of note, fail"),
         ("unknown = 1", "changed_part: no setting is named"),
     ],
 )
@@ -434,7 +486,7 @@ def test_comments_line_ends_and_the_order_of_vertices_are_no_change(project):
         turned,
     ):
         part.write_text(text, newline="")
-        assert source_of(saved, project / "grasps.json", []) == Source(file=part)
+        assert source_of(saved, project / "grasps.json", []) == Source(file=part, unit="mm")
         found += 1
     assert found == 3
 
