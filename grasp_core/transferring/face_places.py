@@ -6,9 +6,9 @@ is parallel to no plane of the axes.
 """
 
 import math
-from collections.abc import Sequence
 from typing import TypeAlias
 
+from grasp_core.arrays import Array
 from grasp_core.objects.face import Face
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -20,9 +20,9 @@ NOTHING_MM = 1e-6
 """Coordinate that is written as zero [mm]."""
 
 
-def triple(numbers: Sequence[float]) -> Triple:
-    """Turn three numbers into plain ones."""
-    x, y, z = map(float, numbers)
+def triple(numbers: Array) -> Triple:
+    """Turn an array of three numbers into plain ones."""
+    x, y, z = numbers.tolist()
     return x, y, z
 
 

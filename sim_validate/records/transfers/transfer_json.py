@@ -81,7 +81,7 @@ def _face_record(change: FaceChange) -> FaceChangeRecord:
         "in_words": str(change),
     }
     if change.normal is not None and change.center is not None:
-        found |= {"normal": change.normal, "center_m": change.center}
+        found["normal"], found["center_m"] = change.normal, change.center
     return found
 
 
