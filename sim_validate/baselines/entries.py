@@ -19,7 +19,7 @@ from sim_validate.baselines.executions import (
     execution_entry,
     rounded,
 )
-from sim_validate.baselines.parts.recorded_part import RecordedPart
+from sim_validate.baselines.parts.recorded_part import RecordedPart, RecordedShape
 from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.setup import WEAKEST
@@ -130,6 +130,11 @@ class Baseline:
         """Refuse a baseline with two entries for one grasp."""
         if len({entry.id for entry in self.entries}) < len(self.entries):
             raise ValueError("two grasps of the baseline have the same id")
+
+    @property
+    def shape(self) -> RecordedShape:
+        """Return what is recorded of the part."""
+        return RecordedShape(self.content_sha256, self.unit, self.part)
 
 
 def plain(entry: Entry | None) -> dict[str, Any] | None:

@@ -113,7 +113,7 @@ class Suite:
         Raises:
             InputError: The baseline is missing, or a file or a changed part is refused.
         """
-        return self.present.against(self.kept)
+        return self.present.against(self.kept.shape)
 
     @cached_property
     def kept(self) -> Baseline:

@@ -60,7 +60,7 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     saved = read_grasps(path)
     source = source_of(saved, path, [command.baseline.parent], command.changed.object)
     now = present(saved, path, source, _asked(command.changed))
-    now = now.against(before)
+    now = now.against(before.shape)
     how = of_settings(before.settings, str(command.baseline))
     if command.setup is not None:
         how = replace(how, setup=setup_from_file(command.setup, how.setup))

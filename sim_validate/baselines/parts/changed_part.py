@@ -14,10 +14,9 @@ from grasp_core.records.grasps_json import RECORDED, SavedGrasps
 from grasp_core.transferring.changed_part import fitting_unit, load_changed_part
 from grasp_core.transferring.like_faces import check_planar, likeness
 from grasp_core.transferring.transfer import Transfer, transfer
-from sim_validate.baselines.entries import Baseline
 from sim_validate.baselines.parts.if_changed import CARRY, FAIL, IfChanged
 from sim_validate.baselines.parts.moves import Moves, moves_since_baseline, moves_since_planning
-from sim_validate.baselines.parts.recorded_part import RecordedPart, recorded_part
+from sim_validate.baselines.parts.recorded_part import RecordedPart, RecordedShape, recorded_part
 from sim_validate.baselines.parts.source_file import Source, fitting_exactly
 
 
@@ -140,7 +139,7 @@ class Present:
     def _with(self, carried: Transfer) -> "Present":
         return replace(self, saved=_tested(self.saved, carried), carried=carried)
 
-    def against(self, before: Baseline) -> "Present":
+    def against(self, before: RecordedShape) -> "Present":
         """Measure how faces moved from where they were when a baseline was written.
 
         If the baseline does not hold the part, it was written on the planned one.

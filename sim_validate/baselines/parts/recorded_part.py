@@ -6,6 +6,7 @@ the shape of the baseline at hand, moves of faces are measured from where they w
 baseline was written, which is what a user has accepted.
 """
 
+from dataclasses import dataclass as plain_dataclass
 from typing import Annotated
 
 from pydantic import Field
@@ -52,6 +53,18 @@ class RecordedPart:
                 "the baseline again with --grasp-bless"
             )
         return found
+
+
+@plain_dataclass(frozen=True, slots=True)
+class RecordedShape:
+    """What a baseline says of the part that it was written on."""
+
+    content_sha256: str
+    """Hash of its mesh."""
+    unit: str | None
+    """Unit of length of its file; None if that is not known."""
+    part: RecordedPart | None
+    """The part; None if it is the one that the grasps were planned on."""
 
 
 def recorded_part(planned: Polyhedron, tested: Polyhedron) -> RecordedPart | None:
