@@ -182,10 +182,10 @@ def present(saved: SavedGrasps, path: Path, source: Source, asked: IfChanged = C
         return Present(saved, source, asked=asked)
     if asked.refuse:
         raise ChangedPartError(
-            f"{source.file}: this is not the mesh that {path} was planned on: the mesh has changed "
-            f"since, or is another object's. Plan on it again (graspproof plan {source.file} --out "
-            "...) and write the baseline with pytest --grasp-bless, put the former file back, or "
-            "name the right file with `object` in a *.grasps.toml"
+            f"{source.file}: this is not the mesh that {path} was planned on, and `refuse = true` "
+            "makes the grasps of a changed part not comparable. Plan on the part again (graspproof "
+            f"plan {source.file} --out ...) and bless (pytest --grasp-bless), or put the former "
+            "file back; if this is another object's file, name the right one with `object`"
         )
     unit, carried = _carried(saved, path, source.file, asked)
     return Present(_tested(saved, carried), source, carried, unit, asked)
