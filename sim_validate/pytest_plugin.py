@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from sim_validate.baselines.source_file import Source
+    from sim_validate.baselines.parts.source_file import Source
     from sim_validate.baselines.suite_toml import Suite
     from sim_validate.execution.verdict import Execution
     from sim_validate.validation.grasp_verdict import Verdict
@@ -27,6 +27,8 @@ LINES = pytest.StashKey[list[dict[str, Any]]]()
 """Lines of the report about grasps, kept for one phase of a test and for the whole run."""
 TRAVELS = "_graspproof"
 """Name of the attribute that carries these lines on pytest's reports between processes."""
+FOR_TERMINAL = ("told", "wrote")
+"""Parts of a line that only the terminal shows."""
 
 
 class UnstableError(AssertionError):
@@ -102,7 +104,10 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         return
     from sim_validate.reports.stability_page import write_report
 
-    write_report(Path(folder), session.config.stash[LINES])
+    lines = session.config.stash[LINES]
+    write_report(Path(folder), [
+        {name: said for name, said in line.items() if name not in FOR_TERMINAL} for line in lines
+    ])  # fmt: skip
 
 
 class _Collecting:
@@ -116,12 +121,15 @@ class _Collecting:
         self._lines += getattr(report, TRAVELS, [])
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """List the meshes that are not the files that grasps were planned from."""
-        notes = sorted({line["mesh_note"] for line in self._lines if line["mesh_note"]})
-        if notes:
-            terminalreporter.section("meshes of grasps")
-        for note in notes:
-            terminalreporter.write_line(note)
+        """List meshes that are not the planned ones, what passed on them, and new baselines."""
+        if not self._lines:
+            return
+        from sim_validate.reports.terminal_lines import sections
+
+        for title, texts in sections(self._lines):
+            terminalreporter.section(title)
+            for text in texts:
+                terminalreporter.write_line(text)
 
 
 class GraspsFile(pytest.File):
@@ -167,10 +175,10 @@ class GraspItem(_SuiteItem):
     def runtest(self) -> None:
         """Fail if the grasp is worse, gone, missing or new, or cannot be compared."""
         from grasp_core.errors import GraspError
-        from sim_validate.baselines.changed_part import ChangedPartError
         from sim_validate.baselines.compare import Status, failing
         from sim_validate.baselines.entries import plain, properties_of
-        from sim_validate.baselines.explain import explained
+        from sim_validate.baselines.explain import explained, passing
+        from sim_validate.baselines.parts.changed_part import ChangedPartError
 
         suite = self.suite
         try:
@@ -181,12 +189,15 @@ class GraspItem(_SuiteItem):
             raise
         (finding,) = done.findings
         files, same = (suite.baseline, suite.grasps), finding.status is Status.SAME
-        why = "" if same else explained(done, files, suite.present)
+        why = "" if same else explained(done, files, suite.compared)
         before, after = plain(finding.before), plain(finding.after)
         self.user_properties.append(("status", finding.status.value))
         self.user_properties += properties_of(after or {}).items()
-        _note(self, finding.id, finding.status.value, why, (before, after), suite.present.mesh)
-        if finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE):
+        fails = finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE)
+        entries, mesh = (before, after), suite.compared.mesh
+        line = _note(self, finding.id, finding.status.value, why, entries, mesh)
+        line["told"] = "" if fails else passing(done, suite.compared)
+        if fails:
             raise UnstableError(f"{why}\n  to accept the change: pytest --grasp-bless {self.path}")
 
 
@@ -196,13 +207,16 @@ class BlessItem(_SuiteItem):
     def runtest(self) -> None:
         """Simulate all grasps and write the baseline."""
         from sim_validate.baselines.entries import plain
+        from sim_validate.baselines.explain import written
 
         found = self.suite.bless()
         self.user_properties.append(("grasps", len(found.entries)))
         for name, why in self.suite.present.gone.items():
             _note(self, name, "gone", why, source=self.suite.present.mesh)
         for entry in found.entries:
-            _note(self, entry.id, "blessed", "", (None, plain(entry)), self.suite.present.mesh)
+            entries, mesh = (None, plain(entry)), self.suite.present.mesh
+            line = _note(self, entry.id, "blessed", "", entries, mesh)
+            line["wrote"] = written(self.suite.baseline, found, self.suite.present)
 
 
 @pytest.fixture
@@ -290,11 +304,13 @@ def assert_survives(
 def _note(
     item: pytest.Item, grasp: str, status: str, why: str, entries: "Entries" = (None, None),
     source: "Source | None" = None,
-) -> None:  # fmt: skip
+) -> dict[str, Any]:  # fmt: skip
     """Remember the outcome of a grasp in a test, with its entries before and after."""
     file, note = (None, "") if source is None else (source.file, source.note)
     line: dict[str, Any] = {
         "test": item.nodeid, "grasp": grasp, "status": status, "why": why, "before": entries[0],
         "after": entries[1], "mesh_file": None if file is None else str(file), "mesh_note": note,
+        "told": "", "wrote": "",
     }  # fmt: skip
     item.stash.setdefault(LINES, []).append(line)
+    return line

@@ -8,6 +8,10 @@ succeeds no other one, however far it is. Of equally near faces, the one with th
 taken. One new face may succeed several old ones that have merged; of a face that was cut in two,
 one part succeeds it, and the other counts as added.
 
+An old face that no face is like may have turned too far for that. The nearest of the new faces that
+succeed no other one, turned by at most `WIDEST_DEG`, is then named as what it probably became, but
+no contact follows it there.
+
 How far a face moved is measured on the line through its old centroid c along its old normal n. With
 q any point of the new plane and n' its normal, the line meets that plane at c - h n, where
 
@@ -18,7 +22,7 @@ positive outwards, because normals point into the part.
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,7 +31,8 @@ from grasp_core.objects.face import Face
 from grasp_core.objects.on_faces import ON_FACE
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import nearest_in
-from grasp_core.transferring.like_faces import SAME, Likeness
+from grasp_core.transferring.face_places import Triple, place_in_words, triple
+from grasp_core.transferring.like_faces import SAME, WIDEST_DEG, Likeness
 
 MOVED = ON_FACE
 """Least distance that counts as moved, relative to the old part's radius: files that keep six
@@ -37,8 +42,6 @@ TURNED = 1e-4
 than a hundredth of the part."""
 RESHAPED = 1e-5
 """Least change of a face's area that counts, relative to its area."""
-MOST_NAMED = 5
-"""Largest number of faces that one line names."""
 MM, MM2 = 1e3, 1e6
 
 
@@ -60,6 +63,15 @@ class FaceChange:
     """Area of the successor [m^2]; 0.0 without one."""
     moved: bool
     """Whether the face is gone, or its plane is another one by more than rounding."""
+    normal: Triple | None = None
+    """Inward unit normal on the old part; None where a file does not say it."""
+    center: Triple | None = None
+    """Centroid on the old part [m]; None where a file does not say it."""
+    likely: int | None = None
+    """Number of the face that it probably became although it turned too far to succeed it; None if
+    it has a successor, or no face is plausible."""
+    likely_turn: float = 0.0
+    """Angle between the normals of these two [rad]; 0.0 without such a face."""
 
     @property
     def reshaped(self) -> bool:
@@ -67,16 +79,35 @@ class FaceChange:
         return abs(self.new_area - self.old_area) > RESHAPED * self.old_area
 
     def __str__(self) -> str:
-        """Say what became of the face, such as `face 3 moved 1.00 mm outward`."""
-        named = f"face {self.old}"
+        """Say what became of the face: `face 3 (facing +z at z = 25 mm) moved 1.00 mm outward`."""
+        return self.in_words(f"face {self.old}", self.old)
+
+    def in_words(self, named: str, number: int | None) -> str:
+        """Say what became of the face under a name that another numbering gives it.
+
+        Args:
+            named: Name of the face, such as `face 3`.
+            number: Its number in that numbering; the number on the changed part is said if it is
+                another one. None if it has none.
+        """
+        named = self.called(named)
+        if self.likely is not None:
+            turn = f"turned {math.degrees(self.likely_turn):.2f} deg"
+            return f"{named} {turn}, too far to be the same face"
         if self.new is None:
             return f"{named} is gone"
-        if self.new != self.old:
-            named += f", now {self.new},"
+        if number is not None and self.new != number:
+            named += f", face {self.new} of the changed part,"
         said = list(_motions(self)) if self.moved else []
         if not said and self.reshaped:
             said = [f"has {MM2 * (self.new_area - self.old_area):+.4g} mm2 of area"]
         return f"{named} {' and '.join(said) or 'is as it was'}"
+
+    def called(self, named: str) -> str:
+        """Return a name of the face with its place, such as `face 3 (facing +z at z = 25 mm)`."""
+        if self.normal is None or self.center is None:
+            return named
+        return f"{named} ({place_in_words(self.normal, self.center)})"
 
 
 def _motions(change: FaceChange) -> Iterable[str]:
@@ -106,6 +137,16 @@ def face_changes(old: Polyhedron, new: Polyhedron, rule: Likeness) -> tuple[Face
         if found is None and (found := _successor(face, new, free, rule, math.inf)) is not None:
             free.remove(found)
         changes.append(_change(index, face, found, new, old.radius))
+    wide = replace(rule, angle=math.radians(WIDEST_DEG))
+    for index, change in enumerate(changes):
+        face = old.faces[index]
+        if (
+            change.new is None
+            and (found := _successor(face, new, free, wide, math.inf)) is not None
+        ):
+            free.remove(found)
+            turn = _turn(face, new.faces[found])
+            changes[index] = replace(change, likely=found, likely_turn=turn)
     return tuple(changes)
 
 
@@ -153,37 +194,19 @@ def _distance(face: Face, point: Array) -> float:
 def _change(
     index: int, face: Face, successor: int | None, new: Polyhedron, size: float
 ) -> FaceChange:
+    normal, center = triple(face.normal), triple(face.centroid)
     if successor is None:
-        return FaceChange(index, None, 0.0, 0.0, face.area, 0.0, moved=True)
+        return FaceChange(index, None, 0.0, 0.0, face.area, 0.0, True, normal, center)
     now = new.faces[successor]
     along = float(now.normal @ face.normal)
     # (1), positive outwards
     distance = float(now.normal @ (face.centroid - now.centroid)) / along
-    turn = math.atan2(float(np.linalg.norm(cross(face.normal, now.normal))), along)
+    turn = _turn(face, now)
     moved = abs(distance) > MOVED * size or turn > TURNED
-    return FaceChange(index, successor, distance, turn, face.area, now.area, moved=moved)
+    return FaceChange(index, successor, distance, turn, face.area, now.area, moved, normal, center)
 
 
-def in_words(changes: Iterable[FaceChange]) -> str:
-    """Say in one line which faces moved, the farthest first, and which have another outline."""
-    listed = list(changes)
-    moved = sorted(
-        (change for change in listed if change.moved),
-        key=lambda change: (change.new is not None, -abs(change.distance), change.old),
-    )
-    said = [str(change) for change in moved[:MOST_NAMED]]
-    if len(moved) > MOST_NAMED:
-        said.append(f"{len(moved) - MOST_NAMED} more faces moved")
-    kept = [change for change in listed if change.reshaped and not change.moved]
-    smaller = [change.old for change in kept if change.new_area < change.old_area]
-    larger = [change.old for change in kept if change.new_area > change.old_area]
-    said += [f"{_named(group)} became {word}"
-             for group, word in ((smaller, "smaller"), (larger, "larger")) if group]  # fmt: skip
-    return "; ".join(said) or "no face moved"
-
-
-def _named(faces: Sequence[int]) -> str:
-    """Name some faces, such as `faces 1, 2`."""
-    names = ", ".join(map(str, faces[:MOST_NAMED]))
-    more = f" and {len(faces) - MOST_NAMED} more" if len(faces) > MOST_NAMED else ""
-    return f"{'face' if len(faces) == 1 else 'faces'} {names}{more}"
+def _turn(face: Face, now: Face) -> float:
+    """Return the angle between the normals of two faces [rad]."""
+    sine = float(np.linalg.norm(cross(face.normal, now.normal)))
+    return math.atan2(sine, float(now.normal @ face.normal))

@@ -26,8 +26,9 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated
 from grasp_core.planning.reach import Finger
 from grasp_core.short_text import counted, summary
+from grasp_core.transferring.change_words import in_words
 from grasp_core.transferring.contacts import CarriedContact, carried_contacts
-from grasp_core.transferring.face_changes import FaceChange, added_faces, face_changes, in_words
+from grasp_core.transferring.face_changes import FaceChange, added_faces, face_changes
 from grasp_core.transferring.judging import (
     CHANGES,
     Change,
@@ -98,8 +99,8 @@ class Transfer(ByValue):
 
     @property
     def faces_in_words(self) -> str:
-        """Say which faces moved and by how much, such as `face 3 moved 1.00 mm outward`."""
-        return in_words(self.faces)
+        """Say in one line where faces are that moved, and by how much."""
+        return in_words(self.faces, self.added)
 
     def __repr__(self) -> str:
         counts = [f"{self.count(status)} {status}" for status in CHANGES]
@@ -169,7 +170,7 @@ class _Judge:
     def carried(self, grasp: Grasp, taken: set[str]) -> CarriedGrasp:
         """Carry a grasp over; its new id joins those that are taken."""
         before = self._before(grasp)
-        contacts = carried_contacts(self.new, grasp, self.rule)
+        contacts = carried_contacts(self.old, self.new, grasp, self.rule)
         lost = [each.reason for each in contacts if each.contact is None]
         if lost:
             return CarriedGrasp(grasp, "gone", "; ".join(lost), contacts, before, None, None)

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, cross
 from grasp_core.checked import coefficient, instance, path_of, switch
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
+from grasp_core.objects.face import Face
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
@@ -40,6 +41,10 @@ SIDE = 500
 NUMBER, NUMBER_SHARE = 8.0, 0.028
 """Radius of the circle around a finger's number: at least so many pixels, and such a share of the
 picture's width."""
+FINGER_LABELS = tuple((str(finger), colour) for finger, colour in enumerate(FINGERS))
+"""Text and colour of each finger's number."""
+MOST_NUMBERED = 20
+"""Largest number of faces that have their numbers on a picture of the object."""
 POLYGON = 3
 """Least number of corners of an area."""
 MANY = 60
@@ -96,12 +101,40 @@ def write_picture(  # noqa: PLR0913 - one keyword for each thing that may be ask
 def write_object_picture(body: Polyhedron, path: Path) -> Path:
     """Draw an object without fingers, and write the picture to a file.
 
+    Up to `MOST_NUMBERED` planar faces have their numbers on them where they face the viewer.
+
     Raises:
         InputError: The ending of the file's name is unknown.
     """
     format_of(path)
     view = View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, body)
-    return write_sheet(sheet_of(glass(body), body, view, body.name, side=SIDE), path)
+    towards = _faces_towards(view, body)
+    places = np.array([_middle(body.faces[face]) for face in towards]).reshape(-1, 3)
+    labels = [(str(face), NEUTRAL) for face in towards]
+    sheet = sheet_of(
+        glass(body), body, view, body.name, numbers=places, side=SIDE, labels=labels
+    )  # fmt: skip
+    return write_sheet(sheet, path)
+
+
+def _faces_towards(view: View, body: Polyhedron) -> list[int]:
+    """List the faces that have numbers and face the viewer."""
+    if body.patches is not None or len(body.faces) > MOST_NUMBERED:
+        return []
+    return [
+        index
+        for index, face in enumerate(body.faces)
+        if float(face.normal @ (view.camera - face.centroid)) < 0.0
+    ]
+
+
+def _middle(face: Face) -> Array:
+    """Return the middle of the largest piece of a face, which is on it even in a bent face."""
+    areas = [
+        float(np.linalg.norm(cross(piece[1:-1] - piece[0], piece[2:] - piece[0]).sum(axis=0)))
+        for piece in face.pieces
+    ]
+    return face.pieces[int(np.argmax(areas))].mean(axis=0)
 
 
 def grasp_figure(  # noqa: PLR0913 - one keyword for each thing that may be asked
@@ -154,6 +187,7 @@ def grasp_sheet(  # noqa: PLR0913 - one keyword for each thing that may be asked
 def sheet_of(  # noqa: PLR0913 - what a drawing consists of
     shapes: Sequence[Shape], extent: Extent, view: View, name: str, *,
     numbers: Array | None = None, side: int, steady: bool = False,
+    labels: Sequence[tuple[str, str]] = FINGER_LABELS,
 ) -> Sheet:  # fmt: skip
     """Draw shapes on a square sheet.
 
@@ -165,6 +199,7 @@ def sheet_of(  # noqa: PLR0913 - what a drawing consists of
         numbers: Where the number of each finger is written, (k, 3) [m]; None for no fingers.
         side: Width and height of the sheet [pixels].
         steady: Whether to choose a scale that suits every view.
+        labels: Text and colour of each number, as many as places at least.
     """
     places = np.empty((0, 3)) if numbers is None else numbers
     low, high = frame_around(shapes, places, extent, None if steady else view)
@@ -175,13 +210,13 @@ def sheet_of(  # noqa: PLR0913 - what a drawing consists of
         return np.array([0.0, side]) + np.array([scale, -scale]) * (points - low)
 
     radius = max(NUMBER, NUMBER_SHARE * side)
-    labels = [
+    marks = [
         mark
-        for finger, middle in enumerate(place(view.seen(places)[0]))
-        for mark in numbered(middle, radius, str(finger), FINGERS[finger])
+        for (text, colour), middle in zip(labels, place(view.seen(places)[0]), strict=False)
+        for mark in numbered(middle, radius, text, colour)
     ]
     moved = [_moved(patch, place, scale) for patch in patches]
-    return Sheet(side, side, name, (*_together(moved), *labels))
+    return Sheet(side, side, name, (*_together(moved), *marks))
 
 
 def _moved(patch: Patch, place: Callable[[Array], Array], scale: float) -> Mark:

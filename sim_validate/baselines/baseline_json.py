@@ -1,7 +1,7 @@
 """Reads and writes baselines as JSON that people can review: a header, then one line per grasp."""
 
 import json
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path, PurePath
 
 from pydantic import TypeAdapter, ValidationError
@@ -23,12 +23,15 @@ def baseline_to_json(baseline: Baseline) -> str:
         "schema": SCHEMA,
         **{each.name: getattr(baseline, each.name) for each in fields(Baseline)},
     }
-    del header["entries"]
+    del header["entries"], header["part"]
+    if baseline.unit is None:
+        del header["unit"]
     head = json.dumps(header, indent=1, sort_keys=True, allow_nan=False).removesuffix("\n}")
     lines = ",\n  ".join(
         json.dumps(fields_of(entry), allow_nan=False) for entry in baseline.entries
     )
-    return f'{head},\n "grasps": [\n  {lines}\n ]\n}}\n'
+    part = "" if baseline.part is None else f' "part": {json.dumps(asdict(baseline.part))},\n'
+    return f'{head},\n{part} "grasps": [\n  {lines}\n ]\n}}\n'
 
 
 def baseline_from_json(text: str, path: str) -> Baseline:

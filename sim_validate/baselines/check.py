@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from sim_validate.baselines.changed_part import Present
 from sim_validate.baselines.compare import Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.entries import Baseline
 from sim_validate.baselines.measure import Measured, Report, measured, with_planned_fingers
+from sim_validate.baselines.parts.changed_part import Present
 from sim_validate.baselines.settings import How
 from sim_validate.validation.grasp_verdict import Verdict
 
@@ -33,7 +33,7 @@ def check(
 
     Args:
         before: The baseline.
-        now: The present grasps, on the part as it is now.
+        now: The present grasps, on the part as it is now, compared `against` the baseline's.
         where: Path of the grasps from the baseline's folder.
         how: How trials are simulated, and which ones.
         processors: Number of processors to use; no result depends on it.
@@ -49,7 +49,7 @@ def check(
         found = _nothing_measured(before, now)
     else:
         found = measured(now.saved, (where, before.limit), how, processors, report)
-    carried = None if now.carried is None else Carried(now.change, now.gone)
+    carried = _carried(now)
     return Checked(
         compare(before, found.baseline, found.refused, carried),
         found,
@@ -64,8 +64,13 @@ def check_one(before: Baseline, now: Present, where: str, how: How, name: str) -
     if one.saved.grasps or one.gone:
         return check(kept, one, where, how, 1, silent)
     gone = _nothing_measured(kept, one)
-    carried = None if one.carried is None else Carried(one.change, {})
-    return Checked(compare(kept, gone.baseline, carried=carried), gone, "")
+    return Checked(compare(kept, gone.baseline, carried=_carried(one)), gone, "")
+
+
+def _carried(now: Present) -> Carried | None:
+    """Say what a comparison must know of a part that is not the planned or the recorded one."""
+    known = now.carried is not None or now.since is not None or bool(now.change)
+    return Carried(now.change, now.gone) if known else None
 
 
 def _nothing_measured(before: Baseline, now: Present) -> Measured:

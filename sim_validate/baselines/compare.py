@@ -102,6 +102,8 @@ class Finding:
     """Reasons for the status, one sentence each."""
     differences: tuple[str, ...] = ()
     """Every difference from the baseline, one sentence each."""
+    beyond: tuple[str, ...] = ()
+    """Those of the differences that are beyond their bands."""
     before: Entry | None = None
     after: Entry | None = None
 
@@ -112,7 +114,7 @@ def bands_between(
     """Choose the tolerances within which results may differ, and say in words why."""
     if carried is not None and _is_other_part(before, after):
         bands = replace(OTHER_PART, friction=FRICTION_BAND * before.friction)
-        return bands, f"with the bands of a changed part: {carried.change}"
+        return bands, "with the bands of a changed part"
     names = sorted({*before.versions, *after.versions} - {*ASIDE})
     others = [
         f"{name} {before.versions.get(name)} -> {after.versions.get(name)}"
@@ -159,14 +161,15 @@ def compare(
         elif name in refused:
             status = Status.NOT_COMPARABLE if changed else Status.REGRESSED
             why = (*changed, f"refused: {refused[name]}")
-            found.append(Finding(name, status, why, (), one, other))
+            found.append(Finding(name, status, why, before=one, after=other))
         elif other_part and carried is None:
-            found.append(Finding(name, Status.NOT_COMPARABLE, changed, (), one, other))
+            found.append(Finding(name, Status.NOT_COMPARABLE, changed, before=one, after=other))
         elif one is None:
-            found.append(Finding(name, Status.NEW, ("not in the baseline",), (), one, other))
+            reasons = ("not in the baseline",)
+            found.append(Finding(name, Status.NEW, reasons, before=one, after=other))
         else:
             reasons = ("in the baseline, but not among the grasps",)
-            found.append(Finding(name, Status.MISSING, reasons, (), one, other))
+            found.append(Finding(name, Status.MISSING, reasons, before=one, after=other))
     return tuple(found)
 
 
@@ -189,9 +192,9 @@ class _Known:
         if self.carried is None and one is None:
             return Finding(name, Status.SAME, (f"gone, as it was: {why}",))
         if self.changed:
-            return Finding(name, Status.NOT_COMPARABLE, (*self.changed, why), (), one)
+            return Finding(name, Status.NOT_COMPARABLE, (*self.changed, why), before=one)
         change = () if self.carried is None else (self.carried.change,)
-        return Finding(name, Status.GONE, (why, *change), (), one)
+        return Finding(name, Status.GONE, (why, *change), before=one)
 
 
 def _is_other_part(before: Baseline, after: Baseline) -> bool:
@@ -202,7 +205,12 @@ def _changed(before: Baseline, after: Baseline, carried: Carried | None) -> Iter
     """Yield the reasons why two baselines cannot be compared."""
     if carried is None and _is_other_part(before, after):
         same = before.object == after.object
-        named = f"{before.object} has changed" if same else f"{before.object} -> {after.object}"
+        named = f"{before.object} -> {after.object}"
+        if same:
+            named = (
+                f"{before.object} has another shape than in the baseline; write the baseline again "
+                "with --grasp-bless if that is meant"
+            )
         yield f"the object is another one: {named}"
     if before.friction != after.friction:
         yield f"friction: {before.friction} -> {after.friction}"
@@ -226,10 +234,11 @@ def _compared(one: Entry, other: Entry, known: _Known) -> Finding:
     changed, bands = known.changed, known.bands
     every = differences(one, other, bands)
     texts = tuple(each.text for each in every)
+    beyond = tuple(each.text for each in every if each.counts)
     if known.carried is None and one.contacts_sha256 != other.contacts_sha256:
         changed = (*changed, "the contacts are others")
     if changed:
-        return Finding(one.id, Status.NOT_COMPARABLE, changed, texts, one, other)
+        return Finding(one.id, Status.NOT_COMPARABLE, changed, texts, beyond, one, other)
     grey = _is_grey(one, other, known.before.friction, bands)
     counting = [each for each in every if each.counts and not (grey and each.of_holding)]
     status = _status(counting, grey=grey, same=one == other)
@@ -238,7 +247,7 @@ def _compared(one: Entry, other: Entry, known: _Known) -> Finding:
         reasons = (f"{one.outcome} -> {other.outcome}, at its critical friction",)
     if known.carried is not None:
         reasons = (f"{WORDS[status]} on the changed part: {known.carried.change}", *reasons)
-    return Finding(one.id, status, reasons, texts, one, other)
+    return Finding(one.id, status, reasons, texts, beyond, one, other)
 
 
 def _status(counting: list[Difference], *, grey: bool, same: bool) -> Status:

@@ -1,11 +1,17 @@
 """Lists the differences between two verdicts on a grasp: which ones count, and which are worse."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from sim_validate.baselines.entries import Entry
-from sim_validate.baselines.executions import ExecutionEntry
+from sim_validate.baselines.executions import DIGITS, ExecutionEntry
 from sim_validate.execution.verdict import may_slip
+
+DIGITS_OF_CHANGE = 2
+"""Number of digits of a difference that the numbers before and after show."""
+LEAST_DIGITS = 4
+"""Least number of digits of a number that changed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,12 +119,17 @@ def _of_numbers(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
             continue
         change = after - before
         counts = not abs(change) <= relative * before + absolute
-        text = f"{name}: {before:.12g} -> {after:.12g}{_per_cent(change, before)}"
+        text = f"{name}: {_figures(before, after, relative * before + absolute)}"
         yield Difference(text, sign * change > 0.0, counts=counts, of_holding=moved)
 
 
-def _per_cent(change: float, before: float) -> str:
-    return f" ({100.0 * change / before:+.2g} %)" if before > 0.0 else ""
+def _figures(before: float, after: float, band: float) -> str:
+    """Write a number before and after, to two digits of what changed, and its band."""
+    change, largest = after - before, max(abs(before), abs(after))
+    digits = math.ceil(math.log10(largest / abs(change))) + DIGITS_OF_CHANGE
+    digits = min(max(digits, LEAST_DIGITS), DIGITS)
+    share = f"{100.0 * change / before:+.2g} %, " if before > 0.0 else ""
+    return f"{before:.{digits}g} -> {after:.{digits}g} ({share}band {band:.2g})"
 
 
 def _of_repeats(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
@@ -192,5 +203,6 @@ def _of_execution_numbers(
         counts = abs(change) > relative * before + absolute and not (
             slides and moved and bands.grey > 0.0
         )
-        text = f"execution: {name}: {before:.12g} -> {after:.12g}{_per_cent(change, before)}"
+        figures = _figures(before, after, relative * before + absolute)
+        text = f"execution: {name}: {figures}"
         yield Difference(text, sign * change > 0.0, counts=counts)

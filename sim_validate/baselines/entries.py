@@ -19,6 +19,7 @@ from sim_validate.baselines.executions import (
     execution_entry,
     rounded,
 )
+from sim_validate.baselines.parts.recorded_part import RecordedPart, RecordedShape
 from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.setup import WEAKEST
@@ -118,11 +119,22 @@ class Baseline:
     """Hash that tells how the processor rounds."""
     entries: tuple[Entry, ...]
     """Entries of the grasps, sorted by id."""
+    unit: str | None = None
+    """Unit of length of the mesh file; None where there is none, or it was not known, and then no
+    file mentions it."""
+    part: RecordedPart | None = None
+    """The part that it was written on; None where that is the one that the grasps were planned on,
+    and then no file mentions it."""
 
     def __post_init__(self) -> None:
         """Refuse a baseline with two entries for one grasp."""
         if len({entry.id for entry in self.entries}) < len(self.entries):
             raise ValueError("two grasps of the baseline have the same id")
+
+    @property
+    def shape(self) -> RecordedShape:
+        """Return what is recorded of the part."""
+        return RecordedShape(self.content_sha256, self.unit, self.part)
 
 
 def plain(entry: Entry | None) -> dict[str, Any] | None:

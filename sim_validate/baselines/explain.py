@@ -4,10 +4,12 @@ import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
-from sim_validate.baselines.changed_part import Present
+from grasp_core.short_text import counted
 from sim_validate.baselines.check import Checked
-from sim_validate.baselines.entries import Entry
+from sim_validate.baselines.compare import WORDS, Status
+from sim_validate.baselines.entries import Baseline, Entry
 from sim_validate.baselines.executions import not_survived
+from sim_validate.baselines.parts.changed_part import Present
 from sim_validate.validation.grasp_verdict import Verdict
 from sim_validate.validation.wrench_verdict import WrenchVerdict
 
@@ -24,8 +26,8 @@ def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
     verdict, how = done.verdicts.get(finding.id), done.how
     executed = done.measured.executions.get(finding.id)
     lines = [f"{finding.id}: {finding.status.value}", *(f"  {why}" for why in finding.reasons)]
-    lines += [f"  {text}" for text in finding.differences if text not in finding.reasons]
-    lines += [f"  compared {how}"] if how else []
+    lines += [f"  {text}" for text in finding.beyond if text not in finding.reasons]
+    lines += [f"  compared {how}"] if how and finding.after is not None else []
     for title, entry in (("baseline", finding.before), ("now", finding.after)):
         lines += [] if entry is None else _numbers(title, entry)
     failed = verdict.failures[0] if verdict is not None and verdict.failures else None
@@ -34,6 +36,41 @@ def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
     lines += [f"  {not_survived(executed)}"] if executed and not_survived(executed) else []
     at = None if verdict is None else "" if failed is None else failed.name
     return "\n".join([*lines, *_next_steps(finding.id, at, files, now)])
+
+
+def passing(done: Checked, now: Present) -> str:
+    """Say in one short line what became of a grasp that passes; empty if there is nothing to say.
+
+    Args:
+        done: The check of this grasp alone.
+        now: The grasps on their part as it is now.
+    """
+    (finding,) = done.findings
+    if not now.change and finding.status is not Status.IMPROVED:
+        return ""
+    said = finding.id
+    if finding.status is Status.GONE or finding.after is None:
+        return f"{said} {finding.reasons[0]}" if finding.reasons else said
+    said += f" {WORDS.get(finding.status, finding.status.value)}"
+    if finding.status is Status.IMPROVED:
+        said += f" than in the baseline: {'; '.join(finding.beyond)}"
+    touched = now.moves.touched(now.planned_faces(finding.id))
+    return f"{said}; touches {touched}" if touched else said
+
+
+def written(path: Path, baseline: Baseline, now: Present) -> str:
+    """Say which baseline was written, where, and with how many grasps.
+
+    Args:
+        path: Path of the baseline.
+        baseline: What it holds.
+        now: The grasps on their part as it is now.
+    """
+    held = sum(entry.held for entry in baseline.entries)
+    said = f"wrote {path}: {held} of {counted(len(baseline.entries), 'grasp')} held"
+    gone = len(now.gone)
+    left = f"; {gone} more {'is' if gone == 1 else 'are'} gone from the changed part and left out"
+    return f"{said}{left if gone else ''}"
 
 
 def _next_steps(name: str, at: str | None, files: tuple[Path, Path], now: Present) -> Iterator[str]:
@@ -84,20 +121,24 @@ def in_words(trial: WrenchVerdict) -> str:
 
 def _numbers(title: str, entry: Entry) -> Iterator[str]:
     failed = f" at {entry.not_held[0]}" if entry.not_held else ""
-    simulated = number(entry.simulated_critical_friction)
-    yield f"  {title}: {entry.outcome}{failed}, moved {number(entry.displacement_m)} m"
-    yield f"    critical friction {entry.critical_friction:.6g} predicted, {simulated} simulated"
-    limit = number(entry.simulated_limit_n)
-    yield f"    weakest wrench {entry.limit_n:.6g} N predicted, {limit} simulated"
+    moved = entry.displacement_m
+    yield f"  {title}: {entry.outcome}{failed}" + (
+        "" if moved is None else f", moved {moved:.2g} m"
+    )
+    critical = _both(entry.critical_friction, entry.simulated_critical_friction, "")
+    yield f"    critical friction {critical}"
+    yield f"    weakest wrench {_both(entry.limit_n, entry.simulated_limit_n, ' N')}"
     if entry.noisy_trials:
         yield f"    with noise {entry.noisy_held} of {entry.noisy_trials} held"
     if (found := entry.execution) is not None:
         lost = f"lost {', '.join(found.lost)}" if found.lost else found.reason
         yield f"    executed: {'survived' if found.survived else lost or 'no trial is possible'}"
-        slips = [number(found.predicted_first_slip), number(found.simulated_first_slip)]
-        yield f"    first slip {slips[0]} predicted, {slips[1]} simulated"
+        slips = (found.predicted_first_slip, found.simulated_first_slip)
+        said = ["none" if slip is None else f"{slip:.4g} times the load" for slip in slips]
+        yield f"    first slip predicted: {said[0]}; simulated: {said[1]}"
 
 
-def number(value: float | None) -> str:
-    """Write a measured number to six digits."""
-    return "not measured" if value is None else f"{value:.6g}"
+def _both(predicted: float, simulated: float | None, unit: str) -> str:
+    """Write a number as predicted and as simulated."""
+    said = "not measured in simulation" if simulated is None else f"{simulated:.4g}{unit} simulated"
+    return f"{predicted:.4g}{unit} predicted, {said}"

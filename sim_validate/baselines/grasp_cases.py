@@ -10,8 +10,9 @@ from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
-from sim_validate.baselines.changed_part import TABLE, if_changed, present
-from sim_validate.baselines.source_file import Source, source_of
+from sim_validate.baselines.parts.changed_part import present
+from sim_validate.baselines.parts.if_changed import TABLE, if_changed
+from sim_validate.baselines.parts.source_file import Source, source_of
 from sim_validate.records.grasps import read_grasps
 
 FRICTION = 0.5

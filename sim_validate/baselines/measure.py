@@ -12,6 +12,7 @@ from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
 from sim_validate.baselines.entries import Baseline, Entry, entry_of
 from sim_validate.baselines.executions import tried_execution
+from sim_validate.baselines.parts.changed_part import Present
 from sim_validate.baselines.settings import How, settings_of
 from sim_validate.execution.asked import AskedExecution
 from sim_validate.execution.jobs import ExecutedGrasp, ExecutionJob
@@ -122,15 +123,19 @@ def _try(job: Job) -> Verdict | str:
         return str(error)
 
 
-def complete(found: Measured) -> Baseline:
+def complete(found: Measured, now: Present) -> Baseline:
     """Return the baseline of a measurement in which every grasp could be simulated.
+
+    Args:
+        found: The measurement.
+        now: The grasps on their part as it was measured.
 
     Raises:
         InputError: A grasp could not be simulated.
     """
     if found.refused:
         raise InputError("; ".join(found.refused.values()))
-    return found.baseline
+    return replace(found.baseline, part=now.recorded, unit=now.file_unit)
 
 
 def with_planned_fingers(how: How, before: Baseline, saved: SavedGrasps) -> How:

@@ -13,15 +13,6 @@ from grasp_core.errors import InputError
 from grasp_core.files.strict_json import place, shown
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
-from sim_validate.baselines.changed_part import (
-    CARRY,
-    IfChanged,
-    Present,
-    if_changed,
-    present,
-    testable,
-)
-from sim_validate.baselines.changed_part import TABLE as CHANGED
 from sim_validate.baselines.check import Checked, check_one, demanded, silent
 from sim_validate.baselines.entries import Baseline
 from sim_validate.baselines.measure import (
@@ -30,8 +21,11 @@ from sim_validate.baselines.measure import (
     seen_from,
     with_planned_fingers,
 )
+from sim_validate.baselines.parts.changed_part import Present, present, testable
+from sim_validate.baselines.parts.if_changed import CARRY, IfChanged, if_changed
+from sim_validate.baselines.parts.if_changed import TABLE as CHANGED
+from sim_validate.baselines.parts.source_file import Source, source_of
 from sim_validate.baselines.settings import How, noise_from_table, of_settings, setup_for
-from sim_validate.baselines.source_file import Source, source_of
 from sim_validate.execution.asked import TABLE, AskedExecution, asked_execution
 from sim_validate.files.toml_tables import read_tables
 from sim_validate.records.grasps import read_grasps
@@ -113,6 +107,15 @@ class Suite:
         return present(self.saved, self.grasps, self.source, self.changed_part)
 
     @cached_property
+    def compared(self) -> Present:
+        """Return the grasps on their part as it is now, compared with the part of the baseline.
+
+        Raises:
+            InputError: The baseline is missing, or a file or a changed part is refused.
+        """
+        return self.present.against(self.kept.shape)
+
+    @cached_property
     def kept(self) -> Baseline:
         """Read the baseline of the suite.
 
@@ -149,7 +152,7 @@ class Suite:
             InputError: A file or a changed part is refused.
             UnfaithfulError: The simulator fails its checks on cases with known answers.
         """
-        now, before = self.present, self.kept
+        now, before = self.compared, self.kept
         done = check_one(before, now, self.where, self._how(before), name)
         return demanded(done) if self.survives else done
 
@@ -168,7 +171,8 @@ class Suite:
         if before is not None:
             how = with_planned_fingers(how, before, now.saved)
         limit = before and before.limit
-        found = complete(measured(testable(now, limit), (self.where, limit), how, 1, silent))
+        done = measured(testable(now, limit), (self.where, limit), how, 1, silent)
+        found = complete(done, now)
         write_baseline(self.baseline, found)
         return found
 

@@ -6,14 +6,15 @@ from dataclasses import replace
 
 from grasp_core.files.text_files import write_text
 from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
-from sim_validate.baselines.changed_part import IfChanged, Present, present, testable
 from sim_validate.baselines.check import Checked, check
 from sim_validate.baselines.compare import Finding, Status, failing
 from sim_validate.baselines.entries import fields_of
 from sim_validate.baselines.junit import junit_text
 from sim_validate.baselines.measure import complete, measured, seen_from
+from sim_validate.baselines.parts.changed_part import Present, present, testable
+from sim_validate.baselines.parts.if_changed import IfChanged
+from sim_validate.baselines.parts.source_file import source_of
 from sim_validate.baselines.settings import How, of_settings, setup_for
-from sim_validate.baselines.source_file import source_of
 from sim_validate.cli import baseline_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
@@ -43,7 +44,7 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     with reporter.progress("simulating") as steps:
         tested = testable(now, command.limit)
         done = measured(tested, (about, command.limit), how, command.jobs, steps.update)
-    found = complete(done)
+    found = complete(done, now)
     write_baseline(command.out, found)
     held = sum(entry.held for entry in found.entries)
     reporter.say(f"wrote {command.out}: {held} of {len(found.entries)} grasps held")
@@ -59,6 +60,7 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     saved = read_grasps(path)
     source = source_of(saved, path, [command.baseline.parent], command.changed.object)
     now = present(saved, path, source, _asked(command.changed))
+    now = now.against(before.shape)
     how = of_settings(before.settings, str(command.baseline))
     if command.setup is not None:
         how = replace(how, setup=setup_from_file(command.setup, how.setup))
@@ -72,7 +74,7 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     _say_mesh(now, reporter)
     if command.bless:
         testable(now, before.limit)
-        write_baseline(command.baseline, complete(done.measured))
+        write_baseline(command.baseline, complete(done.measured, now))
         reporter.say(f"wrote {command.baseline}")
         return Exit.GOOD
     return exit_code(done.findings, strict=command.strict)
@@ -119,8 +121,8 @@ def _show(done: Checked, reporter: Reporter) -> None:
 
 
 def _why(finding: Finding) -> str:
-    """Join the reasons why a grasp changed, and the differences that the reasons do not name."""
-    more = [text for text in finding.differences if text not in finding.reasons]
+    """Join the reasons why a grasp changed, and further differences beyond their bands."""
+    more = [text for text in finding.beyond if text not in finding.reasons]
     return "; ".join([*finding.reasons, *more])
 
 

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 from grasp_core.cones.spanning import count_spanning
+from grasp_core.objects.face import Face
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
 from grasp_core.short_text import vector
-from scenes.drawing.pictures import write_object_picture
+from grasp_core.transferring.face_places import face_in_words
+from scenes.drawing.pictures import MOST_NUMBERED, write_object_picture
 from scenes.example_objects import example_names
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
@@ -20,6 +22,8 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.objects import load_object
 
 MM, CM3 = 1e3, 1e6
+MM2 = 1e6
+COLUMNS = ("face", "where it is", "area mm^2")
 
 
 def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
@@ -42,6 +46,7 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
         "radius_m": body.radius,
         "center_of_mass_m": body.center_of_mass.tolist(),
         "spanning_quadruples": spanning,
+        "face_list": _face_list(body),
         "content_sha256": body.content_sha256,
         "notes": list(body.notes),
     }
@@ -51,11 +56,32 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
     reporter.say(body.name)
     for sentence in _sentences(body, spanning):
         reporter.say(f"  {sentence}")
+    if body.patches is None and len(body.faces) <= MOST_NUMBERED:
+        rows = [_row(number, face) for number, face in enumerate(body.faces)]
+        reporter.table("faces, by the numbers in ids of grasps", COLUMNS, rows)
     if command.picture is not None:
         reporter.say(f"wrote {command.picture}")
     else:
         reporter.say("  `--picture FILE.png` draws it.")
     return Exit.GOOD
+
+
+def _face_list(body: Polyhedron) -> list[dict[str, Any]]:
+    """List the faces of a mesh, in order of their numbers; normals point into the object."""
+    return [
+        {
+            "number": number,
+            "normal": face.normal.tolist(),
+            "area_m2": face.area,
+            "center_m": face.centroid.tolist(),
+            "place": face_in_words(face),
+        }
+        for number, face in enumerate(body.faces)
+    ]
+
+
+def _row(number: int, face: Face) -> tuple[str, ...]:
+    return str(number), face_in_words(face), f"{MM2 * face.area:.5g}"
 
 
 def _sentences(body: Polyhedron, spanning: int | None) -> Iterator[str]:

@@ -110,8 +110,6 @@ def _show(found: Transfer, reporter: Reporter) -> None:
     reporter.table(title, columns, [_row(each) for each in shown])
     say_cut(len(order), reporter)
     reporter.say(f"{found.new.name}: {found.faces_in_words}")
-    if found.added:
-        reporter.say(f"{counted(len(found.added), 'face')} of the changed part took no old place")
     counts = ", ".join(f"{found.count(status)} {status}" for status in CHANGES)
     reporter.say(
         f"{len(found.carried)} of {len(found.grasps)} grasps were carried over, with contacts "

@@ -23,8 +23,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from sim_validate.baselines.baseline_json import read_baseline
-from sim_validate.baselines.changed_part import Present
 from sim_validate.baselines.check import check, silent
+from sim_validate.baselines.parts.changed_part import Present
 from sim_validate.baselines.settings import of_settings
 from sim_validate.records.grasps import read_grasps
 

@@ -11,6 +11,9 @@ import pytest
 
 import scenes
 from grasp_core.planning.request import FAMILIES
+from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG
+from scenes.drawing.views import View
+from scenes.example_objects import example_object
 from sim_validate import main as commands
 from sim_validate.cli.examples import EXAMPLES
 from sim_validate.cli.exit_codes import Exit
@@ -337,12 +340,37 @@ def test_a_mesh_is_described_in_words(capsys):
     assert not re.search(r"[{}\[\]']|None|_", said)
 
 
+def test_the_faces_of_a_mesh_are_listed_with_their_places(capsys):
+    assert main(["inspect", "box", "--json"]) == Exit.GOOD
+    facts = json.loads(capsys.readouterr().out)
+    box = example_object("box")
+    assert facts["faces"] == len(facts["face_list"]) == 6
+    for number, (listed, face) in enumerate(zip(facts["face_list"], box.faces, strict=True)):
+        assert listed["number"] == number
+        assert listed["normal"] == face.normal.tolist()
+        assert listed["center_m"] == face.centroid.tolist()
+        assert listed["area_m2"] == face.area
+    assert facts["face_list"][3]["place"] == "facing +z at z = 25 mm"
+    assert main(["inspect", "box"]) == Exit.GOOD
+    said = capsys.readouterr().out
+    (row,) = [line.split() for line in said.splitlines() if "facing +z" in line]
+    assert row == ["3", "facing", "+z", "at", "z", "=", "25", "mm", "7000"]
+
+
 def test_an_object_is_drawn(here, capsys):
     assert main(["inspect", "wedge", "--picture", "wedge.svg", "--json"]) == Exit.GOOD
     assert json.loads(capsys.readouterr().out)["picture"] == "wedge.svg"
     text = (here / "wedge.svg").read_text()
     assert text.startswith("<svg ")
-    assert "<text" not in text  # there is no finger
+    numbers = [int(each) for each in re.findall(r">(\d+)</text>", text)]
+    assert text.count("<text") == len(numbers)
+    view = View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, wedge := example_object("wedge"))
+    assert numbers == [
+        number
+        for number, face in enumerate(wedge.faces)
+        if (view.camera - face.centroid) @ -face.normal > 0.0
+    ]
+    assert 3 <= len(numbers) < len(wedge.faces)
     assert main(["inspect", "wedge", "--picture", "wedge.doc"]) == Exit.USAGE
     assert "--picture must end in" in capsys.readouterr().err
 

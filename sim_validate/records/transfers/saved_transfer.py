@@ -15,8 +15,9 @@ from grasp_core.files.strict_json import place
 from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById
 from grasp_core.short_text import counted, summary
+from grasp_core.transferring.change_words import in_words
 from grasp_core.transferring.contacts import CarriedContact
-from grasp_core.transferring.face_changes import FaceChange, in_words
+from grasp_core.transferring.face_changes import FaceChange
 from grasp_core.transferring.judging import CHANGES, Change, GraspFigures
 from grasp_core.values import Contact
 from sim_validate.records.transfers.transfer_json import MM, MM2, SCHEMA, TRANSFER
@@ -89,8 +90,8 @@ class SavedTransfer(ByValue, ById[SavedCarriedGrasp]):
 
     @property
     def faces_in_words(self) -> str:
-        """Say which faces moved and by how much, such as `face 3 moved 1.00 mm outward`."""
-        return in_words(self.faces)
+        """Say in one line where faces are that moved, and by how much."""
+        return in_words(self.faces, self.added)
 
     def __repr__(self) -> str:
         counts = [f"{self.count(status)} {status}" for status in CHANGES]
@@ -159,6 +160,10 @@ def _face(record: FaceChangeRecord) -> FaceChange:
         old_area=record["old_area_mm2"] / MM2,
         new_area=record["new_area_mm2"] / MM2,
         moved=record["moved"],
+        normal=record.get("normal"),
+        center=record.get("center_m"),
+        likely=record.get("likely"),
+        likely_turn=math.radians(record.get("likely_turned_deg", 0.0)),
     )
 
 

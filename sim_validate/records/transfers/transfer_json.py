@@ -68,7 +68,7 @@ def summary(found: Transfer) -> TransferSummary:
 
 
 def _face_record(change: FaceChange) -> FaceChangeRecord:
-    return {
+    found: FaceChangeRecord = {
         "old": change.old,
         "new": change.new,
         "moved_mm": _rounded(MM * change.distance),
@@ -76,8 +76,13 @@ def _face_record(change: FaceChange) -> FaceChangeRecord:
         "old_area_mm2": _rounded(MM2 * change.old_area),
         "new_area_mm2": _rounded(MM2 * change.new_area),
         "moved": change.moved,
+        "likely": change.likely,
+        "likely_turned_deg": _rounded(math.degrees(change.likely_turn)),
         "in_words": str(change),
     }
+    if change.normal is not None and change.center is not None:
+        found["normal"], found["center_m"] = change.normal, change.center
+    return found
 
 
 def _grasp_record(found: CarriedGrasp) -> CarriedGraspRecord:

@@ -1,6 +1,6 @@
 """The fields of `transfer.json` with their types, for its writer and for whoever reads it."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NotRequired
 
 from pydantic import ConfigDict, Field, with_config
 from typing_extensions import TypedDict
@@ -14,7 +14,10 @@ Triple = tuple[Finite, Finite, Finite]
 
 
 class FaceChangeRecord(TypedDict):
-    """Fields about what became of one face of the old part."""
+    """Fields about what became of one face of the old part.
+
+    Files of earlier versions lack some of them.
+    """
 
     old: Count
     new: Count | None
@@ -23,6 +26,10 @@ class FaceChangeRecord(TypedDict):
     old_area_mm2: NotNegative
     new_area_mm2: NotNegative
     moved: bool
+    normal: NotRequired[Triple]
+    center_m: NotRequired[Triple]
+    likely: NotRequired[Count | None]
+    likely_turned_deg: NotRequired[NotNegative]
     in_words: str
 
 

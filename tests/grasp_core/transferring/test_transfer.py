@@ -61,7 +61,8 @@ def test_contacts_of_a_moved_face_move_with_it_and_the_others_stay(box, by_mm):
     assert [change.old for change in moved] == [face]
     assert moved[0].distance == pytest.approx(1e-3 * by_mm, abs=1e-12)
     way = "outward" if by_mm > 0.0 else "inward"
-    assert str(moved[0]) == f"face 3 moved {abs(by_mm):.2f} mm {way}"
+    place = "(facing +z at z = 25 mm)"
+    assert str(moved[0]) == f"face 3 {place} moved {abs(by_mm):.2f} mm {way}"
     seen = 0
     for each in found.grasps:
         shift = each.grasp.positions - each.old.positions
@@ -90,10 +91,11 @@ def test_a_face_that_moved_too_far_is_named_with_finger_face_and_distance(box):
         assert lost.contact is None
         assert lost.distance == pytest.approx(2e-3, abs=1e-12)
         assert each.reason == (
-            f"finger {finger} has lost face 3: the nearest like face, 3 of the changed part, is "
-            "2.00 mm away, more than 1.50 mm"
+            f"finger {finger} has lost face 3 (facing +z at z = 25 mm): the nearest face like it, "
+            "face 3 in the numbering of the changed part (facing +z at z = 27 mm), is 2.00 mm "
+            "away, more than 1.50 mm"
         )
-    assert "face 3 moved 2.00 mm outward" in found.faces_in_words
+    assert "face 3 (facing +z at z = 25 mm) moved 2.00 mm outward" in found.faces_in_words
     exactly = gc.transfer(body, with_face_moved(body, 3, 2e-3), grasps, FRICTION, distance=2e-3)
     assert not exactly.count("gone")
 
@@ -112,9 +114,44 @@ def test_a_face_that_turned_too_far_is_lost():
         assert all((each.contacts[each.old.faces.index(3)].contact is None) is lost
                    for each in on_top)  # fmt: skip
         if lost:
-            assert "no face of the changed part is within 5 deg of it" in on_top[0].reason
+            reason = on_top[0].reason
+            assert "no face of the changed part is within 5 deg of it" in reason
+            assert f"is turned by {slope:.2f} deg" in reason
+            assert f"turned {slope:.2f} deg, too far to be the same face" in found.faces_in_words
+            assert "new face" not in found.faces_in_words
         else:
             assert f"turned {slope:.2f} deg" in found.faces_in_words
+
+
+def test_a_turned_face_is_named_before_a_like_one_far_away():
+    """The longer leg's end of a bracket turns, and the shorter leg's inner side is like it."""
+    body = example_object("l-bracket")
+    plan = gc.plan(body, FRICTION)
+    ends = [index for index, face in enumerate(body.faces)
+            if np.isclose(np.abs(face.normal), 1.0, atol=1e-9).any()]  # fmt: skip
+    seen = 0
+    for end in ends:
+        axis = int(np.abs(body.normals[end]).argmax())
+        like = [each for each in ends if body.normals[each] @ body.normals[end] > 0.999]
+        outer = max(like, key=lambda each: -body.normals[end] @ body.faces[each].centroid)
+        if len(like) < 2 or outer != end:
+            continue
+        on = np.isclose(body.vertices[:, axis], body.faces[end].centroid[axis])
+        vertices, other = body.vertices.copy(), (axis + 1) % 3
+        sign = math.copysign(1.0, -body.normals[end][axis])
+        least = vertices[on, other].min()
+        vertices[on, axis] -= sign * math.tan(math.radians(20.0)) * (vertices[on, other] - least)
+        try:
+            new = gc.Polyhedron.from_mesh(vertices, body.triangles, faces="planar")
+        except gc.MeshError:
+            continue
+        grasps = [grasp for grasp in plan.grasps if end in grasp.faces][:5]
+        for each in gc.transfer(body, new, grasps, FRICTION).grasps:
+            lost = each.contacts[each.old.faces.index(end)]
+            assert lost.contact is None
+            assert ", but turned by 20.00 deg, more than 5 deg" in lost.reason
+            seen += 1
+    assert seen >= 3
 
 
 def test_a_contact_in_a_new_hole_goes_to_its_rim(box):

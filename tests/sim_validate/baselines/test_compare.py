@@ -261,8 +261,20 @@ def test_a_grasp_on_a_changed_part_is_compared_and_the_face_is_named(changed, st
 
 def test_it_is_said_that_the_bands_are_those_of_a_changed_part():
     words = bands_between(BEFORE, now(OTHER_PART), MOVED)[1]
-    assert words == f"with the bands of a changed part: {MOVED.change}"
+    assert words == "with the bands of a changed part"
     assert bands_between(BEFORE, now(), MOVED)[1] == "exactly"
+
+
+def test_differences_show_the_digits_that_changed_and_their_band():
+    finding = on_another_part(
+        critical_friction=0.2 + 3.21e-7, limit_n=2.5432, displacement_m=1.2e-5
+    )
+    friction, limit, moved = finding.differences
+    assert friction == "critical_friction: 0.2 -> 0.20000032 (+0.00016 %, band 0.035)"
+    assert limit == "limit_n: 3 -> 2.543 (-15 %, band 0.15)"
+    assert moved == "displacement_m: 1e-05 -> 1.2e-05 (+20 %, band 0.0002)"
+    assert finding.beyond == (limit,)
+    assert finding.reasons[1:] == (limit,)
 
 
 def test_without_being_carried_over_another_part_is_still_not_comparable():

@@ -44,7 +44,8 @@ def transfer(folder, part, *more):
 def test_it_writes_grasps_and_what_became_of_them(folder, tmp_path, capsys):
     assert transfer(folder, "moved.obj", "--out", str(tmp_path / "new")) == Exit.GOOD
     said = capsys.readouterr().out
-    assert "moved: face 3 moved 1.00 mm outward; faces 0, 1, 4, 5 became larger" in said
+    top = "face 3 (facing +z at z = 25 mm)"
+    assert f"moved: {top} moved 1.00 mm outward; faces 0, 1, 4, 5 became larger" in said
     assert "6 of 6 grasps were carried over" in said
     text = (tmp_path / "new" / "transfer.json").read_text()
     record = record_of(TransferFile, text, "transfer.json", schema=1)
@@ -64,7 +65,7 @@ def test_it_writes_grasps_and_what_became_of_them(folder, tmp_path, capsys):
             assert contact["moved_mm"] == (1.0 if contact["old_face"] == 3 else 0.0)
             np.testing.assert_array_equal(contact["position_m"], position)
     (moved,) = [face for face in record["faces"] if face["moved_mm"]]
-    assert moved["in_words"] == "face 3 moved 1.00 mm outward"
+    assert moved["in_words"] == f"{top} moved 1.00 mm outward"
     assert moved["moved_mm"] == 1.0
 
 

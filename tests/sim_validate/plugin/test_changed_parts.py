@@ -12,10 +12,10 @@ import grasp_core as gc
 from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
-from sim_validate.baselines.changed_part import ChangedPartError
 from sim_validate.baselines.compare import Status
 from sim_validate.baselines.grasp_cases import grasp_cases
-from sim_validate.baselines.source_file import Source, source_of
+from sim_validate.baselines.parts.changed_part import ChangedPartError
+from sim_validate.baselines.parts.source_file import Source, source_of
 from sim_validate.baselines.suite_toml import suite_from_toml
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
@@ -24,6 +24,7 @@ from tests.sim_validate.plugin.project import copied, run_pytest
 
 TOP = 3
 """The highest face of the part."""
+FACE = "face 3 (facing +z at z = 25 mm)"
 
 
 @pytest.fixture(scope="module")
@@ -80,13 +81,15 @@ def test_grasps_are_carried_over_to_a_changed_part_and_it_is_said_how_it_changed
     code, said = run_pytest(project, "--grasp-report", "report")
     assert code == 0, said
     assert "1 passed" in said
-    assert f"{part} has changed: face 3 moved 1.00 mm outward" in " ".join(said.split())
+    assert f"{part} has changed: {FACE} moved 1.00 mm outward" in " ".join(said.split())
     assert "its grasps were carried over to it" in " ".join(said.split())
+    (name,) = json.loads((project / "grasps.json").read_text())["grasps"]
+    assert f"  {name['id']} same; touches face 3, which moved\n" in said
     line = line_in(project / "report")
     assert line["status"] == "within bands"
-    assert f"same on the changed part: {part} has changed: face 3 moved 1.00 mm" in line["why"]
+    assert f"same on the changed part: {part} has changed: {FACE} moved 1.00 mm" in line["why"]
     assert line["mesh_file"] == str(part)
-    assert "face 3 moved 1.00 mm outward" in line["mesh_note"]
+    assert f"{FACE} moved 1.00 mm outward" in line["mesh_note"]
     assert line["before"]["contacts_sha256"] != line["after"]["contacts_sha256"]
 
 
@@ -99,10 +102,9 @@ def test_a_grasp_that_the_changed_part_does_not_have_fails_and_is_gone(project):
     assert "1 failed" in said
     line = line_in(project / "report")
     assert line["status"] == "gone"
-    assert (
-        "has lost face 3: the nearest like face, 3 of the changed part, is 1.00 mm away, " in said
-    )
-    assert "face 3 moved 1.00 mm outward" in line["why"]
+    assert f"has lost {FACE}: the nearest face like it, face 3 in the numbering of" in said
+    assert "(facing +z at z = 26 mm), is 1.00 mm away, more than 0.50 mm" in said
+    assert f"{FACE} moved 1.00 mm outward" in line["why"]
     assert "graspproof transfer" in said
 
 
@@ -118,6 +120,10 @@ def test_a_grasp_that_is_better_fails_only_where_that_is_strict(project):
     line = line_in(project / "report")
     assert line["status"] == "improved"
     assert "better on the changed part: " in line["why"]
+    assert "told" not in line
+    better = f"  {line['grasp']} better than in the baseline: critical_friction: 0.2 -> 0."
+    (told,) = [text for text in said.splitlines() if text.startswith(better)]
+    assert told.endswith("; touches face 3, which moved")
     toml = project / "part.grasps.toml"
     write_text(toml, "strict = true\n" + toml.read_text())
     assert run_pytest(project)[0] == 1
@@ -133,7 +139,11 @@ def test_a_grasp_that_is_worse_fails_and_the_face_that_moved_is_named(project):
     assert code == 1
     assert ": regressed" in said
     assert "worse on the changed part: " in said
-    assert "face 3 moved 1.00 mm outward" in said
+    failure = said[said.index(": regressed") : said.index("meshes of grasps")]
+    assert failure.count("has changed") == 1
+    assert "critical_friction: " not in failure
+    assert "N predicted, not measured in simulation" in failure
+    assert f"{FACE} moved 1.00 mm outward" in said
 
 
 def test_blessing_a_changed_part_writes_its_hash_and_then_everything_is_the_same(project):
@@ -141,6 +151,7 @@ def test_blessing_a_changed_part_writes_its_hash_and_then_everything_is_the_same
     grasps = (project / "grasps.json").read_text()
     code, said = run_pytest(project, "--grasp-bless")
     assert code == 0, said
+    assert f"wrote {project / 'part.baseline.json'}: 1 of 1 grasp held" in said
     record = json.loads((project / "part.baseline.json").read_text())
     assert record["content_sha256"] == gc.load_polyhedron(part, unit="mm").content_sha256
     assert (project / "grasps.json").read_text() == grasps
@@ -151,7 +162,106 @@ def test_blessing_a_changed_part_writes_its_hash_and_then_everything_is_the_same
     suite = suite_from_toml(project / "part.grasps.toml")
     (finding,) = suite.tested(suite.ids[0]).findings
     assert finding.status is Status.WITHIN
-    assert "face 3 moved 1.50 mm outward" in finding.reasons[0]
+    moved = "face 3 (facing +z at z = 26 mm) moved 0.50 mm outward"
+    assert f"part.obj has changed since its baseline was written: {moved}" in finding.reasons[0]
+
+
+def test_a_blessed_part_is_not_said_to_have_changed(project):
+    edited(project)
+    assert run_pytest(project, "--grasp-bless")[0] == 0
+    code, said = run_pytest(project, "--grasp-report", "report")
+    assert code == 0, said
+    assert "changed" not in said
+    assert line_in(project / "report")["mesh_note"] == ""
+
+
+def test_the_planned_part_put_back_after_a_blessed_change_is_judged_like_any_other(project, capsys):
+    """It is the one shape on which grasps need not be carried over."""
+    part = project / "part.obj"
+    original = part.read_text()
+    edited(project)
+    assert run_pytest(project, "--grasp-bless")[0] == 0
+    write_text(part, original)
+    code, said = run_pytest(project, "--grasp-report", "report")
+    assert code == 0, said
+    line = line_in(project / "report")
+    assert line["status"] == "within bands"
+    moved = "face 3 (facing +z at z = 26 mm) moved 1.00 mm inward"
+    assert f"{part} has changed since its baseline was written: {moved}" in line["mesh_note"]
+    assert "same on the changed part" in line["why"]
+    baseline = str(project / "part.baseline.json")
+    assert main(["baseline", "check", baseline]) == Exit.GOOD
+    said = " ".join(capsys.readouterr().out.split())
+    assert "1 within bands" in said
+    assert moved in said
+    record = json.loads((project / "part.baseline.json").read_text())
+    record["grasps"][0].update(limit_n=1e3)
+    write_text(project / "part.baseline.json", json.dumps(record))
+    code, said = run_pytest(project)
+    assert code == 1
+    assert "worse on the changed part: " in said
+
+
+def test_the_planned_part_put_back_is_refused_where_every_change_is(project):
+    part = project / "part.obj"
+    original = part.read_text()
+    edited(project)
+    assert run_pytest(project, "--grasp-bless")[0] == 0
+    write_text(part, original)
+    refusing(project)
+    code, said = run_pytest(project)
+    assert code == 1
+    assert "not comparable" in said
+
+
+def test_grasps_that_are_planned_again_are_not_compared_with_a_blessed_change(project):
+    """Then the ids may name other contacts, so the baseline is of another object."""
+    part = edited(project)
+    assert run_pytest(project, "--grasp-bless")[0] == 0
+    edited(project)
+    body = gc.load_polyhedron(part, unit="mm")
+    name = json.loads((project / "grasps.json").read_text())["grasps"][0]["id"]
+    plan = gc.plan(body, 0.5, families=("concurrent",))
+    plan = dataclasses.replace(plan, grasps=(plan[name],))
+    write_text(project / "grasps.json", plan_to_json(body, plan))
+    code, said = run_pytest(project)
+    assert code == 1
+    assert "the object is another one" in said
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"vertices_m": [[0.0, 0.0, 0.0]]}, "part: expected the mesh of a solid"),
+        ({"triangles": [[0, 1, 99]]}, "part: expected the mesh of a solid"),
+        ({"triangles": "all"}, "part.triangles: "),
+        ({"vertices_m": None}, "part.vertices_m: "),
+    ],
+)
+def test_the_part_in_a_baseline_is_checked(project, changed, said):
+    edited(project)
+    suite_from_toml(project / "part.grasps.toml").bless()
+    edited(project)
+    path = project / "part.baseline.json"
+    record = json.loads(path.read_text())
+    record["part"].update(changed)
+    write_text(path, json.dumps(record))
+    suite = suite_from_toml(project / "part.grasps.toml")
+    with pytest.raises(gc.InputError, match=said):
+        _ = suite.compared
+
+
+def test_a_part_in_a_baseline_that_is_not_the_recorded_one_is_refused(project):
+    edited(project)
+    suite_from_toml(project / "part.grasps.toml").bless()
+    edited(project)
+    path = project / "part.baseline.json"
+    record = json.loads(path.read_text())
+    for vertex in record["part"]["vertices_m"]:
+        vertex[0] += 0.001
+    write_text(path, json.dumps(record))
+    with pytest.raises(gc.InputError, match="not the one that its content_sha256 says"):
+        _ = suite_from_toml(project / "part.grasps.toml").compared
 
 
 def test_a_grasp_that_was_gone_when_it_was_blessed_stays_gone_without_a_failure(project):
@@ -236,6 +346,57 @@ def test_where_there_is_no_part_it_is_said_that_a_copy_was_tested(project):
     assert line["mesh_note"].startswith(note)
 
 
+def test_a_missing_part_fails_where_that_is_asked_for(project):
+    toml = project / "part.grasps.toml"
+    write_text(toml, toml.read_text() + '[changed_part]\nmissing = "fail"\n')
+    assert run_pytest(project)[0] == 0
+    (project / "part.obj").unlink()
+    code, said = run_pytest(project, "--grasp-report", "report")
+    assert code == 1
+    assert "the mesh file that its grasps were planned from, 'part'" in said
+    assert "is missing" in said
+    assert line_in(project / "report")["status"] == "not comparable"
+    with pytest.raises(ChangedPartError, match="is missing"):
+        grasp_cases(project, ["grasps.json"], {"changed_part": {"missing": "fail"}})
+
+
+def rescaled(project, by, digits):
+    part = project / "part.obj"
+    rows = [row.split() for row in part.read_text().splitlines()]
+    for row in rows:
+        if row[0] == "v":
+            row[1:] = [f"{by * float(number):.{digits}g}" for number in row[1:]]
+    return write_text(part, "\n".join(map(" ".join, rows)) + "\n")
+
+
+@pytest.mark.parametrize("digits", [15, 8])
+def test_a_part_saved_in_another_unit_is_said_to_be(project, digits):
+    """With fifteen digits the solid is the very same one, with eight nearly."""
+    part = project / "part.obj"
+    write_text(part, part.read_text().replace("\n", "\n# edited\n", 1))
+    edited(project, 1.0 / 3.0)  # so that no number is round
+    assert run_pytest(project, "--grasp-bless")[0] == 0
+    assert json.loads((project / "part.baseline.json").read_text())["unit"] == "mm"
+    rescaled(project, 1e-3, digits)
+    code, said = run_pytest(project, "--grasp-report", "report")
+    assert code == 0, said
+    note = line_in(project / "report")["mesh_note"]
+    assert "its numbers are 0.001 times what they were, so it is taken to be in m now" in note
+    toml = project / "part.grasps.toml"
+    write_text(toml, toml.read_text() + '[changed_part]\nunit = "m"\n')
+    assert "its numbers" not in run_pytest(project)[1]
+
+
+def test_a_shifted_part_is_said_to_be_shifted(project):
+    part = project / "part.obj"
+    rows = [row.split() for row in part.read_text().splitlines()]
+    for row in rows:
+        if row[0] == "v":
+            row[1] = repr(float(row[1]) + 1.0)
+    write_text(part, "\n".join(map(" ".join, rows)) + "\n")
+    assert "it is as if the whole part were shifted by (1, 0, 0) mm; face" in run_pytest(project)[1]
+
+
 def test_blessing_commands_and_markers_refuse_a_changed_part_too(project, capsys):
     edited(project)
     refusing(project)
@@ -258,11 +419,11 @@ def test_commands_carry_grasps_over_and_name_the_face(project, capsys):
     assert main(["baseline", "check", baseline]) == Exit.GOOD
     said = " ".join(capsys.readouterr().out.split())
     assert "1 within bands" in said
-    assert "part.obj has changed: face 3 moved 1.00 mm outward" in said
+    assert f"part.obj has changed: {FACE} moved 1.00 mm outward" in said
     assert main(["baseline", "check", baseline, "--distance-m", "0.0005"]) == Exit.NEGATIVE
     said = " ".join(capsys.readouterr().out.split())
     assert "1 gone" in said
-    assert "face 3 moved 1.00 mm outward" in said
+    assert f"{FACE} moved 1.00 mm outward" in said
     assert main(["baseline", "record", grasps, "-o", baseline, "-q"]) == Exit.GOOD
     capsys.readouterr()
     assert main(["baseline", "check", baseline]) == Exit.GOOD
@@ -302,6 +463,7 @@ def test_a_part_whose_unit_is_not_clear_asks_for_it(project):
         ("refuse = 1", "changed_part.refuse: expected true or false"),
         ("angle_deg = 90", "angle_deg must be a number"),
         ('unit = "ft"', "unit must be one of"),
+        ('missing = "skip"', "missing must be one of note, fail"),
         ("unknown = 1", "changed_part: no setting is named"),
     ],
 )
@@ -324,7 +486,7 @@ def test_comments_line_ends_and_the_order_of_vertices_are_no_change(project):
         turned,
     ):
         part.write_text(text, newline="")
-        assert source_of(saved, project / "grasps.json", []) == Source(file=part)
+        assert source_of(saved, project / "grasps.json", []) == Source(file=part, unit="mm")
         found += 1
     assert found == 3
 

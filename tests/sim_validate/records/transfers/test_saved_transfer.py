@@ -77,10 +77,25 @@ def test_faces_and_rules_are_as_they_were_found(both):
     assert read.faces_in_words == found.faces_in_words
     for there, here in zip(found.faces, read.faces, strict=True):
         assert (here.old, here.new, here.moved) == (there.old, there.new, there.moved)
+        assert (here.normal, here.center) == (there.normal, there.center)
+        assert here.likely == there.likely
+        assert here.likely_turn == pytest.approx(there.likely_turn, rel=SAME, abs=RADIANS)
         assert here.distance == pytest.approx(there.distance, rel=SAME, abs=METRES)
         assert here.turn == pytest.approx(there.turn, rel=SAME, abs=RADIANS)
         assert here.old_area == pytest.approx(there.old_area, rel=SAME, abs=AREA)
         assert here.new_area == pytest.approx(there.new_area, rel=SAME, abs=AREA)
+
+
+def test_files_that_do_not_say_where_faces_are_are_still_read(both):
+    """Earlier versions wrote none of these fields."""
+    found, _ = both
+    record = json.loads(transfer_to_json(found))
+    for face in record["faces"]:
+        for name in ("normal", "center_m", "likely", "likely_turned_deg"):
+            del face[name]
+    read = transfer_from_json(json.dumps(record))
+    assert {face.center for face in read.faces} == {None}
+    assert "facing" not in read.faces_in_words
 
 
 def test_the_changes_reach_every_ending(box):

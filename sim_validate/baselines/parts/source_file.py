@@ -28,6 +28,9 @@ class Source:
     """A sentence that says the mesh file was not found; empty otherwise."""
     changed: bool = False
     """Whether the file holds another solid than the one that was planned on."""
+    unit: str = ""
+    """Unit in which a file of other bytes holds the same solid; empty where that does not matter.
+    """
 
 
 def source_of(
@@ -56,8 +59,8 @@ def source_of(
         return Source()
     found = [named] if named is not None else _beside(body.name, [grasps.parent, *folders])
     for path in found:
-        if _is_source(path, body):
-            return Source(file=path)
+        if (unit := _unit_of_same(path, body)) is not None:
+            return Source(file=path, unit=unit)
     if found:
         return Source(file=found[0], changed=True)
     return Source(
@@ -85,11 +88,20 @@ def _entries(folder: Path) -> list[Path]:
         return []
 
 
-def _is_source(path: Path, body: Polyhedron) -> bool:
-    """Tell whether a body was read from a file, or the file holds the same solid in some unit."""
+def _unit_of_same(path: Path, body: Polyhedron) -> str | None:
+    """Return the unit in which a file holds a body; None if it does not.
+
+    Empty if the body was read from these very bytes, whatever their unit.
+    """
     if hashlib.sha256(read_bytes(path)).hexdigest() == body.source_sha256:
-        return True
-    return any(_content(path, unit, body) == body.content_sha256 for unit in UNITS_M)
+        return ""
+    return fitting_exactly(path, body)
+
+
+def fitting_exactly(path: Path, body: Polyhedron) -> str | None:
+    """Return the unit in which a file holds the very solid of a body; None if it does in none."""
+    same = (unit for unit in UNITS_M if _content(path, unit, body) == body.content_sha256)
+    return next(same, None)
 
 
 def _content(path: Path, unit: str, body: Polyhedron) -> str:

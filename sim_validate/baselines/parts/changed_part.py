@@ -5,77 +5,23 @@ keep their ids, so that each is compared with its own entry of the baseline. Who
 change to be refused says so.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, cast
 
-from grasp_core.checked import number, one_of, switch
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import settings_of
-from grasp_core.files.strict_json import shown
-from grasp_core.objects.polyhedron import UNITS_M
+from grasp_core.objects.polyhedron import UNITS_M, Polyhedron
 from grasp_core.records.grasps_json import RECORDED, SavedGrasps
 from grasp_core.transferring.changed_part import fitting_unit, load_changed_part
-from grasp_core.transferring.like_faces import ANGLE_DEG, WIDEST_DEG, check_planar
+from grasp_core.transferring.like_faces import check_planar, likeness
 from grasp_core.transferring.transfer import Transfer, transfer
-from sim_validate.baselines.source_file import Source
-
-TABLE = "changed_part"
-"""Name of the table of `IfChanged` in a `*.grasps.toml` file."""
+from sim_validate.baselines.parts.if_changed import CARRY, FAIL, IfChanged
+from sim_validate.baselines.parts.moves import Moves, moves_since_baseline, moves_since_planning
+from sim_validate.baselines.parts.recorded_part import RecordedPart, RecordedShape, recorded_part
+from sim_validate.baselines.parts.source_file import Source, fitting_exactly
 
 
 class ChangedPartError(InputError):
-    """Error for a mesh file that has changed although that is refused, or that cannot be judged."""
-
-
-@dataclass(frozen=True, slots=True)
-class IfChanged:
-    """What to do if a part has changed since its grasps were planned.
-
-    Raises:
-        InputError: A field is out of range.
-    """
-
-    refuse: bool = False
-    """Whether a changed part is refused; otherwise grasps are carried over to it."""
-    unit: str | None = None
-    """Unit of length of the mesh file; None for the one in which the part is about as large as it
-    was."""
-    distance_m: float | None = None
-    """Largest distance by which a contact may move [m]; None for a twentieth of the part's radius.
-    """
-    angle_deg: float = ANGLE_DEG
-    """Largest angle between the normals of a face before and after [deg]."""
-
-    def __post_init__(self) -> None:
-        switch(self.refuse, "refuse")
-        if self.unit is not None:
-            one_of(self.unit, UNITS_M, "unit")
-        if self.distance_m is not None:
-            number(self.distance_m, "distance_m", least=0.0)
-        number(self.angle_deg, "angle_deg", least=0.0, most=WIDEST_DEG)
-
-
-CARRY = IfChanged()
-KNOWN = tuple(each.name for each in fields(IfChanged))
-
-
-def if_changed(table: object) -> IfChanged:
-    """Read the table `[changed_part]` of a `*.grasps.toml` file, or the same given by a marker.
-
-    Raises:
-        InputError: A setting is unknown or out of range.
-    """
-    if not isinstance(table, Mapping):
-        raise InputError(f"{TABLE}: expected a table of settings, got {shown(table)}")
-    given = {**cast("Mapping[str, Any]", table)}
-    for name in given:
-        if name not in KNOWN:
-            raise InputError(
-                f"{TABLE}: no setting is named {shown(name)}; choose from {', '.join(KNOWN)}"
-            )
-    return settings_of(IfChanged, given, [TABLE])
+    """Error for a mesh file that is refused because it has changed, is missing or is curved."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,6 +36,23 @@ class Present:
     """How they were carried over; None where the part is as it was."""
     unit: str = ""
     """Unit of length of the changed part's file; empty where the part is as it was."""
+    asked: IfChanged = CARRY
+    """What to do if the part has changed."""
+    recorded_unit: str | None = None
+    """Unit of the mesh file when the baseline was written; None if that is not known."""
+    since: Moves | None = None
+    """How faces moved since the baseline was written on a changed part; None where they are
+    compared with those of the planned part."""
+
+    @property
+    def planned(self) -> Polyhedron:
+        """Return the part that the grasps were planned on."""
+        return self.saved.body if self.carried is None else self.carried.old
+
+    @property
+    def recorded(self) -> RecordedPart | None:
+        """Return what a baseline must keep of the part; None where it is the planned one."""
+        return None if self.carried is None else recorded_part(self.carried.old, self.carried.new)
 
     @property
     def gone(self) -> dict[str, str]:
@@ -100,16 +63,48 @@ class Present:
     @property
     def change(self) -> str:
         """Say which faces moved and by how much; empty where the part is as it was."""
-        if self.carried is None or self.source.file is None:
+        if self.source.file is None or not (self.moves.faces or self.rescaled):
             return ""
-        return f"{self.source.file} has changed: {self.carried.faces_in_words}"
+        said = [self.rescaled, self.moves.in_words if self.moves.faces else "no face moved"]
+        return f"{self.source.file} has changed{self.moves.since}: {'; '.join(filter(None, said))}"
+
+    @property
+    def rescaled(self) -> str:
+        """Say that the mesh file is in another unit than the baseline's; empty if it is not."""
+        unit = self.unit or self.source.unit
+        if not (self.recorded_unit and unit) or self.asked.unit or unit == self.recorded_unit:
+            return ""
+        times = UNITS_M[self.recorded_unit] / UNITS_M[unit]
+        return (
+            f"its numbers are {times:.4g} times what they were, so it is taken to be in {unit} now "
+            f"and no longer in {self.recorded_unit} (if it is not, say `unit`)"
+        )
+
+    @property
+    def file_unit(self) -> str | None:
+        """Find the unit of a mesh file with planar faces, for a baseline; None without a file."""
+        if self.source.file is None or self.saved.body.patches is not None:
+            return None
+        known = self.unit or self.source.unit
+        return known or fitting_exactly(self.source.file, self.planned)
+
+    @property
+    def moves(self) -> Moves:
+        """Return how faces moved, since the baseline where it tells, or else since planning."""
+        if self.since is not None:
+            return self.since
+        return Moves() if self.carried is None else moves_since_planning(self.carried)
 
     @property
     def note(self) -> str:
         """Say what readers must know about the mesh that is tested; empty if nothing."""
         if not self.change:
             return self.source.note
-        return f"{self.change}; its grasps were carried over to it"
+        return (
+            self.change
+            if self.carried is None
+            else f"{self.change}; its grasps were carried over to it"
+        )
 
     @property
     def mesh(self) -> Source:
@@ -120,6 +115,11 @@ class Present:
         """Return the id that a grasp of the file has on the changed part; None if it is gone."""
         found = () if self.carried is None else self.carried.grasps
         return next((each.grasp.id for each in found if each.old.id == name and each.grasp), None)
+
+    def planned_faces(self, name: str) -> tuple[int, ...]:
+        """Return the faces of the planned part that a grasp of the file touches."""
+        grasps = self.saved.grasps if self.carried is None else [e.old for e in self.carried.grasps]
+        return next((grasp.faces for grasp in grasps if grasp.id == name), ())
 
     def first(self, limit: int | None) -> "Present":
         """Return only the first grasps of the file, up to a limit."""
@@ -139,6 +139,26 @@ class Present:
     def _with(self, carried: Transfer) -> "Present":
         return replace(self, saved=_tested(self.saved, carried), carried=carried)
 
+    def against(self, before: RecordedShape) -> "Present":
+        """Measure how faces moved from where they were when a baseline was written.
+
+        If the baseline does not hold the part, it was written on the planned one.
+
+        Raises:
+            InputError: The baseline's mesh is refused.
+        """
+        planned, part, now = self.planned, before.part, self.saved.body
+        found = replace(self, recorded_unit=before.unit)
+        if part is None or part.planned_sha256 != planned.content_sha256:
+            return found
+        if now.content_sha256 == before.content_sha256:
+            return replace(found, since=Moves())
+        if self.source.file is None or self.asked.refuse:
+            return found
+        rule = likeness(planned, self.asked.distance_m, self.asked.angle_deg)
+        then = part.body(planned.name, before.content_sha256)
+        return replace(found, since=moves_since_baseline(then, planned, now, rule))
+
 
 def present(saved: SavedGrasps, path: Path, source: Source, asked: IfChanged = CARRY) -> Present:
     """Carry grasps over to their part as it is now; they stay as they are if it has not changed.
@@ -152,17 +172,23 @@ def present(saved: SavedGrasps, path: Path, source: Source, asked: IfChanged = C
     Raises:
         ChangedPartError: The part has changed, and that is refused or cannot be judged.
     """
+    if source.note and asked.missing == FAIL:
+        raise ChangedPartError(
+            f"{path}: the mesh file that its grasps were planned from, {saved.body.name!r} with "
+            f'some ending, is missing, and `missing = "{FAIL}"` refuses to test the mesh that '
+            f"{path.name} holds; put the file back, or say with `object` where it is"
+        )
     if not source.changed or source.file is None:
-        return Present(saved, source)
+        return Present(saved, source, asked=asked)
     if asked.refuse:
         raise ChangedPartError(
-            f"{source.file}: this is not the mesh that {path} was planned on: the mesh has changed "
-            f"since, or is another object's. Plan on it again (graspproof plan {source.file} --out "
-            "...) and write the baseline with pytest --grasp-bless, put the former file back, or "
-            "name the right file with `object` in a *.grasps.toml"
+            f"{source.file}: this is not the mesh that {path} was planned on, and `refuse = true` "
+            "makes the grasps of a changed part not comparable. Plan on the part again (graspproof "
+            f"plan {source.file} --out ...) and bless (pytest --grasp-bless), or put the former "
+            "file back; if this is another object's file, name the right one with `object`"
         )
     unit, carried = _carried(saved, path, source.file, asked)
-    return Present(_tested(saved, carried), source, carried, unit)
+    return Present(_tested(saved, carried), source, carried, unit, asked)
 
 
 def _carried(saved: SavedGrasps, path: Path, file: Path, asked: IfChanged) -> tuple[str, Transfer]:
