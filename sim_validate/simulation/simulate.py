@@ -206,20 +206,16 @@ class Bench:
         """Return what is applied in each of n samples of m trials, as the simulator takes it.
 
         Returns:
-            External wrenches, (m, n, 6), commands of the servos, (m, n, 3k), frictions, (m, n).
+            External wrenches, (m, n, 6), commands of the servos, (m, n, q), frictions, (m, n).
         """
         layout = self.scene.layout
         wrenches = np.array([schedule.wrenches for schedule in schedules])
         wrenches[..., 3:] -= cross(layout.center, wrenches[..., :3])
-        forces = np.array([schedule.forces for schedule in schedules])
-        pushes = np.einsum("kij,mnki->mnkj", layout.frames, forces)
         # rounded like the scene's numbers (see `layout.arrange`)
         for trial in range(len(schedules)):
-            for part in (wrenches[trial, :, :3], wrenches[trial, :, 3:], pushes[trial]):
+            for part in (wrenches[trial, :, :3], wrenches[trial, :, 3:]):
                 part[...] = to_digits(part)
-        controls = pushes.reshape(*pushes.shape[:2], -1) / layout.drive.stiffness_n_per_m
-        if layout.drive.rigid:  # there are no servos
-            controls = controls[..., :0]
+        controls = np.array([layout.commands(schedule.forces) for schedule in schedules])
         frictions = np.array([to_digits(schedule.friction) for schedule in schedules])
         return wrenches, controls, frictions
 
