@@ -158,10 +158,12 @@ def opened(layout: Layout, physics: PhysicsSettings, comment: str) -> tuple[Elem
 
 
 def add_object(
-    world: Element, layout: Layout, contact: dict[str, str], surface: Surface = "pads"
-) -> None:
-    """Add the object, which gravity does not pull, with the pads that fingertips touch."""
-    body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
+    world: Element, layout: Layout, contact: dict[str, str], surface: Surface = "pads", *,
+    weightless: bool = False,
+) -> None:  # fmt: skip
+    """Add the object with what fingertips touch; where there is gravity it may be weightless."""
+    lifted = {"gravcomp": 1.0} if weightless else {}
+    body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)} | lifted)
     add_element(body, "freejoint", {"name": "object"})
     inertia = layout.inertia_kg_m2[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     add_element(

@@ -88,7 +88,7 @@ def hand_text(layout: HandLayout, physics: PhysicsSettings) -> str:
     """Write the MJCF text of a hand's layout; equal layouts give equal texts."""
     root, world = opened(layout, physics, SCALED)
     contact = as_texts(physics.contact())
-    add_object(world, layout, contact)
+    add_object(world, layout, contact, weightless=bool(layout.gravity.any()))
     pose = layout.palm_pose
     palm = add_element(world, "body", {"name": PALM, **_placed(pose[:3, 3], pose[:3, :3])})
     for place, shape in enumerate(layout.hand.palm):
