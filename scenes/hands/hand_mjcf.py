@@ -3,13 +3,15 @@
 The palm is fixed in the world. Each link is a body on a hinge, turned as in the pose, so that all
 hinges stand at zero; a servo on each has the motor's torque as its `forcerange`. Fingertips are the
 balls that the analysis knows, and touch pads flush with the object's faces, as fingertips on slides
-do (see `scenes.mjcf`). The shapes of links may touch those of other fingers and the palm, and the
-convex hull of a convex object; pairs that the hand lets overlap are excluded. A link whose mass is
-not known has a small one, which gravity does not pull.
+do (see `scenes.mjcf`). Shapes of links may touch those of other fingers and of the palm, except
+pairs that the hand lets overlap. They pass through the object: the pose is known to be clear of it,
+and trials move it by micrometres. A link whose mass is not known has a small one, which gravity
+does not pull.
 """
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -36,8 +38,22 @@ NOMINAL_KG = 1e-3
 """Mass of a link whose own is not known, or does not count [kg]."""
 NOMINAL_M = 0.01
 """Radius of gyration of links [m]: small beside the inertia that servos are given."""
+THIN_M = 1e-6
+"""Least half-size of a box, for shapes that are flat [m]."""
 SHAPES = 1 << 20
 """Bit of what the shapes of links may touch."""
+
+
+IMPEDANCE = 0.999
+"""Impedance of contacts. Links are light along some directions, so contacts give way by more than
+under fingertips on slides, and stiff chains of joints lose force by it: with 0.99, up to half a
+percent."""
+
+
+def hand_physics() -> PhysicsSettings:
+    """Return the settings of scenes with hands, whose contacts are harder than usual."""
+    usual = PhysicsSettings()
+    return replace(usual, solimp=(IMPEDANCE, IMPEDANCE, *usual.solimp[2:]))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -67,11 +83,21 @@ def build_hand_scene(
     Raises:
         InputError: The hand, the object or the pose do not belong together.
     """
-    given = PhysicsSettings() if physics is None else instance(physics, PhysicsSettings, "physics")
+    given = hand_physics() if physics is None else instance(physics, PhysicsSettings, "physics")
     layout = hand_layout(hand, body, reach, friction, down)
     x, y, z = layout.gravity.tolist()
-    used = given.with_gravity((x, y, z))
+    used = replace(given, gravity=(x, y, z))
     return HandScene(hand_text(layout, used), layout, used)
+
+
+def limited(scene: HandScene, limits: Array, friction: float) -> HandScene:
+    """Return a scene with other torque limits, (joints,) [N m], and another friction.
+
+    All else stays as it is, stiffness and commands too.
+    """
+    motors = replace(scene.layout.motors, limits=limits)
+    layout = replace(scene.layout, motors=motors, friction=friction)
+    return HandScene(hand_text(layout, scene.physics), layout, scene.physics)
 
 
 def write_hand_scene(scene: HandScene, path: str | Path) -> Path:
@@ -156,7 +182,7 @@ def rotation_about(axis: Array, angle: float) -> Array:
 
 
 def _shape(body: Element, name: str, shape: LinkShape) -> None:
-    """Add a shape: a ball, a capsule, or a box that reaches as far as the rounded one."""
+    """Add a shape: a ball, a capsule, or the box inside a rounded one that meets its corners."""
     long = np.flatnonzero(shape.half_sizes > 0.0)
     own: dict[str, object] = {"name": name, "contype": SHAPES, "conaffinity": SHAPES,
                               "mass": 0.0, "group": 2, "rgba": (0.62, 0.66, 0.72, 1.0)}  # fmt: skip
@@ -168,7 +194,7 @@ def _shape(body: Element, name: str, shape: LinkShape) -> None:
         turned = turned[:, [(axis + 1) % 3, (axis + 2) % 3, axis]]
         own |= {"type": "capsule", "size": (shape.radius, shape.half_sizes[axis])}
     else:
-        own |= {"type": "box", "size": np.maximum(shape.half_sizes + shape.radius, 1e-6)}
+        own |= {"type": "box", "size": np.maximum(shape.half_sizes + shape.radius / math.sqrt(3.0), THIN_M)}
     add_element(body, "geom", own | _placed(shape.position, turned))
 
 
