@@ -137,7 +137,7 @@ class Layout(ByValue):
         """
         if not joints.shape[1]:
             return np.broadcast_to(self.tip_centers, (len(joints), *self.contacts.shape))
-        slides = joints.reshape(len(joints), -1, 3)
+        slides = joints.reshape(len(joints), joints.shape[1] // 3, 3)
         return self.tip_centers + np.einsum("kij,nkj->nki", self.frames, slides)
 
     def commands(self, forces: Array) -> Array:

@@ -10,16 +10,18 @@ under the acceleration a of gravity: the principle of virtual work. The first fa
 of the levers L of `Motors`, the second sum its gravity.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, cross, frozen
-from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.kinematics import HandPlaces, places
 from grasp_core.hands.reach import HandReach
+from grasp_core.hands.stance import stance_of
 from grasp_core.quality.motors import Motors
 
 
@@ -43,15 +45,10 @@ def hand_motors(
         InputError: The hand is another one or not in a pose, a joint has no torque limit, a link
             has no mass that gravity needs, or a motor cannot carry the links.
     """
-    instance(hand, Hand, "hand", "load_hand makes one")
-    instance(reach, HandReach, "reach", "reach_with makes one")
-    if reach.joints is None or reach.contacts is None or reach.fingers is None:
-        raise InputError(
-            f"reach must have a pose, got none for grasp {reach.grasp}: {reach.explanation}"
-        )
-    found = places(hand, reach.joints, reach.palm_pose)
-    points = np.array([contact.position for contact in reach.contacts])
-    levers = _levers(hand, found, points, reach.fingers.tolist())
+    stance = stance_of(hand, reach)
+    found = places(hand, stance.joints, stance.palm_pose)
+    points = np.array([contact.position for contact in stance.contacts])
+    levers = _levers(hand, found, points, stance.fingers)
     limits = _limits(hand)
     if down is None and not any_orientation:
         return Motors.of(levers, limits)
@@ -87,10 +84,10 @@ def _limits(hand: Hand) -> Array:
 def _chains(hand: Hand) -> list[range]:
     """Return the numbers of each finger's joints."""
     ends = np.cumsum([0, *(len(finger.links) for finger in hand.fingers)]).tolist()
-    return [range(first, end) for first, end in zip(ends, ends[1:], strict=False)]
+    return [range(first, end) for first, end in pairwise(ends)]
 
 
-def _levers(hand: Hand, found: HandPlaces, points: Array, fingers: list[int]) -> Array:
+def _levers(hand: Hand, found: HandPlaces, points: Array, fingers: tuple[int, ...]) -> Array:
     """Return the first factors of (1) for all contacts, (joints, 3k) [m]."""
     chains = _chains(hand)
     levers = np.zeros((len(hand.joints), len(points), 3))

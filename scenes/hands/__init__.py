@@ -1,1 +1,1 @@
-"""Scenes of a hand that stands in a grasp: its real chains of links, moved by servos with limits."""
+"""Scenes of a hand that stands in a grasp: its chains of links, moved by limited servos."""

@@ -21,23 +21,28 @@ the motors cannot, and joints move by micrometres here.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
-from grasp_core.checked import instance
-from grasp_core.errors import InputError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import direction, hand_motors
-from grasp_core.hands.kinematics import places
+from grasp_core.hands.kinematics import places, tip_jacobians
 from grasp_core.hands.reach import HandReach
+from grasp_core.hands.stance import Stance, stance_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from scenes.fingertips import FingerSettings
 from scenes.layout import SQUEEZE, Layout, arrange
+
+TOUCH = 3e-6
+"""Depth of fingertips in their faces at the start, in grasp sizes: more than numbers of nine
+digits leave open."""
+REFINED = 3
+"""Newton steps that put fingertips on their faces: from 10 micrometres to rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
@@ -110,31 +115,50 @@ def hand_layout(
         friction: Coulomb coefficient at every contact.
         down: Direction of gravity in the object's frame, which pulls at the links; None for none.
 
+    Returns:
+        The layout, with the joints turned by as much as fingertips were off their faces.
+
     Raises:
         InputError: The hand, the object or the pose do not belong together.
     """
     check_body(body)
+    stance = stance_of(hand, reach)
     motors = hand_motors(hand, reach, down=down)
-    squeeze = squeezing(motors, reach.certificate.forces)
-    push = float(np.abs(squeeze).max())
-    radius = max(hand.fingers[finger].tip.radius for finger in reach.fingers.tolist())
-    base = arrange(
-        body, reach.contacts, friction, FingerSettings(max_normal_force_n=push, radius_m=radius)
-    )
+    squeeze = squeezing(motors, stance.forces)
+    push, radii = float(np.abs(squeeze).max()), stance.tip_radii
+    tips = FingerSettings(max_normal_force_n=push, radius_m=float(radii.max()), indentation=TOUCH)
+    base = arrange(body, stance.contacts, friction, tips)
     lever = _lever(motors)
-    drive, pose = base.drive, reach.palm_pose.copy()
+    drive, pose = base.drive, stance.palm_pose.copy()
     pose[:3, 3] -= body.center_of_mass
     servo = float(to_digits(np.array(drive.stiffness_n_per_m * lever**2)))
     armature = float(to_digits(np.array(drive.mass_kg * lever**2)))
     own = {each.name: getattr(base, each.name) for each in fields(base)}
     own["squeeze"] = to_digits(SQUEEZE * np.einsum("kij,ki->kj", base.frames, squeeze))
     gravity = np.zeros(3) if down is None else GRAVITY_M_PER_S2 * direction(down)
+    centers = base.contacts - (radii - drive.indentation_m)[:, None] * base.frames[:, :, 0]
+    joints = touching(replace(stance, palm_pose=pose), centers)
     return HandLayout(
-        **own, hand=hand, joints=reach.joints, palm_pose=pose,
-        used_fingers=tuple(reach.fingers.tolist()), motors=motors, gravity=to_digits(gravity),
+        **own, hand=hand, joints=to_digits(joints), palm_pose=to_digits(pose),
+        used_fingers=stance.fingers, motors=motors, gravity=to_digits(gravity),
         servo_n_m_per_rad=servo, damping_n_m_s_per_rad=2.0 * math.sqrt(servo * armature),
         armature_kg_m2=armature,
     )  # fmt: skip
+
+
+def touching(stance: Stance, centers: Array) -> Array:
+    """Turn the joints by the least angles that put fingertips on their places, (j,) [rad].
+
+    Args:
+        stance: The hand, with the fingertips nearly there.
+        centers: Where the middles of fingertips belong, (k, 3) [m], in the frame of the pose.
+    """
+    joints, used = stance.joints, list(stance.fingers)
+    for _ in range(REFINED):
+        tips = places(stance.hand, joints, stance.palm_pose).tips[0, used]
+        J = tip_jacobians(stance.hand, joints, stance.palm_pose)[0, used].reshape(-1, len(joints))
+        joints = joints + np.linalg.lstsq(J, (centers - tips).ravel(), rcond=None)[0]
+    return joints
 
 
 def squeezing(motors: Motors, forces: Array) -> Array:

@@ -152,13 +152,15 @@ def _finger(
 
 
 def _link(parent: Element, layout: HandLayout, link: Link, angle: float) -> Element:
-    joint, pulled = link.joint, bool(layout.gravity.any())
+    joint, mass, center = link.joint, NOMINAL_KG, np.zeros(3)
+    pulled = bool(layout.gravity.any())
+    if pulled and link.mass_kg is not None and link.center_of_mass is not None:
+        mass, center = link.mass_kg, link.center_of_mass
     turned = joint.rotation @ rotation_about(joint.axis, angle)
-    known = link.mass_kg is not None and link.center_of_mass is not None and pulled
-    mass = link.mass_kg if known else NOMINAL_KG
+    lifted = 0.0 if pulled else 1.0
     body = add_element(
         parent, "body",
-        {"name": link.name, "gravcomp": 0.0 if known else 1.0, **_placed(joint.position, turned)},
+        {"name": link.name, "gravcomp": lifted, **_placed(joint.position, turned)},
     )  # fmt: skip
     add_element(
         body, "joint",
@@ -166,7 +168,6 @@ def _link(parent: Element, layout: HandLayout, link: Link, angle: float) -> Elem
          "limited": "false", "damping": 0.0, "stiffness": 0.0,
          "armature": layout.armature_kg_m2, "frictionloss": 0.0},
     )  # fmt: skip
-    center = link.center_of_mass if known else np.zeros(3)
     inertia = (mass * NOMINAL_M**2,) * 3
     add_element(body, "inertial", {"pos": center, "mass": mass, "diaginertia": inertia})
     for place, shape in enumerate(link.shapes):
@@ -194,7 +195,10 @@ def _shape(body: Element, name: str, shape: LinkShape) -> None:
         turned = turned[:, [(axis + 1) % 3, (axis + 2) % 3, axis]]
         own |= {"type": "capsule", "size": (shape.radius, shape.half_sizes[axis])}
     else:
-        own |= {"type": "box", "size": np.maximum(shape.half_sizes + shape.radius / math.sqrt(3.0), THIN_M)}
+        own |= {
+            "type": "box",
+            "size": np.maximum(shape.half_sizes + shape.radius / math.sqrt(3.0), THIN_M),
+        }
     add_element(body, "geom", own | _placed(shape.position, turned))
 
 

@@ -135,9 +135,7 @@ def _limits(
     bench = Bench(scene)
     rig = squeezed(bench, setup, scene.layout.squeeze_forces, friction)
     resisted = resisted_by(body, reach.contacts or (), friction, setup, scene.layout.motors)
-    loads = [
-        Load(size * wrench, resisted.limit(wrench).forces) for wrench, size in exact.values()
-    ]
+    loads = [Load(size * wrench, resisted.limit(wrench).forces) for wrench, size in exact.values()]
     found = ramped_limits(rig, loads)
     return tuple(
         Check(f"limit of motors {name}, over the exact one", math.nan if at is None else at.share,
@@ -157,4 +155,6 @@ def _displaced(scene: HandScene, setup: Setup) -> Check:
     size = GENTLE * TORQUE / HEIGHT
     (poses,) = rig.motions_of_holds([Load(size * np.eye(6)[0], forces)])
     exact = size * HEIGHT**2 / (2.0 * layout.servo_n_m_per_rad)
-    return Check("displacement by the servos, over the exact one", float(poses[-1, 0]) / exact, *SOFTER)
+    return Check(
+        "displacement by the servos, over the exact one", float(poses[-1, 0]) / exact, *SOFTER
+    )

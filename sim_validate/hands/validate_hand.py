@@ -7,8 +7,6 @@ limits are found in simulation too. Controls are the same hand with one thing ch
 makes it let go.
 """
 
-from dataclasses import replace
-
 from grasp_core.checked import instance
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
@@ -21,13 +19,19 @@ from scenes.hands.hand_mjcf import HandScene, build_hand_scene, hand_physics, li
 from sim_validate.hands.hand_controls import HandCase, HandControl, hand_controls
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.hands.hand_verdict import HandControlVerdict, HandVerdict
+from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.hold_verdict import judge
-from sim_validate.simulation.loads import PlannedLoad, planned_loads
+from sim_validate.simulation.loads import planned_loads
 from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import WEAKEST, Agenda, Setup
 from sim_validate.simulation.simulate import Bench
-from sim_validate.simulation.wrench_limits import SimulatedLimit, bisected_limits, part, ramped_limits
+from sim_validate.simulation.wrench_limits import (
+    SimulatedLimit,
+    bisected_limits,
+    part,
+    ramped_limits,
+)
 from sim_validate.validation.wrench_verdict import WrenchVerdict
 
 MOST_PUSH_N = 100.0
@@ -41,7 +45,7 @@ def hand_setup() -> Setup:
     return Setup(fingers=fingers, physics=hand_physics())
 
 
-def validate_hand(
+def validate_hand(  # noqa: PLR0913 - one keyword for each thing that may be asked
     hand: Hand, body: Polyhedron, reach: HandReach, friction: float = 0.5, *,
     down: tuple[float, float, float] | None = None,
     agenda: Agenda | None = None, setup: Setup | None = None,
@@ -75,7 +79,8 @@ def validate_hand(
     positions, normals = [c.position for c in contacts], [c.normal for c in contacts]
     if not force_closure(positions, normals, friction).closed:
         raise InputError(f"the contacts of {reach.grasp} are not in force closure at {friction}")
-    checks = require_faithful_hands(setup, friction)
+    gate = require_faithful(setup, friction, body.radius)
+    checks = (*gate.checks, *require_faithful_hands(setup, friction))
     trial = _Bout(body, contacts, scene, agenda, setup)
     return HandVerdict(
         hand.name, reach.grasp, friction, trial.wrenches(), trial.controls(), checks, scene,
@@ -94,7 +99,13 @@ class _Bout:
         self.case = HandCase(body, contacts, self.layout.friction, self.layout.motors, setup)
         self.rig = self._rig(scene)
         self.loads = planned_loads(
-            body, contacts, self.layout.friction, self.rig.idle, agenda, setup, self.layout.motors
+            body,
+            contacts,
+            self.layout.friction,
+            self.rig.idle,
+            agenda,
+            setup,
+            motors=self.layout.motors,
         )
 
     def _rig(self, scene: HandScene) -> Rig:
@@ -143,4 +154,3 @@ class _Bout:
         high = self.setup.hold.settling_friction * self.case.friction
         (trace,) = rig.hold([part(rig.idle, limit, control.share)], [high])
         return HandControlVerdict(control, judge(trace, self.layout, self.setup.hold))
-

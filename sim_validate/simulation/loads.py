@@ -37,13 +37,14 @@ class PlannedLoad:
     """The friction coefficient that the planned forces need, with the torques of soft contacts."""
 
 
-def planned_loads(
+def planned_loads(  # noqa: PLR0913 - all that loads are planned from
     body: Polyhedron,
     contacts: Sequence[Contact],
     friction: float,
     idle: Load,
     agenda: Agenda,
     setup: Setup,
+    *,
     motors: Motors | None = None,
 ) -> tuple[PlannedLoad, ...]:
     """Plan all wrenches to test, in order: along axes, weakest, random, the user's own.
@@ -64,17 +65,18 @@ def planned_loads(
         for name, found in _relative(resisted, body.radius, agenda)
     ]
     named = [(each.name, each.wrench) for each in agenda.wrenches]
-    own = loads_as_they_are(body, contacts, friction, idle, named, setup, motors)
+    own = loads_as_they_are(body, contacts, friction, idle, named, setup, motors=motors)
     return (*relative, *own)
 
 
-def loads_as_they_are(
+def loads_as_they_are(  # noqa: PLR0913 - all that loads are planned from
     body: Polyhedron,
     contacts: Sequence[Contact],
     friction: float,
     idle: Load,
     wrenches: Sequence[tuple[str, Array]],
     setup: Setup,
+    *,
     motors: Motors | None = None,
 ) -> tuple[PlannedLoad, ...]:
     """Plan finger forces for wrenches that are applied as given, not at a share of a limit.
