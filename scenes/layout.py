@@ -114,10 +114,46 @@ class Layout(ByValue):
         return np.einsum("kij,kj->ki", self.frames, self.squeeze)
 
     @property
+    def tip_radii(self) -> Array:
+        """Return the radii of the fingertips, (k,) [m]."""
+        return np.full(len(self.contacts), self.drive.radius_m)
+
+    @property
     def tip_centers(self) -> Array:
         """Return the centres of the fingertips at their contacts, (k, 3) [m]."""
-        height = self.drive.radius_m - self.drive.indentation_m
-        return self.contacts - height * self.frames[:, :, 0]
+        height = self.tip_radii - self.drive.indentation_m
+        return self.contacts - height[:, None] * self.frames[:, :, 0]
+
+    @property
+    def has_springs(self) -> bool:
+        """Return whether each fingertip stands on springs of its own, alike in all directions."""
+        return not self.drive.rigid
+
+    def tips(self, joints: Array) -> Array:
+        """Compute where the centres of the fingertips are, (n, k, 3) [m].
+
+        Args:
+            joints: Positions of the fingers' joints, (n, 3k) slides [m]; (n, 0) for rigid ones.
+        """
+        if not joints.shape[1]:
+            return np.broadcast_to(self.tip_centers, (len(joints), *self.contacts.shape))
+        slides = joints.reshape(len(joints), joints.shape[1] // 3, 3)
+        return self.tip_centers + np.einsum("kij,nkj->nki", self.frames, slides)
+
+    def commands(self, forces: Array) -> Array:
+        """Compute what servos are told to make fingertips push with forces, (n, 3k) [m].
+
+        Args:
+            forces: Contact forces on the object, (n, k, 3) [N], world axes.
+
+        Returns:
+            Commands, rounded like the numbers of a scene; (n, 0) for rigid fingers, which have no
+            servos.
+        """
+        if self.drive.rigid:
+            return np.zeros((len(forces), 0))
+        pushes = to_digits(np.einsum("kij,nki->nkj", self.frames, forces))
+        return pushes.reshape(len(forces), -1) / self.drive.stiffness_n_per_m
 
 
 def arrange(

@@ -125,8 +125,23 @@ def write_scene(scene: Scene, path: str | Path) -> Path:
 
 def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads") -> str:
     """Write the MJCF text of a layout; equal layouts give equal texts."""
+    root, world = opened(layout, physics, SCALED)
+    contact = as_texts(physics.contact())
+    add_object(world, layout, contact, surface)
+    for finger in range(len(layout.contacts)):
+        _finger(world, layout, contact, finger)
+    if not layout.drive.rigid:
+        actuators = add_element(root, "actuator", {})
+        for finger in range(len(layout.contacts)):
+            _servos(actuators, layout, finger)
+        _keyframes(root, layout)
+    return document(root)
+
+
+def opened(layout: Layout, physics: PhysicsSettings, comment: str) -> tuple[Element, Element]:
+    """Begin a scene: return its root, with all settings and the object's mesh, and its world."""
     root = element("mujoco", {"model": printable(layout.name)})
-    add_comment(root, SCALED)
+    add_comment(root, comment)
     add_element(root, "compiler", COMPILER)
     option = add_element(root, "option", physics.options())
     add_element(option, "flag", physics.flags())
@@ -139,20 +154,16 @@ def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads")
     world = add_element(root, "worldbody", {})
     light = {"pos": (0.0, 0.0, 8.0 * layout.radius_m), "dir": (0.0, 0.0, -1.0)}
     add_element(world, "light", light | {"type": "directional"})
-    contact = as_texts(physics.contact())
-    _object(world, layout, contact, surface)
-    for finger in range(len(layout.contacts)):
-        _finger(world, layout, contact, finger)
-    if not layout.drive.rigid:
-        actuators = add_element(root, "actuator", {})
-        for finger in range(len(layout.contacts)):
-            _servos(actuators, layout, finger)
-        _keyframes(root, layout)
-    return document(root)
+    return root, world
 
 
-def _object(world: Element, layout: Layout, contact: dict[str, str], surface: Surface) -> None:
-    body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
+def add_object(
+    world: Element, layout: Layout, contact: dict[str, str], surface: Surface = "pads", *,
+    weightless: bool = False,
+) -> None:  # fmt: skip
+    """Add the object with what fingertips touch; where there is gravity it may be weightless."""
+    lifted = {"gravcomp": 1.0} if weightless else {}
+    body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)} | lifted)
     add_element(body, "freejoint", {"name": "object"})
     inertia = layout.inertia_kg_m2[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     add_element(

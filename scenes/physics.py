@@ -7,7 +7,7 @@ otherwise creep), hard and constant contact impedance, and a dense Jacobian (the
 solver of MuJoCo 4.0.0 has a bug).
 """
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 from grasp_core.arrays import frozen
@@ -100,6 +100,10 @@ class PhysicsSettings:
                 f"torsion_m makes contacts of dimension {WITH_TORSION} by itself: leave condim at "
                 f"{WITHOUT_TORSION}, got {self.condim}"
             )
+
+    def with_gravity(self, gravity: tuple[float, float, float]) -> "PhysicsSettings":
+        """Return the settings with another acceleration of gravity [m/s^2]."""
+        return replace(self, gravity=gravity)
 
     def record(self) -> dict[str, Any]:
         """Return the settings by name; torsion only where there is some, as older files have it."""

@@ -275,7 +275,7 @@ def _springs(layout: Layout) -> _Springs | None:
 
     Contacts must be hard, and as far from their closest axis as the layout's grasp size.
     """
-    if layout.drive.rigid or layout.torsion_m:
+    if not layout.has_springs or layout.torsion_m:
         return None
     if grasp_size(layout.contacts) < layout.grasp_size_m * (1.0 - SAME):
         return None

@@ -10,6 +10,7 @@ from grasp_core.closure.contact_arrays import contact_frictions, stacked
 from grasp_core.closure.soft.contacts import contact_torsions
 from grasp_core.closure.wrenches import normal_and_tangential
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.motors import Motors
 from grasp_core.quality.weakest_wrench import weakest_from
 from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit, axis_wrenches
 from grasp_core.values import Contact
@@ -36,13 +37,15 @@ class PlannedLoad:
     """The friction coefficient that the planned forces need, with the torques of soft contacts."""
 
 
-def planned_loads(
+def planned_loads(  # noqa: PLR0913 - all that loads are planned from
     body: Polyhedron,
     contacts: Sequence[Contact],
     friction: float,
     idle: Load,
     agenda: Agenda,
     setup: Setup,
+    *,
+    motors: Motors | None = None,
 ) -> tuple[PlannedLoad, ...]:
     """Plan all wrenches to test, in order: along axes, weakest, random, the user's own.
 
@@ -53,25 +56,28 @@ def planned_loads(
         idle: The load without a wrench: only the forces with which fingers squeeze gently.
         agenda: The choice of wrenches to test.
         setup: Settings that hold the largest normal force and the share of the limit to apply.
+        motors: Joints that the contact forces load, of a hand that holds the object.
     """
-    resisted = _resisted(body, contacts, friction, setup)
+    resisted = resisted_by(body, contacts, friction, setup, motors)
     need, share = _Need.of(body, contacts, setup), setup.hold.load_share
     relative = [
         _load(name, found, share * found.limit, idle, need)
         for name, found in _relative(resisted, body.radius, agenda)
     ]
     named = [(each.name, each.wrench) for each in agenda.wrenches]
-    own = loads_as_they_are(body, contacts, friction, idle, named, setup)
+    own = loads_as_they_are(body, contacts, friction, idle, named, setup, motors=motors)
     return (*relative, *own)
 
 
-def loads_as_they_are(
+def loads_as_they_are(  # noqa: PLR0913 - all that loads are planned from
     body: Polyhedron,
     contacts: Sequence[Contact],
     friction: float,
     idle: Load,
     wrenches: Sequence[tuple[str, Array]],
     setup: Setup,
+    *,
+    motors: Motors | None = None,
 ) -> tuple[PlannedLoad, ...]:
     """Plan finger forces for wrenches that are applied as given, not at a share of a limit.
 
@@ -82,20 +88,25 @@ def loads_as_they_are(
         idle: The load without a wrench: only the forces with which fingers squeeze gently.
         wrenches: Named wrenches to test, (6,) each [N, N m].
         setup: Settings that hold the largest normal force.
+        motors: Joints that the contact forces load, of a hand that holds the object.
     """
-    resisted, need = _resisted(body, contacts, friction, setup), _Need.of(body, contacts, setup)
+    resisted = resisted_by(body, contacts, friction, setup, motors)
+    need = _Need.of(body, contacts, setup)
     return tuple(_load(name, resisted.limit(wrench), 1.0, idle, need) for name, wrench in wrenches)
 
 
-def _resisted(
-    body: Polyhedron, contacts: Sequence[Contact], friction: float, setup: Setup
-) -> WrenchBody:
+def resisted_by(
+    body: Polyhedron, contacts: Sequence[Contact], friction: float, setup: Setup,
+    motors: Motors | None = None,
+) -> WrenchBody:  # fmt: skip
+    """Return the body of wrenches that contacts resist, with torques about the centre of mass."""
     positions, normals = stacked(contacts)
     return WrenchBody(
         positions - body.center_of_mass,
         normals,
         contact_frictions(friction, len(contacts)),
         setup.fingers.max_normal_force_n,
+        motors,
         torsions=contact_torsions(setup.torsion_m, contact_frictions(friction, len(contacts))),
     )
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, cross, to_digits
+from scenes.layout import Layout
 from scenes.mjcf import Scene
 from sim_validate.simulation.engine import (
     batch,
@@ -87,10 +88,24 @@ class Ends(Protocol):
         ...
 
 
+class Simulated(Protocol):
+    """A scene that can be simulated: of fingertips on slides, or of a hand."""
+
+    @property
+    def xml(self) -> str:
+        """Return the text that is compiled."""
+        ...
+
+    @property
+    def layout(self) -> Layout:
+        """Return the numbers that the text was made from."""
+        ...
+
+
 class Bench:
     """A compiled scene on which many trials run at once."""
 
-    def __init__(self, scene: Scene, *, threads: int = 1, timeout_s: float = math.inf) -> None:
+    def __init__(self, scene: Simulated, *, threads: int = 1, timeout_s: float = math.inf) -> None:
         """Compile a scene.
 
         Args:
@@ -206,20 +221,16 @@ class Bench:
         """Return what is applied in each of n samples of m trials, as the simulator takes it.
 
         Returns:
-            External wrenches, (m, n, 6), commands of the servos, (m, n, 3k), frictions, (m, n).
+            External wrenches, (m, n, 6), commands of the servos, (m, n, q), frictions, (m, n).
         """
         layout = self.scene.layout
         wrenches = np.array([schedule.wrenches for schedule in schedules])
         wrenches[..., 3:] -= cross(layout.center, wrenches[..., :3])
-        forces = np.array([schedule.forces for schedule in schedules])
-        pushes = np.einsum("kij,mnki->mnkj", layout.frames, forces)
         # rounded like the scene's numbers (see `layout.arrange`)
         for trial in range(len(schedules)):
-            for part in (wrenches[trial, :, :3], wrenches[trial, :, 3:], pushes[trial]):
+            for part in (wrenches[trial, :, :3], wrenches[trial, :, 3:]):
                 part[...] = to_digits(part)
-        controls = pushes.reshape(*pushes.shape[:2], -1) / layout.drive.stiffness_n_per_m
-        if layout.drive.rigid:  # there are no servos
-            controls = controls[..., :0]
+        controls = np.array([layout.commands(schedule.forces) for schedule in schedules])
         frictions = np.array([to_digits(schedule.friction) for schedule in schedules])
         return wrenches, controls, frictions
 
@@ -255,7 +266,7 @@ def first_touch(scene: Scene) -> tuple[Array, Array]:
     return touched(model, mujoco.MjData(model), tips)
 
 
-def acceleration(scene: Scene, wrenches: Array) -> Array:
+def acceleration(scene: Simulated, wrenches: Array) -> Array:
     """Compute the object's first acceleration under several wrenches, with unloaded fingers.
 
     Args:

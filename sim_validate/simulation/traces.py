@@ -94,7 +94,7 @@ def traces(
     parts = [motion.joints[first:] for motion, first in zip(motions, firsts, strict=True)]
     of = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
     joints, ends = np.concatenate(parts), np.cumsum([len(part) for part in parts])[:-1]
-    size, normals = layout.grasp_size_m, layout.frames[:, :, 0]
+    size, normals, radii = layout.grasp_size_m, layout.frames[:, :, 0], layout.tip_radii
     shifts, rotations = moved(joints[:, :7], starts[of, :7], layout)
     tips, began = _tips(joints, layout), _tips(starts, layout)
     _, slips = normal_and_tangential(tips - began[of], normals)
@@ -102,8 +102,8 @@ def traces(
     each = [
         np.split(measured, ends)
         for measured in (
-            shifts + size * rotations, shifts, rotations, slips, heights - layout.drive.radius_m,
-            tips + layout.drive.radius_m * normals,
+            shifts + size * rotations, shifts, rotations, slips, heights - radii,
+            tips + radii[:, None] * normals,
         )
     ]  # fmt: skip
     return tuple(
@@ -172,11 +172,7 @@ def moved(poses: Array, starts: Array, layout: Layout) -> tuple[Array, Array]:
 
 def _tips(joints: Array, layout: Layout) -> Array:
     """Compute fingertip centres in the object's frame, (n, k, 3)."""
-    slides = joints[:, 7:].reshape(len(joints), (joints.shape[1] - 7) // 3, 3)
-    if not slides.shape[1]:  # rigid fingertips
-        slides = np.zeros((1, len(layout.contacts), 3))
-    slid = np.einsum("kij,nkj->nki", layout.frames, slides)
-    centers = layout.tip_centers + slid - joints[:, None, :3]
+    centers = layout.tips(joints[:, 7:]) - joints[:, None, :3]
     # The conjugate of the object's quaternion turns world vectors into its frame.
     backwards = joints[:, None, 3:7] * np.array([1.0, -1.0, -1.0, -1.0])
     return rotated(backwards, centers)

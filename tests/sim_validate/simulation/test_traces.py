@@ -1,4 +1,4 @@
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -102,10 +102,7 @@ def test_a_motion_stopped_before_watching_began_has_an_empty_trace(layout):
 
 def test_rigid_fingers_have_no_slides(layout):
     """The scene has no joints for them: seven numbers a row."""
-    rigid = SimpleNamespace(
-        frames=layout.frames, contacts=layout.contacts, center=layout.center, drive=layout.drive,
-        grasp_size_m=layout.grasp_size_m, tip_centers=layout.tip_centers,
-    )  # fmt: skip
+    rigid = replace(layout, drive=replace(layout.drive, rigid=True))
     away = 1e-4 * layout.frames[0, :, 0]
     (found,) = traces([motion([pose()[:7], pose(away)[:7]])], rigid, [1])
     assert found.gaps_m[0, 0] == pytest.approx(1e-4)

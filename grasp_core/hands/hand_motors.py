@@ -1,0 +1,122 @@
+"""Derives the motors of a hand in a pose: how contact forces and gravity load its joints.
+
+With origin p_j and unit axis w_j of joint j, a contact force f on the object at the point x of a
+finger that the joint moves, and links of masses m_i with their centres c_i beyond the joint, the
+motor of a hand at rest applies
+
+    tau_j = (w_j x (x - p_j)).f  -  sum_i m_i (w_j x (c_i - p_j)).a                     (1)
+
+under the acceleration a of gravity: the principle of virtual work. The first factors are the rows
+of the levers L of `Motors`, the second sum its gravity.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, cross, frozen
+from grasp_core.errors import InputError
+from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.kinematics import HandPlaces, places
+from grasp_core.hands.reach import HandReach
+from grasp_core.hands.stance import stance_of
+from grasp_core.quality.motors import Motors
+
+
+def hand_motors(
+    hand: Hand, reach: HandReach, *, down: ArrayLike | None = None, any_orientation: bool = False
+) -> Motors:
+    """Derive how the contact forces of a grasp load the joints of a hand that stands in it.
+
+    Args:
+        hand: The hand, with a torque limit for each joint.
+        reach: The pose in which it stands (see `reach_with`).
+        down: Direction of gravity in the object's frame, (3,), under which motors carry the links;
+            None for links without weight.
+        any_orientation: Whether motors must carry the links in every orientation, by lower limits
+            (see `Motors.in_any_orientation`).
+
+    Returns:
+        Motors for the contacts of `reach`, in their order.
+
+    Raises:
+        InputError: The hand is another one or not in a pose, a joint has no torque limit, a link
+            has no mass that gravity needs, or a motor cannot carry the links.
+    """
+    stance = stance_of(hand, reach)
+    found = places(hand, stance.joints, stance.palm_pose)
+    points = np.array([contact.position for contact in stance.contacts])
+    levers = _levers(hand, found, points, stance.fingers)
+    limits = _limits(hand)
+    if down is None and not any_orientation:
+        return Motors.of(levers, limits)
+    weights = GRAVITY_M_PER_S2 * _weights(hand, found)
+    if any_orientation:
+        return Motors.in_any_orientation(levers, limits, weights)
+    return Motors.of(levers, limits, weights @ direction(down))
+
+
+def direction(down: ArrayLike | None) -> Array:
+    """Scale a direction to unit length, (3,).
+
+    Raises:
+        InputError: It is not a direction.
+    """
+    way = frozen(down, (3,), "down")
+    length = float(np.linalg.norm(way))
+    if length == 0.0:
+        raise InputError("down must be a direction, got a vector of length zero")
+    return way / length
+
+
+def _limits(hand: Hand) -> Array:
+    missing = [joint.name for joint in hand.joints if joint.torque_limit_n_m is None]
+    if missing:
+        raise InputError(
+            f"hand must have a torque limit for each joint, got none for {missing[0]}: "
+            f"{hand.torque_source}; give your own with hand.with_torque_limits(limits, source)"
+        )
+    return np.array([joint.torque_limit_n_m for joint in hand.joints])
+
+
+def _chains(hand: Hand) -> list[range]:
+    """Return the numbers of each finger's joints."""
+    ends = np.cumsum([0, *(len(finger.links) for finger in hand.fingers)]).tolist()
+    return [range(first, end) for first, end in pairwise(ends)]
+
+
+def _levers(hand: Hand, found: HandPlaces, points: Array, fingers: tuple[int, ...]) -> Array:
+    """Return the first factors of (1) for all contacts, (joints, 3k) [m]."""
+    chains = _chains(hand)
+    levers = np.zeros((len(hand.joints), len(points), 3))
+    for contact, finger in enumerate(fingers):
+        joints = list(chains[finger])
+        arms = points[contact] - found.link_positions[0, joints]
+        levers[joints, contact] = cross(found.joint_axes[0, joints], arms)
+    return levers.reshape(len(levers), -1)
+
+
+def _weights(hand: Hand, found: HandPlaces) -> Array:
+    """Return what (1) multiplies with the acceleration, (joints, 3) [kg m].
+
+    Raises:
+        InputError: A link has no mass or centre of mass.
+    """
+    weights = np.zeros((len(hand.joints), 3))
+    links = hand.links
+    for chain in _chains(hand):
+        for number in chain:
+            link = links[number]
+            if link.mass_kg is None or link.center_of_mass is None:
+                raise InputError(
+                    f"hand must have the mass and centre of mass of each link for gravity, got "
+                    f"none for {link.name}; leave gravity out, or give them"
+                )
+            center = found.link_positions[0, number]
+            center = center + found.link_rotations[0, number] @ link.center_of_mass
+            before = list(range(chain.start, number + 1))
+            arms = center - found.link_positions[0, before]
+            weights[before] -= link.mass_kg * cross(found.joint_axes[0, before], arms)
+    return weights

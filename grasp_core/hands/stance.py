@@ -1,0 +1,62 @@
+"""Says where a hand stands in a grasp that it reaches: what of a `HandReach` is then known."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import instance
+from grasp_core.errors import InputError
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.reach import HandReach
+from grasp_core.values import Contact
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stance:
+    """A hand in a pose at its contacts."""
+
+    hand: Hand
+    joints: Array
+    """Joint angles, (j,) [rad]."""
+    palm_pose: Array
+    """Pose of the palm in the object's frame, (4, 4)."""
+    contacts: tuple[Contact, ...]
+    fingers: tuple[int, ...]
+    """The hand's finger at each contact."""
+    forces: Array
+    """Balanced contact forces strictly inside the friction cones, of any size, (k, 3)."""
+
+    @property
+    def tip_radii(self) -> Array:
+        """Return the radii of the fingertips at the contacts, (k,) [m]."""
+        return np.array([self.hand.fingers[finger].tip.radius for finger in self.fingers])
+
+
+def stance_of(hand: Hand, reach: HandReach) -> Stance:
+    """Return where a hand stands.
+
+    Raises:
+        InputError: The pose is another hand's, or none was found.
+    """
+    instance(hand, Hand, "hand", "load_hand makes one")
+    instance(reach, HandReach, "reach", "reach_with makes one")
+    if reach.hand != hand.name:
+        raise InputError(
+            f"hand must be the one of the pose, {reach.hand}, got {hand.name}: its joints differ"
+        )
+    if (
+        reach.joints is None
+        or reach.palm_pose is None
+        or reach.contacts is None
+        or reach.fingers is None
+        or reach.certificate is None
+        or reach.certificate.forces is None
+    ):
+        raise InputError(
+            f"reach must have a pose, got none for grasp {reach.grasp}: {reach.explanation}"
+        )
+    return Stance(
+        hand, reach.joints, reach.palm_pose, reach.contacts, tuple(reach.fingers.tolist()),
+        reach.certificate.forces,
+    )  # fmt: skip

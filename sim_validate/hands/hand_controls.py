@@ -1,0 +1,135 @@
+"""Makes negative controls of a hand: motors, friction or loads with which it provably lets go.
+
+A control changes one thing about the weakest wrench that a grasp is tested with, and carries the
+proof that the hand cannot hold it then: the upper bound of the wrench's limit (`WrenchLimit`) is
+below what is applied, by `EXCESS` at least. Its servos are told what would hold the load if nothing
+had been changed, and the proof says that no other commands would do better.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grasp_core.arrays import Array, to_digits
+from grasp_core.by_value import ByValue
+from grasp_core.checked import SMALLEST
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.motors import Motors
+from grasp_core.quality.wrench_limits import WrenchLimit
+from grasp_core.values import Contact
+from sim_validate.simulation.loads import PlannedLoad, resisted_by
+from sim_validate.simulation.setup import Setup
+
+EXCESS = 0.05
+"""Share of the applied load, at least, that no forces of a control can balance."""
+OVERLOAD = 1.1
+"""Load of the overloaded control, over the predicted limit."""
+WEAK_MOTORS = 0.9
+"""Torque limits of the control with weak motors, over those that the load needs."""
+USUAL_LOAD = 0.8
+"""Load of the controls with a dead motor or low friction, over the predicted limit of the hand."""
+FRICTIONS = (0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1)
+"""Frictions that are tried for the control with low friction, over that of the grasp."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class HandControl(ByValue):
+    """A load that a hand provably cannot hold, after one thing has been changed."""
+
+    name: str
+    """Kind of the control: `overloaded`, `weak_motors`, `dead_motor` or `low_friction`."""
+    explanation: str
+    """What was changed, as a sentence."""
+    friction: float
+    """Coulomb coefficient at every contact."""
+    limits: Array
+    """Largest torque of each joint, (joints,) [N m]."""
+    share: float
+    """What is applied, over the limit that was predicted before the change."""
+    proof: WrenchLimit
+    """Limit of the applied wrench after the change: its `upper` is below one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandCase:
+    """A hand's contacts and motors, from which its controls are made."""
+
+    body: Polyhedron
+    contacts: tuple[Contact, ...]
+    friction: float
+    motors: Motors
+    setup: Setup
+
+    def limit(self, wrench: Array) -> WrenchLimit:
+        """Find the largest multiple of a wrench that the hand resists."""
+        body = resisted_by(self.body, self.contacts, self.friction, self.setup, self.motors)
+        return body.limit(wrench)
+
+
+def hand_controls(
+    case: HandCase, weakest: PlannedLoad, names: tuple[str, ...]
+) -> tuple[HandControl, ...]:
+    """Make the negative controls that exist for a hand, at most one of each kind.
+
+    Args:
+        case: The hand in its grasp.
+        weakest: The load whose limit is smallest.
+        names: Names of the joints.
+    """
+    at_limit = weakest.limit.wrench
+    kinds = (
+        _overloaded(case, at_limit),
+        _weak_motors(case, at_limit),
+        _dead_motor(case, at_limit, names),
+        _low_friction(case, at_limit),
+    )
+    return tuple(found for kind in kinds for found in kind)
+
+
+def _overloaded(case: HandCase, at_limit: Array) -> Iterator[HandControl]:
+    told = f"the load is {OVERLOAD:g} times the predicted limit"
+    yield from _proved("overloaded", told, case, at_limit, OVERLOAD)
+
+
+def _weak_motors(case: HandCase, at_limit: Array) -> Iterator[HandControl]:
+    weak = WEAK_MOTORS * case.motors.limits
+    if (np.abs(case.motors.gravity) < weak).all():
+        motors = replace(case.motors, limits=weak)
+        told = f"every motor has {WEAK_MOTORS:g} of the torque that the load needs"
+        yield from _proved("weak_motors", told, replace(case, motors=motors), at_limit, 1.0)
+
+
+def _dead_motor(case: HandCase, at_limit: Array, names: tuple[str, ...]) -> Iterator[HandControl]:
+    """Switch off the motor without which the hand holds least; none where all carry links."""
+    found: list[tuple[float, int, HandCase]] = []
+    for joint, lever in enumerate(np.abs(case.motors.levers).max(axis=1).tolist()):
+        if lever == 0.0 or case.motors.gravity[joint]:
+            continue
+        limits = case.motors.limits.copy()
+        limits[joint] = SMALLEST
+        dead = replace(case, motors=replace(case.motors, limits=limits))
+        found.append((float(to_digits(np.array(dead.limit(at_limit).upper))), joint, dead))
+    if found:
+        _, joint, dead = min(found, key=lambda each: each[:2])
+        told = f"the motor of {names[joint]} is dead"
+        yield from _proved("dead_motor", told, dead, at_limit, USUAL_LOAD)
+
+
+def _low_friction(case: HandCase, at_limit: Array) -> Iterator[HandControl]:
+    for share in FRICTIONS:
+        slippery = replace(case, friction=float(to_digits(np.array(share * case.friction))))
+        told = f"the friction is {slippery.friction:.3g} instead of {case.friction:.3g}"
+        found = list(_proved("low_friction", told, slippery, at_limit, USUAL_LOAD))
+        if found:
+            yield from found
+            return
+
+
+def _proved(
+    name: str, told: str, case: HandCase, at_limit: Array, share: float
+) -> Iterator[HandControl]:
+    """Yield a control if the proof leaves no doubt that it cannot hold a share of a wrench."""
+    proof = case.limit(to_digits(share * at_limit))
+    if proof.upper <= 1.0 - EXCESS:
+        yield HandControl(name, told, case.friction, case.motors.limits, share, proof)

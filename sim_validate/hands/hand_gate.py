@@ -1,0 +1,160 @@
+"""Checks the simulator on a hand with known answers before any hand is simulated.
+
+Four fingers with one hinge each hold a cube. Each hinge stands straight above its contact, at the
+height l, so that a torque tau presses with tau / l along the inward normal, and no force across it
+loads the hinge. With torque limits c, the cube of half-width a, and the friction mu, the hand
+resists
+
+    across the plane of the contacts     4 mu c / l,
+    about that axis                      4 mu a c / l,
+    against one finger                   (1 + 2 mu) c / l:                              (1)
+
+the finger in front presses with all it has, and two of the others rub. On slippery contacts only
+the two fingers along a load oppose it, by their servos of stiffness k:
+
+    displacement = F / (2 k / l^2).                                                     (2)
+"""
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.errors import UnfaithfulError
+from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link
+from grasp_core.hands.reach import HandReach
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact
+from scenes.example_objects import example_object
+from scenes.hands.hand_mjcf import HandScene, build_hand_scene, limited
+from sim_validate.simulation.gate.case import Check
+from sim_validate.simulation.loads import resisted_by
+from sim_validate.simulation.rig import squeezed
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.setup import Setup
+from sim_validate.simulation.simulate import Bench
+from sim_validate.simulation.wrench_limits import ramped_limits
+
+HALF, HEIGHT, TIP, TORQUE = 0.03, 0.08, 0.01, 0.35
+"""Half-width of the cube, height of the hinges over the contacts, radius of the fingertips [m], and
+torque limit [N m]: those of a hand that people use."""
+LIMIT = (0.996, 1.006)
+"""Interval of simulated over exact limits."""
+SOFTER = (0.99, 1.01)
+"""Interval of simulated over exact displacements."""
+SLIPPERY = 1e-4
+"""Friction of the contacts that slide."""
+SETTLE_S = 0.5
+"""Time in which the slippery cube comes to rest: five times what others are given [s]."""
+GENTLE = 0.1
+"""Load of the slippery cube, over what one finger presses with."""
+
+
+def require_faithful_hands(setup: Setup, friction: float) -> tuple[Check, ...]:
+    """Check the simulator on the known hand, and refuse settings under which a check fails.
+
+    Args:
+        setup: How trials are simulated.
+        friction: Coulomb coefficient under test.
+
+    Raises:
+        UnfaithfulError: A check failed; nothing simulated with this setup would count.
+    """
+    plain = replace(setup, threads=1, timeout_s=math.inf)
+    checks = known_hand(plain, float(f"{friction:.1e}"))
+    failed = "; ".join(str(check) for check in checks if not check.passed)
+    if failed:
+        raise UnfaithfulError(
+            "the simulator is not faithful with these settings, so no hand is simulated; these "
+            f"checks failed: {failed}"
+        )
+    return checks
+
+
+@lru_cache(maxsize=32)
+def known_hand(setup: Setup, friction: float) -> tuple[Check, ...]:
+    """Measure what the known hand resists, and how far it gives way, over the exact figures."""
+    body, reach = _cube(), _stance(friction)
+    scene = build_hand_scene(_hand(), body, reach, friction, physics=setup.physics)
+    return (*_limits(scene, body, reach, setup), _displaced(scene, setup))
+
+
+def _cube() -> Polyhedron:
+    box = example_object("box")
+    vertices = box.vertices - box.center_of_mass
+    return Polyhedron.from_mesh(
+        HALF * vertices / np.abs(vertices).max(axis=0), box.triangles, name="cube"
+    )
+
+
+def _outward() -> Array:
+    """Return the outward normals at the contacts, (4, 3)."""
+    x, y = np.eye(3)[:2]
+    return np.array([x, y, -x, -y])
+
+
+def _hand() -> Hand:
+    fingers = tuple(
+        HandFinger(
+            f"finger{number}",
+            (Link(f"link{number}", _joint(number, out), (), None, None),),
+            Fingertip(TIP * out + np.array([0.0, 0.0, -HEIGHT]), TIP),
+        )
+        for number, out in enumerate(_outward())
+    )
+    return Hand("known hand", (), fingers)
+
+
+def _joint(number: int, out: Array) -> Joint:
+    axis = np.cross(np.array([0.0, 0.0, 1.0]), out)
+    place = HALF * out + np.array([0.0, 0.0, HEIGHT])
+    return Joint(f"hinge{number}", place, np.eye(3), axis, -1.0, 1.0, TORQUE)
+
+
+def _stance(friction: float) -> HandReach:
+    contacts = tuple(Contact(HALF * out, -out) for out in _outward())
+    proof = force_closure([c.position for c in contacts], [c.normal for c in contacts], friction)
+    return HandReach(
+        "known hand", "cube", "", "", 1, 0.0, np.arange(4), np.zeros(4), np.eye(4), contacts, proof
+    )
+
+
+def _limits(
+    scene: HandScene, body: Polyhedron, reach: HandReach, setup: Setup
+) -> tuple[Check, ...]:
+    """Measure (1)."""
+    friction, press = scene.layout.friction, TORQUE / HEIGHT
+    exact = {
+        "across the contacts": (np.eye(6)[2], 4.0 * friction * press),
+        "about the axis across them": (np.eye(6)[5], 4.0 * friction * HALF * press),
+        "against one finger": (np.eye(6)[0], (1.0 + 2.0 * friction) * press),
+    }
+    bench = Bench(scene)
+    rig = squeezed(bench, setup, scene.layout.squeeze_forces, friction)
+    resisted = resisted_by(body, reach.contacts or (), friction, setup, scene.layout.motors)
+    loads = [Load(size * wrench, resisted.limit(wrench).forces) for wrench, size in exact.values()]
+    found = ramped_limits(rig, loads)
+    return tuple(
+        Check(f"limit of motors {name}, over the exact one", math.nan if at is None else at.share,
+              *LIMIT)
+        for name, at in zip(exact, found, strict=True)
+    )  # fmt: skip
+
+
+def _displaced(scene: HandScene, setup: Setup) -> Check:
+    """Measure (2)."""
+    smooth = limited(scene, scene.layout.motors.limits, SLIPPERY)
+    layout = smooth.layout
+    # without the grasp's own friction forces, which slippery contacts do not carry
+    forces = np.einsum("kij,kj->ki", layout.frames * np.array([1.0, 0.0, 0.0]), layout.squeeze)
+    patient = replace(setup, hold=replace(setup.hold, settle_s=SETTLE_S))
+    rig = squeezed(Bench(smooth), patient, forces, SLIPPERY)
+    size = GENTLE * TORQUE / HEIGHT
+    (poses,) = rig.motions_of_holds([Load(size * np.eye(6)[0], forces)])
+    exact = size * HEIGHT**2 / (2.0 * layout.servo_n_m_per_rad)
+    return Check(
+        "displacement by the servos, over the exact one", float(poses[-1, 0]) / exact, *SOFTER
+    )

@@ -1,0 +1,156 @@
+"""Tests a hand that stands in a grasp: from its motors through simulation to a verdict.
+
+For each test wrench the analysis predicts the largest multiple that contacts and motors resist. A
+share of it is applied in simulation to a hand with its real chains of links, whose servos are told
+the joint torques of the planned contact forces and are limited as the motors are. On request the
+limits are found in simulation too. Controls are the same hand with one thing changed that provably
+makes it let go.
+"""
+
+from grasp_core.checked import instance
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.errors import InputError
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.reach import HandReach
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact
+from scenes.fingertips import FingerSettings
+from scenes.hands.hand_mjcf import HandScene, build_hand_scene, hand_physics, limited
+from sim_validate.hands.hand_controls import HandCase, HandControl, hand_controls
+from sim_validate.hands.hand_gate import require_faithful_hands
+from sim_validate.hands.hand_verdict import HandControlVerdict, HandVerdict
+from sim_validate.simulation.gate.gate import require_faithful
+from sim_validate.simulation.hold_verdict import judge
+from sim_validate.simulation.loads import planned_loads
+from sim_validate.simulation.rig import Rig, squeezed
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.setup import WEAKEST, Agenda, Setup
+from sim_validate.simulation.simulate import Bench
+from sim_validate.simulation.wrench_limits import (
+    SimulatedLimit,
+    bisected_limits,
+    part,
+    ramped_limits,
+)
+from sim_validate.validation.wrench_verdict import WrenchVerdict
+
+MOST_PUSH_N = 100.0
+"""Largest normal force of a fingertip in predictions, unless stated [N]: more than hands' motors
+give, so that they are what limits."""
+
+
+def hand_setup() -> Setup:
+    """Return the usual setup for hands: harder contacts, and fingertips as strong as motors."""
+    fingers = FingerSettings(max_normal_force_n=MOST_PUSH_N)
+    return Setup(fingers=fingers, physics=hand_physics())
+
+
+def validate_hand(  # noqa: PLR0913 - one keyword for each thing that may be asked
+    hand: Hand, body: Polyhedron, reach: HandReach, friction: float = 0.5, *,
+    down: tuple[float, float, float] | None = None,
+    agenda: Agenda | None = None, setup: Setup | None = None,
+) -> HandVerdict:  # fmt: skip
+    """Test a hand that stands in a grasp, and its negative controls, in simulation.
+
+    Args:
+        hand: The hand, with a torque limit for each joint (`hand.with_torque_limits`).
+        body: The object.
+        reach: The pose in which the hand stands (see `gc.reach_with`).
+        friction: Coulomb coefficient at every contact.
+        down: Direction of gravity in the object's frame, which pulls at the links, (3,); None for
+            links without weight. The object's weight is a wrench like any other.
+        agenda: Which wrenches to hold, and whether to find limits and to try controls. Its other
+            trials are not run for hands.
+        setup: How trials are simulated; None for that of `hand_setup`.
+
+    Raises:
+        InputError: Hand, object and pose do not belong together, or are not in force closure.
+        UnfaithfulError: The simulator fails its checks with these settings.
+    """
+    agenda = Agenda() if agenda is None else instance(agenda, Agenda, "agenda")
+    setup = hand_setup() if setup is None else instance(setup, Setup, "setup")
+    if setup.torsion_m:
+        raise InputError(
+            "setup.physics.torsion_m must be zero for a hand: levers of motors have no column for "
+            "the torque of a contact"
+        )
+    scene = build_hand_scene(hand, body, reach, friction, down=down, physics=setup.physics)
+    contacts = reach.contacts or ()
+    positions, normals = [c.position for c in contacts], [c.normal for c in contacts]
+    if not force_closure(positions, normals, friction).closed:
+        raise InputError(f"the contacts of {reach.grasp} are not in force closure at {friction}")
+    gate = require_faithful(setup, friction, body.radius)
+    checks = (*gate.checks, *require_faithful_hands(setup, friction))
+    trial = _Bout(body, contacts, scene, agenda, setup)
+    return HandVerdict(
+        hand.name, reach.grasp, friction, trial.wrenches(), trial.controls(), checks, scene,
+        setup, agenda,
+    )  # fmt: skip
+
+
+class _Bout:
+    """A hand on the bench, with the trials of an agenda."""
+
+    def __init__(
+        self, body: Polyhedron, contacts: tuple[Contact, ...], scene: HandScene, agenda: Agenda,
+        setup: Setup,
+    ) -> None:  # fmt: skip
+        self.scene, self.agenda, self.setup, self.layout = scene, agenda, setup, scene.layout
+        self.case = HandCase(body, contacts, self.layout.friction, self.layout.motors, setup)
+        self.rig = self._rig(scene)
+        self.loads = planned_loads(
+            body,
+            contacts,
+            self.layout.friction,
+            self.rig.idle,
+            agenda,
+            setup,
+            motors=self.layout.motors,
+        )
+
+    def _rig(self, scene: HandScene) -> Rig:
+        bench = Bench(scene, threads=self.setup.threads, timeout_s=self.setup.timeout_s)
+        # high friction while closing is that of the grasp, whatever a control's is
+        high = self.setup.hold.settling_friction * self.case.friction
+        forces = self.layout.squeeze_forces
+        return squeezed(bench, self.setup, forces, scene.layout.friction, high)
+
+    def wrenches(self) -> tuple[WrenchVerdict, ...]:
+        """Judge the hold of every load and, if asked for, find its limit."""
+        traces = self.rig.hold([planned.load for planned in self.loads])
+        return tuple(
+            WrenchVerdict(
+                name=planned.name,
+                wrench=planned.load.wrench,
+                predicted_limit=planned.predicted_limit,
+                required_friction=planned.required_friction,
+                hold=judge(trace, self.layout, self.setup.hold),
+                simulated_limit=limit,
+                trace=trace if self.agenda.keep_traces else None,
+            )
+            for planned, trace, limit in zip(self.loads, traces, self._limits(), strict=True)
+        )
+
+    def _limits(self) -> tuple[SimulatedLimit | None, ...]:
+        limits = [planned.limit for planned in self.loads]
+        if self.agenda.limits == "ramp":
+            return ramped_limits(self.rig, limits)
+        if self.agenda.limits == "bisection":
+            return bisected_limits(self.rig, limits)
+        return (None,) * len(limits)
+
+    def controls(self) -> tuple[HandControlVerdict, ...]:
+        """Try the hand with what provably makes it let go."""
+        if not self.agenda.controls:
+            return ()
+        weakest = next(planned for planned in self.loads if planned.name == WEAKEST)
+        names = tuple(joint.name for joint in self.layout.hand.joints)
+        controls = hand_controls(self.case, weakest, names)
+        return tuple(self._tried(control, weakest.limit) for control in controls)
+
+    def _tried(self, control: HandControl, limit: Load) -> HandControlVerdict:
+        scene = limited(self.scene, control.limits, control.friction)
+        rig = self._rig(scene)
+        high = self.setup.hold.settling_friction * self.case.friction
+        (trace,) = rig.hold([part(rig.idle, limit, control.share)], [high])
+        return HandControlVerdict(control, judge(trace, self.layout, self.setup.hold))

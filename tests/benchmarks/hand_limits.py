@@ -1,0 +1,159 @@
+"""What hands hold with their motors, predicted against simulated.
+
+    python -m tests.benchmarks.hand_limits [--grasps 100] [--payloads 8] [--quick]
+
+Grasps of five built-in objects, two of them not convex, that the Allegro and the LEAP hand reach,
+with motors of 0.35 and 0.15 N m. For each, the limits of 26 wrenches are found by slowly rising
+loads; the hand must hold 0.9 of each predicted limit and let go at 1.1 of it; its negative controls
+must let go. The LEAP hand, whose links have masses, then carries a weight under gravity in 42
+directions of space: for each direction the largest mass, predicted and simulated.
+"""
+
+import argparse
+import time
+from collections import Counter
+
+import numpy as np
+
+import grasp_core as gc
+import scenes
+import sim_validate as sv
+from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from sim_validate.simulation.hold_verdict import holds
+from sim_validate.simulation.loads import loads_as_they_are, planned_loads
+from sim_validate.simulation.rig import squeezed
+from sim_validate.simulation.simulate import Bench
+from sim_validate.simulation.wrench_limits import part, ramped_limits
+from tests.benchmarks.payloads import directions
+
+FRICTION, RADIUS_M, APPROACH_M = 0.5, 0.035, 0.03
+OBJECTS = ("dodecahedron", "wedge", "l-bracket", "hex-nut", "box")
+HANDS = ("allegro", "leap")
+TORQUES = (0.35, 0.15)
+BELOW, ABOVE = 0.9, 1.1
+AGENDA = sv.Agenda(random_wrenches=13, limits="ramp", critical_friction=False)
+
+
+def scaled(name):
+    """A built-in object of the size of a hand."""
+    body = scenes.example_object(name)
+    vertices = (body.vertices - body.center_of_mass) * RADIUS_M / body.radius
+    return gc.Polyhedron.from_mesh(vertices, body.triangles, name=name)
+
+
+def reached(hand, body, count):
+    """Yield the poses in which a hand reaches the best grasps."""
+    finger = gc.Finger(hand.fingers[0].tip.radius, APPROACH_M)
+    for grasp in gc.plan(body, FRICTION, limit=count, finger=finger).grasps:
+        found = gc.reach_with(hand, body, grasp, FRICTION)
+        if found.reached:
+            yield found
+
+
+def rig_of(scene, setup):
+    """The hand, closed on the object."""
+    layout = scene.layout
+    return squeezed(Bench(scene), setup, layout.squeeze_forces, layout.friction)
+
+
+def around(body, contacts, verdict):
+    """False answers just below and above the limits, of how many, as counts."""
+    setup, layout = verdict.setup, verdict.scene.layout
+    rig, counted = rig_of(verdict.scene, setup), Counter()
+    planned = planned_loads(
+        body, contacts, FRICTION, rig.idle, AGENDA, setup, motors=layout.motors
+    )  # fmt: skip
+    limits = [each.limit for each in planned]
+    for share, right in ((BELOW, True), (ABOVE, False)):
+        traces = rig.hold([part(rig.idle, limit, share) for limit in limits])
+        answers = [holds(trace, layout, setup.hold) for trace in traces]
+        counted["answers"] += len(answers)
+        counted["false"] += sum(answer is not None and answer != right for answer in answers)
+        counted["open"] += sum(answer is None for answer in answers)
+    return counted
+
+
+def limits(count):
+    """Print errors of limits, false answers and controls that held; return what is wrong."""
+    shares, counted, seconds, kinds = [], Counter(), [], Counter()
+    each = -(-count // (len(HANDS) * len(OBJECTS)))
+    for name in HANDS:
+        hand = gc.load_hand(name)
+        for body in map(scaled, OBJECTS):
+            for found in reached(hand, body, each):
+                for torque in TORQUES:
+                    strong = hand.with_torque_limits(torque, "this benchmark")
+                    begun = time.process_time()
+                    verdict = sv.validate_hand(strong, body, found, FRICTION, agenda=AGENDA)
+                    seconds.append(time.process_time() - begun)
+                    at = [trial.simulated_limit for trial in verdict.wrenches]
+                    shares += [one.share for one in at if one is not None]
+                    counted["limits not found"] += sum(one is None for one in at)
+                    counted["not held at .8"] += len(verdict.failures)
+                    counted += around(body, found.contacts, verdict)
+                    for control in verdict.controls:
+                        kinds[control.control.name] += 1
+                        counted["controls held"] += not control.let_go
+                counted["grasps"] += 1
+            print(name, body.name, dict(counted), flush=True)
+    errors = np.abs(np.array(shares) - 1.0)
+    print(
+        f"{counted['grasps']} grasps x {len(TORQUES)} torque limits, {len(shares)} limits: "
+        f"simulated over predicted {min(shares):.4f} to {max(shares):.4f}, error median "
+        f"{100 * np.median(errors):.3f} %, 95 % within {100 * np.quantile(errors, 0.95):.3f} %"
+    )
+    print(
+        f"{counted['answers']} holds at {BELOW:g} and {ABOVE:g} of the limit: {counted['false']} "
+        f"false, {counted['open']} open; controls {dict(kinds)}: {counted['controls held']} held; "
+        f"{np.median(seconds):.2f} s a verdict"
+    )
+    wrong = ("false", "controls held", "limits not found", "not held at .8")
+    return sum(counted[name] for name in wrong)
+
+
+def payloads(count):
+    """Print errors of the largest mass in each direction, and of the one in any orientation."""
+    hand, setup = gc.load_hand("leap").with_torque_limits(0.35, "this benchmark"), sv.hand_setup()
+    body = scaled("dodecahedron")
+    ratios, lowest = [], []
+    for found in reached(hand, body, count):
+        every = gc.hand_motors(hand, found, any_orientation=True)
+        promised = gc.payload(
+            body, found.contacts, FRICTION, max_push_n=setup.fingers.max_normal_force_n,
+            motors=every,
+        ).free.lower  # fmt: skip
+        masses = []
+        for way in directions():
+            scene = scenes.build_hand_scene(hand, body, found, FRICTION, down=tuple(way))
+            rig = rig_of(scene, setup)
+            weight = [("weight", np.append(GRAVITY_M_PER_S2 * way, np.zeros(3)))]
+            (load,) = loads_as_they_are(
+                body, found.contacts, FRICTION, rig.idle, weight, setup,
+                motors=scene.layout.motors,
+            )  # fmt: skip
+            (at,) = ramped_limits(rig, [load.limit])
+            ratios.append(np.nan if at is None else at.share)
+            masses.append(load.predicted_limit * ratios[-1])
+        lowest.append(promised / min(masses))
+    print(
+        f"{len(lowest)} grasps x {len(ratios) // max(len(lowest), 1)} directions: simulated over "
+        f"predicted mass {np.nanmin(ratios):.4f} to {np.nanmax(ratios):.4f}, "
+        f"{int(np.isnan(ratios).sum())} not found; mass promised in any orientation over the least "
+        f"simulated one {min(lowest):.4f} to {max(lowest):.4f}"
+    )
+    return int(np.isnan(ratios).sum()) + sum(share > 1.01 for share in lowest)
+
+
+def main():
+    """Print the figures; 1 if an answer is false or a control holds."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--grasps", type=int, default=100)
+    parser.add_argument("--payloads", type=int, default=8)
+    parser.add_argument("--quick", action="store_true", help="10 grasps, 1 payload")
+    asked = parser.parse_args()
+    grasps, carried = (10, 1) if asked.quick else (asked.grasps, asked.payloads)
+    return int(bool(limits(grasps) + payloads(carried)))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,101 @@
+"""Hands in simulation hold what their motors are predicted to, and controls let go."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import sim_validate as sv
+from grasp_core.errors import InputError, UnfaithfulError
+from scenes.physics import PhysicsSettings
+from sim_validate.hands.hand_gate import known_hand
+from sim_validate.hands.validate_hand import hand_setup
+from sim_validate.validation.wrench_verdict import AGREEMENT
+from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
+
+DOWN = (0.0, 0.6, -0.8)
+CASES = [("allegro", "dodecahedron", 0.035, None), ("leap", "dodecahedron", 0.035, DOWN),
+         ("allegro", "l-bracket", 0.04, None)]  # fmt: skip
+TORQUE = 0.35
+
+
+def verdict(hand, name, radius, down, **agenda):
+    body = scaled(name, radius)
+    reach = next(each for each in reaches(hand, name, radius) if each.reached)
+    held = gc.load_hand(hand).with_torque_limits(TORQUE, "a test")
+    asked = sv.Agenda(critical_friction=False, **agenda)
+    return sv.validate_hand(held, body, reach, FRICTION, down=down, agenda=asked), reach
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case[0]}-{case[1]}")
+def test_a_hand_holds_up_to_its_predicted_limits(case):
+    found, _ = verdict(*case, random_wrenches=3, limits="ramp", controls=False)
+    assert found.good, found.mismatches
+    assert len(found.wrenches) == 16
+    for trial in found.wrenches:
+        assert trial.simulated_limit is not None
+        assert abs(trial.simulated_limit.share - 1.0) < AGREEMENT
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case[0]}-{case[1]}")
+def test_controls_let_go_and_carry_their_proofs(case):
+    found, reach = verdict(*case)
+    names = [each.control.name for each in found.controls]
+    assert {"overloaded", "weak_motors", "low_friction"} <= set(names)
+    assert ("dead_motor" in names) == (case[3] is None)
+    assert found.controls_let_go
+    positions = np.array([contact.position for contact in reach.contacts])
+    normals = np.array([contact.normal for contact in reach.contacts])
+    for each in found.controls:
+        control = each.control
+        motors = replace(found.scene.layout.motors, limits=control.limits)
+        assert control.proof.upper < 1.0
+        assert control.proof.verify(
+            positions, normals, control.friction, motors=motors,
+            max_normal_force=found.setup.fingers.max_normal_force_n,
+            center=scaled(case[1], case[2]).center_of_mass,
+        )  # fmt: skip
+
+
+def test_twice_the_torque_holds_twice_as_much():
+    case = CASES[0]
+    one, reach = verdict(*case, controls=False)
+    held = gc.load_hand(case[0]).with_torque_limits(2.0 * TORQUE, "a test")
+    two = sv.validate_hand(
+        held, scaled(case[1], case[2]), reach, FRICTION, agenda=sv.Agenda(controls=False)
+    )
+    for weak, strong in zip(one.wrenches[:12], two.wrenches[:12], strict=True):
+        sizes = [each.predicted_limit * np.linalg.norm(each.wrench) for each in (weak, strong)]
+        assert sizes[1] == pytest.approx(2.0 * sizes[0], rel=1e-6)
+
+
+def test_the_known_hand_is_exact_and_wrong_settings_are_refused():
+    checks = known_hand(hand_setup(), FRICTION)
+    assert len(checks) == 4
+    assert all(check.passed for check in checks), [str(check) for check in checks]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"cone": "pyramidal"}, {"solimp": (0.5, 0.5, 0.001, 0.5, 2.0)}, {"impratio": 1.0}],
+    ids=lambda change: next(iter(change)),
+)
+def test_unfaithful_settings_are_refused(change):
+    body, reach = scaled("dodecahedron", 0.035), reaches("allegro", "dodecahedron", 0.035)[0]
+    held = gc.load_hand("allegro").with_torque_limits(TORQUE, "a test")
+    setup = replace(hand_setup(), physics=replace(PhysicsSettings(), **change))
+    with pytest.raises(UnfaithfulError, match="the simulator is not faithful"):
+        sv.validate_hand(held, body, reach, FRICTION, setup=setup)
+
+
+def test_what_cannot_be_tested_is_refused():
+    body, reach = scaled("dodecahedron", 0.035), reaches("allegro", "dodecahedron", 0.035)[0]
+    held = gc.load_hand("allegro").with_torque_limits(TORQUE, "a test")
+    with pytest.raises(InputError, match=r"are not in force closure at 0\.001"):
+        sv.validate_hand(held, body, reach, 0.001)
+    soft = replace(hand_setup(), physics=PhysicsSettings(torsion_m=0.005))
+    with pytest.raises(InputError, match="torsion_m must be zero for a hand"):
+        sv.validate_hand(held, body, reach, FRICTION, setup=soft)
+    with pytest.raises(InputError, match="must have a torque limit"):
+        sv.validate_hand(gc.load_hand("allegro"), body, reach, FRICTION)
