@@ -23,12 +23,12 @@ from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.records.executions_json import Executions
 from sim_validate.replaying.recorded import Recorded
 from sim_validate.replaying.replay import replayed
+from sim_validate.reports.charts.fidelity_charts import Agreement, fidelity_figure
+from sim_validate.reports.charts.margin_charts import margin_figure
+from sim_validate.reports.charts.motion_charts import motion_figure
+from sim_validate.reports.charts.survival_charts import survival_figure
+from sim_validate.reports.charts.wrench_charts import wrench_figure
 from sim_validate.reports.drawn_grasps import certified
-from sim_validate.reports.fidelity_charts import Agreement, fidelity_figure
-from sim_validate.reports.margin_charts import margin_figure
-from sim_validate.reports.motion_charts import motion_figure
-from sim_validate.reports.survival_charts import survival_figure
-from sim_validate.reports.wrench_charts import wrench_figure
 from sim_validate.simulation.setup import Agenda, Setup
 from tests.scenes.drawing.hands.standing import standing
 

@@ -11,8 +11,8 @@ import grasp_core as gc
 import scenes
 from scenes.drawing.canvas import STYLE, encoded
 from scenes.drawing.pictures import grasp_figure
-from sim_validate.reports.margin_charts import margin_figure
-from sim_validate.reports.wrench_charts import wrench_figure
+from sim_validate.reports.charts.margin_charts import margin_figure
+from sim_validate.reports.charts.wrench_charts import wrench_figure
 from tests.docs_pictures import FOLDER, FRICTION, PICTURES, best
 from tests.scenes.drawing.test_pictures import assert_inside
 

@@ -30,11 +30,11 @@ from sim_validate.replaying.from_verdicts import of_verdict
 from sim_validate.replaying.recorded import Wanted
 from sim_validate.replaying.replay import Replayed, replayed
 from sim_validate.reports.agreement import Record
-from sim_validate.reports.margin_charts import margin_panels
-from sim_validate.reports.motion_charts import motion_panels
+from sim_validate.reports.charts.margin_charts import margin_panels
+from sim_validate.reports.charts.motion_charts import motion_panels
+from sim_validate.reports.charts.wrench_charts import wrench_panels
 from sim_validate.reports.reached_grasps import held_in
 from sim_validate.reports.run_folder import RunFolder
-from sim_validate.reports.wrench_charts import wrench_panels
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,13 +18,14 @@ from sim_validate.reports.agreement import (
     quadrants_in,
     wrench_size,
 )
+from sim_validate.reports.charts.fidelity_charts import fidelity_panels
+from sim_validate.reports.charts.survival_charts import survival_sentence, survival_sheet
 from sim_validate.reports.executed_grasps import (
     described_executions,
     execution_row,
     execution_settings,
     said_of_both,
 )
-from sim_validate.reports.fidelity_charts import fidelity_panels
 from sim_validate.reports.grasp_page import MILLI, MIRRORED, Copy
 from sim_validate.reports.pages import page
 from sim_validate.reports.reached_grasps import (
@@ -33,7 +34,6 @@ from sim_validate.reports.reached_grasps import (
     said_of_reach,
 )
 from sim_validate.reports.run_folder import RunFolder
-from sim_validate.reports.survival_charts import survival_sentence, survival_sheet
 
 
 @dataclass(frozen=True, slots=True)

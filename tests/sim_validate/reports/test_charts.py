@@ -24,8 +24,8 @@ from sim_validate.reports.agreement import (
     limits_in,
     quadrants_in,
 )
-from sim_validate.reports.fidelity_charts import fidelity_panels
-from sim_validate.reports.margin_charts import (
+from sim_validate.reports.charts.fidelity_charts import fidelity_panels
+from sim_validate.reports.charts.margin_charts import (
     directions_of_map,
     margin_figure,
     margin_panels,
@@ -33,8 +33,8 @@ from sim_validate.reports.margin_charts import (
     on_map,
     pixels,
 )
-from sim_validate.reports.motion_charts import friction_used, motion_figure, motion_panels
-from sim_validate.reports.wrench_charts import shadow_of, wrench_figure, wrench_panels
+from sim_validate.reports.charts.motion_charts import friction_used, motion_figure, motion_panels
+from sim_validate.reports.charts.wrench_charts import shadow_of, wrench_figure, wrench_panels
 from sim_validate.simulation.setup import Agenda, Setup
 from tests.scenes.drawing.whole import assert_whole
 from tests.sim_validate.rigs import grasps

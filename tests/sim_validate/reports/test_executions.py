@@ -26,11 +26,7 @@ from sim_validate.records.executions_json import Executions, executions_to_json,
 from sim_validate.records.grasps import read_grasps
 from sim_validate.reports import drawn_grasps
 from sim_validate.reports import report as reports
-from sim_validate.reports.drawn_grasps import Drawn
-from sim_validate.reports.executed_grasps import execute_command, said_of_both
-from sim_validate.reports.report import write_report
-from sim_validate.reports.run_folder import runs_in
-from sim_validate.reports.survival_charts import (
+from sim_validate.reports.charts.survival_charts import (
     accelerations_g,
     certified_multiples,
     certified_steps,
@@ -39,6 +35,10 @@ from sim_validate.reports.survival_charts import (
     survivals,
     ticks_up_to,
 )
+from sim_validate.reports.drawn_grasps import Drawn
+from sim_validate.reports.executed_grasps import execute_command, said_of_both
+from sim_validate.reports.report import write_report
+from sim_validate.reports.run_folder import runs_in
 from tests.scenes.drawing.whole import assert_whole
 from tests.sim_validate.reports.test_report import EVIL, Page, changed
 

@@ -1,0 +1,1 @@
+"""Charts of reports: each module draws what one kind of figure says."""
