@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array, Indices, cross
 from grasp_core.frames import plane_tangents
 from grasp_core.hands.loop_values import Targets
 from grasp_core.values import ContactRegion, Grasp
@@ -51,15 +51,12 @@ def _is_wide(region: ContactRegion) -> bool:
 
 def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
     """Return a point of each edge and the unit vector from it into the convex polygon."""
-    middle, found = polygon.mean(axis=0), list[tuple[Array, Array]]()
-    for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        along = end - start
-        length = float(np.linalg.norm(along))
-        if length > SHORT:
-            inward = np.cross(normal, along)
-            inward *= np.copysign(1.0 / np.linalg.norm(inward), inward @ (middle - start))
-            found.append((start, inward))
-    return found
+    along = np.roll(polygon, -1, axis=0) - polygon
+    kept = np.linalg.norm(along, axis=1) > SHORT
+    starts, inward = polygon[kept], cross(normal, along[kept])
+    sides = np.einsum("ej,ej->e", inward, polygon.mean(axis=0) - starts)
+    inward *= np.copysign(1.0 / np.linalg.norm(inward, axis=1), sides)[:, None]
+    return list(zip(starts, inward, strict=True))
 
 
 def is_within(targets: Targets, contact: int, position: Array, slack: float) -> bool:
