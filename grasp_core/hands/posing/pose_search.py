@@ -32,6 +32,11 @@ MOST_STEPS = 60
 GOOD_MM, ROUGH_MM, FINE_MM = 0.05, 1.0, 1e-6
 """Distances from touching at which the search for a pose ends, from which fingertips are laid on
 the surface, and at which they lie on a flat one [mm]."""
+MOST_TOUCHES, TOUCH_STEPS = 12, 8
+"""Largest number of planes that a fingertip tries on a curved surface, and of steps to each."""
+SETTLED, RESTING_MM = 1e-9, 1e-9
+"""Change of a distance below which a fingertip rests on a surface [m], and distance from touching
+at which it does [mm]."""
 ROOM = 0.0015
 """Distance beyond the one asked for that the search keeps from the object [m]."""
 PULL = 0.03
@@ -130,8 +135,13 @@ def _tried(asked: Asked, used: Indices, aims: Targets, start: Start) -> FoundPos
         return _why_away(asked.hand, pose.q)
     laid = aims._replace(origins=np.array(aims.origins), normals=np.array(aims.normals))
     near = far._replace(overlaps=False, margin=LEAST_MARGIN, pull=0.0)
-    points = np.empty((len(used), 3))
-    if kernel.touch(arrays, tree, laid, near, pose, sums, FINE_MM, points) > TOUCHING:
+    points, off, before = np.empty((len(used), 3)), np.inf, np.inf
+    for _ in range(MOST_TOUCHES):
+        kernel.settle(arrays, tree, laid, near, pose, sums, TOUCH_STEPS, FINE_MM)
+        before, off = off, kernel.lay(arrays, tree, laid, pose, points)
+        if off <= RESTING_MM or abs(before - off) <= SETTLED:
+            break
+    if off > TOUCHING:
         return _why_away(asked.hand, pose.q)
     if blocked := blocking(asked, pose, start.fingers, asked.clearance):
         return blocked

@@ -14,6 +14,7 @@ from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
 from sim_validate.commands.hands.hand import asked_hand
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import remove_reaches
+from sim_validate.parallel.compiling_hands import compile_for_hands, must_compile
 from sim_validate.parallel.reaching import ReachJob, reached
 from sim_validate.records.grasps import grasp_with_id
 from sim_validate.records.reaches_json import REACHES, reaches_summary, reaches_to_json
@@ -59,6 +60,9 @@ def _reach(
         "seed": command.seed,
     }
     found: list[HandReach] = []
+    if jobs and must_compile():
+        reporter.say("compiling inner loops once, which takes a minute or two")
+        compile_for_hands(hand, saved.body, command.seed, command.jobs)
     try:
         with reporter.progress("reaching") as steps:
             for each in reached(jobs, command.jobs):
