@@ -1,5 +1,6 @@
 """A gripper with three fingers stands at three contacts of a grasp, and MuJoCo agrees."""
 
+from contextlib import suppress
 from itertools import combinations
 
 import mujoco
@@ -8,6 +9,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
+from grasp_core.errors import UndecidedError
 from grasp_core.hands.posing.pose_search import TOUCHING
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
 from tests.hand_models import numbers
@@ -105,12 +107,12 @@ def test_the_first_choice_has_the_largest_margin(hand):
         if not found.reached or found.starts > STARTS:
             continue
         firsts += 1
-        margins = {
-            chosen: gc.force_closure(
-                grasp.positions[list(chosen)], grasp.normals[list(chosen)], FRICTION
-            ).margin
-            for chosen in combinations(range(4), 3)
-        }
+        margins = dict[tuple[int, ...], float]()
+        for chosen in combinations(range(4), 3):
+            kept = list(chosen)
+            with suppress(UndecidedError):  # what is nearly degenerate is not chosen either
+                proof = gc.force_closure(grasp.positions[kept], grasp.normals[kept], FRICTION)
+                margins[chosen] = proof.margin
         assert margins[tuple(found.used)] >= max(margins.values()) - 1e-6
     assert firsts >= 1
 
