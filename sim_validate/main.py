@@ -45,6 +45,7 @@ ACTIONS: dict[type[Any], str] = {
     command_flags.Analyze: "analyze:analyze_file",
     transfer_flags.Transfer: "transfer:transfer_file",
     hand_flags.Reach: "hands.reach:reach_file",
+    hand_flags.Hand: "hands.hand:show_hand",
     dataset_flags.Build: "dataset:build_dataset",
     dataset_flags.Import: "dataset:import_dataset",
     dataset_flags.Verify: "dataset:verify_dataset",

@@ -76,7 +76,7 @@ def test_commands_end_as_the_page_says(page, tmp_path, monkeypatch):
 
 
 EXAMPLES = [
-    pytest.param(code, said, id=f"{page}-{place}")
+    pytest.param(page, code, said, id=f"{page}-{place}")
     for page, text in PAGES.items() if page not in {"datasets", "regions", "baselines"}
     for place, (code, said) in enumerate(
         re.findall(r"```python\n(.*?)```\n\nprints\n\n```text\n(.*?)```", text, re.DOTALL)
@@ -84,9 +84,13 @@ EXAMPLES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("code", "said"), EXAMPLES)
-def test_the_examples_print_what_they_say(code, said, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(("page", "code", "said"), EXAMPLES)
+def test_the_examples_print_what_they_say(page, code, said, tmp_path, monkeypatch, capsys):
+    """Models that the page shows are files with their names."""
     monkeypatch.chdir(tmp_path)
+    for model in blocks(PAGES[page], "xml"):
+        (name,) = re.findall(r'<mujoco model="(\w+)">', model)
+        (tmp_path / f"{name}.xml").write_text(model)
     exec(compile(code, "<example>", "exec"), {"__name__": "__main__"})  # noqa: S102 - our own page
     assert capsys.readouterr().out == said
 
@@ -94,15 +98,16 @@ def test_the_examples_print_what_they_say(code, said, tmp_path, monkeypatch, cap
 def test_every_block_of_code_is_one_that_a_test_runs():
     kinds = {"sh": 0, "python": 0, "text": 0, "json": 0, "toml": 0, "py": 0}
     kinds["math"] = 0  # formulas
+    kinds["xml"] = 0  # models that examples read
     for text in PAGES.values():
         for language in re.findall(r"^```(\w+)$", text, re.MULTILINE):
             kinds[language] += 1
     own = [text for page, text in PAGES.items() if page not in {"datasets", "regions", "baselines"}]
     assert sum(len(blocks(text, "python")) for text in own) == len(EXAMPLES) >= 9
     assert not any(blocks(text, "py") for text in own)
-    for name in ("json", "toml"):
+    for name in ("json", "toml", "xml"):
         assert [page for page, text in PAGES.items() if blocks(text, name)] in (
-            ["baselines", "datasets", "files"], ["datasets", "files"], ["files"],
+            ["baselines", "datasets", "files"], ["datasets", "files"], ["files"], ["hands"],
         )  # fmt: skip
 
 

@@ -48,6 +48,7 @@ def hand_arrays(hand: Hand) -> HandArrays:
     balls = _balls([part for part in parts if part.link not in ends])
     at = np.array([link for link, _, _ in balls], np.int64)
     shapes = [part.shape for part in parts]
+    held = [_link_ball(parts, link) for link in range(-1, len(links))]
     return HandArrays(
         positions=np.array([link.joint.position for link in links]),
         rotations=np.array([link.joint.rotation for link in links]),
@@ -61,13 +62,38 @@ def hand_arrays(hand: Hand) -> HandArrays:
         shape_rotations=np.array([shape.rotation for shape in shapes]),
         shape_sizes=np.array([shape.half_sizes for shape in shapes]),
         shape_radii=np.array([shape.radius for shape in shapes]),
-        shape_reaches=np.array([float(np.linalg.norm(s.half_sizes)) + s.radius for s in shapes]),
+        shape_reaches=np.array([_reach(shape) for shape in shapes]),
         shape_tips=_shape_tips(parts, ends.tolist(), tips),
+        link_shapes=np.array([shape for shape, _ in held], np.int64),
+        link_reaches=np.array([reach for _, reach in held]),
         pairs=_pairs(where, free),
         ball_links=at,
         ball_centers=np.array([center for _, center, _ in balls]).reshape(-1, 3),
         ball_radii=np.array([radius for _, _, radius in balls]),
     )
+
+
+def _reach(shape: LinkShape) -> float:
+    """Return the largest distance of a shape's points from its middle."""
+    return float(np.linalg.norm(shape.half_sizes)) + shape.radius
+
+
+def _link_ball(parts: list[_Part], link: int) -> tuple[int, float]:
+    """Find the smallest ball about the middle of a link's shape that holds all shapes of the link.
+
+    Returns:
+        The shape's number and the ball's radius; -1 and zero for a link without shapes.
+    """
+    best = (-1, 0.0)
+    own = [(number, part.shape) for number, part in enumerate(parts) if part.link == link]
+    for number, middle in own:
+        reach = SAME + max(
+            float(np.linalg.norm(shape.position - middle.position)) + _reach(shape)
+            for _, shape in own
+        )
+        if best[0] < 0 or reach < best[1]:
+            best = (number, reach)
+    return best
 
 
 def _free_links(hand: Hand, starts: Indices) -> Array:

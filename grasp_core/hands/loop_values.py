@@ -40,6 +40,11 @@ class HandArrays(NamedTuple):
     """Largest distances of the shapes' points from their middles, (s,) [m]."""
     shape_tips: Indices
     """The finger whose tip's ball a shape holds and shares, or -1, (s,)."""
+    link_shapes: Indices
+    """For the palm and each link, the shape about whose middle a ball holds all of its shapes, or
+    -1 if it has none, (j + 1,)."""
+    link_reaches: Array
+    """Radii of these balls, (j + 1,) [m]."""
     pairs: Indices
     """Pairs of shapes of one hand that must not overlap, (p, 2)."""
     ball_links: Indices

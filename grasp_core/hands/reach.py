@@ -3,7 +3,8 @@
 A pose that is returned is checked: joints are within their ranges, exact distances of all shapes
 are no less than the clearance that was asked for, fingertips touch within 10 um, and the contacts
 that are reached are proved to be in force closure. No pose means that none was found from the
-starts that were tried, never that there is none.
+starts that were tried, never that there is none. What is proved instead is that a hand with three
+fingers has no contacts to stand at, where no three of the grasp's contacts are in force closure.
 """
 
 from collections import Counter
@@ -20,6 +21,7 @@ from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import Hand
+from grasp_core.hands.posing.contact_choices import ContactChoices, contact_choices
 from grasp_core.hands.posing.opening import Opening, opened
 from grasp_core.hands.posing.pose_search import Asked, FoundPose, NoPose, find_pose
 from grasp_core.objects.on_faces import check_body
@@ -27,9 +29,10 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.short_text import summary
 from grasp_core.values import FINGERS, Contact, Grasp
 
-ReachReason: TypeAlias = Literal["", "limit", "collision", "not found"]
+ReachReason: TypeAlias = Literal["", "limit", "collision", "not found", "no closure"]
 """Why no pose was found: fingertips stayed away with a joint at a limit, or touched but something
-overlapped, or neither; empty where one was found."""
+overlapped, or neither; or, proved, no three contacts close for a hand with three fingers; empty
+where a pose was found."""
 MOST_STARTS = 10_000
 LARGEST_CLEARANCE = 0.02
 OVERLAPS = {"self": "the hand itself", "object": "the object", "table": "the table"}
@@ -52,23 +55,31 @@ class HandReach(ByValue):
     clearance_m: float
     """Least distance that was asked for between all that must not touch [m]."""
     fingers: Indices | None = None
-    """The hand's finger at each contact, (4,)."""
+    """The hand's finger at each contact that is used, (k,)."""
     joints: Array | None = None
     """Joint angles in the order of `Hand.joints`, (j,) [rad]."""
     palm_pose: Array | None = None
     """Pose of the palm in the object's frame, (4, 4)."""
     contacts: tuple[Contact, ...] | None = None
-    """Contacts that are reached, in the grasp's finger order."""
+    """Contacts that are reached, k of them, in the grasp's finger order."""
     certificate: ClosureCertificate | None = None
     """Proof of force closure with these contacts."""
     within_regions: tuple[bool, ...] | None = None
-    """Whether each is in the grasp's region for it, or at the planned contact."""
+    """Whether each is in the grasp's region for it, or at the planned contact; regions are proved
+    for four contacts together, so that they promise nothing to three."""
     pregrasp: Array | None = None
     """Joint angles at which the fingers are open and the hand is free, (j,) [rad]; None if none
     were found."""
     approach: Array | None = None
     """Unit vector along which the palm moves in with open fingers, over 60 mm, in the object's
     frame, (3,); None if no straight way was found."""
+    used: Indices | None = None
+    """Indices of the grasp's contacts at which fingers stand, (k,), rising: all four, or three for
+    a hand with three fingers. All are taken to be used where `fingers` are given and this is
+    not."""
+    open_choices: tuple[ClosureCertificate, ...] = ()
+    """Proofs that choices of three contacts are not in force closure, where the reason is
+    `no closure`."""
 
     def __post_init__(self) -> None:
         for name in ("hand", "grasp", "explanation"):
@@ -77,7 +88,11 @@ class HandReach(ByValue):
         whole(self.starts, "starts")
         number(self.clearance_m, "clearance_m", least=0.0, most=LARGEST_CLEARANCE)
         if self.fingers is not None:
-            object.__setattr__(self, "fingers", frozen_indices(self.fingers, (FINGERS,), "fingers"))
+            used = range(FINGERS) if self.used is None else self.used
+            kept = frozen_indices(used, (None,), "used")
+            fingers = frozen_indices(self.fingers, (len(kept),), "fingers")
+            object.__setattr__(self, "used", kept)
+            object.__setattr__(self, "fingers", fingers)
         shapes = {
             "joints": (None,),
             "palm_pose": (POSE, POSE),
@@ -113,7 +128,8 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
     """Look for a pose in which a hand stands in a grasp.
 
     Args:
-        hand: The hand, with four or five fingers.
+        hand: The hand. One with three fingers stands at three of the grasp's contacts which alone
+            are in force closure, and any other at all four.
         body: The object.
         grasp: The grasp.
         friction: Coulomb coefficient at every contact.
@@ -123,13 +139,13 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
         table_down: Downward direction in the object's frame, (3,): the object lies on a table
             across it, and the hand stays above the table. None for no table.
         clearance_m: Least distance between all that must not touch [m].
-        starts: Largest number of starts.
+        starts: Largest number of starts, for each choice of contacts.
 
     Returns:
         A pose that is checked, or what was in the way.
 
     Raises:
-        InputError: An argument is refused, or the hand has three fingers.
+        InputError: An argument is refused.
     """
     _check(hand, body, grasp)
     up, height = _table(body, table_down)
@@ -139,7 +155,10 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
         number(clearance_m, "clearance_m", least=0.0, most=LARGEST_CLEARANCE), regions,
         seed_of(seed), whole(starts, "starts", least=1, most=MOST_STARTS),
     )  # fmt: skip
-    found = find_pose(asked)
+    choices = contact_choices(grasp, asked.friction, len(hand.fingers))
+    if not choices.closed:
+        return _unclosed(asked, choices)
+    found = find_pose(asked, choices.closed)
     if isinstance(found, NoPose):
         reason, said = _why(found)
         return HandReach(hand.name, grasp.id, reason, said, found.starts, clearance_m)
@@ -147,24 +166,9 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
 
 
 def _check(hand: Hand, body: Polyhedron, grasp: Grasp) -> None:
-    check_hand(hand)
+    instance(hand, Hand, "hand", "load_hand makes one")
     check_body(body)
     instance(grasp, Grasp, "grasp", "plan finds some")
-
-
-def check_hand(hand: Hand) -> Hand:
-    """Check that a value is a hand with enough fingers for a grasp.
-
-    Raises:
-        InputError: It is not.
-    """
-    instance(hand, Hand, "hand", "load_hand makes one")
-    if len(hand.fingers) < FINGERS:
-        raise InputError(
-            f"hand must have at least {FINGERS} fingers, got {len(hand.fingers)}: the grasps here "
-            f"have {FINGERS} contacts, and with one finger less they are not proved to hold"
-        )
-    return hand
 
 
 def _table(body: Polyhedron, down: ArrayLike | None) -> tuple[Array, float]:
@@ -185,7 +189,23 @@ def _reached(asked: Asked, found: FoundPose, opening: Opening) -> HandReach:
     return HandReach(
         asked.hand.name, asked.grasp.id, "", "", found.starts, asked.clearance, found.fingers,
         found.joints, found.palm_pose, contacts, proof, found.within, opening.joints,
-        opening.approach,
+        opening.approach, found.used,
+    )  # fmt: skip
+
+
+def _unclosed(asked: Asked, choices: ContactChoices) -> HandReach:
+    """Say that there are no contacts to stand at, with the proofs."""
+    count, name = len(asked.hand.fingers), asked.hand.name
+    fewer = f"{name} has {count} fingers, and no {count} of the grasp's {FINGERS} contacts alone"
+    at = f"at friction {asked.friction:g}"
+    if not choices.undecided:
+        reason, said = "no closure", f"{fewer} are in force closure {at}, which is proved"
+    else:
+        reason = "not found"
+        said = f"{fewer} are proved to be in force closure {at}; {choices.undecided} choices of "
+        said += "contacts are undecided"
+    return HandReach(
+        name, asked.grasp.id, reason, said, 0, asked.clearance, open_choices=choices.open
     )  # fmt: skip
 
 

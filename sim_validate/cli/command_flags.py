@@ -27,7 +27,7 @@ from sim_validate.cli.flag_groups import (
     Usual,
     Wrench,
 )
-from sim_validate.cli.hand_flags import Reach
+from sim_validate.cli.hand_flags import Hand, Reach
 from sim_validate.cli.showing_flags import PICTURES, Report, View
 from sim_validate.cli.transfer_flags import Transfer
 from sim_validate.parallel.processes import available_cores
@@ -265,6 +265,7 @@ Command = (
     | Analyze
     | Transfer
     | Reach
+    | Hand
     | Dataset
     | Baseline
     | Inspect

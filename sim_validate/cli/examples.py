@@ -47,6 +47,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "reach plan/grasps.json --hand allegro --out reached",
         "reach plan/grasps.json --hand my_hand.xml --fingertips ff,mf,rf,th --table 0 0 -1",
     ),
+    "hand": (
+        "hand allegro",
+        "hand my_hand.xml --fingertips ff,mf,rf,th",
+    ),
     "inspect": ("inspect part.stl --unit mm", "inspect part.stl --unit mm --picture part.png"),
     "objects": ("objects",),
     "doctor": ("doctor",),

@@ -1,4 +1,4 @@
-"""The flags that say with which hand grasps are to be reached.
+"""The flags that say with which hand grasps are to be reached, and which hand is to be shown.
 
 This module imports nothing that is slow to load, so that help and usage errors answer at once.
 """
@@ -16,6 +16,23 @@ from sim_validate.parallel.processes import available_cores
 MOST_STARTS = 10_000
 
 
+Fingertips = Annotated[str, arg(metavar="NAME,NAME,...")]
+"""Names of a hand's fingertips in its file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """Show what a hand was read as: fingers, joints with ranges and torque limits, fingertips."""
+
+    hand: Positional[str]
+    """The hand: allegro, leap, an MJCF or URDF file, or menagerie:NAME for a model of the package
+    mujoco-menagerie."""
+    fingertips: Fingertips = ""
+    """For a hand from a file: names of sites, geoms or bodies that are fingertips, separated by
+    commas."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
 @dataclass(frozen=True, slots=True)
 class Reach:
     """Look for poses in which a hand stands in grasps: palm pose and joints, checked exactly."""
@@ -25,7 +42,7 @@ class Reach:
     hand: str = "allegro"
     """The hand: allegro, leap, an MJCF or URDF file, or menagerie:NAME for a model of the package
     mujoco-menagerie."""
-    fingertips: Annotated[str, arg(metavar="NAME,NAME,...")] = ""
+    fingertips: Fingertips = ""
     """For a hand from a file: names of sites, geoms or bodies that are fingertips, separated by
     commas."""
     grasp: str | None = None

@@ -7,10 +7,10 @@ an installation compiles on two cores.
 
 import importlib
 import signal
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -28,6 +28,8 @@ from scenes.example_objects import example_object
 OUTWARD = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 """Outward directions of a tetrahedron's faces, (4, 3); a third of each is its face's middle [m]."""
 FRICTION = 0.5
+Calls: TypeAlias = Mapping[str, Callable[[Array, Array], object]]
+"""For each kernel a function that compiles it, given four contacts and their normals."""
 
 
 def _closure(points: Array, normals: Array) -> None:
@@ -46,14 +48,18 @@ def _last_family(_points: Array, _normals: Array) -> None:
     plan(example_object("tetrahedron"), FRICTION, families=("regulus",), limit=1)
 
 
-BESIDE: Mapping[str, Callable[[Array, Array], object]] = {
-    "grasp_core.solvers.nearest_point_kernel": (
-        lambda points, _: least_distance(points[:3], -np.ones((1, 3)))
-    ),
+def _nearest(points: Array, _normals: Array) -> None:
+    least_distance(points[:3], -np.ones((1, 3)))
+
+
+def _quality(points: Array, normals: Array) -> None:
+    ferrari_canny(points, normals, FRICTION, torque_scale=1.0)
+
+
+BESIDE: Calls = {
+    "grasp_core.solvers.nearest_point_kernel": _nearest,
     "grasp_core.closure.critical_friction_kernel": _closure,
-    "grasp_core.quality.ferrari_canny_kernel": (
-        lambda points, normals: ferrari_canny(points, normals, FRICTION, torque_scale=1.0)
-    ),
+    "grasp_core.quality.ferrari_canny_kernel": _quality,
     "grasp_core.families.regulus_kernel": _last_family,
     "grasp_core.quality.wrench_limits_kernel": _limits,
 }
@@ -62,19 +68,22 @@ need them, a call that compiles it."""
 
 
 @contextmanager
-def compiled_beside(jobs: int) -> Generator[int]:
+def compiled_beside(jobs: int, calls: Calls | None = None) -> Generator[int]:
     """Compile loops in another process during a `with` block, if they are not kept.
 
     The first use of such a loop in the block waits until that process has compiled it.
 
     Args:
         jobs: Largest number of processes; below two, nothing is compiled beside the block.
+        calls: For each kernel, a function of a module that compiles it, in the order in which the
+            block needs them; None for those of a plan.
 
     Yields:
         The number of processes that the block may use: one while loops are compiled, as others
         would compile the same loops.
     """
-    missing = [name for name in BESIDE if jobs > 1 and not is_kept(name)]
+    wanted = BESIDE if calls is None else calls
+    missing = {name: call for name, call in wanted.items() if jobs > 1 and not is_kept(name)}
     if not missing:
         yield jobs
         return
@@ -101,10 +110,10 @@ def _wait(pipe: Any, name: str, done: set[str]) -> None:
             done.add(pipe.recv())
 
 
-def _compile(pipe: Any, names: Iterable[str]) -> None:
+def _compile(pipe: Any, calls: Calls) -> None:
     """Compile kernels one after the other, and send the name of each that is ready."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt ends it through its parent
     with suppress(BrokenPipeError):
-        for name in names:
-            BESIDE[name](OUTWARD / 3.0, -OUTWARD / np.sqrt(3.0))
+        for name, call in calls.items():
+            call(OUTWARD / 3.0, -OUTWARD / np.sqrt(3.0))
             pipe.send(name)

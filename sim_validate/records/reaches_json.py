@@ -73,6 +73,7 @@ def reaches_summary(found: Sequence[HandReach], *, complete: bool) -> ReachesSum
         "limit": reasons.count("limit"),
         "collision": reasons.count("collision"),
         "not_found": reasons.count("not found"),
+        "no_closure": reasons.count("no closure"),
         "complete": complete,
     }
 
@@ -94,6 +95,7 @@ def _pose(hand: Hand, found: HandReach) -> PoseRecord | None:
     if contacts is None or certificate is None or found.palm_pose is None or found.joints is None:
         return None
     fingers: list[int] = np.asarray(found.fingers).tolist()
+    used: list[int] = np.asarray(found.used).tolist()
     listed: list[ReachedContactRecord] = [
         {
             "finger": hand.fingers[fingers[k]].name,
@@ -107,6 +109,7 @@ def _pose(hand: Hand, found: HandReach) -> PoseRecord | None:
     return {
         "palm_pose": (first, second, third, last),
         "joints_rad": found.joints.tolist(),
+        "used": used,
         "contacts": listed,
         "closure_margin": certificate.margin,
         "pregrasp_joints_rad": None if found.pregrasp is None else found.pregrasp.tolist(),

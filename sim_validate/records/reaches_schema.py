@@ -5,12 +5,14 @@ from typing import Annotated, Literal, NotRequired
 from pydantic import ConfigDict, Field, with_config
 from typing_extensions import TypedDict
 
+from grasp_core.hands.hand import FEWEST_FINGERS
 from grasp_core.hands.reach import ReachReason
 from grasp_core.values import FINGERS
 from sim_validate.records.hand_model import ModelRecord
 from sim_validate.records.verdicts_schema import Count, Finite, ObjectRecord, Positive
 
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Contact = Annotated[int, Field(ge=0, lt=FINGERS)]
 Triple = tuple[Finite, Finite, Finite]
 Row = tuple[Finite, Finite, Finite, Finite]
 
@@ -41,8 +43,10 @@ class PoseRecord(TypedDict):
 
     palm_pose: tuple[Row, Row, Row, Row]
     joints_rad: list[Finite]
+    used: NotRequired[Annotated[list[Contact], Field(min_length=FEWEST_FINGERS)]]
+    """Indices of the grasp's contacts at which fingers stand; all of them where it is missing."""
     contacts: Annotated[
-        list[ReachedContactRecord], Field(min_length=FINGERS, max_length=FINGERS)
+        list[ReachedContactRecord], Field(min_length=FEWEST_FINGERS, max_length=FINGERS)
     ]  # fmt: skip
     closure_margin: Finite
     pregrasp_joints_rad: list[Finite] | None
@@ -70,6 +74,9 @@ class ReachesSummary(TypedDict):
     limit: Count
     collision: Count
     not_found: Count
+    no_closure: NotRequired[Count]
+    """Grasps no three of whose contacts close, for a hand with three fingers; none where it is
+    missing."""
     complete: bool
 
 

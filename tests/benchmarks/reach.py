@@ -1,11 +1,14 @@
 """How many grasps a hand reaches, how long it takes, and whether the poses are what they claim.
 
     python -m tests.benchmarks.reach [--meshes FOLDER] [--limit 100] [--quick] [--hands NAME,NAME]
+    python -m tests.benchmarks.reach --poses 1000 [--limit 40]
 
 Eight built-in objects of 35 mm radius, four of them not convex, and up to four scans of a folder
 scaled to it; the best grasps for fingers as thick as the hand's tips. For each object: grasps,
 reached with and without aiming at regions, median and mean time of one core, how the others ended,
-and how many poses open and have a straight way in.
+and how many poses open and have a straight way in. With `--poses`, at least so many poses are
+sought over all built-in objects and as many random ones as it takes, only with regions, to check
+them.
 
 Every pose is then checked by code that shares nothing with the search: joints against their ranges;
 distances between the hand's parts, and from objects that are not scans, by MuJoCo's
@@ -16,7 +19,7 @@ from every shape, in NumPy; and force closure by critical friction. Overlaps abo
 import sys
 import time
 from collections import Counter
-from itertools import combinations, pairwise
+from itertools import chain, combinations, count, pairwise
 from pathlib import Path
 
 import mujoco
@@ -34,7 +37,9 @@ FRICTION, RADIUS_M, APPROACH_M = 0.5, 0.035, 0.03
 BUILT_IN = ("box", "dodecahedron", "wedge", "octahedron", "l-bracket", "hex-nut", "cross", "mug")
 SCANS = ("003_cracker_box", "006_mustard_bottle", "036_wood_block", "061_foam_brick")
 HANDS = ("allegro", "leap")
-ALLOWED_M, POINTS = 1e-4, 20_000
+ALLOWED_M, POINTS, FAR_M = 1e-4, 20_000, 0.002
+RANDOM = "random-"
+RANDOM_FACES = 12
 
 
 def scaled(body):
@@ -93,12 +98,16 @@ class Judge:
 
     def depth(self, found):
         """How deep points of the surface are inside shapes [m]."""
-        at, deepest = places(self.hand, found.joints, found.palm_pose), -np.inf
+        at, deepest = places(self.hand, found.joints, found.palm_pose), -FAR_M
         frames = [(s, found.palm_pose[:3, :3], found.palm_pose[:3, 3]) for s in self.hand.palm]
         frames += [(s, at.link_rotations[0, k], at.link_positions[0, k])
                    for k, link in enumerate(self.hand.links) for s in link.shapes]  # fmt: skip
         for shape, rotation, position in frames:
-            local = (self.points - position) @ rotation - shape.position
+            middle, reach = position + rotation @ shape.position, np.linalg.norm(shape.half_sizes)
+            near = np.linalg.norm(self.points - middle, axis=1) <= reach + shape.radius + FAR_M
+            if not near.any():
+                continue
+            local = (self.points[near] - position) @ rotation - shape.position
             out = np.abs(local @ shape.rotation) - shape.half_sizes
             away = np.linalg.norm(np.maximum(out, 0.0), axis=1) + np.minimum(out.max(axis=1), 0.0)
             deepest = max(deepest, float(shape.radius - away.min()))
@@ -110,7 +119,7 @@ class Judge:
 
 def examine(case):
     """The line of one object and one hand."""
-    name, folder, hand_name, limit = case
+    name, folder, hand_name, limit, with_plain = case
     path = None if folder is None else Path(folder) / f"{name}.ply"
     body = scaled(scenes.example_object(name) if path is None else gc.load_polyhedron(path))
     hand = gc.load_hand(hand_name)
@@ -122,7 +131,8 @@ def examine(case):
         begun = time.process_time()
         found.append(gc.reach_with(hand, body, grasp, FRICTION))
         seconds.append(time.process_time() - begun)
-        plain += gc.reach_with(hand, body, grasp, FRICTION, regions=False).reached
+        if with_plain:
+            plain += gc.reach_with(hand, body, grasp, FRICTION, regions=False).reached
     good = [one for one in found if one.reached]
     low, high = hand.ranges.T
     wrong = Counter(
@@ -146,6 +156,18 @@ def examine(case):
     }  # fmt: skip
 
 
+def many(poses, hands, limit):
+    """Lines of one object and hand after the other, until there are so many poses."""
+    named = (name for name in scenes.example_names() if not name.startswith(RANDOM))
+    names = chain(named, (f"{RANDOM}{RANDOM_FACES}-{seed}" for seed in count()))
+    while poses > 0:
+        name = next(names)
+        for hand in hands:
+            row = examine((name, None, hand, limit, False))
+            poses -= row["reached"]
+            yield row
+
+
 def main():
     """Print a line per hand and object, and the sums; 1 if a pose is not what it claims."""
     words = sys.argv
@@ -153,13 +175,17 @@ def main():
     limit = 5 if quick else int(words[words.index("--limit") + 1]) if "--limit" in words else 100
     folder = words[words.index("--meshes") + 1] if "--meshes" in words else None
     hands = words[words.index("--hands") + 1].split(",") if "--hands" in words else HANDS
-    cases = [(name, None, hand, limit) for hand in hands for name in BUILT_IN]
+    poses = int(words[words.index("--poses") + 1]) if "--poses" in words else None
+    cases = [(name, None, hand, limit, True) for hand in hands for name in BUILT_IN]
     if folder:
-        cases += [(name, folder, hand, limit) for hand in hands for name in SCANS]
+        cases += [(name, folder, hand, limit, True) for hand in hands for name in SCANS]
     print("hand     object              grasps reached contacts-only median ms mean ms  opens ways "
           "within  not reached")  # fmt: skip
     rows = []
-    for row in each(examine, cases, jobs=available_cores()):
+    found = (
+        each(examine, cases, jobs=available_cores()) if poses is None else many(poses, hands, limit)
+    )
+    for row in found:
         rows.append(row)
         ms = 1e3 * np.array(row["seconds"])
         print(f"{row['hand']:8} {row['object']:20} {row['grasps']:5d} {row['reached']:7d} "
@@ -174,9 +200,10 @@ def main():
         ms = 1e3 * np.concatenate([row["seconds"] for row in own])
         wrong = sum((row["wrong"] for row in own), Counter())
         bad += sum(wrong.values())
-        print(f"{hand}: {good} of {total} grasps reached ({good / total:.1%}), {plain} "
-              f"({plain / total:.1%}) at the planned contacts; median {np.median(ms):.0f} ms, mean "
-              f"{ms.mean():.0f} ms; wrong claims: {dict(wrong) or 'none'}")  # fmt: skip
+        at = f", {plain} ({plain / total:.1%}) at the planned contacts" if poses is None else ""
+        print(f"{hand}: {good} of {total} grasps reached ({good / total:.1%}){at}; median "
+              f"{np.median(ms):.0f} ms, mean {ms.mean():.0f} ms; wrong claims: "
+              f"{dict(wrong) or 'none'}")  # fmt: skip
     return 1 if bad else 0
 
 

@@ -1,6 +1,7 @@
 """Measures how far a hand is from itself, from an object and from a table, compiled."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
@@ -12,6 +13,8 @@ from grasp_core.hands.loop_values import HandArrays, SurfaceTree
 
 INSIDE = 0.5
 """Windings of a surface around a point from which the point counts as inside."""
+ROUNDING = 1e-9
+"""Distance beyond a limit from which a quick bound on a distance decides [m]."""
 
 
 @loop()
@@ -29,7 +32,65 @@ def place_shapes(  # noqa: PLR0913, PLR0917 - poses in, poses out
 
 
 @loop()
-def pair_distance(  # noqa: C901, PLR0913, PLR0917 - two shapes, and where they are nearest
+def near_links(hand: HandArrays, middles: Array, limit: float, near: NDArray[np.bool_]) -> None:
+    """Fill in which links, the palm first, may be as near to each other as a limit, by their balls.
+
+    Args:
+        hand: The hand.
+        middles: Middles of its shapes, (s, 3).
+        limit: The distance.
+        near: Filled in both ways round, (j + 1, j + 1).
+    """
+    for a in range(len(hand.link_shapes)):
+        for b in range(a):
+            one, other, square = hand.link_shapes[a], hand.link_shapes[b], 0.0
+            if one >= 0 and other >= 0:
+                for k in range(3):
+                    square += (middles[one, k] - middles[other, k]) ** 2
+            reach = limit + hand.link_reaches[a] + hand.link_reaches[b]
+            near[a, b] = near[b, a] = reach >= 0.0 and square <= reach * reach
+
+
+@loop()
+def may_be_near(middles: Array, reaches: Array, i: int, j: int, limit: float) -> bool:
+    """Return whether two shapes may be as near as a limit, by the balls that hold them.
+
+    A call with few arguments costs less than one with a whole hand.
+
+    Args:
+        middles: Middles of the shapes, (s, 3).
+        reaches: Radii of the balls, (s,).
+        i: The first shape.
+        j: The second.
+        limit: The distance.
+    """
+    square = 0.0
+    for k in range(3):
+        square += (middles[i, k] - middles[j, k]) ** 2
+    reach = limit + reaches[i] + reaches[j]
+    return reach >= 0.0 and square <= reach * reach
+
+
+@loop()
+def _apart_by_faces(hand: HandArrays, turned: Array, middles: Array, i: int, j: int) -> float:
+    """Return how far the boxes of two shapes are apart at least, along the axes of either."""
+    widest = -np.inf
+    for one, other in ((i, j), (j, i)):
+        for a in range(3):
+            height, reach = 0.0, hand.shape_sizes[one, a]
+            for k in range(3):
+                height += turned[one, k, a] * (middles[other, k] - middles[one, k])
+            for b in range(3):
+                along = 0.0
+                for k in range(3):
+                    along += turned[one, k, a] * turned[other, k, b]
+                reach += abs(along) * hand.shape_sizes[other, b]
+            widest = max(widest, abs(height) - reach)
+    return widest
+
+
+@loop()
+def pair_distance(  # noqa: PLR0913, PLR0917 - two shapes, and where they are nearest
     hand: HandArrays, turned: Array, middles: Array, i: int, j: int, limit: float, way: Array,
     point: Array,
 ) -> float:  # fmt: skip
@@ -46,12 +107,10 @@ def pair_distance(  # noqa: C901, PLR0913, PLR0917 - two shapes, and where they 
         point: Filled with a point between the two, (3,).
     """
     both = hand.shape_radii[i] + hand.shape_radii[j]
-    h, g, square = hand.shape_sizes[i], hand.shape_sizes[j], 0.0
-    for k in range(3):
-        square += (middles[i, k] - middles[j, k]) ** 2
-    reach = limit + hand.shape_reaches[i] + hand.shape_reaches[j]
-    if reach >= 0.0 and square > reach * reach:
-        return np.sqrt(square) - reach + limit
+    h, g = hand.shape_sizes[i], hand.shape_sizes[j]
+    apart = _apart_by_faces(hand, turned, middles, i, j) - both
+    if apart > limit + ROUNDING:
+        return apart
     local, between, found, at = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3)
     into_frame(turned[i], middles[i], middles[j], local)
     for a in range(3):
@@ -87,9 +146,15 @@ def of_itself(
         worst: Filled with the two shapes that are nearest, (2,); -1 if none is below `need`.
     """
     best, way, point = np.nextafter(need, np.inf), np.empty(3), np.empty(3)
+    near = np.empty((len(hand.link_shapes), len(hand.link_shapes)), np.bool_)
+    near_links(hand, middles, best, near)
     worst[:] = -1
     for n in range(len(hand.pairs)):
         i, j = hand.pairs[n, 0], hand.pairs[n, 1]
+        if not near[hand.shape_links[i] + 1, hand.shape_links[j] + 1]:
+            continue
+        if not may_be_near(middles, hand.shape_reaches, i, j, best):
+            continue
         apart = pair_distance(hand, turned, middles, i, j, best, way, point)
         if apart < best:
             best = apart

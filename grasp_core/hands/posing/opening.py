@@ -17,7 +17,6 @@ from grasp_core.hands.hand_arrays import hand_arrays
 from grasp_core.hands.loop_values import Pose, Targets, Wanted
 from grasp_core.hands.posing.pose_search import Asked, FoundPose, blocking
 from grasp_core.hands.posing.targets import targets
-from grasp_core.values import FINGERS
 
 GAPS_M = (0.015, 0.01, 0.006, 0.003)
 """Distances of fingertips from the surface that are tried, the largest first [m]."""
@@ -63,7 +62,7 @@ def _open_joints(asked: Asked, found: FoundPose) -> Array | None:
     contacts = found.certificate
     for gap in GAPS_M:
         aims = _pulled_back(asked, found, gap)
-        pose: Pose = kernel.empty_pose(arrays, FINGERS)
+        pose: Pose = kernel.empty_pose(arrays, len(found.used))
         pose.palm[:], pose.origin[:] = found.palm_pose[:3, :3], found.palm_pose[:3, 3]
         pose.q[:] = found.joints
         wanted = Wanted(
@@ -91,7 +90,9 @@ def _pulled_back(asked: Asked, found: FoundPose, gap: float) -> Targets:
 
 def _aims(asked: Asked, found: FoundPose) -> Targets:
     """Return targets at the planned contacts."""
-    aims = targets(asked.grasp, regions=False, up=asked.up, height=asked.height)
+    aims = targets(
+        asked.grasp, found.used, regions=False, up=asked.up, height=asked.height
+    )  # fmt: skip
     return aims._replace(fingers=found.fingers)
 
 
@@ -116,7 +117,8 @@ def _is_free(asked: Asked, found: FoundPose, joints: Array, way: Array) -> bool:
     """Return whether the open hand is free at all steps of a straight way in."""
     arrays = hand_arrays(asked.hand)
     aims = _aims(asked, found)
-    pose: Pose = compiled("grasp_core.hands.posing.pose_kernel").empty_pose(arrays, FINGERS)
+    kernel = compiled("grasp_core.hands.posing.pose_kernel")
+    pose: Pose = kernel.empty_pose(arrays, len(found.used))
     pose.palm[:], pose.q[:] = found.palm_pose[:3, :3], joints
     for back in np.arange(TICK, LINE + 0.5 * TICK, TICK):
         pose.origin[:] = found.palm_pose[:3, 3] - back * way

@@ -12,7 +12,7 @@ from grasp_core.compiled import loop
 from grasp_core.hands.distances.surface_kernel import nearest
 from grasp_core.hands.kinematics_kernel import moved, product, turn
 from grasp_core.hands.loop_values import HandArrays, Pose, Sums, SurfaceTree, Targets, Wanted
-from grasp_core.hands.posing.pose_rows_kernel import MOVES, place, residuals
+from grasp_core.hands.posing.pose_rows_kernel import MOVES, ON_SURFACE, place, residuals
 
 SCALE_MOVE, SCALE_TURN = 1e6, 2.5e3
 """Squares of the millimetres by which one metre of a move, and one radian, moves a fingertip."""
@@ -24,10 +24,6 @@ STALLED, PATIENCE = 0.02, 4
 """A start is given up after so many steps in a row that make the cost smaller by less than this."""
 FREE = 1e-9
 """Sum of squares below which nothing overlaps [mm^2]."""
-SETTLED = 1e-9
-"""Change of a distance below which a fingertip rests on a surface [m]."""
-MOST_TOUCHES, TOUCH_STEPS = 12, 8
-"""Largest number of planes that a fingertip tries on a curved surface, and of steps to each."""
 
 
 @loop()
@@ -176,46 +172,37 @@ def settle(  # noqa: PLR0913, PLR0917 - a hand, an object and what is asked
 
 
 @loop()
-def touch(  # noqa: PLR0913, PLR0917 - a hand, an object and what is asked
-    hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums,
-    good: float, points: Array,
+def lay(
+    hand: HandArrays, tree: SurfaceTree, targets: Targets, pose: Pose, points: Array
 ) -> float:  # fmt: skip
-    """Move a hand, changing `pose` in place, until fingertips rest on the surface itself.
+    """Lay the planes that fingertips touch on the surface itself.
 
-    The plane that a fingertip touches is moved to the nearest point of the surface, and turned
-    across the line to it, until the fingertip's distance from the surface is its radius.
+    The plane of a fingertip is moved to the nearest point of the surface, and turned across the
+    line to it.
 
     Args:
         hand: The hand.
         tree: The object's surface.
         targets: Where fingertips are to touch; `origins` and `normals` are changed in place.
-        wanted: What is asked for.
-        pose: The pose.
-        sums: The sums, filled in.
-        good: Distance from touching that is asked for [mm].
+        pose: The pose, whose parts are placed.
         points: Filled with the nearest points of the surface, (k, 3) [m].
 
     Returns:
         The largest distance of a fingertip from touching the surface [m].
     """
-    off, before = np.inf, np.inf
-    for _ in range(MOST_TOUCHES):
-        settle(hand, tree, targets, wanted, pose, sums, TOUCH_STEPS, good)
-        place(hand, targets, pose)
-        before, off = off, 0.0
-        for k in range(len(targets.fingers)):
-            tip, square = pose.tips[k], 0.0
-            nearest(tip, np.inf, tree.corners, tree.middles, tree.radii, tree.links, points[k])
-            for j in range(3):
-                square += (points[k, j] - tip[j]) ** 2
-            distance = np.sqrt(square)
-            off = max(off, abs(distance - hand.tip_radii[targets.fingers[k]]))
-            ahead = 0.0
-            for j in range(3):
-                targets.normals[k, j] = (points[k, j] - tip[j]) / max(distance, SETTLED)
-                ahead += (points[k, j] - targets.origins[k, j]) * targets.normals[k, j]
-            for j in range(3):  # across the normal, the planned contact stays the one to be near
-                targets.origins[k, j] += ahead * targets.normals[k, j]
-        if off <= 1e-3 * good or abs(before - off) <= SETTLED:
-            break
+    place(hand, targets, pose)
+    off = 0.0
+    for k in range(len(targets.fingers)):
+        tip, square = pose.tips[k], 0.0
+        nearest(tip, np.inf, tree.corners, tree.middles, tree.radii, tree.links, points[k])
+        for j in range(3):
+            square += (points[k, j] - tip[j]) ** 2
+        distance = np.sqrt(square)
+        off = max(off, abs(distance - hand.tip_radii[targets.fingers[k]]))
+        ahead = 0.0
+        for j in range(3):
+            targets.normals[k, j] = (points[k, j] - tip[j]) / max(distance, ON_SURFACE)
+            ahead += (points[k, j] - targets.origins[k, j]) * targets.normals[k, j]
+        for j in range(3):  # across the normal, the planned contact stays the one to be near
+            targets.origins[k, j] += ahead * targets.normals[k, j]
     return off

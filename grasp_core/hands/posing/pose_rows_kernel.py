@@ -14,7 +14,12 @@ from grasp_core.arrays import Array
 from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import cross, dotted
 from grasp_core.hands.distances.boxes_kernel import corners_of
-from grasp_core.hands.distances.collisions_kernel import pair_distance, place_shapes
+from grasp_core.hands.distances.collisions_kernel import (
+    may_be_near,
+    near_links,
+    pair_distance,
+    place_shapes,
+)
 from grasp_core.hands.distances.surface_kernel import nearest
 from grasp_core.hands.kinematics_kernel import chains, moved
 from grasp_core.hands.loop_values import HandArrays, Pose, Sums, SurfaceTree, Targets, Wanted
@@ -190,8 +195,14 @@ def _balls(
 def _links(hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums) -> None:
     """Add the residuals of links that are too near to each other."""
     x, along = np.empty(3), np.empty(3)
+    near = np.empty((len(hand.link_shapes), len(hand.link_shapes)), np.bool_)
+    near_links(hand, pose.middles, wanted.apart, near)
     for n in range(len(hand.pairs)):
         a, b = hand.pairs[n, 0], hand.pairs[n, 1]
+        if not near[hand.shape_links[a] + 1, hand.shape_links[b] + 1]:
+            continue
+        if not may_be_near(pose.middles, hand.shape_reaches, a, b, wanted.apart):
+            continue
         short = wanted.apart - pair_distance(
             hand, pose.turned, pose.middles, a, b, wanted.apart, along, x
         )

@@ -6,23 +6,24 @@ Finally force closure is proved with the contacts that are reached.
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.compiled import compiled
-from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.frames import POSE
 from grasp_core.hands.distances.surface import surface_tree
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays
 from grasp_core.hands.loop_values import Pose, Targets, Wanted
+from grasp_core.hands.posing.contact_choices import proved_closure
 from grasp_core.hands.posing.starts import Start, starts
 from grasp_core.hands.posing.targets import is_within, targets
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.values import FINGERS, Grasp
+from grasp_core.values import Grasp
 
 TOUCHING = 1e-5
 """Largest gap or overlap of a fingertip that counts as touching [m]: a tenth of the overlap that
@@ -31,6 +32,11 @@ MOST_STEPS = 60
 GOOD_MM, ROUGH_MM, FINE_MM = 0.05, 1.0, 1e-6
 """Distances from touching at which the search for a pose ends, from which fingertips are laid on
 the surface, and at which they lie on a flat one [mm]."""
+MOST_TOUCHES, TOUCH_STEPS = 12, 8
+"""Largest number of planes that a fingertip tries on a curved surface, and of steps to each."""
+SETTLED, RESTING_MM = 1e-9, 1e-9
+"""Change of a distance below which a fingertip rests on a surface [m], and distance from touching
+at which it does [mm]."""
 ROOM = 0.0015
 """Distance beyond the one asked for that the search keeps from the object [m]."""
 PULL = 0.03
@@ -58,14 +64,17 @@ class Asked:
     """Whether contacts may be anywhere in their regions."""
     seed: int
     most_starts: int
+    """Largest number of starts for each choice of contacts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundPose:
     """A pose in which a hand holds an object."""
 
+    used: Indices
+    """Indices of the grasp's contacts at which fingers stand, (k,)."""
     fingers: Indices
-    """The finger for each contact, (4,)."""
+    """The finger at each of them, (k,)."""
     joints: Array
     """Joint angles, (j,) [rad]."""
     palm_pose: Array
@@ -74,7 +83,7 @@ class FoundPose:
     """Proof of force closure with the contacts that are reached."""
     within: tuple[bool, ...]
     """Whether each contact is in its region, or at the planned contact."""
-    starts: int
+    starts: int = 1
     """Number of starts that were tried."""
 
 
@@ -88,27 +97,35 @@ class NoPose:
     starts: int
 
 
-def find_pose(asked: Asked) -> FoundPose | NoPose:
-    """Look for a pose from one start after the other."""
-    found = starts(
-        asked.hand, asked.grasp.positions, asked.grasp.normals, seed=asked.seed,
-        count=asked.most_starts,
-    )  # fmt: skip
-    aims = targets(asked.grasp, regions=asked.regions, up=asked.up, height=asked.height)
+def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | NoPose:
+    """Look for a pose from one start after the other.
+
+    Args:
+        asked: What a pose is sought for.
+        choices: Indices of contacts at which fingers may stand; later ones are tried where no pose
+            was found for those before.
+    """
     tally: Counter[str] = Counter()
-    for number, start in enumerate(found, 1):
-        ended = _tried(asked, aims._replace(fingers=start.fingers), start, number)
-        if isinstance(ended, FoundPose):
-            return ended
-        tally[ended] += 1
-    return NoPose(tally, len(found))
+    for chosen in choices:
+        used = np.array(chosen, np.int64)
+        aims = targets(
+            asked.grasp, used, regions=asked.regions, up=asked.up, height=asked.height
+        )  # fmt: skip
+        for start in starts(
+            asked.hand, aims.origins, aims.normals, seed=asked.seed, count=asked.most_starts
+        ):
+            ended = _tried(asked, used, aims._replace(fingers=start.fingers), start)
+            if not isinstance(ended, str):
+                return replace(ended, starts=tally.total() + 1)
+            tally[ended] += 1
+    return NoPose(tally, tally.total())
 
 
-def _tried(asked: Asked, aims: Targets, start: Start, number: int) -> FoundPose | str:
+def _tried(asked: Asked, used: Indices, aims: Targets, start: Start) -> FoundPose | str:
     """Move the hand from one start; return a pose, or what is in the way."""
     arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
     kernel = compiled("grasp_core.hands.posing.pose_kernel")
-    pose: Pose = kernel.empty_pose(arrays, FINGERS)
+    pose: Pose = kernel.empty_pose(arrays, len(used))
     pose.palm[:], pose.origin[:], pose.q[:] = start.rotation, start.position, start.joints
     sums = kernel.empty_sums(arrays, aims)
     room = asked.clearance + ROOM
@@ -118,18 +135,23 @@ def _tried(asked: Asked, aims: Targets, start: Start, number: int) -> FoundPose 
         return _why_away(asked.hand, pose.q)
     laid = aims._replace(origins=np.array(aims.origins), normals=np.array(aims.normals))
     near = far._replace(overlaps=False, margin=LEAST_MARGIN, pull=0.0)
-    points = np.empty((FINGERS, 3))
-    if kernel.touch(arrays, tree, laid, near, pose, sums, FINE_MM, points) > TOUCHING:
+    points, off, before = np.empty((len(used), 3)), np.inf, np.inf
+    for _ in range(MOST_TOUCHES):
+        kernel.settle(arrays, tree, laid, near, pose, sums, TOUCH_STEPS, FINE_MM)
+        before, off = off, kernel.lay(arrays, tree, laid, pose, points)
+        if off <= RESTING_MM or abs(before - off) <= SETTLED:
+            break
+    if off > TOUCHING:
         return _why_away(asked.hand, pose.q)
     if blocked := blocking(asked, pose, start.fingers, asked.clearance):
         return blocked
-    certificate = _closed(points, laid.normals, asked.friction)
-    if certificate is None:
+    certificate = proved_closure(points, laid.normals, asked.friction)
+    if certificate is None or not certificate.closed:
         return "open"
     within = tuple(
         is_within(aims, k, point, MARGIN) for k, point in enumerate(certificate.positions)
     )
-    return FoundPose(start.fingers, pose.q, _as_pose(pose), certificate, within, number)
+    return FoundPose(used, start.fingers, pose.q, _as_pose(pose), certificate, within)
 
 
 def blocking(asked: Asked, pose: Pose, fingers: Indices | None, clearance: float) -> str:
@@ -170,12 +192,3 @@ def _as_pose(pose: Pose) -> Array:
     found = np.eye(POSE)
     found[:3, :3], found[:3, 3] = pose.palm, pose.origin
     return found
-
-
-def _closed(points: Array, normals: Array, friction: float) -> ClosureCertificate | None:
-    """Prove force closure with the contacts that are reached; None if that fails."""
-    try:
-        found = force_closure(points, normals, friction)
-    except (UndecidedError, SolverError):
-        return None
-    return found if found.closed else None

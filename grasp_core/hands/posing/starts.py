@@ -18,7 +18,6 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays
-from grasp_core.values import FINGERS
 
 POSTURES = 400
 """Number of postures to choose from."""
@@ -57,7 +56,7 @@ class Start:
     """Where a search starts."""
 
     fingers: Indices
-    """The finger for each contact, (4,)."""
+    """The finger for each contact, (k,)."""
     joints: Array
     """Joint angles, (j,) [rad]."""
     rotation: Array
@@ -88,18 +87,18 @@ def starts(hand: Hand, positions: Array, normals: Array, *, seed: int, count: in
 
     Args:
         hand: The hand.
-        positions: Contacts, (4, 3) [m].
-        normals: Unit vectors into the object, (4, 3).
+        positions: Contacts, (k, 3) [m].
+        normals: Unit vectors into the object, (k, 3).
         seed: Seed of the postures.
         count: Largest number of starts.
     """
     found, arrays = postures(hand, seed), hand_arrays(hand)
     if not len(found.joints):
         return []
-    orders = np.array(list(itertools.permutations(range(len(arrays.tip_radii)), FINGERS)))
+    orders = np.array(list(itertools.permutations(range(len(arrays.tip_radii)), len(normals))))
     inward = found.tips.mean(axis=1, keepdims=True) - found.tips
     inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), 1e-9)
-    i, j = np.triu_indices(FINGERS, 1)
+    i, j = np.triu_indices(len(normals), 1)
     # all tips of a hand are taken to be as thick as the first
     middles = positions - arrays.tip_radii[0] * normals
     apart = np.linalg.norm(middles[i] - middles[j], axis=1)

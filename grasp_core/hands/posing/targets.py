@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices, cross
 from grasp_core.frames import plane_tangents
 from grasp_core.hands.loop_values import Targets
-from grasp_core.values import FINGERS, ContactRegion, Grasp
+from grasp_core.values import ContactRegion, Grasp
 
 NARROW = 1e-4
 """Least inscribed radius of a region that is aimed at; in smaller ones the contact is [m]."""
@@ -13,26 +13,27 @@ SHORT = 1e-9
 """Length below which an edge of a region is left out [m]."""
 
 
-def targets(grasp: Grasp, *, regions: bool, up: Array, height: float) -> Targets:
-    """Say where fingertips are to touch, with finger k at contact k.
+def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: float) -> Targets:
+    """Say where fingertips are to touch, with finger k at the k-th of the contacts that are used.
 
     Args:
         grasp: The grasp.
+        used: Indices of its contacts at which fingers are to stand, (k,).
         regions: Whether to aim at regions where there are some.
         up: Unit normal of the table, (3,).
         height: Its height along it; minus infinity for none [m].
     """
-    normals = grasp.normals
-    aimed = [regions and _is_wide(region) for region in grasp.regions]
+    normals, own = grasp.normals[used], [grasp.regions[int(contact)] for contact in used]
+    aimed = [regions and _is_wide(region) for region in own]
     rows = [
         (finger, *row)
-        for finger in range(FINGERS)
+        for finger, region in enumerate(own)
         if aimed[finger]
-        for row in _edges(grasp.regions[finger].polygon, normals[finger])
+        for row in _edges(region.polygon, normals[finger])
     ]
     return Targets(
-        np.arange(FINGERS, dtype=np.int64),
-        grasp.positions,
+        np.arange(len(used), dtype=np.int64),
+        grasp.positions[used],
         normals,
         np.array([plane_tangents(*normal) for normal in normals.tolist()]),
         np.where(aimed, 0.0, 1.0),
@@ -50,15 +51,12 @@ def _is_wide(region: ContactRegion) -> bool:
 
 def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
     """Return a point of each edge and the unit vector from it into the convex polygon."""
-    middle, found = polygon.mean(axis=0), list[tuple[Array, Array]]()
-    for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        along = end - start
-        length = float(np.linalg.norm(along))
-        if length > SHORT:
-            inward = np.cross(normal, along)
-            inward *= np.copysign(1.0 / np.linalg.norm(inward), inward @ (middle - start))
-            found.append((start, inward))
-    return found
+    along = np.roll(polygon, -1, axis=0) - polygon
+    kept = np.linalg.norm(along, axis=1) > SHORT
+    starts, inward = polygon[kept], cross(normal, along[kept])
+    sides = np.einsum("ej,ej->e", inward, polygon.mean(axis=0) - starts)
+    inward *= np.copysign(1.0 / np.linalg.norm(inward, axis=1), sides)[:, None]
+    return list(zip(starts, inward, strict=True))
 
 
 def is_within(targets: Targets, contact: int, position: Array, slack: float) -> bool:

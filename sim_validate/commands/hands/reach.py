@@ -6,15 +6,16 @@ from dataclasses import replace
 
 from grasp_core.files.text_files import write_text
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.reach import HandReach, check_hand
+from grasp_core.hands.reach import HandReach
 from grasp_core.records.grasps_json import SavedGrasps
-from scenes.hand_files.loading import load_hand
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
+from sim_validate.commands.hands.hand import asked_hand
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import REACHES, remove_reaches
+from sim_validate.parallel.compiling_hands import compile_for_hands, must_compile
 from sim_validate.parallel.reaching import ReachJob, reached
 from sim_validate.records.grasps import grasp_with_id
 from sim_validate.records.reaches_json import reaches_summary, reaches_to_json
@@ -26,8 +27,7 @@ ABSENT = "-"
 
 def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
     """Look for a pose of a hand in each grasp of a file, and write what was found."""
-    names = tuple(name.strip() for name in command.fingertips.split(",") if name.strip())
-    hand = check_hand(load_hand(command.hand, names))
+    hand = asked_hand(command)
     saved = saved_grasps(command.grasps, reporter)
     if saved is None:
         return Exit.NONE
@@ -63,6 +63,9 @@ def _reach(
         "seed": command.seed,
     }
     found: list[HandReach] = []
+    if jobs and must_compile():
+        reporter.say("compiling inner loops once, which takes a minute or two")
+        compile_for_hands(hand, saved.body, command.seed, command.jobs)
     try:
         with reporter.progress("reaching") as steps:
             for each in reached(jobs, command.jobs):
@@ -91,6 +94,11 @@ def _show(hand: Hand, found: Sequence[HandReach], reporter: Reporter) -> None:
         f"{counts['collision']} met a collision, {counts['limit']} a joint's limit, and for "
         f"{counts['not_found']} no pose was found; more --starts may find some"
     )
+    if unclosed := counts.get("no_closure"):
+        reporter.say(
+            f"{unclosed} have no {len(hand.fingers)} contacts that are in force closure alone, "
+            "which is proved; more friction may help, and other grasps"
+        )
     for each in shown:
         if not each.reached:
             reporter.warn(f"{each.grasp}: {each.reason}: {each.explanation}")

@@ -12,9 +12,11 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.hand_flags import Reach
 from sim_validate.commands.hands.reach import say_where_to_look
 from sim_validate.main import main
+from sim_validate.records.reaches_json import REACHES
 from sim_validate.records.reaches_schema import ReachesFile
 from tests.grasp_core.hands.gripping import plain_hand
 from tests.hand_models import hand_mjcf
+from tests.three_fingers import THREE_TIPS, three_fingers_file
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +39,8 @@ def test_it_writes_poses_that_are_in_force_closure(grasps, tmp_path, capsys):
     assert f"{summary['reached']} of 3 grasps were reached" in said
     assert "give the folder of grasps.json as --out" in said
     assert code == (Exit.GOOD if summary["reached"] == 3 else Exit.NEGATIVE)
-    assert sum(summary[key] for key in ("reached", "limit", "collision", "not_found")) == 3
+    ends = ("reached", "limit", "collision", "not_found", "no_closure")
+    assert sum(summary[key] for key in ends) == 3
     for each in record["reaches"]:
         assert (each["pose"] is not None) == each["reached"] == (each["reason"] == "")
         if each["pose"]:
@@ -47,6 +50,7 @@ def test_it_writes_poses_that_are_in_force_closure(grasps, tmp_path, capsys):
             assert gc.force_closure(positions, normals, record["friction"]).closed
             assert len(each["pose"]["joints_rad"]) == len(record["hand"]["joints"]) == 16
             assert len({contact["finger"] for contact in contacts}) == 4
+            assert each["pose"]["used"] == [0, 1, 2, 3]
 
 
 def test_it_says_which_command_shows_the_hand(grasps, tmp_path, capsys):
@@ -91,9 +95,40 @@ def test_what_cannot_be_asked_is_refused(words, said, grasps, capsys):
     assert said in capsys.readouterr().err
 
 
-def test_three_fingers_are_refused_before_anything_is_sought(grasps, tmp_path, capsys):
-    path = tmp_path / "three.xml"
-    path.write_text(hand_mjcf(plain_hand(3)))
-    words = ["--hand", str(path), "--fingertips", "f0_tip,f1_tip,f2_tip"]
-    assert main(["reach", str(grasps), *words]) == Exit.INPUT
-    assert "at least 4 fingers, got 3" in capsys.readouterr().err
+def test_three_fingers_stand_at_contacts_that_the_file_names(grasps, tmp_path, capsys):
+    hand = ["--hand", three_fingers_file(tmp_path), "--fingertips", ",".join(THREE_TIPS)]
+    code = main(["reach", str(grasps), *hand, "--out", str(tmp_path)])
+    said = capsys.readouterr()
+    record = record_of(ReachesFile, (tmp_path / REACHES).read_text(), REACHES, schema=1)
+    assert record["summary"]["reached"] == 3, said
+    assert code == Exit.GOOD
+    for each, grasp in zip(record["reaches"], gc.load_grasps(grasps).grasps, strict=True):
+        used, contacts = each["pose"]["used"], each["pose"]["contacts"]
+        assert len(used) == len(contacts) == 3
+        assert {contact["finger"] for contact in contacts} == set(THREE_TIPS)
+        positions = np.array([contact["position_m"] for contact in contacts])
+        normals = np.array([contact["normal"] for contact in contacts])
+        assert gc.force_closure(positions, normals, record["friction"]).closed
+        # each fingertip is on the face of the planned contact whose place it takes
+        assert normals == pytest.approx(grasp.normals[used], abs=1e-6)
+
+
+def test_where_no_three_contacts_close_the_command_says_so(tmp_path, capsys):
+    assert main(["plan", "dodecahedron", "--limit", "1", "--out", str(tmp_path), "-q"]) == Exit.GOOD
+    hand = ["--hand", three_fingers_file(tmp_path), "--fingertips", ",".join(THREE_TIPS)]
+    words = ["reach", str(tmp_path / "grasps.json"), *hand, "--friction", "0.05"]
+    assert main([*words, "--out", str(tmp_path)]) == Exit.NEGATIVE
+    said = capsys.readouterr()
+    assert "1 have no 3 contacts that are in force closure alone" in said.out
+    assert "no 3 of the grasp's 4 contacts alone are in force closure at friction 0.05" in said.err
+    record = record_of(ReachesFile, (tmp_path / REACHES).read_text(), REACHES, schema=1)
+    assert record["summary"]["no_closure"] == 1
+    assert record["reaches"][0]["reason"] == "no closure"
+
+
+def test_files_from_before_hands_with_three_fingers_are_read(grasps, tmp_path):
+    main(["reach", str(grasps), "--limit", "1", "--out", str(tmp_path), "-q"])
+    old = json.loads((tmp_path / REACHES).read_text())
+    del old["summary"]["no_closure"], old["reaches"][0]["pose"]["used"]
+    read = record_of(ReachesFile, json.dumps(old), REACHES, schema=1)
+    assert len(read["reaches"][0]["pose"]["contacts"]) == 4

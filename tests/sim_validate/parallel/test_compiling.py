@@ -17,9 +17,8 @@ import sys
 from grasp_core import compiled as loops
 from sim_validate.parallel import compiling
 
-compiling.BESIDE = {"%s": compiling.BESIDE["%s"]}
 if __name__ == "__main__":
-    with compiling.compiled_beside(int(sys.argv[1])):
+    with compiling.compiled_beside(int(sys.argv[1]), {"%s": compiling.BESIDE["%s"]}):
         compiling.BESIDE["%s"](compiling.OUTWARD, compiling.OUTWARD)
     stats = loops.compiled("%s").solve.stats
     print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))

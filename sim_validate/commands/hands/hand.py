@@ -1,0 +1,96 @@
+"""Runs the command `hand`, which shows what a hand was read as."""
+
+import math
+from typing import Any
+
+from grasp_core.hands.hand import Hand, HandFinger
+from grasp_core.short_text import counted
+from scenes.hand_files.loading import load_hand
+from sim_validate.cli import hand_flags
+from sim_validate.cli.console import Reporter
+from sim_validate.cli.exit_codes import Exit
+
+MM = 1e3
+NONE_STATED = "none stated"
+
+
+def asked_hand(command: hand_flags.Hand | hand_flags.Reach) -> Hand:
+    """Load the hand that a command names."""
+    names = (name.strip() for name in command.fingertips.split(","))
+    return load_hand(command.hand, [name for name in names if name])
+
+
+def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
+    """Show fingers, joints and fingertips of a hand."""
+    hand = asked_hand(command)
+    reporter.document(hand_facts(hand))
+    fingers = [
+        (f.name, str(len(f.links)), f"{MM * f.tip.radius:.1f}", str(_shapes(f)))
+        for f in hand.fingers
+    ]
+    reporter.table(
+        f"fingers of {hand.name}", ("fingertip", "joints", "radius mm", "shapes"), fingers
+    )
+    columns = ("joint", "fingertip", "range deg", "torque limit N m")
+    reporter.table("joints, from the palm outwards", columns, _joints(hand))
+    reporter.say(f"The palm has {counted(len(hand.palm), 'shape')} that must touch nothing.")
+    if hand.ignored_pairs:
+        listed = ", ".join(" and ".join(pair) for pair in hand.ignored_pairs)
+        reporter.say(f"Links that may overlap, besides neighbours: {listed}.")
+    reporter.say(f"Torque limits: {hand.torque_source}.")
+    for source in hand.sources:
+        reporter.say(f"Source: {source}.")
+    return Exit.GOOD
+
+
+def _shapes(finger: HandFinger) -> int:
+    return sum(len(link.shapes) for link in finger.links)
+
+
+def _joints(hand: Hand) -> list[tuple[str, ...]]:
+    """Return the cells of a table with one row for each joint."""
+    return [
+        (
+            link.joint.name,
+            finger.name,
+            f"{math.degrees(link.joint.lowest):.1f} to {math.degrees(link.joint.highest):.1f}",
+            _torque(link.joint.torque_limit_n_m),
+        )
+        for finger in hand.fingers
+        for link in finger.links
+    ]
+
+
+def _torque(limit: float | None) -> str:
+    return NONE_STATED if limit is None else f"{limit:g}"
+
+
+def hand_facts(hand: Hand) -> dict[str, Any]:
+    """Return what a hand was read as, for JSON, with units in the keys."""
+    return {
+        "name": hand.name,
+        "fingers": [
+            {
+                "fingertip": finger.name,
+                "tip_radius_m": finger.tip.radius,
+                "tip_center_m": finger.tip.center.tolist(),
+                "joints": [
+                    {
+                        "name": link.joint.name,
+                        "link": link.name,
+                        "lowest_rad": link.joint.lowest,
+                        "highest_rad": link.joint.highest,
+                        "torque_limit_n_m": link.joint.torque_limit_n_m,
+                        "mass_kg": link.mass_kg,
+                        "shapes": len(link.shapes),
+                    }
+                    for link in finger.links
+                ],
+            }
+            for finger in hand.fingers
+        ],
+        "palm_shapes": len(hand.palm),
+        "may_overlap": [list(pair) for pair in hand.ignored_pairs],
+        "torque_source": hand.torque_source,
+        "sources": list(hand.sources),
+    }

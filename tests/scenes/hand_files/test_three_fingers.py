@@ -1,0 +1,147 @@
+"""A gripper with three fingers stands at three contacts of a grasp, and MuJoCo agrees."""
+
+from contextlib import suppress
+from itertools import combinations
+
+import mujoco
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+from grasp_core.errors import UndecidedError
+from grasp_core.hands.posing.pose_search import TOUCHING
+from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
+from tests.hand_models import numbers
+from tests.three_fingers import THREE_TIPS, three_fingers_file, three_fingers_mjcf
+
+OBJECTS = ("box", "dodecahedron")
+RADIUS = 0.035
+CLEARANCE = 5e-4
+STARTS = 50
+"""Starts for each choice of contacts: a pose from fewer is one for the first choice."""
+MUJOCO_SLACK = 2e-6
+"""Twice the tolerance of MuJoCo's own distances of convex bodies [m]."""
+
+
+@pytest.fixture(scope="module")
+def hand(tmp_path_factory):
+    return scenes.load_hand(three_fingers_file(tmp_path_factory.mktemp("hand")), THREE_TIPS)
+
+
+@pytest.fixture(scope="module")
+def reached(hand):
+    """The object, grasp and pose of each grasp that is reached."""
+    tried = [(name, grasp) for name in OBJECTS for grasp in grasps(name, RADIUS)]
+    found = [(name, grasp, gc.reach_with(hand, scaled(name, RADIUS), grasp, FRICTION))
+             for name, grasp in tried]  # fmt: skip
+    return [(scaled(name, RADIUS), grasp, each) for name, grasp, each in found if each.reached]
+
+
+def simulated(hand, body, found):
+    """The gripper's own file with the object beside it, in the palm's frame, in MuJoCo."""
+    assets = f'<asset><mesh name="object" vertex="{numbers(body.vertices)}"/></asset>'
+    geom = '<body name="object" mocap="true"><geom name="object" type="mesh" mesh="object"/></body>'
+    text = three_fingers_mjcf().replace("</worldbody>", f"{geom}</worldbody>{assets}")
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    for joint, angle in zip(hand.joints, found.joints, strict=True):
+        data.joint(joint.name).qpos = angle
+    # MuJoCo moves a mesh's frame to its centre of mass, and the body's stays where it is put
+    R, p = found.palm_pose[:3, :3].T, -found.palm_pose[:3, :3].T @ found.palm_pose[:3, 3]
+    data.mocap_pos[0] = p
+    mujoco.mju_mat2Quat(data.mocap_quat[0], np.ascontiguousarray(R).ravel())
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def test_most_grasps_are_reached_at_three_contacts_that_close(hand, reached):
+    assert len(reached) >= 5
+    for body, grasp, found in reached:
+        assert len(found.used) == len(found.fingers) == len(found.contacts) == 3
+        assert sorted(found.fingers) == [0, 1, 2]
+        assert (np.diff(found.used) > 0).all()
+        low, high = hand.ranges.T
+        assert ((low <= found.joints) & (found.joints <= high)).all()
+        planned = grasp.positions[found.used], grasp.normals[found.used]
+        assert gc.force_closure(*planned, FRICTION).closed
+        points = np.array([contact.position for contact in found.contacts])
+        normals = np.array([contact.normal for contact in found.contacts])
+        again = gc.force_closure(points, normals, FRICTION)
+        assert again.closed
+        assert again.verify()
+        assert found.certificate.verify()
+        assert gc.critical_friction(points, normals) < FRICTION
+        assert normals == pytest.approx(planned[1], abs=1e-6)  # flat faces, and the same ones
+        assert body.radius < 0.05
+
+
+def test_mujoco_has_fingertips_on_the_object_and_all_else_apart(hand, reached):
+    seen = 0
+    for body, _, found in reached:
+        model, data = simulated(hand, body, found)
+
+        def apart(i, j, model=model, data=data):
+            return mujoco.mj_geomDistance(model, data, i, j, 0.05, None)
+
+        solid = model.geom("object").id
+        tips = {model.geom(name).id for name in THREE_TIPS}
+        for geom in set(range(model.ngeom)) - {solid}:
+            if geom in tips:
+                assert apart(geom, solid) == pytest.approx(0.0, abs=TOUCHING + MUJOCO_SLACK)
+            else:
+                assert apart(geom, solid) >= CLEARANCE - MUJOCO_SLACK
+        for i, j in combinations(sorted(set(range(model.ngeom)) - {solid}), 2):
+            one, other = int(model.geom_bodyid[i]), int(model.geom_bodyid[j])
+            if other not in {one, model.body_parentid[one]} and model.body_parentid[other] != one:
+                assert apart(i, j) >= CLEARANCE - MUJOCO_SLACK
+                seen += 1
+    assert seen >= 5 * len(reached) > 0
+
+
+def test_the_first_choice_has_the_largest_margin(hand):
+    """Where a pose is found for the first choice, no other three contacts close with more."""
+    firsts = 0
+    for grasp in grasps("dodecahedron", RADIUS):
+        found = gc.reach_with(hand, scaled("dodecahedron", RADIUS), grasp, FRICTION, starts=STARTS)
+        if not found.reached or found.starts > STARTS:
+            continue
+        firsts += 1
+        margins = dict[tuple[int, ...], float]()
+        for chosen in combinations(range(4), 3):
+            kept = list(chosen)
+            with suppress(UndecidedError):  # what is nearly degenerate is not chosen either
+                proof = gc.force_closure(grasp.positions[kept], grasp.normals[kept], FRICTION)
+                margins[chosen] = proof.margin
+        assert margins[tuple(found.used)] >= max(margins.values()) - 1e-6
+    assert firsts >= 1
+
+
+def test_where_no_three_contacts_close_each_choice_has_a_proof(hand):
+    body, grasp = scaled("dodecahedron", RADIUS), grasps("dodecahedron", RADIUS)[0]
+    found = gc.reach_with(hand, body, grasp, 0.05)
+    assert gc.force_closure(grasp, friction=0.05).closed  # it is the fourth contact that is missed
+    assert (found.reached, found.reason, found.starts) == (False, "no closure", 0)
+    assert "no 3 of the grasp's 4 contacts alone are in force closure" in found.explanation
+    assert len(found.open_choices) == 4
+    for chosen, proof in zip(combinations(range(4), 3), found.open_choices, strict=True):
+        assert proof.positions == pytest.approx(grasp.positions[list(chosen)], abs=0.0)
+        assert not proof.closed
+        assert proof.verify()
+
+
+def test_contacts_stay_the_planned_three_without_regions(hand):
+    body, seen = scaled("dodecahedron", RADIUS), 0
+    for grasp in grasps("dodecahedron", RADIUS):
+        found = gc.reach_with(hand, body, grasp, FRICTION, regions=False)
+        if found.reached:
+            seen += 1
+            points = np.array([contact.position for contact in found.contacts])
+            assert points == pytest.approx(grasp.positions[found.used], abs=1e-8)
+            assert all(found.within_regions)
+    assert seen >= 2
+
+
+def test_the_same_seed_gives_the_same_three_contacts(hand, reached):
+    body, grasp, found = reached[0]
+    assert gc.reach_with(hand, body, grasp, FRICTION) == found
