@@ -172,8 +172,8 @@ def knock_in_words(settings: ExecutionSettings) -> str:
     """Say which speed a knock gives the object, since its impulse does not depend on the mass."""
     return (
         f"a knock of {settings.knock_n_s:g} N s would give a free object of "
-        f"{settings.mass_kg:g} kg {settings.knock_n_s / settings.mass_kg:.3g} m/s; the impulse is not scaled to the mass, "
-        "so choose it with --knock-n-s"
+        f"{settings.mass_kg:g} kg {settings.knock_n_s / settings.mass_kg:.3g} m/s; the impulse is "
+        "not scaled to the mass, so choose it with --knock-n-s"
     )
 
 

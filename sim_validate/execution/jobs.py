@@ -12,7 +12,7 @@ from grasp_core.values import Grasp
 from scenes.physics import PhysicsSettings
 from sim_validate.execution.execute import chosen_squeeze, execute, held_scene
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.execution.verdict import Execution
+from sim_validate.execution.verdict import Execution, ExecutionTrial
 from sim_validate.parallel.processes import each, processes
 
 
@@ -46,6 +46,11 @@ class ExecutedGrasp(ByValue):
     def survived(self) -> bool:
         """Whether the object survived every trial, of at least one."""
         return self.execution is not None and self.execution.survived
+
+    @property
+    def trials(self) -> tuple[ExecutionTrial, ...]:
+        """The trials of the execution; empty where no squeeze holds the object."""
+        return () if self.execution is None else self.execution.trials
 
     @property
     def least_predicted_loss(self) -> float:

@@ -152,7 +152,8 @@ def _plain_columns(chosen: Selection, name: Name) -> Columns:
 
 def _plain(column: Column, values: NDArray[Any]) -> NDArray[Any]:
     if column.kind == "bool":
-        return np.array([-1 if value is None else int(value) for value in values], dtype=np.int8)
+        cells = values.astype(np.float64)
+        return np.where(np.isnan(cells), -1.0, cells).astype(np.int8)
     if column.kind == "text":
         return np.array(["" if value is None else value for value in values], dtype=np.str_)
     return values
