@@ -138,7 +138,9 @@ def _show(found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter:
     for line in lines[:TABLE_ROWS]:
         reporter.warn(line)
     if len(lines) > TABLE_ROWS:
-        reporter.warn(f"and {len(lines) - TABLE_ROWS} more, which {EXECUTIONS} has all of")
+        reporter.warn(
+            f"and {len(lines) - TABLE_ROWS} more: {EXECUTIONS} (--out DIR) has all of them"
+        )
     if any(not trial.survived for each in found if each.execution
            for trial in each.execution.of_kind("knock")):  # fmt: skip
         reporter.warn(knock_in_words(settings))

@@ -47,7 +47,8 @@ def pyarrow() -> Any:
         return importlib.import_module("pyarrow")
     except ImportError as error:
         raise InputError(
-            "datasets are Parquet files, which need pyarrow: run pip install 'graspproof[dataset]'"
+            "datasets are Parquet files, which need pyarrow: run pip install 'graspproof[dataset]' "
+            "('.[dataset]' in a checkout)"
         ) from error
 
 

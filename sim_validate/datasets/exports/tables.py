@@ -103,7 +103,8 @@ def write_hdf5(
         h5py: Any = importlib.import_module("h5py")
     except ImportError as error:
         raise InputError(
-            "writing HDF5 needs h5py: run pip install 'graspproof[hdf5]', or choose another format"
+            "writing HDF5 needs h5py: run pip install 'graspproof[hdf5]' ('.[hdf5]' in a "
+            "checkout), or choose another format"
         ) from error
     held = io.BytesIO()
     with h5py.File(held, "w") as file:
