@@ -46,7 +46,7 @@ PAYLOAD_MEANS = "payload kg: that multiple of the mass, for loads that grow slow
 SLIPS = "first slips, predicted/simulated"
 SLIPS_MEAN = (
     "first slip: least multiple of the trials' loads at which a contact slips; above one none "
-    "does, and in simulation 1.00 also stands for a slip when the whole load had come"
+    "does, and in simulation 1.00 also stands for a slip once the whole weight had come"
 )
 
 

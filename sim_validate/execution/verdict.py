@@ -117,15 +117,16 @@ def ended(trial: ExecutionTrial, settings: ExecutionSettings | None = None) -> s
 
     Args:
         trial: The trial.
-        settings: How far an object may move and turn; if None, both are named as reasons.
+        settings: How far an object may move and turn; if None, it is left open which it was.
     """
     if trial.survived or trial.dropped:
         return trial.fate
-    if settings is None:
-        return "moved or turned too far"
-    moved = ["moved"] if trial.displacement_m > settings.most_m else []
-    turned = ["turned"] if trial.turn_rad > settings.most_rad else []
-    return f"{' and '.join(moved + turned) or 'moved or turned'} too far"
+    ways = list[str]()
+    if settings is not None:
+        ways += ["moved"] if trial.displacement_m > settings.most_m else []
+        ways += ["turned"] if trial.turn_rad > settings.most_rad else []
+    said = " and ".join(ways) or "moved or turned"
+    return f"{said} too far {'after' if trial.fate == 'slipped' else 'without'} a slip"
 
 
 def trial_in_words(trial: ExecutionTrial, settings: ExecutionSettings | None = None) -> str:

@@ -62,8 +62,8 @@ def test_losses_are_told_in_millimetres_and_degrees_as_limits_are_given():
     )
     assert losses_in_words(execution(trial("weight", True), lost)) == [trial_in_words(lost)]
     assert trial_in_words(lost) == (
-        "knock -y: moved or turned too far, moved 123 mm and turned 108 degrees; first slip "
-        "predicted at 0.8 of the load, simulated at 0.75; loss predicted at 0.9"
+        "knock -y: moved or turned too far after a slip, moved 123 mm and turned 108 degrees; "
+        "first slip predicted at 0.8 of the load, simulated at 0.75; loss predicted at 0.9"
     )
 
 
@@ -72,9 +72,9 @@ def test_losses_are_told_in_millimetres_and_degrees_as_limits_are_given():
     [
         (True, "slipped", 4.0, 4.0, "slipped"),
         (False, "dropped", 90.0, 90.0, "dropped"),
-        (False, "stuck", 4.0, 15.9, "turned too far"),
-        (False, "slipped", 6.0, 4.0, "moved too far"),
-        (False, "stuck", 6.0, 15.9, "moved and turned too far"),
+        (False, "stuck", 4.0, 15.9, "turned too far without a slip"),
+        (False, "slipped", 6.0, 4.0, "moved too far after a slip"),
+        (False, "stuck", 6.0, 15.9, "moved and turned too far without a slip"),
     ],
 )
 def test_an_object_that_was_kept_and_failed_is_said_to_have_left_its_place(
