@@ -1,7 +1,7 @@
 """Finds, chooses and tabulates grasps by their ids, families and figures."""
 
 import importlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import (
     Any,
@@ -17,13 +17,15 @@ from typing import (
 
 import numpy as np
 
-from grasp_core.checked import number, one_of, shown
+from grasp_core.checked import number, one_of, several, shown
 from grasp_core.errors import InputError
-from grasp_core.values import Family, Grasp
+from grasp_core.values import Grasp, Method
 
 SHOWN_IDS = 5
 """Largest number of ids that a message lists."""
 AXES = ("x", "y", "z")
+FREE_IDS = "f-"
+"""Beginning of the ids of grasps that the free method made, whose family is that of their lines."""
 
 
 class Named(Protocol):
@@ -101,7 +103,8 @@ class ById(Generic[Item]):
 class Demands:
     """What a grasp has to be like in order to be chosen; None demands nothing."""
 
-    family: Family | None = None
+    families: tuple[Method, ...] | None = None
+    """Families of which a grasp must have one, or `free` for grasps of the free method."""
     min_radius_m: float | None = None
     """Least radius of the discs in which fingers may stand [m]."""
     min_closure_margin: float | None = None
@@ -112,8 +115,6 @@ class Demands:
     """A further test of the user's own."""
 
     def __post_init__(self) -> None:
-        if self.family is not None:
-            one_of(self.family, get_args(Family), "family")
         figures = ("min_radius_m", "min_closure_margin", "max_critical_friction")
         for name in (*figures, "min_ferrari_canny_n"):
             if (least := getattr(self, name)) is not None:
@@ -128,7 +129,7 @@ class Demands:
         """Return whether a grasp is chosen; only figures that are asked for are computed."""
         most = self.max_critical_friction
         return (
-            (self.family is None or grasp.family == self.family)
+            (self.families is None or any(_is_of(grasp, family) for family in self.families))
             and (self.min_radius_m is None or grasp.radius >= self.min_radius_m)
             and (self.min_closure_margin is None or grasp.closure_margin >= self.min_closure_margin)
             and (most is None or grasp.critical_friction <= most)
@@ -138,6 +139,28 @@ class Demands:
             )
             and (self.where is None or bool(self.where(grasp)))
         )
+
+
+def families_of(given: Method | Iterable[Method] | None) -> tuple[Method, ...] | None:
+    """Return the families that are asked for, one or several; None where any will do.
+
+    Raises:
+        InputError: Something is no family.
+    """
+    if given is None:
+        return None
+    listed = (given,) if isinstance(given, str) else given
+    return several(listed, _family, "family", "families")
+
+
+def _family(given: Any) -> Method:
+    one_of(given, get_args(Method), "family")
+    return cast("Method", given)
+
+
+def _is_of(grasp: Grasp, family: Method) -> bool:
+    """Return whether a grasp is of a family, by its id where the free method made it."""
+    return grasp.id.startswith(FREE_IDS) if family == "free" else grasp.family == family
 
 
 def data_frame(grasps: Sequence[Grasp]) -> Any:
@@ -150,6 +173,15 @@ def data_frame(grasps: Sequence[Grasp]) -> Any:
     Raises:
         InputError: The library pandas is not installed.
     """
+    return frame_of([_row(grasp) for grasp in grasps], [grasp.id for grasp in grasps])
+
+
+def frame_of(rows: Sequence[Mapping[str, object]], ids: Sequence[str]) -> Any:
+    """Return a `pandas.DataFrame` of rows, cells by column, indexed by id.
+
+    Raises:
+        InputError: The library pandas is not installed.
+    """
     try:
         pandas: Any = importlib.import_module("pandas")
     except ImportError as error:
@@ -157,8 +189,7 @@ def data_frame(grasps: Sequence[Grasp]) -> Any:
             "to_dataframe: expected that pandas is installed, but it is not; install it with "
             "pip install pandas"
         ) from error
-    index = pandas.Index([grasp.id for grasp in grasps], name="id")
-    return pandas.DataFrame([_row(grasp) for grasp in grasps], index=index)
+    return pandas.DataFrame(list(rows), index=pandas.Index(list(ids), name="id"))
 
 
 def _row(grasp: Grasp) -> Mapping[str, object]:

@@ -9,6 +9,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
 import pytest
 
 import grasp_core as gc
@@ -299,12 +300,16 @@ def test_the_contacts_file_is_one(tmp_path):
     assert grasp.name == json.loads(text)["grasps"][0]["id"]
 
 
-def test_the_lines_of_python_run(tmp_path, monkeypatch):
+def test_the_lines_of_python_run(tmp_path, monkeypatch, capsys):
     pytest.importorskip("pyarrow")
     build_small(tmp_path / "ds")
     monkeypatch.chdir(tmp_path)
-    (code,) = blocks(DATASETS, "python")
+    loading, training = blocks(DATASETS, "python")
     names = {}
-    exec(code, names)  # noqa: S102 - it is what the page tells people to run
+    exec(loading, names)  # noqa: S102 - it is what the page tells people to run
     assert names["points"].shape[1:] == (4, 3)
     assert len(names["points"])
+    exec(training, names)  # noqa: S102 - the same
+    assert capsys.readouterr().out == "25 True False\n"
+    assert 0 < names["testing"].sum() < len(names["testing"]) == len(names["labels"])
+    assert np.isfinite(names["inputs"]).all()

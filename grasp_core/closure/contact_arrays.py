@@ -1,9 +1,9 @@
 """Turns contacts into checked arrays, one set or many sets of equal size, and into a hash."""
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,13 +25,16 @@ def stacked(contacts: Iterable[Contact]) -> tuple[Array, Array]:
 
 
 def contact_arrays(
-    positions: ArrayLike | Grasp | Iterable[Grasp], normals: ArrayLike | None, *, many: bool = False
-) -> tuple[Array, Array]:
+    positions: ArrayLike | Grasp | Iterable[Grasp] | Sequence[Contact], normals: ArrayLike | None,
+    *, many: bool = False,
+) -> tuple[Array, Array]:  # fmt: skip
     """Return checked positions and normals of one set of contacts, or of many sets.
 
     Args:
-        positions: Contact points, (k, 3) [m], or a Grasp; for many sets (g, k, 3), or grasps.
-        normals: Unit vectors into the object, of the same shape; None where grasps are given.
+        positions: Contact points, (k, 3) [m], a Grasp, or Contacts; for many sets (g, k, 3), or
+            grasps.
+        normals: Unit vectors into the object, of the same shape; None where grasps or Contacts are
+            given.
         many: Whether there is an axis of sets.
 
     Raises:
@@ -39,21 +42,40 @@ def contact_arrays(
             contacts in a set.
     """
     given: Any = positions
-    if isinstance(positions, Grasp) and not many:
-        if normals is not None:
-            raise InputError(
-                f"normals must be left out where a Grasp is given, got {shown(normals)}"
-            )
-        return positions.positions, positions.normals
     if normals is None and many:
         return _of_grasps((given,) if isinstance(given, Grasp) else given)
-    if normals is None:
-        raise InputError("normals are missing; pass positions and normals, or a Grasp")
+    held = None if many else contacts_in(given)
+    if held is not None and normals is not None:
+        what = "a Grasp is" if isinstance(given, Grasp) else "Contacts are"
+        raise InputError(f"normals must be left out where {what} given, got {shown(normals)}")
+    if isinstance(given, Grasp):
+        return given.positions, given.normals
+    if held is not None:
+        given, units = stacked(held)
+    elif normals is not None:
+        units = normals
+    else:
+        raise InputError(
+            "normals are missing; pass positions and normals, a Grasp, or a sequence of Contacts"
+        )
     points = frozen(given, (None, None, 3) if many else (None, 3), "positions")
     if points.shape[-2] < FEWEST:
         raise InputError(f"positions must hold at least two contacts, got {points.shape[-2]}")
     check_spread(np.ptp(points, axis=-2))
-    return points, frozen_units(normals, points.shape, "normals")
+    return points, frozen_units(units, points.shape, "normals")
+
+
+def contacts_in(given: Any) -> tuple[Contact, ...] | None:
+    """Return the contacts of a Grasp or of a sequence of Contacts; None for anything else."""
+    if isinstance(given, Grasp):
+        return given.contacts
+    if not isinstance(given, list | tuple):
+        return None
+    listed = cast("list[object] | tuple[object, ...]", given)
+    if not listed or not isinstance(listed[0], Contact):
+        return None
+    check = partial(instance, kind=Contact, name="positions", remedy="all must be Contacts")
+    return several(listed, check, "positions", "Contacts")
 
 
 def _of_grasps(given: Any) -> tuple[Array, Array]:

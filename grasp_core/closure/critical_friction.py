@@ -24,7 +24,7 @@ narrow, `friction_search` goes program by program, with proofs in rational arith
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,7 +41,7 @@ from grasp_core.closure.soft.contacts import SoftContacts, contact_torsions
 from grasp_core.closure.soft.critical_friction import friction_interval
 from grasp_core.closure.wrenches import WRENCH, normal_and_tangential
 from grasp_core.compiled import compiled
-from grasp_core.values import Grasp
+from grasp_core.values import Contact, Grasp
 
 KERNEL = "grasp_core.closure.critical_friction_kernel"
 NO_FORCE = 1e-100
@@ -52,7 +52,7 @@ SEARCHED = 0.95
 
 
 def critical_friction(
-    positions: ArrayLike | Grasp,
+    positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None = None,
     *,
     torsion_m: ArrayLike = 0.0,
@@ -64,7 +64,7 @@ def critical_friction(
     interval is at most 6e-8 wide, or that share of its upper end where this is above 1.
 
     Args:
-        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
+        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp or Contacts.
         normals: Unit vectors into the object, (k, 3).
         torsion_m: Torsional coefficient, one for all contacts or one each, (k,) [m]. It stays as it
             is whatever the friction; zero is a hard finger.
@@ -109,13 +109,13 @@ def critical_frictions(
 
 
 def critical_friction_interval(
-    positions: ArrayLike | Grasp,
+    positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None = None,
 ) -> FrictionInterval:
     """Find proved bounds of the critical friction, with the forces and twist as proof.
 
     Args:
-        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
+        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp or Contacts.
         normals: Unit vectors into the object, (k, 3).
 
     Returns:

@@ -29,6 +29,7 @@ made explicit; the cone program is standard.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -45,7 +46,7 @@ from grasp_core.closure.soft.contacts import SoftContacts, are_torsions, contact
 from grasp_core.closure.wrenches import normal_and_tangential
 from grasp_core.errors import UndecidedError
 from grasp_core.fields import are_frictions, are_units, is_array, is_number
-from grasp_core.values import Grasp
+from grasp_core.values import Contact, Grasp
 
 UNSAFE = 1e-6
 """Size of a margin above which the margin itself does not explain why nothing can be proved."""
@@ -194,7 +195,7 @@ def _balance(forces: Array, arms: Array, normals: Array) -> bool:
 
 
 def force_closure(
-    positions: ArrayLike | Grasp,
+    positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None = None,
     friction: ArrayLike = 0.5,
     *,
@@ -203,7 +204,7 @@ def force_closure(
     """Decide force closure of contacts under Coulomb friction, hard ones or soft ones.
 
     Args:
-        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
+        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp or Contacts.
         normals: Unit vectors into the object, (k, 3).
         friction: Coulomb coefficient, one for all contacts or one each, (k,).
         torsion_m: Torsional coefficient, one for all contacts or one each, (k,) [m]: the largest

@@ -21,6 +21,7 @@ and the torsional coefficient mu_ti, that is, a torque over the length mu_ti / m
 Source: Ferrari & Canny, "Planning optimal grasps" (ICRA 1992), with circular cones.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Self, TypeAlias, get_args
 
@@ -37,7 +38,7 @@ from grasp_core.errors import InputError
 from grasp_core.fields import are_frictions, is_a, is_array
 from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.solvers.ties import on_grid
-from grasp_core.values import Grasp
+from grasp_core.values import Contact, Grasp
 
 Norm: TypeAlias = Literal["l1", "linf"]
 """How contact forces are bounded: by the sum of normal forces (`l1`) or one by one (`linf`)."""
@@ -99,7 +100,7 @@ class WrenchSet(ByValue):
     @classmethod
     def of(  # noqa: PLR0913 - each is a quantity of its own
         cls,
-        positions: ArrayLike | Grasp,
+        positions: ArrayLike | Grasp | Sequence[Contact],
         normals: ArrayLike | None,
         friction: ArrayLike,
         *,

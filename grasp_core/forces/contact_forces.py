@@ -4,7 +4,7 @@
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Literal
 
@@ -23,11 +23,11 @@ from grasp_core.forces.force_programs import (
     least_imbalance,
     least_norm,
 )
-from grasp_core.values import Grasp
+from grasp_core.values import Contact, Grasp
 
 
 def contact_forces(  # noqa: PLR0913 - the contract's arguments
-    positions: ArrayLike | Grasp,
+    positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None,
     friction: ArrayLike,
     wrench: ArrayLike,
@@ -39,7 +39,7 @@ def contact_forces(  # noqa: PLR0913 - the contract's arguments
     """Find forces at the contacts that balance an external wrench, or each of many.
 
     Args:
-        positions: Contact points, (k, 3) [m]; or a Grasp, with `normals` None.
+        positions: Contact points, (k, 3) [m]; or a Grasp or Contacts, with `normals` None.
         normals: Unit vectors into the object, (k, 3).
         friction: Coulomb coefficient that the forces must respect, one for all contacts or one
             each, (k,).
@@ -121,7 +121,7 @@ def _objective(name: str) -> Callable[[Balance, Array], Array]:
 
 
 def _balance(
-    positions: ArrayLike | Grasp, normals: ArrayLike | None, wrenches: Array,
+    positions: ArrayLike | Grasp | Sequence[Contact], normals: ArrayLike | None, wrenches: Array,
     normal_force: tuple[float, float], center: ArrayLike, *, by_load: bool = False,
 ) -> Balance:  # fmt: skip
     points, units = contact_arrays(positions, normals)

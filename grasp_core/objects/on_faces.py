@@ -33,7 +33,10 @@ def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
             its surface or outside its border.
     """
     check_body(body)
-    instance(grasp, Grasp, "grasp", "gc.plan makes grasps")
+    instance(
+        grasp, Grasp, "grasp", "gc.plan makes grasps; of contacts of your own, seat and grasp_of "
+        "in grasp_core.planning.given_contacts make one, as docs/python.md shows",
+    )  # fmt: skip
     slack = ON_FACE * body.radius
     for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True)):
         where = f"grasp {grasp.id}: contact {finger}"

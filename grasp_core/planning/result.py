@@ -1,18 +1,18 @@
 """Holds a plan: the grasps found on one object, what was tried, and what was ruled out."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from textwrap import shorten
 from typing import Any, Literal, Protocol, TypeAlias
 
 from grasp_core.by_value import ByValue
-from grasp_core.grasp_tables import ById, Demands, data_frame
+from grasp_core.grasp_tables import ById, Demands, data_frame, families_of
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.short_text import counted, summary
-from grasp_core.values import FaceQuadruple, Family, Grasp
+from grasp_core.values import FaceQuadruple, Grasp, Method
 
 LONGEST_REASON = 160
 """Most characters of a reason in the `repr` of a plan, so that it takes two lines at most."""
@@ -192,7 +192,7 @@ class Plan(ByValue, ById[Grasp], InNotebooks):
         self,
         where: Callable[[Grasp], bool] | None = None,
         *,
-        family: Family | None = None,
+        family: Method | Sequence[Method] | None = None,
         min_radius_m: float | None = None,
         min_closure_margin: float | None = None,
         max_critical_friction: float | None = None,
@@ -202,7 +202,8 @@ class Plan(ByValue, ById[Grasp], InNotebooks):
 
         Args:
             where: A function that says of a grasp whether it is kept.
-            family: The family of the grasps that are kept.
+            family: The family of the grasps that are kept, or several. `free` keeps what the free
+                method made: ids that begin with `f-`, whose `family` is that of their lines.
             min_radius_m: Least radius of the discs in which fingers may stand [m].
             min_closure_margin: Least proved margin of force closure.
             max_critical_friction: Largest critical friction.
@@ -212,8 +213,8 @@ class Plan(ByValue, ById[Grasp], InNotebooks):
             InputError: A demand is not a number, or there is no such family.
         """
         demands = Demands(
-            family, min_radius_m, min_closure_margin, max_critical_friction, min_ferrari_canny_n,
-            where,
+            families_of(family), min_radius_m, min_closure_margin, max_critical_friction,
+            min_ferrari_canny_n, where,
         )  # fmt: skip
         return replace(self, grasps=tuple(filter(demands.are_met_by, self.grasps)))
 
@@ -230,7 +231,7 @@ class Plan(ByValue, ById[Grasp], InNotebooks):
     def __repr__(self) -> str:
         """Return a summary: number of grasps, largest radius, and outcomes of all quadruples."""
         of, known = self.counts.quadruples, self.outcomes
-        sets = f"of {counted(of, 'face quadruple')} {known.held} held, {known.absent} absent"
+        sets = f"{counted(of, 'face quadruple')} searched: {known.held} held, {known.absent} absent"
         sets += f", {known.open} open, {known.out_of_reach} out of reach"
         parts = [counted(len(self.grasps), "grasp"), sets]
         if self.absence is not None:

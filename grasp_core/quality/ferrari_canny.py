@@ -26,6 +26,7 @@ Source: Ferrari & Canny 1992; the growing polytope is the expanding-polytope alg
 collision detection in six dimensions (also Zheng 2013 for this metric).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,7 +40,7 @@ from grasp_core.closure.wrenches import WRENCH
 from grasp_core.compiled import compiled
 from grasp_core.fields import are_units, is_a, is_array, is_number
 from grasp_core.quality.inner_polytope import InnerPolytope
-from grasp_core.values import Grasp
+from grasp_core.values import Contact, Grasp
 
 GAP = 1e-4
 """Default of the largest relative gap (upper - lower) / upper between the bounds of a quality."""
@@ -113,7 +114,7 @@ class FerrariCanny(ByValue):
 
 
 def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
-    positions: ArrayLike | Grasp,
+    positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None = None,
     friction: ArrayLike = 0.5,
     *,
@@ -126,7 +127,7 @@ def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
     """Bound the largest wrench that bounded contact forces resist in every direction.
 
     Args:
-        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp.
+        positions: Contact points, (k, 3) [m], k >= 2; or a Grasp or Contacts.
         normals: Unit vectors into the object, (k, 3).
         friction: Coulomb coefficient, one for all contacts or one each, (k,).
         center: Point about which torques are taken, (3,) [m].

@@ -8,7 +8,7 @@ without pyramids see `ferrari_canny`.
 
 import importlib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,13 +16,19 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.checked import MOST_EDGES, whole
-from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions, unit_size
+from grasp_core.closure.contact_arrays import (
+    contact_arrays,
+    contact_frictions,
+    contacts_in,
+    stacked,
+    unit_size,
+)
 from grasp_core.closure.wrench_sets import WrenchSet, scaled_arms
 from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
 from grasp_core.solvers.lp import RESIDUAL, LinearProgram, Optimum, maximize
-from grasp_core.values import Grasp
+from grasp_core.values import Contact, Grasp
 
 FEWEST_EDGES = 3
 KERNEL = "grasp_core.quality.min_weight_kernel"
@@ -57,7 +63,7 @@ def _circle(edges: int) -> Array:
 
 
 def min_weight(
-    positions: ArrayLike | Grasp,
+    positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None = None,
     friction: ArrayLike = 0.5,
     *,
@@ -70,7 +76,7 @@ def min_weight(
         l = 1/N - max y.m  subject to  y.(m - w_j) <= 1/N.
 
     Args:
-        positions: Contact points, (k, 3) [m]; or a Grasp.
+        positions: Contact points, (k, 3) [m]; or a Grasp or Contacts.
         normals: Unit vectors into the object, (k, 3).
         friction: Coulomb coefficient, one for all contacts or one each, (k,).
         edges: How many edges each pyramid has.
@@ -177,7 +183,7 @@ def _balanced_by_any_weights(W: Array) -> bool:
 
 
 def hull_volume(
-    positions: ArrayLike | Grasp,
+    positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None = None,
     friction: ArrayLike = 0.5,
     *,
@@ -188,7 +194,7 @@ def hull_volume(
     """Compute the volume of the hull of the pyramids' edges in wrench space [N^6].
 
     Args:
-        positions: Contact points, (k, 3) [m]; or a Grasp.
+        positions: Contact points, (k, 3) [m]; or a Grasp or Contacts.
         normals: Unit vectors into the object, (k, 3).
         friction: Coulomb coefficient, one for all contacts or one each, (k,).
         center: Point about which torques are taken, (3,) [m].
@@ -214,7 +220,10 @@ def hull_volume(
 
 
 def smallest_singular_value(
-    positions: ArrayLike | Grasp, *, center: ArrayLike = (0.0, 0.0, 0.0), torque_scale: float
+    positions: ArrayLike | Grasp | Sequence[Contact],
+    *,
+    center: ArrayLike = (0.0, 0.0, 0.0),
+    torque_scale: float,
 ) -> float:
     """Compute the least singular value of the map from forces to wrenches.
 
@@ -222,7 +231,7 @@ def smallest_singular_value(
     line.
 
     Args:
-        positions: Contact points, (k, 3) [m]; or a Grasp.
+        positions: Contact points, (k, 3) [m]; or a Grasp or Contacts.
         center: Point about which torques are taken, (3,) [m].
         torque_scale: Length that makes a torque comparable with a force [m].
 
@@ -232,7 +241,8 @@ def smallest_singular_value(
     Source:
         Li & Sastry, "Task-oriented optimal grasping by multifingered robot hands" (1988).
     """
-    given = positions.positions if isinstance(positions, Grasp) else positions
+    held = contacts_in(positions)
+    given: Any = positions if held is None else stacked(held)[0]
     points = frozen(given, (None, 3), "positions")
     if not len(points):
         raise InputError("positions must hold at least one contact, got none")

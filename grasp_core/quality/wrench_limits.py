@@ -26,6 +26,7 @@ local force, u = m mu / mu_t [N] with the torsional coefficient mu_t, so that th
 |(f_t, u)| <= mu f_n and all of the above stays as it is.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -43,7 +44,7 @@ from grasp_core.errors import InputError
 from grasp_core.fields import is_array, is_number
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.solvers.conic import ConicProgram, minimize
-from grasp_core.values import Grasp
+from grasp_core.values import Contact, Grasp
 
 KERNEL = "grasp_core.quality.wrench_limits_kernel"
 CLOSE = 1e-7
@@ -85,7 +86,7 @@ class WrenchLimit(ByValue):
 
     def verify(  # noqa: PLR0913 - each is a quantity of its own
         self,
-        positions: ArrayLike | Grasp,
+        positions: ArrayLike | Grasp | Sequence[Contact],
         normals: ArrayLike | None,
         friction: ArrayLike,
         *,
@@ -98,7 +99,7 @@ class WrenchLimit(ByValue):
 
         Args:
             positions: Contact points or Grasp, as given to `wrench_limits`, (k, 3) [m].
-            normals: Unit vectors into the object, (k, 3), or None with a Grasp.
+            normals: Unit vectors into the object, (k, 3), or None with a Grasp or Contacts.
             friction: Coulomb coefficient, one for all contacts or one each.
             max_normal_force: Largest normal force of each contact [N].
             center: Point about which torques are taken, (3,) [m].
@@ -138,7 +139,7 @@ class WrenchLimit(ByValue):
 
 
 def max_resisted_wrench(  # noqa: PLR0913 - each is a quantity of its own
-    positions: ArrayLike | Grasp,
+    positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None,
     friction: ArrayLike,
     wrench: ArrayLike,
@@ -151,7 +152,7 @@ def max_resisted_wrench(  # noqa: PLR0913 - each is a quantity of its own
     """Find the largest multiple of an external wrench that the contacts can resist.
 
     Args:
-        positions: Contact points, (k, 3) [m]; or a Grasp, with `normals` None.
+        positions: Contact points, (k, 3) [m]; or a Grasp or Contacts, with `normals` None.
         normals: Unit vectors into the object, (k, 3).
         friction: Coulomb coefficient, one for all contacts or one each.
         wrench: External (force, torque), (6,) [N, N m], torque about `center`.
@@ -174,7 +175,7 @@ def max_resisted_wrench(  # noqa: PLR0913 - each is a quantity of its own
 
 
 def wrench_limits(  # noqa: PLR0913 - each is a quantity of its own
-    positions: ArrayLike | Grasp,
+    positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None,
     friction: ArrayLike,
     wrenches: ArrayLike,
@@ -189,7 +190,7 @@ def wrench_limits(  # noqa: PLR0913 - each is a quantity of its own
     The weakest of the limits is `min(limits, key=lambda found: found.limit)`.
 
     Args:
-        positions: Contact points, (k, 3) [m]; or a Grasp, with `normals` None.
+        positions: Contact points, (k, 3) [m]; or a Grasp or Contacts, with `normals` None.
         normals: Unit vectors into the object, (k, 3).
         friction: Coulomb coefficient, one for all contacts or one each.
         wrenches: External (force, torque), (n, 6) [N, N m], torque about `center`.

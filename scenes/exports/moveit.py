@@ -33,8 +33,8 @@ def yaml_text(body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> str:
         yaml: Any = importlib.import_module("yaml")
     except ImportError as error:
         raise InputError(
-            "writing YAML needs PyYAML: run pip install 'graspproof[moveit]', or take another "
-            "format"
+            "writing YAML needs PyYAML: run pip install 'graspproof[moveit]' ('.[moveit]' in a "
+            "checkout), or take another format"
         ) from error
     document = {
         "graspable_object": graspable_object(body, grasps),

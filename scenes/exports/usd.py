@@ -34,7 +34,8 @@ def write_usd(path: Path, body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> 
         Usd, Geom, Gf, Sdf = (importlib.import_module(f"pxr.{name}") for name in names)
     except ImportError as error:
         raise InputError(
-            "writing USD needs usd-core: run pip install 'graspproof[usd]', or take another format"
+            "writing USD needs usd-core: run pip install 'graspproof[usd]' ('.[usd]' in a "
+            "checkout), or take another format"
         ) from error
     stage = Usd.Stage.CreateInMemory()
     Geom.SetStageMetersPerUnit(stage, 1.0)

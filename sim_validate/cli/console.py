@@ -26,6 +26,8 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text)
 
 
+GAP, MARGIN = 2, 1
+"""Widths of the space behind a column of a table, and before the first one, in characters."""
 TABLE_ROWS = 20
 """Largest number of rows shown in a table; files and JSON documents have all of them."""
 
@@ -66,9 +68,21 @@ class Reporter:
             sys.stdout.write(text)
 
     def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Print a table on the same stream as lines of results."""
+        """Print a table on the same stream as lines of results.
+
+        A table that would have to break words or numbers is divided: the columns that do not fit
+        follow below, again beside the first one.
+        """
         if self.quiet:
             return
+        console = self.err if self.json_only else self.out
+        for part in _parts(columns, rows, console.width):
+            chosen = [[row[place] for place in part] for row in rows]
+            self._table(console, title, [columns[place] for place in part], chosen)
+
+    def _table(
+        self, console: Console, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]
+    ) -> None:
         table = Table(
             title=Text(printable(title)),
             title_justify="left",
@@ -82,11 +96,30 @@ class Reporter:
             )
         for row in rows:
             table.add_row(*(Text(printable(cell)) for cell in row))
-        (self.err if self.json_only else self.out).print(table)
+        console.print(table)
 
     def progress(self, title: str) -> "Steps":
         """Show progress of long work: a bar on a terminal, plain lines elsewhere."""
         return Steps(title, self.err, shown=not self.quiet)
+
+
+def _parts(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], width: int
+) -> list[list[int]]:  # fmt: skip
+    """Divide the columns of a table, by their places, into parts that fit; each has the first one.
+
+    The last column may break its lines between words, so it needs as much as its longest word.
+    """
+    texts = [[name, *(row[place] for row in rows)] for place, name in enumerate(columns)]
+    needed = [max(map(len, each)) + GAP for each in texts]
+    needed[-1] = max(len(word) for text in texts[-1] for word in text.split() or [""]) + GAP
+    parts = [[0]]
+    for place in range(1, len(columns)):
+        used = sum(needed[each] for each in parts[-1])
+        if len(parts[-1]) > 1 and MARGIN + used + needed[place] > width:
+            parts.append([0])
+        parts[-1].append(place)
+    return parts
 
 
 class Steps:

@@ -54,8 +54,8 @@ class Tips:
     tip_stiffness_n_per_m: Usual = 2000.0
     """Stiffness of the springs on which fingertips slide [N/m]."""
     tip_radius_m: Usual | None = None
-    """Radius of the fingertips [m]; if not given, the one planned for, or a tenth of the object's
-    radius, or less where that would overlap something."""
+    """Radius of the springy fingertips in executions [m]; if not given, --finger-radius-m of the
+    plan, or a tenth of the object's radius, or less where that would overlap something."""
     tip_mass_kg: Usual = 0.05
     """Mass of a fingertip with the part of its finger that moves with it [kg]."""
     damping_ratio: Annotated[float, at_least(0.01, up_to=10.0)] = 0.5
@@ -81,7 +81,8 @@ class Executing:
     stop_from_m_per_s: Usual = 0.5
     """Speed before a stop [m/s]."""
     knock_n_s: Length = 0.05
-    """Impulse of a knock [N s]; 0 for no knocks."""
+    """Impulse of a knock [N s], whatever the mass: over the mass [kg] it is the speed that a free
+    object would get [m/s]. 0 for no knocks."""
     off_mm: Length = 2.0
     """Distance of a misplaced object from where the fingers expect it [mm]."""
     off_deg: Degrees = 2.0

@@ -122,7 +122,8 @@ class Planning:
     """
     approach_m: Positive | None = None
     """With --finger-radius-m: keep only grasps that fingers of that radius reach along straight
-    paths of this length that do not meet the object [m]."""
+    paths of this length that do not meet the object [m]. Take about the object's size where fingers
+    come from outside, or a few fingertip radii where they only close."""
     edge_clearance_m: NotNegative = 0.0
     """How far contacts and their regions stay from the edges of their faces [m]."""
     share_faces_m: NotNegative | None = None
@@ -134,7 +135,9 @@ class Planning:
     does. They replace the regions of the construction if the discs in them around all contacts are
     larger."""
     finger_radius_m: Positive | None = None
-    """Radius of the fingertips whose path --approach-m keeps free [m]. With --optimize, moved
+    """Radius of your fingertips, whose path --approach-m keeps free [m]. It goes into the plan, and
+    the fingertips in simulation have it, too, unless --fingertip-radius-m (in trials of closure) or
+    --tip-radius-m (in executions) says otherwise. With --optimize, moved
     contacts stay this far from edges, or half the radius of the largest disc in a face if that is
     less. If not given, they stay a twentieth of the object's radius from edges, or as far as
     planned."""
@@ -152,8 +155,8 @@ class Fingers:
     max_normal_force: Usual = 10.0
     """Largest normal force of each finger [N]."""
     fingertip_radius_m: Usual | None = None
-    """Radius of the fingertips [m]; if not given, the one planned for, or a tenth of the object's
-    radius, or less if that does not fit."""
+    """Radius of the fingertips in trials of closure [m]; if not given, --finger-radius-m of the
+    plan, or a tenth of the object's radius, or less if that does not fit."""
     fingertip_mass_kg: Usual | None = None
     """Mass of a fingertip [kg]; if not given, it is chosen so that similar grasps behave alike."""
     stiffness_n_per_m: Usual | None = None

@@ -18,6 +18,7 @@ from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_tom
 from sim_validate.datasets.describing.card import CARD
 from sim_validate.datasets.exports.formats import export
 from sim_validate.datasets.manifest import read_manifest
+from sim_validate.datasets.open_dataset import splits_in_words
 from sim_validate.datasets.verifying.redo import Sample
 from sim_validate.datasets.verifying.verify import verify
 from sim_validate.parallel.clusters import dask_workers, ray_workers
@@ -55,9 +56,11 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
         f"{rows['objects']} objects, {rows['grasps']} grasps and controls, {rows['trials']} trials"
         + (f", {rows['executions']} trials of executions" if config.execution else "")
     )
+    manifest = read_manifest(out)
+    reporter.say(splits_in_words(manifest))
     if built.quarantined:
         reporter.warn(f"{out / 'quarantine.jsonl'} says why objects were left out")
-    reporter.document({"out": str(out), "manifest": asdict(read_manifest(out))})
+    reporter.document({"out": str(out), "manifest": asdict(manifest)})
     return Exit.PARTIAL if built.quarantined else Exit.GOOD
 
 

@@ -1,5 +1,6 @@
 """Runs the command `execute`, which simulates grasps as a robot executes them."""
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -12,7 +13,12 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.executions import check_mass, execution_settings
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
-from sim_validate.execution.jobs import ExecutedGrasp, ExecutionJob, executed
+from sim_validate.execution.jobs import (
+    ExecutedGrasp,
+    ExecutionJob,
+    best_executed,
+    executed,
+)
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (
     Execution,
@@ -29,11 +35,18 @@ from sim_validate.records.executions_json import (
 from sim_validate.records.grasps import grasp_with_id
 from sim_validate.records.setup_toml import physics_from_file
 
-ABSENT = "-"
+ABSENT, NEVER = "-", "never"
+"""Texts for a number that there is not, and for a load that nothing brings about."""
+LOSS_MEANS = (
+    "least loss: least multiple of a trial's load at which the object is lost, predicted; the "
+    "number to choose by (docs/which-number.md)"
+)
 LOAD_MEANS = "load: multiple of the weight, in any direction, that the squeeze is certified for"
+PAYLOAD_MEANS = "payload kg: that multiple of the mass, for loads that grow slowly"
 SLIPS = "first slips, predicted/simulated"
 SLIPS_MEAN = (
-    "first slip: least multiple of the trials' loads at which a contact slips; above one none does"
+    "first slip: least multiple of the trials' loads at which a contact slips; above one none "
+    "does, and in simulation 1.00 also stands for a slip once the whole weight had come"
 )
 
 
@@ -111,20 +124,26 @@ def _code(found: Sequence[ExecutedGrasp]) -> Exit:
 
 def _show(found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter: Reporter) -> None:
     kinds, shown = settings.trials, found[:TABLE_ROWS]
-    columns = ("grasp", "family", "load", "survived", "mm moved", "controls let go")
+    columns = ("grasp", "survived", "least loss", "load", "payload kg", "mm moved", "controls")
     reporter.table("executions", columns, [_row(each) for each in shown])
-    reporter.say(LOAD_MEANS)
+    for meaning in (LOSS_MEANS, LOAD_MEANS, PAYLOAD_MEANS):
+        reporter.say(meaning)
     for title, cell in (("trials survived", _survived), (SLIPS, _slips)):
         rows = [(each.id, *(cell(each.execution, kind) for kind in kinds)) for each in shown]
         reporter.table(title, ("grasp", *kinds), rows)
     reporter.say(SLIPS_MEAN)
     say_cut(len(found), reporter)
     _say_totals(found, settings, reporter)
-    lines = list(_losses(found))
+    lines = list(_losses(found, settings))
     for line in lines[:TABLE_ROWS]:
         reporter.warn(line)
     if len(lines) > TABLE_ROWS:
-        reporter.warn(f"and {len(lines) - TABLE_ROWS} more lines")
+        reporter.warn(
+            f"and {len(lines) - TABLE_ROWS} more: {EXECUTIONS} (--out DIR) has all of them"
+        )
+    if any(not trial.survived for each in found if each.execution
+           for trial in each.execution.of_kind("knock")):  # fmt: skip
+        reporter.warn(knock_in_words(settings))
 
 
 def _say_totals(
@@ -143,17 +162,33 @@ def _say_totals(
         f"survived; {totals['controls_let_go']} of {totals['controls']} negative controls let go "
         "(all should)"
     )
+    if (best := best_executed(found)) is not None and best.execution is not None:
+        reporter.say(
+            f"best for this: {best.id}, predicted to be lost at {best.least_predicted_loss:.3g} "
+            f"times the loads of its worst trial; its squeeze carries "
+            f"{best.execution.payload_kg:.3g} kg in any direction"
+        )
+
+
+def knock_in_words(settings: ExecutionSettings) -> str:
+    """Say which speed a knock gives the object, since its impulse does not depend on the mass."""
+    return (
+        f"a knock of {settings.knock_n_s:g} N s would give a free object of "
+        f"{settings.mass_kg:g} kg {settings.knock_n_s / settings.mass_kg:.3g} m/s; the impulse is "
+        "not scaled to the mass, so choose it with --knock-n-s"
+    )
 
 
 def _row(each: ExecutedGrasp) -> tuple[str, ...]:
     found = each.execution
     if found is None:
-        return (each.id, each.family, ABSENT, "no", ABSENT, ABSENT)
+        return (each.id, "no", *5 * (ABSENT,))
     moved = max((trial.displacement_m for trial in found.trials), default=0.0)
     let_go = sum(control.let_go for control in found.controls)
     return (
-        each.id, each.family, f"{found.load_multiple:.3g}", "yes" if found.survived else "no",
-        f"{1e3 * moved:.3g}", f"{let_go} of {len(found.controls)}",
+        each.id, "yes" if found.survived else "no", multiple_in_words(found.least_predicted_loss),
+        f"{found.load_multiple:.3g}", f"{found.payload_kg:.3g}", f"{1e3 * moved:.3g}",
+        f"{let_go} of {len(found.controls)}",
     )  # fmt: skip
 
 
@@ -168,10 +203,18 @@ def _slips(found: Execution | None, kind: str) -> str:
     if not trials:
         return ABSENT
     predicted = min(trial.predicted_first_slip for trial in trials)
-    return f"{predicted:.2f}/{min(trial.simulated_first_slip for trial in trials):.2f}"
+    simulated = min(trial.simulated_first_slip for trial in trials)
+    return f"{multiple_in_words(predicted)}/{multiple_in_words(simulated)}"
 
 
-def _losses(found: Sequence[ExecutedGrasp]) -> Iterator[str]:
+def multiple_in_words(multiple: float) -> str:
+    """Write the multiple of a load with three digits, and no more than two behind the point."""
+    if math.isinf(multiple):
+        return NEVER
+    return f"{multiple:.{max(0, 2 - math.floor(math.log10(max(multiple, 1.0))))}f}"
+
+
+def _losses(found: Sequence[ExecutedGrasp], settings: ExecutionSettings) -> Iterator[str]:
     """Yield a line about each control that held, grasp without a squeeze, and failed trial."""
     for each in found:
         if each.execution is not None:
@@ -180,4 +223,4 @@ def _losses(found: Sequence[ExecutedGrasp]) -> Iterator[str]:
         if each.execution is None:
             yield f"{each.id}: not executed: {each.reason}"
         else:
-            yield from (f"{each.id}: {line}" for line in losses_in_words(each.execution))
+            yield from (f"{each.id}: {line}" for line in losses_in_words(each.execution, settings))

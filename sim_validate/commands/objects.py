@@ -94,12 +94,13 @@ def _sentences(body: Polyhedron, spanning: int | None) -> Iterator[str]:
         f"{vector(np.round(MM * body.center_of_mass, 3))} mm."
     )
     if spanning is not None:
-        least = "so the constructions of the paper have faces to start from" if spanning else (
-            "so grasps need friction or leaning force cones"
-        )  # fmt: skip
         yield (
-            f"The normals of {spanning} sets of four faces positively span all directions, {least}."
-        )
+            f"The normals of {spanning} sets of four faces positively span all directions, so the "
+            "constructions of the paper have faces to start from." if spanning else
+            "No four of its faces have normals that positively span all directions, as in boxes "
+            "and prisms. Grasps are planned all the same, with force cones that lean and need "
+            "friction; only `--cones normal` would find none."
+        )  # fmt: skip
     yield from (f"Note: {note}." for note in body.notes)
     yield f"The sha256 of its content is {body.content_sha256}."
 

@@ -56,6 +56,10 @@ def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Repor
     ]  # fmt: skip
     columns = ("s", "um moved", "urad turned", "most um slid", "most um off a face")
     reporter.table(f"{recorded.name}: {found.name}, once friction is lowered", columns, rows)
+    reporter.say(
+        "off a face: below zero fingertips press on their faces, which the simulator lets them "
+        "enter by that much"
+    )
     limit = found.predicted_limit
     predicted = "no forces resist it" if limit is None else f"{limit:.4g} times it is resisted"
     needs = found.required_friction

@@ -203,5 +203,6 @@ def _surprises(verdicts: Sequence[Verdict]) -> Iterable[str]:
         for trial in control.tried
         if not control.let_go
     ]
-    more = [f"and {len(lines) - TABLE_ROWS} more lines"] if len(lines) > TABLE_ROWS else []
+    left = len(lines) - TABLE_ROWS
+    more = [f"and {left} more: verdicts.json (--out DIR) has all of them"] if left > 0 else []
     return lines[:TABLE_ROWS] + more

@@ -1,5 +1,6 @@
 """Reads a finished dataset, or one split of it: its tables as arrays, and how they were made."""
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -125,6 +126,16 @@ def select(folder: Path, split: str | None = None) -> Selection:
     return Selection(folder, read_manifest(folder), split)
 
 
+def splits_in_words(manifest: Manifest) -> str:
+    """Say how many objects each split has."""
+    files = manifest.of_table("objects")
+    counts = [
+        f"{split} {sum(each.rows or 0 for each in files if each.split == split)}"
+        for split, _ in reversed(SPLITS)
+    ]
+    return f"{', '.join(counts)} objects"
+
+
 def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Columns]:
     """Read the tables of a dataset, each as a dictionary of its columns.
 
@@ -135,9 +146,20 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
     Returns:
         Arrays by table and column, with one entry per row: contact points, for example, are (n, 4,
         3) [m]. Missing numbers are NaN, or -1 in columns of whole numbers; missing text is None.
+        Columns of truth values are bool; with missing values they are 1.0, 0.0 and NaN.
+
+    Warns:
+        UserWarning: The split has no objects, as splits of small datasets often do.
 
     Raises:
         InputError: The split is unknown, the dataset is not finished, or a file is damaged.
     """
     chosen = select(path_of(folder, "folder"), split)
+    if split is not None and not chosen.counts()["objects"]:
+        warnings.warn(
+            f"{folder}: the split {split} has no objects; the dataset has "
+            f"{splits_in_words(chosen.manifest)}. Another seed splits the objects in another way, "
+            "and docs/datasets.md says how to choose",
+            stacklevel=2,
+        )
     return {name: read_columns(chosen.paths(name), name, chosen.tables) for name in chosen.tables}

@@ -47,7 +47,8 @@ def pyarrow() -> Any:
         return importlib.import_module("pyarrow")
     except ImportError as error:
         raise InputError(
-            "datasets are Parquet files, which need pyarrow: run pip install 'graspproof[dataset]'"
+            "datasets are Parquet files, which need pyarrow: run pip install 'graspproof[dataset]' "
+            "('.[dataset]' in a checkout)"
         ) from error
 
 
@@ -191,8 +192,9 @@ def _check_size(path: Path, claimed: Any) -> None:
 def read_columns(paths: Sequence[Path], name: Name, tables: Tables = TABLES) -> Columns:
     """Read the columns of a table's files, one after another, as arrays (rows, ..).
 
-    Null is NaN in columns of floats, and -1 in columns of whole numbers. Text and truth values are
-    objects, with None for null.
+    Null is NaN in columns of floats, and -1 in columns of whole numbers. Text is an object, with
+    None for null. Truth values are bool where none is null. Otherwise they are 1.0, 0.0 and NaN:
+    floats refuse `~` and `&`, which would give wrong answers for objects without a word.
 
     Raises:
         InputError: A file is damaged.
@@ -203,8 +205,12 @@ def read_columns(paths: Sequence[Path], name: Name, tables: Tables = TABLES) -> 
 
 def _as_array(column: Column, rows: Sequence[Mapping[str, Any]]) -> NDArray[Any]:
     values = [row[column.name] for row in rows]
-    if column.kind not in MISSING:
+    if column.kind == "text":
         return np.array(values, dtype=object)
+    if column.kind == "bool":
+        unknown = any(value is None for value in values)
+        return np.array([math.nan if value is None else value for value in values],
+                        dtype=np.float64 if unknown else np.bool_)  # fmt: skip
     missing = MISSING[column.kind]
     empty = np.full(column.shape, missing).tolist()
     filled = [empty if value is None else value for value in values]

@@ -1,17 +1,18 @@
 """Executes several grasps of one object, in one process or in several, with results in order."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from grasp_core.by_value import ByValue
 from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import NoForcesError
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.solvers.ties import first_best
 from grasp_core.values import Grasp
 from scenes.physics import PhysicsSettings
 from sim_validate.execution.execute import chosen_squeeze, execute, held_scene
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.execution.verdict import Execution
+from sim_validate.execution.verdict import Execution, ExecutionTrial
 from sim_validate.parallel.processes import each, processes
 
 
@@ -47,9 +48,33 @@ class ExecutedGrasp(ByValue):
         return self.execution is not None and self.execution.survived
 
     @property
+    def trials(self) -> tuple[ExecutionTrial, ...]:
+        """The trials of the execution; empty where no squeeze holds the object."""
+        return () if self.execution is None else self.execution.trials
+
+    @property
+    def least_predicted_loss(self) -> float:
+        """Least multiple of a trial's load at which the object is lost, predicted.
+
+        It is 0 where no squeeze holds the object, or no trial is possible.
+        """
+        return 0.0 if self.execution is None else self.execution.least_predicted_loss
+
+    @property
     def controls_let_go(self) -> bool:
         """Whether every negative control slipped, as it must; True where there is none."""
         return self.execution is None or self.execution.controls_let_go
+
+
+def best_executed(grasps: Iterable[ExecutedGrasp]) -> ExecutedGrasp | None:
+    """Return the grasp with the largest of the least predicted losses among those that survived.
+
+    A grasp whose negative control held does not count. Of equal ones the first is taken; None if
+    no grasp survived.
+    """
+    kept = [grasp for grasp in grasps if grasp.survived and grasp.controls_let_go]
+    losses = [grasp.least_predicted_loss for grasp in kept]
+    return kept[first_best(losses)] if kept else None
 
 
 def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[ExecutedGrasp]:

@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from scenes.physics import PhysicsSettings
-from sim_validate.execution.settings import TrialKind
+from sim_validate.execution.settings import ExecutionSettings, TrialKind
 from sim_validate.execution.trials import Skipped
 
 Fate: TypeAlias = Literal["stuck", "slipped", "dropped"]
@@ -88,6 +88,20 @@ class Execution(ByValue):
         """Whether every control slipped, as it must."""
         return all(control.let_go for control in self.controls)
 
+    @property
+    def least_predicted_loss(self) -> float:
+        """Least multiple of a trial's load at which the object is lost, predicted; 0 without one.
+
+        It ranks grasps by survival better than any other number, but is blind to what the fingers
+        meet when an object is misplaced: for those trials it is that of the weight where planned.
+        """
+        return min((trial.predicted_loss for trial in self.trials), default=0.0)
+
+    @property
+    def payload_kg(self) -> float:
+        """Largest mass that the squeeze is certified to carry slowly, in any direction [kg]."""
+        return self.load_multiple * self.mass_kg
+
     def of_kind(self, kind: str) -> tuple[ExecutionTrial, ...]:
         """Return the trials of a kind."""
         return tuple(trial for trial in self.trials if trial.kind == kind)
@@ -98,21 +112,38 @@ class Execution(ByValue):
         return sum(trial.survived for trial in own), len(own)
 
 
-def trial_in_words(trial: ExecutionTrial) -> str:
+def ended(trial: ExecutionTrial, settings: ExecutionSettings | None = None) -> str:
+    """Say what became of the object, and where it was kept and still failed, why.
+
+    Args:
+        trial: The trial.
+        settings: How far an object may move and turn; if None, it is left open which it was.
+    """
+    if trial.survived or trial.dropped:
+        return trial.fate
+    ways = list[str]()
+    if settings is not None:
+        ways += ["moved"] if trial.displacement_m > settings.most_m else []
+        ways += ["turned"] if trial.turn_rad > settings.most_rad else []
+    said = " and ".join(ways) or "moved or turned"
+    return f"{said} too far {'after' if trial.fate == 'slipped' else 'without'} a slip"
+
+
+def trial_in_words(trial: ExecutionTrial, settings: ExecutionSettings | None = None) -> str:
     """Say how a trial of an execution ended, and what was predicted."""
     return (
-        f"{trial.name}: {trial.fate}, moved {1e3 * trial.displacement_m:.3g} mm and turned "
-        f"{math.degrees(trial.turn_rad):.3g} degrees; first slip predicted at "
+        f"{trial.name}: {ended(trial, settings)}, moved {1e3 * trial.displacement_m:.3g} mm and "
+        f"turned {math.degrees(trial.turn_rad):.3g} degrees; first slip predicted at "
         f"{trial.predicted_first_slip:.3g} of the load, simulated at "
         f"{trial.simulated_first_slip:.3g}; loss predicted at {trial.predicted_loss:.3g}"
     )
 
 
-def losses_in_words(found: Execution) -> list[str]:
+def losses_in_words(found: Execution, settings: ExecutionSettings | None = None) -> list[str]:
     """Say which trials were not survived, or that there was none to survive."""
     if not found.trials:
         return ["no trial is possible, so nothing was survived"]
-    return [trial_in_words(trial) for trial in found.trials if not trial.survived]
+    return [trial_in_words(trial, settings) for trial in found.trials if not trial.survived]
 
 
 def held_controls_in_words(found: Execution) -> list[str]:

@@ -159,5 +159,6 @@ def _imported(module: str, extra: str) -> Any:
         return importlib.import_module(module)
     except ImportError as error:
         raise InputError(
-            f"--engine {extra} needs {module}: pip install 'graspproof[{extra}]'"
+            f"--engine {extra} needs {module}: pip install 'graspproof[{extra}]' ('.[{extra}]' in "
+            "a checkout)"
         ) from error

@@ -4,7 +4,7 @@ Numbers that JSON lacks are null: a first slip that never comes is infinite.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,7 +17,7 @@ from grasp_core.files.complaints import record_of, settings_of
 from grasp_core.files.json_text import text_of
 from grasp_core.files.strict_json import place
 from grasp_core.files.text_files import read_text
-from grasp_core.grasp_tables import ById
+from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from scenes.physics import PhysicsSettings
@@ -55,6 +55,32 @@ class Executions(ByValue, ById[ExecutedGrasp]):
     complete: bool
     """Whether every grasp that was asked for was executed."""
     grasps: tuple[ExecutedGrasp, ...]
+
+    def to_dataframe(self) -> Any:
+        """Return a `pandas.DataFrame` with a row for each grasp, indexed by its id.
+
+        Columns are `family`, `survived`, `controls_let_go`, `trials`, `trials_survived`,
+        `least_predicted_loss`, `load_multiple` and `payload_kg`; the last two are NaN where no
+        squeeze holds the object.
+
+        Raises:
+            InputError: The library pandas is not installed.
+        """
+        return frame_of(list(map(_row, self.grasps)), [each.id for each in self.grasps])
+
+
+def _row(grasp: ExecutedGrasp) -> Mapping[str, object]:
+    found = grasp.execution
+    return {
+        "family": grasp.family,
+        "survived": grasp.survived,
+        "controls_let_go": grasp.controls_let_go,
+        "trials": len(grasp.trials),
+        "trials_survived": sum(trial.survived for trial in grasp.trials),
+        "least_predicted_loss": grasp.least_predicted_loss,
+        "load_multiple": math.nan if found is None else found.load_multiple,
+        "payload_kg": math.nan if found is None else found.payload_kg,
+    }
 
 
 def executions_to_json(

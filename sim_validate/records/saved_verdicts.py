@@ -1,5 +1,6 @@
 """Loads `verdicts.json` for people who look at verdicts in Python."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +11,7 @@ from grasp_core.checked import path_of
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
 from grasp_core.files.text_files import read_text
-from grasp_core.grasp_tables import ById
+from grasp_core.grasp_tables import ById, frame_of
 from sim_validate.records.verdicts_schema import SCHEMA, VerdictRecord, VerdictsFile
 from sim_validate.simulation.hold_verdict import LET_GO, Outcome
 
@@ -38,6 +39,11 @@ class SavedVerdict(ByValue):
     record: Mapping[str, Any] = field(repr=False)
     """All fields of the verdict, by the names in docs/files.md."""
 
+    @property
+    def good(self) -> bool:
+        """Whether all wrenches held, negative controls let go, and nothing was contradicted."""
+        return self.held and self.controls_let_go and not self.mismatches
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SavedVerdicts(ByValue, ById[SavedVerdict]):
@@ -54,6 +60,32 @@ class SavedVerdicts(ByValue, ById[SavedVerdict]):
     complete: bool
     """Whether every grasp that was asked for was tested."""
     verdicts: tuple[SavedVerdict, ...]
+
+    def to_dataframe(self) -> Any:
+        """Return a `pandas.DataFrame` with a row for each verdict, indexed by the grasp's id.
+
+        Columns are `good`, `held`, `outcome`, `controls_let_go`, `mismatches` (how many),
+        `predicted_critical_friction`, `simulated_critical_friction` (NaN where it was not
+        measured) and `displacement_m`.
+
+        Raises:
+            InputError: The library pandas is not installed.
+        """
+        return frame_of(list(map(_row, self.verdicts)), [each.id for each in self.verdicts])
+
+
+def _row(verdict: SavedVerdict) -> Mapping[str, object]:
+    simulated = verdict.simulated_critical_friction
+    return {
+        "good": verdict.good,
+        "held": verdict.held,
+        "outcome": verdict.outcome.value,
+        "controls_let_go": verdict.controls_let_go,
+        "mismatches": len(verdict.mismatches),
+        "predicted_critical_friction": verdict.predicted_critical_friction,
+        "simulated_critical_friction": math.nan if simulated is None else simulated,
+        "displacement_m": verdict.displacement_m,
+    }
 
 
 def load_verdicts(path: str | Path) -> SavedVerdicts:

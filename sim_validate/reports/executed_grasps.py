@@ -10,9 +10,9 @@ from typing import cast
 import numpy as np
 
 from scenes.drawing.pages import NOTHING, number
-from sim_validate.execution.jobs import ExecutedGrasp
+from sim_validate.execution.jobs import ExecutedGrasp, best_executed
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.execution.verdict import Execution, ExecutionTrial
+from sim_validate.execution.verdict import Execution, ExecutionTrial, ended
 from sim_validate.records.executions_json import Executions, executions_summary
 from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record, said_of
 
@@ -81,6 +81,9 @@ def execution_row(found: ExecutedGrasp | None) -> Record:
     return {
         "said": said,
         "tone": tone,
+        "loss": _slip(None if execution is None else execution.least_predicted_loss),
+        "least_loss": _in_scripts(0.0 if found is None else found.least_predicted_loss),
+        "payload": number(None if execution is None else execution.payload_kg, 3),
         "multiple": number(None if execution is None else execution.load_multiple, 3),
         "survived": f"{sum(trial.survived for trial in trials)} of {len(trials)}",
         "predicted": _slip(min((trial.predicted_first_slip for trial in trials), default=None)),
@@ -99,7 +102,15 @@ def described_executions(executions: Executions) -> str:
         "controls let go, as all should"
     )
     said += f"; no squeeze holds the object in {lost} of them" if lost else ""
-    return said + ("." if executions.complete else "; the executions were interrupted.")
+    said += "." if executions.complete else "; the executions were interrupted."
+    best = best_executed(executions.grasps)
+    if best is not None and best.execution is not None:
+        said += (
+            f" Best for this is {best.id}: predicted to be lost at "
+            f"{_slip(best.least_predicted_loss)} times the loads of its hardest trial, and its "
+            f"squeeze carries {number(best.execution.payload_kg, 3)} kg in any direction."
+        )
+    return said
 
 
 def execution_settings(executions: Executions) -> Iterable[tuple[str, str]]:
@@ -124,7 +135,9 @@ def execution_section(executions: Executions | None, found: ExecutedGrasp | None
         "tone": tone,
         "facts": list(_facts(executions, execution)),
         "reason": None if found is None else found.reason,
-        "trials": [] if execution is None else [_trial(each) for each in execution.trials],
+        "trials": [] if execution is None else [
+            _trial(each, executions.settings) for each in execution.trials
+        ],
         "controls": [] if execution is None else [
             {
                 "name": each.name,
@@ -178,7 +191,11 @@ def _facts(executions: Executions, found: Execution | None) -> Iterable[tuple[st
     if found is not None:
         sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(found.squeeze, axis=1))
         yield "Squeeze, finger by finger", f"{sizes} N"
-        yield "Certified for", f"{found.load_multiple:.3g} times the weight, in any direction"
+        yield (
+            "Certified for", f"{found.load_multiple:.3g} times the weight, in any direction: a "
+            f"payload of {found.payload_kg:.3g} kg, for loads that grow slowly",
+        )  # fmt: skip
+        yield "Least predicted loss", f"{_slip(found.least_predicted_loss)} times a trial's load"
         if found.load_multiple >= 1.0:
             spare = f"{found.load_multiple - 1.0:.3g} g in any direction, if it grows slowly"
             yield "So the palm may accelerate by", spare
@@ -191,10 +208,10 @@ def _springs(settings: ExecutionSettings) -> str:
     return f"{settings.stiffness_n_per_m:.5g} N/m, {tips}"
 
 
-def _trial(trial: ExecutionTrial) -> Record:
+def _trial(trial: ExecutionTrial, settings: ExecutionSettings) -> Record:
     return {
         "name": trial.name,
-        "fate": trial.fate,
+        "fate": ended(trial, settings),
         "said": "survived" if trial.survived else "failed",
         "tone": GOOD if trial.survived else BAD,
         "slip": number(MILLI * trial.slip_m, 2),
@@ -204,6 +221,11 @@ def _trial(trial: ExecutionTrial) -> Record:
         "loss": _slip(trial.predicted_loss),
         "simulated": _slip(trial.simulated_first_slip),
     }
+
+
+def _in_scripts(multiple: float) -> str:
+    """Write a multiple of a load as scripts of the page read it."""
+    return "Infinity" if math.isinf(multiple) else f"{multiple:.6g}"
 
 
 def _slip(multiple: float | None) -> str:

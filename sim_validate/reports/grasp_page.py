@@ -54,6 +54,18 @@ SPAN = (
     "half-angle of the widest cones around the normals of which any choice of directions "
     "positively spans space; 0: none do, and the force cones lean"
 )
+MOTIONS = (
+    (
+        "Object moved at most", "displacement_m",
+        "under any of the loads below, from when friction was lowered until the answer was known; "
+        "the chart shows one trial in full length",
+    ),
+    (
+        "While a load came, at most", "start_displacement_m",
+        "before that, at high friction: the fingers give way a little",
+    ),
+)  # fmt: skip
+"""Names, fields and meanings of the two motions that a page tells."""
 FOCUS = "where lines of force meet, in the object's frame"
 
 
@@ -126,6 +138,7 @@ def grasp_page(
         facts=list(_facts(run, grasp, verdict)),
         contacts=list(_contacts(shown)),
         certified=_certified(run, grasp),
+        sizes=_sizes(run, verdict),
         trials=[] if verdict is None else [_trial(verdict, each) for each in verdict["wrenches"]],
         controls=[] if verdict is None else _controls(verdict["controls"]),
         commands=[*_commands(run, grasp, verdict), *([DRAW_ALL] if kin.first else [])],
@@ -163,12 +176,10 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[Fac
 
 def _measured(verdict: Record) -> Iterable[Fact]:
     """Yield what the simulation found."""
-    moved = [trial["displacement_m"] for trial in verdict["wrenches"]]
-    known = [MICRO * each for each in moved if each is not None]
-    yield (
-        "Object moved at most", f"{number(max(known, default=None), 2)} µm",
-        "while any of the loads below acted",
-    )  # fmt: skip
+    for name, field, meaning in MOTIONS:
+        moved = [trial.get(field) for trial in verdict["wrenches"]]
+        known = [MICRO * each for each in moved if each is not None]
+        yield name, f"{number(max(known, default=None), 2)} µm", meaning
     if (repeats := verdict.get("robustness")) is not None:
         low, high = repeats["pass_rate_interval"]
         said = f"held {repeats['held']} of {repeats['trials']} times"
@@ -205,6 +216,15 @@ def _certified(run: RunFolder, grasp: Grasp) -> str:
     return (
         f"Regions are certified for friction {run.regions_friction:g}: discs of {discs} mm.{where}"
     )
+
+
+def _sizes(run: RunFolder, verdict: Record | None) -> Record:
+    """Write the lengths by which torques are divided: the object's radius, the grasp's size."""
+    size = None if verdict is None else verdict["settings"]["grasp_size_m"]
+    return {
+        "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
+        "grasp": NOTHING if size is None else f"{number(MILLI * size, 3)} mm",
+    }
 
 
 def _trial(verdict: Record, trial: Record) -> Record:

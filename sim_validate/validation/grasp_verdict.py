@@ -44,6 +44,16 @@ class Verdict(ByValue, InNotebooks):
     controls_failed = Renamed("controls_let_go")
 
     @property
+    def predicted_critical_friction(self) -> float:
+        """The critical friction by analysis, as `SavedVerdict` names it."""
+        return self.critical_friction.predicted
+
+    @property
+    def simulated_critical_friction(self) -> float | None:
+        """The one found in simulation; None if it was not measured or not found."""
+        return self.critical_friction.simulated
+
+    @property
     def failures(self) -> tuple[WrenchVerdict, ...]:
         """The wrenches that were not held, in order."""
         return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)

@@ -48,6 +48,9 @@ def test_an_empty_plan_is_still_a_result(plan):
     ("demand", "meets"),
     [
         ({"family": "pencil"}, lambda g: g.family == "pencil"),
+        ({"family": ["pencil", "regulus"]}, lambda g: g.family in {"pencil", "regulus"}),
+        ({"family": ("free",)}, lambda g: g.id.startswith("f-")),
+        ({"family": ("free", "pencil")}, lambda g: g.id[0] in "fp"),
         ({"min_radius_m": 0.004}, lambda g: g.radius >= 0.004),
         ({"min_closure_margin": 0.05}, lambda g: g.closure_margin >= 0.05),
         ({"max_critical_friction": 0.2}, lambda g: g.critical_friction <= 0.2),
@@ -61,6 +64,14 @@ def test_a_filter_keeps_what_meets_the_demand_in_order(plan, demand, meets):
     assert list(kept) == [grasp for grasp in plan if meets(grasp)]
 
 
+def test_what_plan_takes_for_families_filter_takes_too():
+    body = scenes.example_object("tetrahedron")
+    for families in ("free", ["pencil", "free"]):
+        plan = gc.plan(body, 0.5, families=families)
+        assert len(plan) > 0
+        assert list(plan.filter(family=families)) == list(plan)
+
+
 def test_demands_are_met_together(plan):
     both = plan.filter(family="concurrent", min_radius_m=0.004)
     assert list(both) == list(plan.filter(family="concurrent").filter(min_radius_m=0.004))
@@ -70,6 +81,8 @@ def test_demands_are_met_together(plan):
     ("demand", "words"),
     [
         ({"family": "square"}, "family"),
+        ({"family": ["pencil", "square"]}, "family"),
+        ({"family": 3}, "family"),
         ({"min_radius_m": "a"}, "min_radius_m"),
         ({"max_critical_friction": float("nan")}, "max_critical_friction"),
         ({"where": 3}, "where"),

@@ -39,7 +39,7 @@ def test_plans_objects_and_grasps_are_shown_in_two_lines(planned):
 def test_they_say_what_tells_them_apart(planned):
     body, plan = planned
     assert repr(body) == "Polyhedron('wedge', 6 vertices, 8 triangles, 8 faces, radius=0.0677424)"
-    assert repr(plan).startswith("Plan(3 grasps, of 70 face quadruples ")
+    assert repr(plan).startswith("Plan(3 grasps, 70 face quadruples searched: ")
     assert "friction=0.5" in repr(plan)
     assert len({repr(grasp) for grasp in plan.grasps}) == 3
     for grasp in plan.grasps:

@@ -410,6 +410,7 @@ def test_plans_ordered_by_what_grasps_carry_show_it(capsys):
     [
         (["--approach-m", "0.1"], "--approach-m also needs --finger-radius-m"),
         (["--finger-radius-m", "0.01"], "--finger-radius-m also needs --approach-m"),
+        (["--finger-radius-m", "0.01"], "such as 0.05: about the object's size"),
         (["--edge-clearance-m", "5"], "clearance must be a number from 0"),
         (["--complete", "--family", "pencil"], "needs the free method"),
         (["--optimize", "--share-faces-m", "0.01"], "leave out --optimize or these"),
@@ -420,6 +421,22 @@ def test_plans_ordered_by_what_grasps_carry_show_it(capsys):
 def test_flags_that_do_not_fit_are_refused(capsys, flags, said):
     assert main(["plan", "box", *flags]) == Exit.INPUT
     assert said in capsys.readouterr().err
+
+
+def test_faces_that_span_nothing_are_no_failure(capsys):
+    """No four normals of a box have positive sums in all directions; it is planned all the same."""
+    assert main(["inspect", "box"]) == Exit.GOOD
+    said = capsys.readouterr().out
+    assert "No four of its faces have normals that positively span all directions" in said
+    assert "Grasps are planned all the same" in said
+
+
+@pytest.mark.parametrize("command", ["inspect", "plan", "run"])
+@pytest.mark.usefixtures("here")
+def test_a_file_of_results_is_no_object(capsys, command):
+    Path("grasps.json").write_text("{}")
+    assert main([command, "grasps.json"]) == Exit.INPUT
+    assert "validate` and `execute` read a grasps.json" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("words", EXAMPLES)

@@ -17,6 +17,12 @@ from sim_validate.cli.console import Reporter
 def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
     """Load a mesh file, or a built-in object if the name has no mesh ending."""
     path = Path(name)
+    if path.suffix.lower() == ".json":
+        raise InputError(
+            f"{name}: expected a mesh file or a built-in object, not a file of results; "
+            "`graspproof view`, `validate` and `execute` read a grasps.json, and `graspproof "
+            "report` shows the folder of a run"
+        )
     if path.suffix.lower().lstrip(".") in FORMATS or path.is_file():
         given = mesh.limits
         return load_polyhedron(
@@ -90,7 +96,9 @@ def asked_finger(planning: flag_groups.Planning) -> Finger | None:
         if planning.finger_radius_m is not None and not planning.optimize:
             raise InputError(
                 "--finger-radius-m also needs --approach-m, the length of the straight free path "
-                "on which fingers approach, or --optimize, which keeps contacts that far from edges"
+                "on which fingers approach, such as 0.05: about the object's size where fingers "
+                "come from outside, or a few fingertip radii where they only close; or give "
+                "--optimize, which keeps contacts the radius away from edges"
             )
         return None
     if planning.finger_radius_m is None:

@@ -103,7 +103,8 @@ def write_hdf5(
         h5py: Any = importlib.import_module("h5py")
     except ImportError as error:
         raise InputError(
-            "writing HDF5 needs h5py: run pip install 'graspproof[hdf5]', or choose another format"
+            "writing HDF5 needs h5py: run pip install 'graspproof[hdf5]' ('.[hdf5]' in a "
+            "checkout), or choose another format"
         ) from error
     held = io.BytesIO()
     with h5py.File(held, "w") as file:
@@ -152,7 +153,8 @@ def _plain_columns(chosen: Selection, name: Name) -> Columns:
 
 def _plain(column: Column, values: NDArray[Any]) -> NDArray[Any]:
     if column.kind == "bool":
-        return np.array([-1 if value is None else int(value) for value in values], dtype=np.int8)
+        cells = values.astype(np.float64)
+        return np.where(np.isnan(cells), -1.0, cells).astype(np.int8)
     if column.kind == "text":
         return np.array(["" if value is None else value for value in values], dtype=np.str_)
     return values

@@ -135,7 +135,7 @@ def test_a_loss_names_trial_numbers_and_prediction():
     )
     said = not_survived(ExecutedGrasp("c-1", "", "1f", found))
     assert said.startswith("c-1 with 0.3 kg: 1 of 2 trials lost; its squeeze is certified for 2.7")
-    assert "weight: slipped, moved 7 mm" in said
+    assert "weight: moved or turned too far after a slip, moved 7 mm" in said
     assert "first slip predicted at 0.83 of the load, simulated at 2.49" in said
     assert "control idle did not slip" in said
     assert not_survived(ExecutedGrasp("c", "", "1f", EXECUTION)) == ""

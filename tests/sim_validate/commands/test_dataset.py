@@ -1,7 +1,9 @@
 """Datasets from the command line, and what becomes of them when processes are killed."""
 
+import contextlib
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -12,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import sim_validate as sv
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.verifying.verify import verify
 from sim_validate.main import main
@@ -56,6 +59,22 @@ def large_dataset(tmp_path_factory):
 def test_a_dataset_is_made_and_nothing_is_wrong_with_it(dataset, capsys):
     assert main(["dataset", "verify", str(dataset), "--json"]) == Exit.GOOD
     assert json.loads(capsys.readouterr().out) == {"dataset": str(dataset), "faults": []}
+
+
+def test_a_build_says_how_many_objects_each_split_has(dataset, capsys):
+    """Two objects leave at least one of the three splits without any."""
+    assert main(["dataset", "build", *OBJECTS[:2], *LIGHT, "--out", str(dataset)]) == Exit.GOOD
+    last = capsys.readouterr().out.splitlines()[-1]
+    found = re.fullmatch(r"train (\d), validation (\d), test (\d) objects", last)
+    counts = dict(zip(("train", "validation", "test"), map(int, found.groups()), strict=True))
+    assert sum(counts.values()) == 2
+    for split, count in counts.items():
+        warned = contextlib.nullcontext() if count else pytest.warns(UserWarning, match=last)
+        with warned:
+            grasps = sv.load_dataset(dataset, split)["grasps"]
+        assert len(set(grasps["object_id"])) == count
+        assert grasps["held"].dtype == bool
+    assert 0 in counts.values()
 
 
 def test_a_changed_file_is_named(dataset, tmp_path, capsys):

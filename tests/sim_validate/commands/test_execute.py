@@ -43,10 +43,12 @@ def test_grasps_that_survive_are_shown_and_written(here, capsys):
     assert main([*words, "--trials", "weight,lift,knock"]) == Exit.GOOD
     shown = capsys.readouterr().out
     for part in (
-        "wrote e/executions.json", "controls let go", "2.78", "3 of 3", "6 of 6", "1 of 1",
+        "wrote e/executions.json", "least loss", "payload kg", "2.78", "0.834",
+        "3 of 3", "6 of 6", "1 of 1",
         "first slips, predicted/simulated", "2.75/2.75", "no lift for 2 of 2 grasps: a fingertip",
         "load: multiple of the weight, in any direction, that the squeeze is certified for\n",
-        "at which a contact slips; above one none does\n",
+        "at which a contact slips; above one none does, and in simulation 1.00 also stands for a",
+        "best for this: p-0-7-1-5, predicted to be lost at ",
         "2 of 2 grasps survived every trial with 0.3 kg; 14 of 14 trials were survived; 6 of 6",
     ):  # fmt: skip
         assert part in shown, shown
@@ -79,12 +81,24 @@ def test_a_grasp_that_does_not_survive_is_a_result(capsys):
     assert main([*words, "--out", "."]) == Exit.NEGATIVE
     said = capsys.readouterr()
     assert "0 of 1 grasps survived every trial with 1.3 kg" in said.out
-    assert re.search(r"^c-0-1-2-7: weight: (slipped|dropped), moved [\d.e+]+ mm", said.err, re.M)
+    assert "a knock of" not in said.err
+    assert re.search(
+        r"^c-0-1-2-7: weight: (.*too far after a slip|dropped), moved [\d.e+]+ mm", said.err, re.M
+    )
     (grasp,) = sv.load_executions("executions.json").grasps
     assert not grasp.survived
     (trial,) = grasp.execution.trials
     assert trial.fate in {"slipped", "dropped"}
     assert trial.predicted_first_slip == pytest.approx(grasp.execution.load_multiple, rel=0.05)
+
+
+@pytest.mark.usefixtures("here")
+def test_where_knocks_fail_the_speed_that_they_give_is_told(capsys):
+    words = ["execute", "grasps.json", "--mass-kg", "0.01", "--limit", "1", *QUICK]
+    assert main([*words, "--knock-n-s", "0.4"]) == Exit.NEGATIVE
+    said = capsys.readouterr().err
+    assert "a knock of 0.4 N s would give a free object of 0.01 kg 40 m/s; the impulse is" in said
+    assert re.search("knock [+-][xyz]: (.* too far after a slip|dropped), moved", said)
 
 
 @pytest.mark.usefixtures("here")

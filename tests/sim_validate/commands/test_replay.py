@@ -133,6 +133,7 @@ def test_a_table_for_people(folder, capsys):
     assert f"{name}: too much" in said
     assert "slipped: " in said
     assert "(the file says slipped)" in said
+    assert "off a face: below zero fingertips press on their faces" in said
 
 
 def test_dataset_rows(tmp_path, replay, capsys):

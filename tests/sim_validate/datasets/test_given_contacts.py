@@ -109,8 +109,8 @@ def test_what_is_open_lets_go_and_what_is_off_the_object_is_not_tried(planned, t
     )
     found = judged(tmp_path / "ds", path)
     assert list(found["name"]) == ["../../good", "one face", "far", "turned"]
-    assert list(found["held"]) == [True, False, None, None]
-    assert list(found["force_closed"]) == [True, False, None, None]
+    np.testing.assert_array_equal(found["held"], [1.0, 0.0, np.nan, np.nan])
+    np.testing.assert_array_equal(found["force_closed"], [1.0, 0.0, np.nan, np.nan])
     assert list(found["outcome"][2:]) == ["not_tried"] * 2
     assert all("contact 0 is on no face" in note for note in found["note"][2:])
     assert all(not note for note in found["note"][:2])
@@ -197,4 +197,4 @@ def test_judged_grasps_are_exported_with_what_could_not_be_tried(planned, tmp_pa
                 {name: arrays[name][given] for name in ("contact_points_m", "contact_normals")},
             ),
         )
-    assert list(again["held"]) == [True, None]
+    np.testing.assert_array_equal(again["held"], [1.0, np.nan])

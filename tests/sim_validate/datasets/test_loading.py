@@ -8,6 +8,7 @@ import pytest
 
 import sim_validate
 from sim_validate.datasets.columns import TABLES
+from sim_validate.datasets.parquet import parquet_bytes, read_columns, read_rows
 
 pytest.importorskip("pyarrow")
 SPLITS = ("train", "validation", "test")
@@ -98,12 +99,37 @@ def test_pandas_loads_it_as_the_card_says_and_stacks_lists_to_arrays(beside):
                 np.testing.assert_array_equal(stacked, values)
             elif column.kind == "float":
                 np.testing.assert_array_equal(there.to_numpy(), values)
+            elif column.kind == "bool":
+                assert values.dtype == bool
+                np.testing.assert_array_equal(there.to_numpy(), values)
             else:
                 assert [None if pandas.isna(cell) else cell for cell in there] == list(values)
             compared += values.size
     assert compared == sum(cells(table) for table in expected.values())
     np.testing.assert_array_equal(names["points"], expected["grasps"]["contact_points_m"])
     assert len(names["grasps"]) == len(names["points"]) >= 10
+
+
+def test_truth_values_are_bool_or_floats_that_refuse_to_be_negated(beside, tmp_path):
+    """Objects would take `~` and give -1 or -2 for it, which both count as true."""
+    grasps = sim_validate.load_dataset(beside)["grasps"]
+    held, closed = grasps["held"], grasps["force_closed"]
+    assert held.dtype == closed.dtype == bool
+    assert 0 < (~held).sum() < len(held)
+    (path,) = sorted(Path(beside).glob("data/grasps/train-*.parquet"))
+    rows = read_rows(path, "grasps")
+    unknown = tmp_path / "grasps.parquet"
+    unknown.write_bytes(parquet_bytes("grasps", [rows[0] | {"held": None}, *rows[1:]], {}))
+    found = read_columns([unknown], "grasps")["held"]
+    assert found.dtype == np.float64
+    assert np.isnan(found).sum() == 1
+    assert (found == True).sum() + (found == False).sum() == len(rows) - 1  # noqa: E712
+    with pytest.raises(TypeError):
+        np.invert(found)
+    with pytest.raises(TypeError):
+        np.bitwise_and(found, closed[: len(rows)])
+    with pytest.raises(IndexError):
+        closed[: len(rows)][found]
 
 
 @pytest.fixture

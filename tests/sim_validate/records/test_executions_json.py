@@ -37,6 +37,8 @@ def test_executions_come_back_as_they_were(tmp_path):
     assert found["p-0-1-2-3"].survived
     assert list(found[:2]) == [found[0], found.grasps[1]]
     assert not found["c-0-1-2-3"].controls_let_go
+    assert found["p-0-1-2-3"].trials == found["p-0-1-2-3"].execution.trials != ()
+    assert found[2].trials == ()
     with pytest.raises(KeyError, match="nobody"):
         found["nobody"]
     again = executions_to_json(
@@ -44,6 +46,22 @@ def test_executions_come_back_as_they_were(tmp_path):
     )
     assert again == executions_text()
     assert not executions_from_json(executions_text(complete=False)).complete
+
+
+def test_executions_are_a_table(tmp_path):
+    path = tmp_path / "executions.json"
+    path.write_text(executions_text())
+    found = sv.load_executions(path)
+    table = found.to_dataframe()
+    assert table.index.tolist() == [grasp.id for grasp in found]
+    assert table["survived"].dtype == table["controls_let_go"].dtype == bool
+    assert table["survived"].tolist() == [False, True, False]
+    for grasp in found[:2]:
+        row = table.loc[grasp.id]
+        assert row.least_predicted_loss == min(each.predicted_loss for each in grasp.trials)
+        assert row.payload_kg == grasp.execution.load_multiple * SETTINGS.mass_kg
+    assert np.isnan(table.iloc[2].payload_kg)
+    assert table.iloc[2].least_predicted_loss == 0.0
 
 
 def test_the_file_is_strict_json_with_all_settings():

@@ -37,6 +37,29 @@ def test_verdicts_are_loaded_with_their_figures(folder):
     assert sv.load_verdicts(folder / "verdicts.json") == found
 
 
+def test_saved_and_live_verdicts_have_the_same_names(folder):
+    plan, found = gc.load_grasps(folder / "grasps.json"), sv.load_verdicts(folder / "verdicts.json")
+    live, saved = sv.validate(plan.body, plan[0], 0.5), found[0]
+    for name in ("id", "held", "outcome", "good", "controls_let_go", "mismatches",
+                 "predicted_critical_friction", "simulated_critical_friction"):  # fmt: skip
+        assert getattr(saved, name) == getattr(live, name), name
+    assert saved.good
+    assert not replace(saved, mismatches=("it slipped",)).good
+    assert not replace(saved, controls_let_go=False).good
+
+
+def test_verdicts_are_a_table(folder):
+    found = sv.load_verdicts(folder / "verdicts.json")
+    none = replace(found[1], simulated_critical_friction=None, held=False)
+    table = replace(found, verdicts=(found[0], none)).to_dataframe()
+    assert table.index.tolist() == [verdict.id for verdict in found]
+    assert table["good"].tolist() == [True, False]
+    assert table["good"].dtype == table["held"].dtype == bool
+    assert table["outcome"].tolist() == ["held", "held"]
+    assert table["predicted_critical_friction"].iloc[0] == found[0].predicted_critical_friction
+    assert table["simulated_critical_friction"].isna().tolist() == [False, True]
+
+
 def test_a_control_that_holds_is_told(folder, tmp_path):
     document = json.loads((folder / "verdicts.json").read_text())
     controls = document["verdicts"][0]["controls"]

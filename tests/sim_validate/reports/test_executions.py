@@ -112,14 +112,22 @@ def test_the_first_page_has_a_row_for_each_grasp(run, report):
     text = (report / "index.html").read_text()
     table = text[text.index('id="executions"') :]
     names = [grasp.id for grasp in read_grasps(run / "grasps.json").grasps]
-    assert cells_of(table, f"{names[0]}</a></th>")[-5:] == [
-        "failed 1 of 4 trials", "3 of 4", "2.5", "0.72", "0.73",
+    assert cells_of(table, f"{names[0]}</a></th>")[-7:] == [
+        "failed 1 of 4 trials", "3 of 4", "0.90", "0.75", "2.5", "0.72", "0.73",
     ]  # fmt: skip
-    assert cells_of(table, f"{names[1]}</a></th>")[-5:-2] == ["survived", "4 of 4", "3.5"]
-    assert cells_of(table, f"{names[2]}</a></th>")[-5:] == ["no squeeze", "0 of 0", "-", "-", "-"]
+    assert cells_of(table, f"{names[1]}</a></th>")[-7:-2] == [
+        "survived", "4 of 4", "0.90", "1.05", "3.5",
+    ]  # fmt: skip
+    assert cells_of(table, f"{names[2]}</a></th>")[-7:] == [
+        "no squeeze", "0 of 0", "-", "-", "-", "-", "-",
+    ]  # fmt: skip
+    assert re.findall(r'data-loss="([^"]*)"', text) == ["0.9", "0.9", "0"]
+    assert '<option value="-loss">' in text
     said = " ".join(Page(text).said)
     assert "with 0.3 kg at friction 0.4, 1 of 3 grasps survived every trial; 2 of 2" in said
     assert "no squeeze holds the object in 1 of them" in said
+    assert f"Best for this is {names[1]}: predicted to be lost at 0.90 times" in said
+    assert "its squeeze carries 1.05 kg in any direction." in said
     assert "certified in any direction" in said
     assert "hollow: predicted not to slip" in said
     for name in names:

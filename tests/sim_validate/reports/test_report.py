@@ -101,6 +101,12 @@ def test_a_page_says_what_the_files_say(small_run, small_report):
         assert f"{1e3 * certified['disc_radius_m']:.3g} mm" in said
         assert certified["proof"]["file"] in said
         assert "held 2 of 2 times" in said
+        for field, name in (("displacement_m", "Object moved at most"),
+                            ("start_displacement_m", "While a load came, at most")):  # fmt: skip
+            most = 1e6 * max(trial[field] for trial in verdict["wrenches"])
+            place = page.said.index(name)
+            assert float(page.said[place + 1].split()[0]) == pytest.approx(most, rel=0.06)
+        assert f"the size of the grasp, {1e3 * lever:.3g} mm, so that the limit of a torque" in said
 
 
 def test_the_first_page_counts(small_run, small_report):
@@ -109,6 +115,7 @@ def test_the_first_page_counts(small_run, small_report):
     controls = summary["controls"]
     assert f"3 of 3 held, {controls} of {controls} negative controls were let go" in said
     assert "critical friction: 3 pairs" in said
+    assert "in the trials of closure masses are scaled" in said
     assert "largest wrench [N], torques over grasp size: 39 pairs" in said
     assert "39 agree" in said
 
@@ -242,6 +249,7 @@ def test_of_many_grasps_those_with_bad_news_are_shown(copy, tmp_path):
     assert "3 grasps at friction 0.5" in said
     assert "1 are shown" in said
     assert "critical friction: 3 pairs" in said
+    assert "in the trials of closure masses are scaled" in said
 
 
 def test_several_runs_make_one_report(copy, tmp_path):

@@ -1,0 +1,77 @@
+"""Contacts may be given as values, too: every function takes them where it takes positions."""
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+
+BODY = scenes.example_object("wedge")
+GRASP = gc.plan(BODY, 0.5, limit=1)[0]
+CONTACTS = list(GRASP.contacts)
+LOAD = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "judged",
+    [
+        lambda given: gc.force_closure(given, friction=0.5).closed,
+        gc.critical_friction,
+        lambda given: gc.critical_friction_interval(given).upper,
+        lambda given: gc.min_weight(given, friction=0.5),
+        lambda given: (
+            gc.ferrari_canny(
+                given, friction=0.5, center=BODY.center_of_mass, torque_scale=BODY.radius
+            ).lower
+        ),
+        lambda given: gc.max_resisted_wrench(given, None, 0.5, LOAD, max_normal_force=10.0),
+        lambda given: gc.contact_forces(given, None, 0.5, LOAD).tolist(),
+        lambda given: gc.smallest_singular_value(given, torque_scale=BODY.radius),
+    ],
+)
+def test_contacts_are_judged_as_the_grasp_that_has_them(judged):
+    wanted = judged(GRASP)
+    assert judged(CONTACTS) == judged(tuple(CONTACTS)) == wanted
+    assert judged(CONTACTS[::-1]) is not None
+
+
+def test_flipping_all_normals_changes_nothing_about_closure():
+    """Balanced forces stay balanced when all of them are turned about."""
+    for points, normals in (
+        (GRASP.positions, GRASP.normals),
+        (GRASP.positions[:3], GRASP.normals[:3]),
+    ):
+        for friction in (0.02, 0.3, 0.9):
+            inward = gc.force_closure(points, normals, friction).closed
+            assert gc.force_closure(points, -normals, friction).closed == inward
+        assert gc.critical_friction(points, -normals) == pytest.approx(
+            gc.critical_friction(points, normals), abs=1e-7
+        )
+
+
+@pytest.mark.parametrize(
+    ("given", "normals", "words"),
+    [
+        (CONTACTS, GRASP.normals, "normals must be left out where Contacts are given"),
+        (GRASP, GRASP.normals, "normals must be left out where a Grasp is given"),
+        ([*CONTACTS, 3], None, "positions must be a Contact, got 3"),
+        (CONTACTS[:1], None, "at least two contacts"),
+        (GRASP.positions, None, "normals are missing; pass .* a sequence of Contacts"),
+        ([], None, "normals are missing"),
+    ],
+)
+def test_what_is_given_twice_or_is_no_contact_is_refused(given, normals, words):
+    with pytest.raises(gc.InputError, match=words):
+        gc.force_closure(given, normals, friction=0.5)
+
+
+def test_contacts_of_ones_own_become_a_grasp_that_can_be_validated():
+    import sim_validate as sv
+    from grasp_core.planning.given_contacts import grasp_of, seat
+
+    with pytest.raises(gc.InputError, match="seat and grasp_of"):
+        sv.validate(BODY, CONTACTS)
+    points = np.array([contact.position for contact in CONTACTS])
+    made = grasp_of(seat(BODY, points, GRASP.normals), 0.5, "mine")
+    assert isinstance(made, gc.Grasp)
+    assert made.faces == GRASP.faces
