@@ -18,14 +18,13 @@ from pathlib import Path
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
-from grasp_core.by_value import ByValue
 from grasp_core.checked import instance, path_of
 from grasp_core.files.whole_files import write_parts
 from grasp_core.hands.hand import PALM, Hand, HandFinger, Link, LinkShape
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.hands.hand_layout import HandLayout, hand_layout
-from scenes.mjcf import add_object, opened
+from scenes.mjcf import Scene, add_object, opened
 from scenes.mjcf_text import Element, add_element, as_texts, document, quaternion
 from scenes.physics import PhysicsSettings
 
@@ -57,12 +56,10 @@ def hand_physics() -> PhysicsSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class HandScene(ByValue):
+class HandScene(Scene):
     """A hand that holds an object as the text of a MuJoCo model, with its numbers."""
 
-    xml: str
     layout: HandLayout
-    physics: PhysicsSettings
 
 
 def build_hand_scene(
@@ -87,7 +84,7 @@ def build_hand_scene(
     layout = hand_layout(hand, body, reach, friction, down)
     x, y, z = layout.gravity.tolist()
     used = replace(given, gravity=(x, y, z))
-    return HandScene(hand_text(layout, used), layout, used)
+    return HandScene(hand_text(layout, used), layout, used, "pads")
 
 
 def limited(scene: HandScene, limits: Array, friction: float) -> HandScene:
@@ -97,7 +94,7 @@ def limited(scene: HandScene, limits: Array, friction: float) -> HandScene:
     """
     motors = replace(scene.layout.motors, limits=limits)
     layout = replace(scene.layout, motors=motors, friction=friction)
-    return HandScene(hand_text(layout, scene.physics), layout, scene.physics)
+    return HandScene(hand_text(layout, scene.physics), layout, scene.physics, "pads")
 
 
 def write_hand_scene(scene: HandScene, path: str | Path) -> Path:

@@ -12,6 +12,7 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
+from grasp_core.hands.stance import stance_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
 from scenes.fingertips import FingerSettings
@@ -75,9 +76,8 @@ def validate_hand(  # noqa: PLR0913 - one keyword for each thing that may be ask
             "the torque of a contact"
         )
     scene = build_hand_scene(hand, body, reach, friction, down=down, physics=setup.physics)
-    contacts = reach.contacts or ()
-    positions, normals = [c.position for c in contacts], [c.normal for c in contacts]
-    if not force_closure(positions, normals, friction).closed:
+    contacts = stance_of(hand, reach).contacts
+    if not force_closure(contacts, friction=friction).closed:
         raise InputError(f"the contacts of {reach.grasp} are not in force closure at {friction}")
     gate = require_faithful(setup, friction, body.radius)
     checks = (*gate.checks, *require_faithful_hands(setup, friction))

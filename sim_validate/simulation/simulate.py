@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, cross, to_digits
-from scenes.layout import Layout
 from scenes.mjcf import Scene
 from sim_validate.simulation.engine import (
     batch,
@@ -88,24 +87,10 @@ class Ends(Protocol):
         ...
 
 
-class Simulated(Protocol):
-    """A scene that can be simulated: of fingertips on slides, or of a hand."""
-
-    @property
-    def xml(self) -> str:
-        """Return the text that is compiled."""
-        ...
-
-    @property
-    def layout(self) -> Layout:
-        """Return the numbers that the text was made from."""
-        ...
-
-
 class Bench:
     """A compiled scene on which many trials run at once."""
 
-    def __init__(self, scene: Simulated, *, threads: int = 1, timeout_s: float = math.inf) -> None:
+    def __init__(self, scene: Scene, *, threads: int = 1, timeout_s: float = math.inf) -> None:
         """Compile a scene.
 
         Args:
@@ -266,7 +251,7 @@ def first_touch(scene: Scene) -> tuple[Array, Array]:
     return touched(model, mujoco.MjData(model), tips)
 
 
-def acceleration(scene: Simulated, wrenches: Array) -> Array:
+def acceleration(scene: Scene, wrenches: Array) -> Array:
     """Compute the object's first acceleration under several wrenches, with unloaded fingers.
 
     Args:
