@@ -124,6 +124,7 @@ def test_noise_is_as_the_page_says():
 
 
 @pytest.mark.slow
+@pytest.mark.more
 def test_repeated_checks_are_the_same_each_time():
     command = [sys.executable, "-m", "tests.benchmarks.repeats", "--times", "2"]
     ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)

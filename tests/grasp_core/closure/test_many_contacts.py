@@ -9,6 +9,7 @@ import pytest
 import grasp_core as gc
 from tests.grasp_core.bodies import BODIES, holds, moved
 from tests.judges import pyramids_say
+from tests.marks import more as more_cases
 
 SIDES = 64
 """Pyramids inside and around the cones then differ by 0.12 % in friction."""
@@ -140,7 +141,7 @@ def test_two_hundred_contact_sets_are_decided_as_the_judges_decide_them(body):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", range(2))
+@pytest.mark.parametrize("part", [0, *more_cases(1)])
 @pytest.mark.parametrize("body", BODIES)
 def test_ten_thousand_contact_sets_are_decided_as_the_judges_decide_them(body, part):
     check_many(body, 5_000 // len(BODIES), seed=(2, part))

@@ -17,6 +17,7 @@ from tests.grasp_core.execution.held import (
     opposed,
     planned,
 )
+from tests.marks import more
 
 G = 9.80665
 ANY = gc.any_direction(1.0)
@@ -131,7 +132,7 @@ def test_no_random_or_searched_squeeze_survives_more():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["box", "dodecahedron", "wedge"])
+@pytest.mark.parametrize("name", ["box", *more("dodecahedron", "wedge")])
 def test_no_squeeze_of_many_survives_more(name):
     assert against_brute_force(name, 3, 300) == 900
 

@@ -80,6 +80,7 @@ def test_a_grasp_that_is_not_closed_or_not_there_is_refused():
 
 
 @pytest.mark.slow
+@pytest.mark.more
 def test_nearly_all_grasps_of_all_objects_get_better_and_none_worse(capsys):
     """The best eight grasps of each object; prints how the gains are distributed."""
     gains = {}

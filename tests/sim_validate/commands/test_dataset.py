@@ -127,6 +127,7 @@ def test_a_driver_killed_at_random_moments_loses_nothing(large_dataset, tmp_path
 
 
 @pytest.mark.slow
+@pytest.mark.more
 def test_a_worker_that_is_killed_costs_nothing_but_time(large_dataset, tmp_path):
     folder = tmp_path / "ds"
     process = subprocess.Popen(command(folder, 2))

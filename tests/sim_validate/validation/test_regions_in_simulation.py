@@ -5,13 +5,14 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from tests.benchmarks.regions import FAMILIES, FRICTION, Task, examine
+from tests.benchmarks.regions import FRICTION, Task, examine
+from tests.marks import more
 
 CONES = 1_250
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", ["regulus", "pencil", *more("concurrent", "free")])
 def test_what_the_regions_say_is_so_in_simulation(family):
     tested, far = 0, np.zeros((0, 2))
     for name in ("wedge", "hex-nut", "octahedron", "mug"):
