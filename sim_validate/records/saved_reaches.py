@@ -141,6 +141,7 @@ def _reach(hand: HandRecord, record: ReachRecord, clearance_m: float) -> HandRea
         within_regions=tuple(each["within_region"] for each in contacts),
         pregrasp=_array(pose["pregrasp_joints_rad"]),
         approach=_array(pose["approach"]),
+        used=np.array(pose["used"]) if "used" in pose else None,
     )  # fmt: skip
 
 

@@ -11,9 +11,10 @@ from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.hand_flags import Reach
 from sim_validate.commands.hands.reach import say_where_to_look
+from sim_validate.files.stale_results import REACHES
 from sim_validate.main import main
-from sim_validate.records.reaches_json import REACHES
 from sim_validate.records.reaches_schema import ReachesFile
+from sim_validate.records.saved_reaches import read_reaches
 from tests.grasp_core.hands.gripping import plain_hand
 from tests.hand_models import hand_mjcf
 from tests.three_fingers import THREE_TIPS, three_fingers_file
@@ -111,6 +112,9 @@ def test_three_fingers_stand_at_contacts_that_the_file_names(grasps, tmp_path, c
         assert gc.force_closure(positions, normals, record["friction"]).closed
         # each fingertip is on the face of the planned contact whose place it takes
         assert normals == pytest.approx(grasp.normals[used], abs=1e-6)
+    saved, _ = read_reaches(tmp_path / REACHES)
+    kept = {each["id"]: each["pose"]["used"] for each in record["reaches"]}
+    assert {name: each.used.tolist() for name, each in saved.found.items()} == kept
 
 
 def test_where_no_three_contacts_close_the_command_says_so(tmp_path, capsys):
