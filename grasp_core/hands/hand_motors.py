@@ -50,15 +50,15 @@ def hand_motors(
     points = np.array([contact.position for contact in stance.contacts])
     levers = _levers(hand, found, points, stance.fingers)
     limits = _limits(hand)
-    if down is None and not any_orientation:
-        return Motors.of(levers, limits)
-    weights = GRAVITY_M_PER_S2 * _weights(hand, found)
     if any_orientation:
-        return Motors.in_any_orientation(levers, limits, weights)
-    return Motors.of(levers, limits, weights @ direction(down))
+        return Motors.in_any_orientation(levers, limits, GRAVITY_M_PER_S2 * _weights(hand, found))
+    if down is None:
+        return Motors.of(levers, limits)
+    carried = GRAVITY_M_PER_S2 * _weights(hand, found) @ direction(down)
+    return Motors.of(levers, limits, carried)
 
 
-def direction(down: ArrayLike | None) -> Array:
+def direction(down: ArrayLike) -> Array:
     """Scale a direction to unit length, (3,).
 
     Raises:
