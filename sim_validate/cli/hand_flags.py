@@ -56,6 +56,11 @@ class Reach:
     """Least distance between all that must not touch [m]."""
     starts: Annotated[int, at_least(1, up_to=MOST_STARTS)] = 100
     """Largest number of starts for each grasp."""
+    torque_limit_n_m: Annotated[float | None, at_least(1e-6, up_to=1e6)] = None
+    """Torque limit of every joint [N m], instead of those of the hand."""
+    simulate: bool = False
+    """Hold test wrenches in simulation with the hand's links and motors, and try negative controls;
+    every joint needs a torque limit."""
     friction: Friction | None = None
     """Coulomb coefficient to prove force closure with; if not given, the one planned for."""
     seed: Seed = 0

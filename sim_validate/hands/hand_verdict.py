@@ -2,13 +2,15 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from grasp_core.by_value import ByValue
 from grasp_core.short_text import summary
 from scenes.hands.hand_mjcf import HandScene
 from sim_validate.hands.hand_controls import HandControl
 from sim_validate.simulation.gate.case import Check
 from sim_validate.simulation.hold_verdict import LET_GO, HoldVerdict, Outcome
-from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.simulation.setup import WEAKEST, Agenda, Setup
 from sim_validate.validation.wrench_verdict import WrenchVerdict
 
 
@@ -51,6 +53,16 @@ class HandVerdict(ByValue):
     def held(self) -> bool:
         """Return whether every wrench held."""
         return not self.failures
+
+    @property
+    def weakest_n(self) -> float:
+        """Return the size of the weakest wrench that was found, at its predicted limit [N].
+
+        Torques count over the object's radius.
+        """
+        trial = next(each for each in self.wrenches if each.name == WEAKEST)
+        scale = np.array([1.0] * 3 + [self.scene.layout.radius_m] * 3)
+        return trial.predicted_limit * float(np.linalg.norm(trial.wrench / scale))
 
     @property
     def controls_let_go(self) -> bool:

@@ -1,6 +1,6 @@
 """Writes `reaches.json`: in which grasps a hand can stand, with poses, and why not in others."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
+from sim_validate.hands.hand_verdict import HandVerdict
 from sim_validate.records.hand_model import model_record
 from sim_validate.records.reaches_schema import (
     AskedRecord,
@@ -21,6 +22,7 @@ from sim_validate.records.reaches_schema import (
     ReachesSummary,
     ReachRecord,
     Row,
+    SimulatedHandRecord,
     Triple,
 )
 from sim_validate.records.verdicts_json import object_record
@@ -30,7 +32,7 @@ SCHEMA = 1
 
 def reaches_to_json(  # noqa: PLR0913 - the parts of the file
     hand: Hand, body: Polyhedron, friction: float, asked: AskedRecord, found: Sequence[HandReach],
-    *, complete: bool, grasps: Sequence[Grasp],
+    *, complete: bool, grasps: Sequence[Grasp], verdicts: Mapping[str, HandVerdict] | None = None,
 ) -> str:  # fmt: skip
     """Write the text of `reaches.json`; equal results give equal texts.
 
@@ -42,6 +44,7 @@ def reaches_to_json(  # noqa: PLR0913 - the parts of the file
         found: The results, one per grasp.
         complete: Whether every grasp that was asked for was looked at.
         grasps: The grasps that were asked for.
+        verdicts: What the hand held in simulation, by the ids of the grasps.
     """
     planned = {grasp.id: contacts_sha256(grasp.contacts) for grasp in grasps}
     document: ReachesFile = {
@@ -58,7 +61,10 @@ def reaches_to_json(  # noqa: PLR0913 - the parts of the file
         },
         "asked": asked,
         "summary": reaches_summary(found, complete=complete),
-        "reaches": [_record(hand, each, planned[each.grasp]) for each in found],
+        "reaches": [
+            _record(hand, each, planned[each.grasp], (verdicts or {}).get(each.grasp))
+            for each in found
+        ],
         "versions": versions(),
     }
     return text_of({**document})
@@ -78,8 +84,8 @@ def reaches_summary(found: Sequence[HandReach], *, complete: bool) -> ReachesSum
     }
 
 
-def _record(hand: Hand, found: HandReach, planned: str) -> ReachRecord:
-    return {
+def _record(hand: Hand, found: HandReach, planned: str, verdict: HandVerdict | None) -> ReachRecord:
+    record: ReachRecord = {
         "id": found.grasp,
         "contacts_sha256": planned,
         "reached": found.reached,
@@ -87,6 +93,27 @@ def _record(hand: Hand, found: HandReach, planned: str) -> ReachRecord:
         "explanation": found.explanation,
         "starts": found.starts,
         "pose": _pose(hand, found),
+    }
+    if verdict is not None:
+        record["simulated"] = _simulated(verdict)
+    return record
+
+
+def _simulated(verdict: HandVerdict) -> SimulatedHandRecord:
+    return {
+        "held": verdict.held,
+        "wrenches": len(verdict.wrenches),
+        "not_held": [trial.name for trial in verdict.failures],
+        "weakest_n": verdict.weakest_n,
+        "controls": [
+            {
+                "name": each.control.name,
+                "explanation": each.control.explanation,
+                "let_go": each.let_go,
+            }
+            for each in verdict.controls
+        ],
+        "contradictions": list(verdict.mismatches),
     }
 
 

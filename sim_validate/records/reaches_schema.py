@@ -53,6 +53,29 @@ class PoseRecord(TypedDict):
     approach: Triple | None
 
 
+class HandControlRecord(TypedDict):
+    """Fields about one negative control of a hand."""
+
+    name: str
+    explanation: str
+    let_go: bool
+
+
+class SimulatedHandRecord(TypedDict):
+    """Fields about the trials of a hand in its pose, with its motors."""
+
+    held: bool
+    wrenches: Count
+    """Number of wrenches that were to be held."""
+    not_held: list[str]
+    """Names of the wrenches that were not held."""
+    weakest_n: NotNegative
+    """Size of the weakest wrench at its predicted limit, torques over the object's radius."""
+    controls: list[HandControlRecord]
+    contradictions: list[str]
+    """Where the simulation contradicts the analysis, a sentence each."""
+
+
 class ReachRecord(TypedDict):
     """Fields about one grasp."""
 
@@ -64,6 +87,8 @@ class ReachRecord(TypedDict):
     explanation: str
     starts: Count
     pose: PoseRecord | None
+    simulated: NotRequired[SimulatedHandRecord]
+    """What the hand held in simulation; absent where no simulation was asked for."""
 
 
 class ReachesSummary(TypedDict):

@@ -28,6 +28,7 @@ from sim_validate.records.reaches_schema import (
     PoseRecord,
     ReachesFile,
     ReachRecord,
+    SimulatedHandRecord,
 )
 
 TOUCHING_M = 1e-4
@@ -53,6 +54,8 @@ class SavedReaches:
     """Margin of closure with the contacts that are reached, by the ids of these grasps."""
     fingers: tuple[str, ...]
     """Names of the hand's fingers."""
+    simulated: Mapping[str, SimulatedHandRecord]
+    """What the hand held in simulation, by the ids of the grasps in which it was simulated."""
 
     @property
     def reached(self) -> int:
@@ -104,6 +107,9 @@ def _saved(record: ReachesFile) -> SavedReaches:
             for each in record["reaches"] if each["pose"] is not None
         },
         fingers=tuple(own["fingers"]),
+        simulated={
+            each["id"]: each["simulated"] for each in record["reaches"] if "simulated" in each
+        },
     )  # fmt: skip
 
 

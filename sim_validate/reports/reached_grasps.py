@@ -18,12 +18,19 @@ if TYPE_CHECKING:
 MILLI = 1e3
 STARTS, SEED, CLEARANCE_M = 100, 0, 5e-4
 """Values that `graspproof reach` takes where nothing else is asked for."""
-REASONS = {"collision": "a collision", "limit": "a joint's limit", "not found": "no pose found"}
+REASONS = {
+    "collision": "a collision",
+    "limit": "a joint's limit",
+    "not found": "no pose found",
+    "no closure": "no three contacts close",
+}
 """Words for what was in the way."""
 CLEARANCE = "least distance asked for between all that must not touch: links, palm, object, table"
 FINGERS = "that touch at the grasp's contacts, by finger of the grasp"
 WITHIN = "where the fingertips touch; force closure is proved again with these contacts"
 OPENING = "joint angles at which the fingers are 3 to 15 mm open, with the palm where it is"
+MOTORS = "in simulation, each at 80 % of what contacts and motors resist by the analysis"
+WEAKEST = "that contacts and motors resist; torques over the object's radius"
 WAY = "over 60 mm, with open fingers and nothing in the way"
 
 
@@ -119,6 +126,13 @@ def _facts(reaches: "SavedReaches", found: "HandReach") -> Iterable[tuple[str, s
     if found.reached:
         yield "Fingers open", _found(found.pregrasp), OPENING
         yield "Straight way in", _found(found.approach), WAY
+    if (held := reaches.simulated.get(found.grasp)) is not None:
+        count, lost = held["wrenches"], len(held["not_held"])
+        yield "Held with its motors", f"{count - lost} of {count} wrenches", MOTORS
+        yield "Weakest wrench", f"{number(held['weakest_n'])} N", WEAKEST
+        let_go = sum(control["let_go"] for control in held["controls"])
+        controls = ", ".join(control["name"].replace("_", " ") for control in held["controls"])
+        yield "Controls let go", f"{let_go} of {len(held['controls'])}", controls
     yield "Starts tried", str(found.starts), "postures from which a pose was sought"
 
 

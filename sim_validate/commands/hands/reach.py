@@ -13,8 +13,10 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
 from sim_validate.commands.hands.hand import asked_hand
+from sim_validate.commands.hands.simulated import show_simulated, simulated, with_motors
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import REACHES, remove_reaches
+from sim_validate.hands.hand_verdict import HandVerdict
 from sim_validate.parallel.compiling_hands import compile_for_hands, must_compile
 from sim_validate.parallel.reaching import ReachJob, reached
 from sim_validate.records.grasps import grasp_with_id
@@ -27,7 +29,7 @@ ABSENT = "-"
 
 def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
     """Look for a pose of a hand in each grasp of a file, and write what was found."""
-    hand = asked_hand(command)
+    hand = with_motors(asked_hand(command), command)
     saved = saved_grasps(command.grasps, reporter)
     if saved is None:
         return Exit.NONE
@@ -35,17 +37,19 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
         saved = replace(saved, grasps=(grasp_with_id(command.grasps, saved, command.grasp),))
     chosen = chosen_grasps(saved, friction=command.friction, seed=None, limit=command.limit)
     with alone_in(command.out):
-        found, text = _reach(command, hand, chosen, reporter)
+        found, verdicts, text = _reach(command, hand, chosen, reporter)
     reporter.text(text)
     _show(hand, found, reporter)
+    show_simulated(verdicts, reporter)
     say_where_to_look(command, reporter)
-    return Exit.GOOD if all(each.reached for each in found) else Exit.NEGATIVE
+    good = all(each.reached for each in found) and all(each.good for each in verdicts.values())
+    return Exit.GOOD if good else Exit.NEGATIVE
 
 
 def _reach(
     command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, reporter: Reporter
-) -> tuple[list[HandReach], str]:
-    """Look for poses, and write what is done even if the run is interrupted."""
+) -> tuple[list[HandReach], dict[str, HandVerdict], str]:
+    """Look for poses, test them, and write what is done even if the run is interrupted."""
     if command.out is not None:
         remove_reaches(command.out)
     jobs = [
@@ -63,6 +67,7 @@ def _reach(
         "seed": command.seed,
     }
     found: list[HandReach] = []
+    verdicts: dict[str, HandVerdict] = {}
     if jobs and must_compile():
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_for_hands(hand, saved.body, command.seed, command.jobs)
@@ -72,15 +77,18 @@ def _reach(
                 found.append(each)
                 good = sum(one.reached for one in found)
                 steps.update(len(found), len(jobs), f"({good} reached)")
+        verdicts = simulated(command, hand, saved, found, reporter)
     finally:
-        complete = len(found) == len(jobs)
+        done = sum(each.reached for each in found) == len(verdicts) or not command.simulate
+        complete = len(found) == len(jobs) and done
         text = reaches_to_json(
-            hand, saved.body, saved.friction, asked, found, complete=complete, grasps=saved.grasps
-        )
+            hand, saved.body, saved.friction, asked, found, complete=complete,
+            grasps=saved.grasps, verdicts=verdicts,
+        )  # fmt: skip
         if command.out is not None and found:
             path = write_text(command.out / REACHES, text)
             reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
-    return found, text
+    return found, verdicts, text
 
 
 def _show(hand: Hand, found: Sequence[HandReach], reporter: Reporter) -> None:

@@ -1,6 +1,7 @@
 """The command `reach`: its file, its exit codes, and what it refuses."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -136,3 +137,34 @@ def test_files_from_before_hands_with_three_fingers_are_read(grasps, tmp_path):
     del old["summary"]["no_closure"], old["reaches"][0]["pose"]["used"]
     read = record_of(ReachesFile, json.dumps(old), REACHES, schema=1)
     assert len(read["reaches"][0]["pose"]["contacts"]) == 4
+
+
+def test_a_simulated_hand_holds_and_its_grasps_are_ranked(grasps, tmp_path, capsys):
+    shutil.copy(grasps, tmp_path / "grasps.json")
+    words = ["reach", str(tmp_path / "grasps.json"), "--hand", "allegro", "--limit", "2"]
+    code = main([*words, "--simulate", "--torque-limit-n-m", "0.35", "--out", str(tmp_path)])
+    said = capsys.readouterr().out
+    record = record_of(ReachesFile, (tmp_path / REACHES).read_text(), REACHES, schema=1)
+    reached = [each for each in record["reaches"] if each["reached"]]
+    assert reached, said
+    assert code == (Exit.GOOD if len(reached) == 2 else Exit.NEGATIVE)
+    for each in reached:
+        held = each["simulated"]
+        assert held["held"]
+        assert held["wrenches"] == 13
+        assert len(held["controls"]) >= 3
+        assert all(control["let_go"] for control in held["controls"])
+        assert held["weakest_n"] > 0.1
+    assert f"{len(reached)} of {len(reached)} hands held all wrenches" in said
+    best = max(reached, key=lambda each: each["simulated"]["weakest_n"])["id"]
+    ranked = said[said.index("with its motors") :]
+    assert min((ranked.index(each["id"]), each["id"]) for each in reached)[1] == best
+    assert main(["report", str(tmp_path), "-q"]) == Exit.GOOD
+    page = (tmp_path / "report" / "grasps" / f"{best}.html").read_text()
+    assert "Held with its motors" in page
+    assert "13 of 13 wrenches" in page
+
+
+def test_a_hand_without_torque_limits_is_not_simulated(grasps, capsys):
+    assert main(["reach", str(grasps), "--simulate"]) == Exit.INPUT
+    assert "give one with --torque-limit-n-m" in capsys.readouterr().err
