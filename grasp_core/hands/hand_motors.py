@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, cross, frozen
+from grasp_core.checked import switch
 from grasp_core.errors import InputError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
@@ -46,16 +47,17 @@ def hand_motors(
             has no mass that gravity needs, or a motor cannot carry the links.
     """
     stance = stance_of(hand, reach)
+    switch(any_orientation, "any_orientation")
+    way = None if down is None else direction(down)
     found = places(hand, stance.joints, stance.palm_pose)
     points = np.array([contact.position for contact in stance.contacts])
     levers = _levers(hand, found, points, stance.fingers)
     limits = _limits(hand)
     if any_orientation:
         return Motors.in_any_orientation(levers, limits, GRAVITY_M_PER_S2 * _weights(hand, found))
-    if down is None:
+    if way is None:
         return Motors.of(levers, limits)
-    carried = GRAVITY_M_PER_S2 * _weights(hand, found) @ direction(down)
-    return Motors.of(levers, limits, carried)
+    return Motors.of(levers, limits, GRAVITY_M_PER_S2 * _weights(hand, found) @ way)
 
 
 def direction(down: ArrayLike) -> Array:

@@ -77,12 +77,13 @@ def require_faithful_hands(setup: Setup, friction: float) -> tuple[Check, ...]:
 @lru_cache(maxsize=32)
 def known_hand(setup: Setup, friction: float) -> tuple[Check, ...]:
     """Measure what the known hand resists, and how far it gives way, over the exact figures."""
-    body, reach = _cube(), _stance(friction)
-    scene = build_hand_scene(_hand(), body, reach, friction, physics=setup.physics)
+    body, reach = cube(), stance(friction)
+    scene = build_hand_scene(hinged_hand(), body, reach, friction, physics=setup.physics)
     return (*_limits(scene, body, reach, setup), _displaced(scene, setup))
 
 
-def _cube() -> Polyhedron:
+def cube() -> Polyhedron:
+    """Return the cube that the known hand holds."""
     box = example_object("box")
     vertices = box.vertices - box.center_of_mass
     return Polyhedron.from_mesh(
@@ -96,7 +97,8 @@ def _outward() -> Array:
     return np.array([x, y, -x, -y])
 
 
-def _hand() -> Hand:
+def hinged_hand() -> Hand:
+    """Return the hand with one hinge a finger."""
     fingers = tuple(
         HandFinger(
             f"finger{number}",
@@ -114,7 +116,8 @@ def _joint(number: int, out: Array) -> Joint:
     return Joint(f"hinge{number}", place, np.eye(3), axis, -1.0, 1.0, TORQUE)
 
 
-def _stance(friction: float) -> HandReach:
+def stance(friction: float) -> HandReach:
+    """Return the pose in which it holds the cube, with its proof at a friction."""
     contacts = tuple(Contact(HALF * out, -out) for out in _outward())
     proof = force_closure([c.position for c in contacts], [c.normal for c in contacts], friction)
     return HandReach(

@@ -20,7 +20,7 @@ from grasp_core.hands.kinematics import places
 from grasp_core.hands.named_hands import HANDS, load_hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.values import Contact
-from sim_validate.records.hand_model import hand_of_model
+from sim_validate.records.hand_model import ModelRecord, hand_of_model
 from sim_validate.records.reaches_json import SCHEMA
 from sim_validate.records.reaches_schema import (
     AskedRecord,
@@ -170,7 +170,7 @@ def _hand(record: HandRecord, reached: Sequence[HandReach]) -> tuple[Hand | None
     """
     name = record["name"]
     if "model" in record:
-        hand = hand_of_model(name, record["model"], record["sources"], record["torque_source"])
+        hand = _modelled(name, record, record["model"])
     elif name in HANDS:
         hand = load_hand(name)
     else:
@@ -188,6 +188,13 @@ def _hand(record: HandRecord, reached: Sequence[HandReach]) -> tuple[Hand | None
         "not touch at the contacts there, so it is another hand of that name. Run `graspproof "
         "reach` again."
     )
+
+
+def _modelled(name: str, record: HandRecord, model: ModelRecord) -> Hand:
+    try:
+        return hand_of_model(name, model, record["sources"], record["torque_source"])
+    except InputError as error:
+        raise InputError(f"hand.model of {name} is none that a hand can have: {error}") from error
 
 
 def _touches(hand: Hand, reached: Sequence[HandReach]) -> bool:

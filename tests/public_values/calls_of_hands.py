@@ -1,10 +1,13 @@
 """Functions about hands: a call of each, and what they must refuse."""
 
 import grasp_core as gc
+import scenes
+from sim_validate.hands.hand_gate import cube, hinged_hand, stance
 from tests.public_values.bad_values import (
     AT_LEAST_ONE,
     FRICTION,
     NOT_NEGATIVE,
+    PATH,
     SEED,
     SEVERAL,
     SWITCH,
@@ -24,7 +27,29 @@ def reaching():
     }  # fmt: skip
 
 
+def standing():
+    return {"hand": hinged_hand(), "body": cube(), "reach": stance(0.5), "friction": 0.5}
+
+
+DOWN = optional(array([0.0, 0.0, -1.0])) | {"zero": [0.0, 0.0, 0.0]}
+
+
 CALLS = [
+    Call("gc.hand_motors", lambda: {"hand": hinged_hand(), "reach": stance(0.5)}, {
+        "hand": VALUE, "reach": VALUE, "down": DOWN, "any_orientation": SWITCH,
+    }),
+    Call("scenes.build_hand_scene", standing, {
+        "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": FRICTION, "down": DOWN,
+        "physics": optional(VALUE),
+    }),
+    Call("scenes.write_hand_scene", lambda: {
+        "scene": scenes.build_hand_scene(**standing()), "path": "hand.xml",
+    }, {"scene": VALUE, "path": PATH}),
+    Call("sv.hand_setup", dict, {}),
+    Call("sv.validate_hand", standing, {
+        "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": FRICTION, "down": DOWN,
+        "agenda": optional(VALUE), "setup": optional(VALUE),
+    }),
     Call("gc.load_hand", lambda: {"name": "leap"}, {"name": WORD}),
     Call("gc.reach_with", reaching, {
         "hand": VALUE,

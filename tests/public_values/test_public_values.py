@@ -53,12 +53,14 @@ MADE_BY_FUNCTIONS = {
     "gc.Plan": "plan",
     "gc.QualityCeiling": "quality_ceiling",
     "gc.WrenchLimit": "wrench_limits",
+    "scenes.HandScene": "build_hand_scene",
     "scenes.HeldScene": "build_held_scene",
     "scenes.Layout": "build_scene",
     "scenes.Scene": "build_scene",
     "scenes.Turntable": "show",
     "sv.Execution": "execute",
     "sv.ExecutionTrial": "execute",
+    "sv.HandVerdict": "validate_hand",
     "sv.Verdict": "validate",
 }
 """Results: users read them and do not make them."""
