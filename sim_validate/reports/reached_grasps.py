@@ -9,7 +9,7 @@ from grasp_core.short_text import counted
 from grasp_core.values import Grasp
 from scenes.drawing.hands.posed_hands import PosedHand, posed_hand
 from scenes.drawing.pages import number
-from sim_validate.reports.agreement import GOOD, QUIET, Record
+from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record
 
 if TYPE_CHECKING:
     from grasp_core.hands.reach import HandReach
@@ -68,7 +68,14 @@ def said_of_reach(reaches: "SavedReaches | None", grasp: Grasp) -> tuple[str, st
         return f"{name}: not asked", QUIET
     if not found.reached:
         return f"{name}: not reached, {REASONS[found.reason]}", QUIET
-    return f"{name}: reached, {_where(found)}", GOOD
+    said = f"{name}: reached, {_where(found)}"
+    held = reaches.simulated.get(grasp.id)
+    if held is None:
+        return said, GOOD
+    strength = f"{number(held['weakest_n'])} N with its motors"
+    if held["held"]:
+        return f"{said}, held: {strength}", GOOD
+    return f"{said}, not held in simulation", BAD
 
 
 def _where(found: "HandReach") -> str:
@@ -95,6 +102,10 @@ def reach_settings(reaches: "SavedReaches") -> Iterable[tuple[str, str]]:
     yield "hand.name", reaches.hand_name
     yield "hand.friction", f"{reaches.friction:g}"
     yield from ((f"hand.{name}", str(value)) for name, value in reaches.asked.items())
+    limits = [] if reaches.hand is None else [j.torque_limit_n_m for j in reaches.hand.joints]
+    stated = sorted({limit for limit in limits if limit is not None})
+    if stated:
+        yield "hand.torque_limits_n_m", ", ".join(f"{limit:g}" for limit in stated)
 
 
 def reach_section(reaches: "SavedReaches | None", grasp: Grasp) -> Record | None:
@@ -129,7 +140,7 @@ def _facts(reaches: "SavedReaches", found: "HandReach") -> Iterable[tuple[str, s
     if (held := reaches.simulated.get(found.grasp)) is not None:
         count, lost = held["wrenches"], len(held["not_held"])
         yield "Held with its motors", f"{count - lost} of {count} wrenches", MOTORS
-        yield "Weakest wrench", f"{number(held['weakest_n'])} N", WEAKEST
+        yield "Weakest wrench of the hand", f"{number(held['weakest_n'])} N", WEAKEST
         let_go = sum(control["let_go"] for control in held["controls"])
         controls = ", ".join(control["name"].replace("_", " ") for control in held["controls"])
         yield "Controls let go", f"{let_go} of {len(held['controls'])}", controls

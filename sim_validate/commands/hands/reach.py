@@ -41,7 +41,8 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
     reporter.text(text)
     _show(hand, found, reporter)
     show_simulated(verdicts, reporter)
-    say_where_to_look(command, reporter)
+    if any(each.reached for each in found):
+        say_where_to_look(command, reporter)
     good = all(each.reached for each in found) and all(each.good for each in verdicts.values())
     return Exit.GOOD if good else Exit.NEGATIVE
 
