@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 ENDINGS = (".xml", ".mjcf", ".urdf")
 MENAGERIE = "menagerie:"
+CLOSE_BY = 2
+"""Number of joints between links that may be built into each other, at most."""
 FULL_TURN = np.pi
 """Largest angle of a joint for which the file states no range [rad]."""
 
@@ -93,10 +95,25 @@ def _from_file(path: Path, fingertips: tuple[str, ...]) -> Hand:
                                    "are taken as their boxes",),
         f"{path.name}; None where it states none",
     )  # fmt: skip
-    pairs = _excluded(model, found) | overlapping_pairs(hand, 0.5 * hand.ranges.sum(axis=1))
+    middle = overlapping_pairs(hand, 0.5 * hand.ranges.sum(axis=1))
+    pairs = _excluded(model, found) | (middle & _close_by(hand))
     return Hand(
         hand.name, hand.palm, hand.fingers, hand.sources, hand.torque_source, tuple(sorted(pairs))
     )
+
+
+def _close_by(hand: Hand) -> set[tuple[str, str]]:
+    """Return the names of links that overlap where they are built into each other.
+
+    They are two joints apart at most, in one finger or from the palm. Links of different fingers
+    that meet in the middle of their ranges are not: fingers that close meet there.
+    """
+    pairs = set[tuple[str, str]]()
+    for finger in hand.fingers:
+        chain = [PALM, *(link.name for link in finger.links)]
+        for apart in range(1, CLOSE_BY + 1):
+            pairs |= {(min(p), max(p)) for p in zip(chain, chain[apart:], strict=False)}
+    return pairs
 
 
 def _balls(

@@ -2,6 +2,7 @@
 
 from contextlib import suppress
 from itertools import combinations
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.errors import UndecidedError
+from grasp_core.hands.distances.collisions import overlapping_pairs
 from grasp_core.hands.posing.pose_search import TOUCHING
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
 from tests.hand_models import numbers
@@ -145,3 +147,17 @@ def test_contacts_stay_the_planned_three_without_regions(hand):
 def test_the_same_seed_gives_the_same_three_contacts(hand, reached):
     body, grasp, found = reached[0]
     assert gc.reach_with(hand, body, grasp, FRICTION) == found
+
+
+def test_fingers_that_meet_in_the_middle_of_their_ranges_may_not_overlap(tmp_path):
+    """Closed there, all three tips are in one place; the thumb and its base are built together."""
+    text = Path(three_fingers_file(tmp_path)).read_text()
+    closed = tmp_path / "closed.xml"
+    closed.write_text(text.replace('range="-70 70"', 'range="-140 0"'))
+    hand = scenes.load_hand(closed, THREE_TIPS)
+    owner = {link.name: finger.name for finger in hand.fingers for link in finger.links}
+    middle = overlapping_pairs(hand, 0.5 * hand.ranges.sum(axis=1))
+    across = [pair for pair in middle if len({owner.get(name, "palm") for name in pair}) == 2]
+    met = [pair for pair in across if "palm" not in pair]
+    assert met, middle
+    assert not set(met) & set(hand.ignored_pairs)
