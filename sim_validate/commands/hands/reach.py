@@ -98,11 +98,13 @@ def _show(hand: Hand, found: Sequence[HandReach], reporter: Reporter) -> None:
     reporter.table(f"grasps with the hand {hand.name}", columns, [_row(hand, e) for e in shown])
     say_cut(len(found), reporter)
     counts = reaches_summary(found, complete=True)
-    reporter.say(
-        f"{counts['reached']} of {counts['grasps']} grasps were reached; of the others "
-        f"{counts['collision']} met a collision, {counts['limit']} a joint's limit, and for "
-        f"{counts['not_found']} no pose was found; more --starts may find some"
-    )
+    said = f"{counts['reached']} of {counts['grasps']} grasps were reached"
+    if counts["collision"] + counts["limit"] + counts["not_found"]:
+        said += (
+            f"; of the others {counts['collision']} met a collision, {counts['limit']} a joint's "
+            f"limit, and for {counts['not_found']} no pose was found; more --starts may find some"
+        )
+    reporter.say(said)
     if unclosed := counts.get("no_closure"):
         reporter.say(
             f"{unclosed} have no {len(hand.fingers)} contacts that are in force closure alone, "

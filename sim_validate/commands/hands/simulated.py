@@ -27,7 +27,8 @@ def with_motors(hand: Hand, command: hand_flags.Reach) -> Hand:
     if command.simulate and missing:
         raise InputError(
             f"--simulate needs a torque limit for each joint, but {hand.name} has none for "
-            f"{missing[0]} ({hand.torque_source}); give one with --torque-limit-n-m"
+            f"{missing[0]}; give one for all joints with --torque-limit-n-m, or each in the hand's "
+            "file (actuatorfrcrange of its joint)"
         )
     return hand
 

@@ -167,4 +167,4 @@ def test_a_simulated_hand_holds_and_its_grasps_are_ranked(grasps, tmp_path, caps
 
 def test_a_hand_without_torque_limits_is_not_simulated(grasps, capsys):
     assert main(["reach", str(grasps), "--simulate"]) == Exit.INPUT
-    assert "give one with --torque-limit-n-m" in capsys.readouterr().err
+    assert "give one for all joints with --torque-limit-n-m" in capsys.readouterr().err
