@@ -1,14 +1,16 @@
 """How many grasps a hand reaches, how long it takes, and whether the poses are what they claim.
 
-    python -m tests.benchmarks.reach [--meshes FOLDER] [--limit 100] [--quick] [--hands NAME,NAME]
+    python -m tests.benchmarks.reach [--meshes FOLDER] [--limit 100] [--quick]
+        [--hands NAME,NAME] [--jobs 2]
     python -m tests.benchmarks.reach --poses 1000 [--limit 40]
 
 Eight built-in objects of 35 mm radius, four of them not convex, and up to four scans of a folder
-scaled to it; the best grasps for fingers as thick as the hand's tips. For each object: grasps,
-reached with and without aiming at regions, median and mean time of one core, how the others ended,
-and how many poses open and have a straight way in. With `--poses`, at least so many poses are
-sought over all built-in objects and as many random ones as it takes, only with regions, to check
-them.
+scaled to it; the best grasps for fingers as thick as the hand's tips. For each object: grasps, how
+many are reached with and without aiming at regions, the median and mean time of one search, the
+median without regions, how the others ended, and how many poses open and have a straight way in.
+`--jobs 1` measures times on a machine whose cores share their work. With `--poses`, at least so
+many poses are sought over all built-in objects and as many random ones as it takes, only with
+regions, to check them.
 
 Every pose is then checked by code that shares nothing with the search: joints against their ranges;
 distances between the hand's parts, and from objects that are not scans, by MuJoCo's
@@ -126,13 +128,15 @@ def examine(case):
     finger = gc.Finger(hand.fingers[0].tip.radius, APPROACH_M)
     grasps = gc.plan(body, FRICTION, limit=limit, finger=finger).grasps
     gc.reach_with(hand, body, grasps[0], FRICTION)  # what is made once per hand and object
-    judge, found, plain, seconds = Judge(hand, body), [], 0, []
+    judge, found, plain, seconds, plain_seconds = Judge(hand, body), [], 0, [], []
     for grasp in grasps:
         begun = time.process_time()
         found.append(gc.reach_with(hand, body, grasp, FRICTION))
         seconds.append(time.process_time() - begun)
         if with_plain:
+            begun = time.process_time()
             plain += gc.reach_with(hand, body, grasp, FRICTION, regions=False).reached
+            plain_seconds.append(time.process_time() - begun)
     good = [one for one in found if one.reached]
     low, high = hand.ranges.T
     wrong = Counter(
@@ -148,7 +152,7 @@ def examine(case):
     )  # fmt: skip
     return {
         "hand": hand_name, "object": name, "grasps": len(grasps), "reached": len(good),
-        "plain": plain, "seconds": seconds, "wrong": wrong,
+        "plain": plain, "seconds": seconds, "plain_seconds": plain_seconds, "wrong": wrong,
         "reasons": Counter(one.reason for one in found if not one.reached),
         "opens": sum(one.pregrasp is not None for one in good),
         "ways": sum(one.approach is not None for one in good),
@@ -176,20 +180,20 @@ def main():
     folder = words[words.index("--meshes") + 1] if "--meshes" in words else None
     hands = words[words.index("--hands") + 1].split(",") if "--hands" in words else HANDS
     poses = int(words[words.index("--poses") + 1]) if "--poses" in words else None
+    jobs = int(words[words.index("--jobs") + 1]) if "--jobs" in words else available_cores()
     cases = [(name, None, hand, limit, True) for hand in hands for name in BUILT_IN]
     if folder:
         cases += [(name, folder, hand, limit, True) for hand in hands for name in SCANS]
-    print("hand     object              grasps reached contacts-only median ms mean ms  opens ways "
-          "within  not reached")  # fmt: skip
+    print("hand     object              grasps reached contacts-only median ms mean ms "
+          "contacts-only ms  opens ways within  not reached")  # fmt: skip
     rows = []
-    found = (
-        each(examine, cases, jobs=available_cores()) if poses is None else many(poses, hands, limit)
-    )
+    found = each(examine, cases, jobs=jobs) if poses is None else many(poses, hands, limit)
     for row in found:
         rows.append(row)
-        ms = 1e3 * np.array(row["seconds"])
+        ms, plain_ms = 1e3 * np.array(row["seconds"]), 1e3 * np.array(row["plain_seconds"])
+        at = f"{np.median(plain_ms):16.0f}" if plain_ms.size else f"{'-':>16}"
         print(f"{row['hand']:8} {row['object']:20} {row['grasps']:5d} {row['reached']:7d} "
-              f"{row['plain']:13d} {np.median(ms):9.0f} {ms.mean():7.0f} {row['opens']:6d} "
+              f"{row['plain']:13d} {np.median(ms):9.0f} {ms.mean():7.0f} {at} {row['opens']:6d} "
               f"{row['ways']:4d} {row['within']:6d}  {dict(row['reasons'])}",
               flush=True)  # fmt: skip
     bad = 0
@@ -200,7 +204,11 @@ def main():
         ms = 1e3 * np.concatenate([row["seconds"] for row in own])
         wrong = sum((row["wrong"] for row in own), Counter())
         bad += sum(wrong.values())
-        at = f", {plain} ({plain / total:.1%}) at the planned contacts" if poses is None else ""
+        at = ""
+        if poses is None:
+            alone = 1e3 * np.concatenate([row["plain_seconds"] for row in own])
+            at = (f", {plain} ({plain / total:.1%}) at the planned contacts (median "
+                  f"{np.median(alone):.0f} ms, mean {alone.mean():.0f} ms)")  # fmt: skip
         print(f"{hand}: {good} of {total} grasps reached ({good / total:.1%}){at}; median "
               f"{np.median(ms):.0f} ms, mean {ms.mean():.0f} ms; wrong claims: "
               f"{dict(wrong) or 'none'}")  # fmt: skip

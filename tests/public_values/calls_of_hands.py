@@ -43,7 +43,7 @@ CALLS = [
         "physics": optional(VALUE),
     }),
     Call("scenes.write_hand_scene", lambda: {
-        "scene": scenes.build_hand_scene(**standing()), "path": "hand.xml",
+        "scene": scenes.build_hand_scene(**standing()), "path": "no/such/hand.xml",
     }, {"scene": VALUE, "path": PATH}),
     Call("sv.hand_setup", dict, {}),
     Call("sv.validate_hand", standing, {
