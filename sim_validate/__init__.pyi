@@ -4,6 +4,7 @@ from sim_validate.execution.jobs import ExecutedGrasp as ExecutedGrasp
 from sim_validate.execution.settings import ExecutionSettings as ExecutionSettings
 from sim_validate.execution.verdict import Execution as Execution
 from sim_validate.execution.verdict import ExecutionTrial as ExecutionTrial
+from sim_validate.hands.execute_hand import execute_hand as execute_hand
 from sim_validate.hands.hand_verdict import HandVerdict as HandVerdict
 from sim_validate.hands.validate_hand import hand_setup as hand_setup
 from sim_validate.hands.validate_hand import validate_hand as validate_hand

@@ -65,6 +65,18 @@ class HeldSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class FingersSeen:
+    """What the fingers of a scene did in each of n samples, as the palm sees it."""
+
+    tips: Array
+    """Displacements of the fingertips along the axes of their springs, (n, k, 3) [m]."""
+    forces: Array
+    """Contact forces on the object along these axes, (n, k, 3) [N]."""
+    turns: Array | None
+    """Orientations of the fingertips, (n, k, 3, 3); None where they do not turn."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class HeldLayout:
     """Positions, masses and springs of everything in a scene of execution, in the world frame."""
 
@@ -100,6 +112,57 @@ class HeldLayout:
     """Acceleration of gravity, (3,) [m/s^2]."""
 
     @property
+    def tip_names(self) -> tuple[str, ...]:
+        """Return the names of the fingertips' shapes in the scene."""
+        return tuple(f"finger{finger}" for finger in range(len(self.contacts)))
+
+    @property
+    def tip_masses(self) -> Array:
+        """Return the inertia of each fingertip along its springs, (k, 3) [kg]."""
+        return np.full(self.stiffness.shape, self.tip_mass_kg)
+
+    @property
+    def stiffest(self) -> float:
+        """Return the stiffness of the stiffest spring [N/m]."""
+        return float(self.stiffness.max())
+
+    @property
+    def above_table(self) -> tuple[Array, Array]:
+        """Return balls that a table must not meet: middles (n, 3) and radii (n,) [m]."""
+        return self.tip_centers, self.tip_radius_m
+
+    def joints(self, reached: Array) -> Array:
+        """Find where the joints of the fingers are.
+
+        Args:
+            reached: Displacements of the fingertips along their springs, (k, 3) [m].
+        """
+        return reached.ravel()
+
+    def commands(self, shares: Array, reached: Array | None) -> Array:
+        """Find what the fingers are told, (n, joints).
+
+        Args:
+            shares: Share of the squeeze, (n, 1), or of each finger's part of it, (n, k).
+            reached: Displacements of the fingertips from which commands count, (k, 3) [m]; None for
+                none.
+        """
+        base = 0.0 if reached is None else reached
+        told = base + shares[:, :, None] * (self.pushes / self.stiffness)
+        return told.reshape(len(shares), -1)
+
+    def fingers_seen(self, joints: Array, loads: Array, turned: Array) -> FingersSeen:
+        """See what fingers did.
+
+        Args:
+            joints: Positions of their joints, (n, joints) [m].
+            loads: What contacts load these joints with, (n, joints) [N].
+            turned: Orientation of the object as the palm sees it, (n, 3, 3).
+        """
+        shape = (len(turned), *self.stiffness.shape)
+        return FingersSeen(joints.reshape(shape), -loads.reshape(shape), None)
+
+    @property
     def tip_centers(self) -> Array:
         """Return the centres of the fingertips at their contacts, (k, 3) [m]."""
         height = self.tip_radius_m - TOUCH * self.radius_m
@@ -126,7 +189,7 @@ class HeldLayout:
         root = np.linalg.inv(np.linalg.cholesky(mass))
         own = float(np.linalg.eigvalsh(root @ stiff @ root.T)[-1])
         cube = self.tip_mass_kg + 2.0 * self.mass_kg / (3.0 * len(self.contacts))
-        return math.sqrt(max(own, float(self.stiffness.max()) / cube))
+        return math.sqrt(max(own, self.stiffest / cube))
 
     @property
     def fastest_tip(self) -> float:
@@ -134,7 +197,7 @@ class HeldLayout:
 
         They are sqrt(k / m_t) and c / m_t of its springs and dampers.
         """
-        swing = math.sqrt(float(self.stiffness.max()) / self.tip_mass_kg)
+        swing = math.sqrt(self.stiffest / self.tip_mass_kg)
         return max(swing, float(self.damping.max()) / self.tip_mass_kg)
 
     @property

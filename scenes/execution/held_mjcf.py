@@ -161,6 +161,19 @@ def write_held_scene(scene: HeldScene, path: str | Path) -> Path:
 
 def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
     """Write the MJCF text of a held object; equal layouts give equal texts."""
+    root, world = opened(layout, physics)
+    palm = add_palm(world, layout)
+    for finger in range(len(layout.contacts)):
+        _finger(palm, layout, physics, finger)
+    actuators = add_element(root, "actuator", {})
+    for finger in range(len(layout.contacts)):
+        _springs(actuators, layout, finger)
+    add_start(root, layout)
+    return document(root)
+
+
+def opened(layout: HeldLayout, physics: PhysicsSettings) -> tuple[Element, Element]:
+    """Open a model with options, the object and the table; return it and its world."""
     root = element("mujoco", {"model": printable(layout.name)})
     add_comment(root, TRUE_MASS)
     add_element(root, "compiler", COMPILER)
@@ -179,18 +192,16 @@ def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
     add_element(world, "light", light | {"type": "directional"})
     _object(world, layout, physics)
     _table(world, layout, physics)
-    palm = _palm(world, layout)
-    for finger in range(len(layout.contacts)):
-        _finger(palm, layout, physics, finger)
-    actuators = add_element(root, "actuator", {})
-    for finger in range(len(layout.contacts)):
-        _springs(actuators, layout, finger)
+    return root, world
+
+
+def add_start(root: Element, layout: HeldLayout) -> None:
+    """Add the keyframe of a squeezed object, with the commands that squeeze."""
+    told = layout.commands(np.ones((1, 1)), None)[0]
     home = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(6)])
-    rest = np.concatenate([home, np.zeros(layout.stiffness.size)])
+    rest = np.concatenate([home, np.zeros(len(told))])
     keys = add_element(root, "keyframe", {})
-    commands = (layout.pushes / layout.stiffness).ravel()
-    add_element(keys, "key", {"name": "squeeze", "qpos": rest, "ctrl": commands})
-    return document(root)
+    add_element(keys, "key", {"name": "squeeze", "qpos": rest, "ctrl": told})
 
 
 def _object(world: Element, layout: HeldLayout, physics: PhysicsSettings) -> None:
@@ -230,11 +241,12 @@ def palm_armature(layout: HeldLayout) -> Array:
     return np.repeat([slides, slides * layout.radius_m**2], 3)
 
 
-def _palm(world: Element, layout: HeldLayout) -> Element:
-    body = add_element(world, "body", {"name": "palm", "pos": (0.0, 0.0, 0.0), "gravcomp": 1.0})
-    for place, (name, armature) in enumerate(zip(PALM, palm_armature(layout), strict=True)):
+def add_palm(world: Element, layout: HeldLayout, name: str = "palm") -> Element:
+    """Add the body that moves on slides and hinges, and return it."""
+    body = add_element(world, "body", {"name": name, "pos": (0.0, 0.0, 0.0), "gravcomp": 1.0})
+    for place, (way, armature) in enumerate(zip(PALM, palm_armature(layout), strict=True)):
         kind, axis = ("slide", "hinge")[place // 3], np.eye(3)[place % 3]
-        _joint(body, {"name": f"palm_{name}", "type": kind, "axis": axis, "armature": armature})
+        _joint(body, {"name": f"palm_{way}", "type": kind, "axis": axis, "armature": armature})
     mass = PALM_SHARE * layout.mass_kg
     inertia = (mass * layout.radius_m**2,) * 3
     own = {"pos": (0.0, 0.0, 0.0), "mass": mass, "diaginertia": inertia}

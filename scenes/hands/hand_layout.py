@@ -128,7 +128,7 @@ def hand_layout(
     push, radii = float(np.abs(squeeze).max()), stance.tip_radii
     tips = FingerSettings(max_normal_force_n=push, radius_m=float(radii.max()), indentation=TOUCH)
     base = arrange(body, stance.contacts, friction, tips)
-    lever = _lever(motors)
+    lever = mean_lever(motors)
     drive, pose = base.drive, stance.palm_pose.copy()
     pose[:3, 3] -= body.center_of_mass
     servo = float(to_digits(np.array(drive.stiffness_n_per_m * lever**2)))
@@ -171,7 +171,7 @@ def squeezing(motors: Motors, forces: Array) -> Array:
     return forces * float((room[loaded] / np.abs(torques[loaded])).min())
 
 
-def _lever(motors: Motors) -> float:
+def mean_lever(motors: Motors) -> float:
     """Return the root mean square distance of contacts from the joints that they load [m]."""
     squares = (motors.levers.reshape(len(motors.limits), -1, 3) ** 2).sum(axis=2)
     return math.sqrt(float(squares[squares > 0.0].mean()))

@@ -3,29 +3,25 @@
 The palm is fixed in the world. Each link is a body on a hinge, turned as in the pose, so that all
 hinges stand at zero; a servo on each has the motor's torque as its `forcerange`. Fingertips are the
 balls that the analysis knows, and touch pads flush with the object's faces, as fingertips on slides
-do (see `scenes.mjcf`). Shapes of links may touch those of other fingers and of the palm, except
-pairs that the hand lets overlap. They pass through the object: the pose is known to be clear of it,
-and trials move it by micrometres. A link whose mass is not known has a small one, which gravity
+do (see `scenes.mjcf`). Shapes of links pass through the object: the pose is known to be clear of
+it, and trials move it by micrometres. A link whose mass is not known has a small one, which gravity
 does not pull.
 """
 
-import math
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-
-from grasp_core.arrays import Array, to_digits
+from grasp_core.arrays import Array
 from grasp_core.checked import instance, path_of
 from grasp_core.files.whole_files import write_parts
-from grasp_core.hands.hand import PALM, Hand, HandFinger, Link, LinkShape
+from grasp_core.hands.hand import PALM, Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
+from scenes.hands.chains_mjcf import Chains, add_exclusions, add_fingers, placed
 from scenes.hands.hand_layout import HandLayout, hand_layout
 from scenes.mjcf import Scene, add_object, opened
-from scenes.mjcf_text import Element, add_element, as_texts, document, quaternion
+from scenes.mjcf_text import Element, add_element, as_texts, document
 from scenes.physics import PhysicsSettings
 
 SCALED = (
@@ -33,16 +29,6 @@ SCALED = (
     "inertia of the joints are scaled to suit the grasp; torque limits are the motors'."
 )
 """Comment at the top of every scene."""
-NOMINAL_KG = 1e-3
-"""Mass of a link whose own is not known, or does not count [kg]."""
-NOMINAL_M = 0.01
-"""Radius of gyration of links [m]: small beside the inertia that servos are given."""
-THIN_M = 1e-6
-"""Least half-size of a box, for shapes that are flat [m]."""
-SHAPES = 1 << 20
-"""Bit of what the shapes of links may touch."""
-
-
 IMPEDANCE = 0.999
 """Impedance of contacts. Links are light along some directions, so contacts give way by more than
 under fingertips on slides, and stiff chains of joints lose force by it: with 0.99, up to half a
@@ -113,100 +99,24 @@ def hand_text(layout: HandLayout, physics: PhysicsSettings) -> str:
     contact = as_texts(physics.contact())
     add_object(world, layout, contact, weightless=bool(layout.gravity.any()))
     pose = layout.palm_pose
-    palm = add_element(world, "body", {"name": PALM, **_placed(pose[:3, 3], pose[:3, :3])})
-    for place, shape in enumerate(layout.hand.palm):
-        _shape(palm, f"{PALM}_{place}", shape)
-    angles = iter(layout.joints.tolist())
-    for number, finger in enumerate(layout.hand.fingers):
-        _finger(palm, layout, (number, finger), angles, contact)
-    _exclusions(add_element(root, "contact", {}), layout.hand)
+    palm = add_element(world, "body", {"name": PALM, **placed(pose[:3, 3], pose[:3, :3])})
+    tips = tuple(_tip(layout, number, contact) for number in range(len(layout.hand.fingers)))
+    chains = Chains(
+        layout.hand, layout.joints, layout.armature_kg_m2, tips, weighs=bool(layout.gravity.any())
+    )
+    add_fingers(palm, chains)
+    add_exclusions(add_element(root, "contact", {}), layout.hand)
     actuators = add_element(root, "actuator", {})
     for joint, limit in zip(layout.hand.joints, layout.motors.limits.tolist(), strict=True):
         _servo(actuators, layout, joint.name, limit)
     return document(root)
 
 
-def _placed(position: Array, rotation: Array) -> dict[str, object]:
-    return {"pos": to_digits(position), "quat": quaternion(rotation)}
-
-
-def _finger(
-    palm: Element, layout: HandLayout, numbered: tuple[int, HandFinger], angles: Iterator[float],
-    contact: dict[str, str],
-) -> None:  # fmt: skip
-    number, finger = numbered
-    parent = palm
-    for link in finger.links:
-        parent = _link(parent, layout, link, next(angles))
-    touching = [place for place, used in enumerate(layout.used_fingers) if used == number]
-    tip = {"name": f"tip_{finger.name}", "type": "sphere", "size": finger.tip.radius,
-           "pos": finger.tip.center, "contype": 0, "conaffinity": 0, "mass": 0.0, "group": 0,
-           "friction": (layout.friction, layout.torsion_m, 0.0),
-           "rgba": (0.8, 0.25, 0.2, 1.0)}  # fmt: skip
-    if touching:
-        tip["conaffinity"] = 1 << touching[0]
-    add_element(parent, "geom", tip | contact)
-
-
-def _link(parent: Element, layout: HandLayout, link: Link, angle: float) -> Element:
-    joint, mass, center = link.joint, NOMINAL_KG, np.zeros(3)
-    pulled = bool(layout.gravity.any())
-    if pulled and link.mass_kg is not None and link.center_of_mass is not None:
-        mass, center = link.mass_kg, link.center_of_mass
-    turned = joint.rotation @ rotation_about(joint.axis, angle)
-    lifted = 0.0 if pulled else 1.0
-    body = add_element(
-        parent, "body",
-        {"name": link.name, "gravcomp": lifted, **_placed(joint.position, turned)},
-    )  # fmt: skip
-    add_element(
-        body, "joint",
-        {"name": joint.name, "type": "hinge", "axis": joint.axis, "pos": (0.0, 0.0, 0.0),
-         "limited": "false", "damping": 0.0, "stiffness": 0.0,
-         "armature": layout.armature_kg_m2, "frictionloss": 0.0},
-    )  # fmt: skip
-    inertia = (mass * NOMINAL_M**2,) * 3
-    add_element(body, "inertial", {"pos": center, "mass": mass, "diaginertia": inertia})
-    for place, shape in enumerate(link.shapes):
-        _shape(body, f"{link.name}_{place}", shape)
-    return body
-
-
-def rotation_about(axis: Array, angle: float) -> Array:
-    """Return the rotation by an angle about a unit axis, (3, 3)."""
-    x, y, z = axis.tolist()
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
-
-
-def _shape(body: Element, name: str, shape: LinkShape) -> None:
-    """Add a shape: a ball, a capsule, or the box inside a rounded one that meets its corners."""
-    long = np.flatnonzero(shape.half_sizes > 0.0)
-    own: dict[str, object] = {"name": name, "contype": SHAPES, "conaffinity": SHAPES,
-                              "mass": 0.0, "group": 2, "rgba": (0.62, 0.66, 0.72, 1.0)}  # fmt: skip
-    turned = shape.rotation
-    if not long.size:
-        own |= {"type": "sphere", "size": shape.radius}
-    elif long.size == 1 and shape.radius:
-        axis = int(long[0])
-        turned = turned[:, [(axis + 1) % 3, (axis + 2) % 3, axis]]
-        own |= {"type": "capsule", "size": (shape.radius, shape.half_sizes[axis])}
-    else:
-        own |= {
-            "type": "box",
-            "size": np.maximum(shape.half_sizes + shape.radius / math.sqrt(3.0), THIN_M),
-        }
-    add_element(body, "geom", own | _placed(shape.position, turned))
-
-
-def _exclusions(contact: Element, hand: Hand) -> None:
-    """Let neighbours of a chain overlap, and what the hand lets overlap."""
-    pairs = {tuple(sorted(pair)) for pair in hand.ignored_pairs}
-    for finger in hand.fingers:
-        chain = [PALM, *(link.name for link in finger.links)]
-        pairs |= {tuple(sorted(pair)) for pair in pairwise(chain)}
-    for one, other in sorted(pairs):
-        add_element(contact, "exclude", {"body1": one, "body2": other})
+def _tip(layout: HandLayout, finger: int, contact: Mapping[str, object]) -> Mapping[str, object]:
+    """Return what a fingertip touches: the pad at its contact, if it has one."""
+    touching = [place for place, used in enumerate(layout.used_fingers) if used == finger]
+    pads = {"conaffinity": 1 << touching[0]} if touching else {}
+    return {"friction": (layout.friction, layout.torsion_m, 0.0), **contact, **pads}
 
 
 def _servo(actuators: Element, layout: HandLayout, name: str, limit: float) -> None:

@@ -61,6 +61,9 @@ class Reach:
     simulate: bool = False
     """Hold test wrenches in simulation with the hand's links and motors, and try negative controls;
     every joint needs a torque limit."""
+    mass_kg: Annotated[float | None, at_least(1e-6, up_to=1e6)] = None
+    """Mass of the object [kg], with which the hand also executes each grasp that it reaches, as
+    `execute` does with fingertips on springs; every joint needs a torque limit."""
     friction: Friction | None = None
     """Coulomb coefficient to prove force closure with; if not given, the one planned for."""
     seed: Seed = 0

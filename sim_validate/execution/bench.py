@@ -17,6 +17,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from scenes.execution.held_mjcf import SAMPLE_S, HeldScene, palm_armature
+from scenes.execution.turns import hinged, rotations
 from scenes.mjcf_text import quaternion
 from sim_validate.execution.drives import Drive, Table
 from sim_validate.execution.paths import WHOLE
@@ -39,8 +40,13 @@ class HeldMotion:
     """Orientation of the object (w, x, y, z), (n, 4)."""
     palm: Array
     """Positions of the palm's slides and hinges, (n, 6) [m, rad]."""
+    fingers: Array
+    """Positions of the fingers' joints, (n, joints) [m, rad]."""
     tips: Array
     """Displacements of the fingertips along their springs, (n, k, 3) [m]."""
+    tip_turns: Array | None
+    """Orientations of the fingertips as the palm sees them, (n, k, 3, 3); None where they do not
+    turn."""
     forces: Array
     """Contact forces on the object along the axes of the springs, (n, k, 3) [N]."""
     table: Array
@@ -50,16 +56,18 @@ class HeldMotion:
 
     @property
     def joints(self) -> Array:
-        """Return the positions of all joints as the scene has them, (n, 13 + 3k)."""
-        tips = self.tips.reshape(len(self.tips), -1)
-        return np.concatenate([self.moved, self.turned, self.palm, tips], axis=1)
+        """Return the positions of all joints as the scene has them, (n, 13 + joints)."""
+        return np.concatenate([self.moved, self.turned, self.palm, self.fingers], axis=1)
 
 
 def motions_joined(first: HeldMotion, second: HeldMotion) -> HeldMotion:
     """Return one motion after another, with the faults of both."""
-    names = ("moved", "turned", "palm", "tips", "forces", "table")
+    names = ("moved", "turned", "palm", "fingers", "tips", "forces", "table")
     both = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names}
-    return HeldMotion(**both, faults=first.faults + second.faults)
+    turns = None
+    if first.tip_turns is not None and second.tip_turns is not None:
+        turns = np.concatenate([first.tip_turns, second.tip_turns])
+    return HeldMotion(**both, tip_turns=turns, faults=first.faults + second.faults)
 
 
 class HeldBench:
@@ -92,9 +100,7 @@ class HeldBench:
                 "take 0.00125 s"
             )
         self.body = self.model.body("object").id
-        self.tips = [
-            self.model.geom(f"finger{finger}").id for finger in range(len(scene.layout.contacts))
-        ]
+        self.tips = [self.model.geom(name).id for name in scene.layout.tip_names]
 
     def run(
         self, drives: Sequence[Drive], start: Array | None = None, friction: Array | None = None
@@ -140,7 +146,7 @@ class HeldBench:
             exactly one contact.
         """
         data = mujoco.MjData(self.model)
-        data.qpos[PALM + 1 :] = reached.ravel()
+        data.qpos[PALM + 1 :] = self.scene.layout.joints(reached)
         return touched(self.model, data, self.tips)
 
     def _recorded(self, trials: batch.Batch, lengths: Array) -> tuple[Array, Array]:
@@ -161,7 +167,7 @@ class HeldBench:
                 joints[place, :3] = drive.pose.moved
                 joints[place, 3:7] = drive.pose.quaternion
             if drive.reached is not None:
-                joints[place, PALM + 1 :] = drive.reached.ravel()
+                joints[place, PALM + 1 :] = self.scene.layout.joints(drive.reached)
             speeds[place, :3] += drive.velocity
             speeds[place, FREE : FREE + 3] += drive.velocity
         if any(drive.table for drive in drives):
@@ -214,31 +220,32 @@ class HeldBench:
         layout = self.scene.layout
         loads = np.zeros((most, len(drives), 6))
         motors = np.zeros((most, len(drives), PALM - FREE))
-        commands = np.zeros((most, len(drives), layout.stiffness.size))
-        give = layout.pushes / layout.stiffness
+        commands = np.zeros((most, len(drives), self.model.nu))
         for place, drive in enumerate(drives):
             n = len(drive)
             loads[:n, place] = drive.wrenches
             loads[:n, place, :3] += layout.mass_kg * (drive.gravity - layout.gravity)
             motors[:n, place] = drive.accelerations * palm_armature(layout)
-            base = 0.0 if drive.reached is None else drive.reached
-            told = base + drive.grasping.reshape(n, -1, 1) * give
-            commands[:n, place] = told.reshape(n, -1)
+            commands[:n, place] = layout.commands(drive.grasping.reshape(n, -1), drive.reached)
         return loads, motors, commands
 
     def _motion(self, joints: Array, forces: Array, faults: tuple[str, ...]) -> HeldMotion:
         # what has no end is no number either: angles beyond all bounds have no cosine
         joints = np.where(np.isfinite(joints), joints, np.nan)
-        shape = (len(joints), *self.scene.layout.stiffness.shape)
-        own = -forces[:, PALM:].reshape(shape)
-        axes = self.scene.layout.axes
-        finger_forces = np.einsum("kij,nkj->ni", axes, own)
+        layout = self.scene.layout
+        palm = hinged(joints[:, 10 : PALM + 1])
+        turned = palm.transpose(0, 2, 1) @ rotations(joints[:, 3:7])
+        fingers = joints[:, PALM + 1 :]
+        found = layout.fingers_seen(fingers, forces[:, PALM:], turned)
+        finger_forces = np.einsum("kij,nkj->ni", layout.axes, found.forces)
         return HeldMotion(
             moved=joints[:, :3],
             turned=joints[:, 3:7],
             palm=joints[:, 7 : PALM + 1],
-            tips=joints[:, PALM + 1 :].reshape(shape),
-            forces=own,
+            fingers=fingers,
+            tips=found.tips,
+            tip_turns=found.turns,
+            forces=found.forces,
             table=forces[:, :3] - finger_forces,
             faults=faults,
         )

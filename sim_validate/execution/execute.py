@@ -75,7 +75,17 @@ def execute(  # noqa: PLR0913 - `mass_kg` is the one setting that has no default
     settings = _settings(settings, mass_kg)
     whole(threads, "threads", least=1, most=MOST_THREADS)
     best = chosen_squeeze(body, grasp, friction, settings)
-    scene = held_scene(body, best.grip, settings, physics)
+    return executed(body, best, held_scene(body, best.grip, settings, physics), settings, threads)
+
+
+def executed(
+    body: Polyhedron, best: BestSqueeze, scene: HeldScene, settings: ExecutionSettings, threads: int
+) -> Execution:
+    """Simulate the trials of a scene with the squeeze that was chosen for it, and judge each.
+
+    Raises:
+        UnfaithfulError: The simulator fails on a case with a known answer, or failed in a trial.
+    """
     require_faithful_execution(scene.layout, scene.physics, settings.hand, settings.push_n)
     lost_m = max(LOST * body.radius, 2.0 * settings.most_m)
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
@@ -160,14 +170,19 @@ def held_scene(
 
     A curved surface is there as far as fingertips come before the object counts as lost.
     """
-    reach = None
-    if body.patches is not None:
-        turn = settings.most_rad + math.radians(settings.off_deg)
-        moved = settings.most_m + settings.off_mm / 1000.0
-        reach = moved + (turn + SPARE) * body.radius + float(grip.tip_radius_m.max())
     return build_held_scene(
-        body, grip, settings.mass_kg, settings=settings.hand, physics=physics, reach_m=reach
-    )
+        body, grip, settings.mass_kg, settings=settings.hand, physics=physics,
+        reach_m=surface_reach(body, grip, settings),
+    )  # fmt: skip
+
+
+def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> float | None:
+    """Return how far from the contacts a curved surface must be there [m]; None for all of it."""
+    if body.patches is None:
+        return None
+    turn = settings.most_rad + math.radians(settings.off_deg)
+    moved = settings.most_m + settings.off_mm / 1000.0
+    return moved + (turn + SPARE) * body.radius + float(grip.tip_radius_m.max())
 
 
 def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> tuple[HeldMotion, ...]:

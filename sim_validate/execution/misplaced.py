@@ -14,9 +14,9 @@ import numpy as np
 from grasp_core.arrays import Array, Indices, to_digits
 from grasp_core.geometry.nearest_points import nearest_on_surface
 from scenes.execution.held import TOUCH, HeldLayout
+from scenes.execution.turns import rotations
 from scenes.mjcf_text import quaternion
 from sim_validate.execution.drives import Pose
-from sim_validate.execution.slips import rotations
 
 MET = 1e-7
 """Distance from the surface at which a fingertip has met it, in object radii."""

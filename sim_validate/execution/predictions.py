@@ -4,20 +4,20 @@ While no contact slips, the fingertips move with the surface, and the object mov
 against the palm as a mass on springs:
 
     M x'' + C x' + K x = w,                                                               (1)
-    M = M_o + sum_i m_t W_i W_i',   C = sum_i W_i C_i W_i',
+    M = M_o + sum_i W_i m_i W_i',   C = sum_i W_i C_i W_i',
 
 with the maps W_i and the grasp stiffness K of `grasp_core.execution.grips`, the object's mass
-matrix M_o, the tips' masses m_t and the dampers C_i. In the palm's axes, the load w is the object's
-weight and what else acts on it, less the inertial forces of the palm's acceleration (a, e) and
-rate of turning o:
+matrix M_o, the tips' masses m_i, (3, 3), and the dampers C_i. In the palm's axes, the load w is the
+object's weight and what else acts on it, less the inertial forces of the palm's acceleration (a, e)
+and rate of turning o:
 
-    w = (m g, 0) + w_e - M_o (a, e) - (0, o x I o) - sum_i W_i m_t b_i,                   (2)
+    w = (m g, 0) + w_e - M_o (a, e) - (0, o x I o) - sum_i W_i m_i b_i,                   (2)
     b_i = a + e x c_i + o x (o x c_i),
 
 with the object's inertia I and the tips' centres c_i. The contact force on the object then changes
 by
 
-    -K_i d_i - C_i d_i' - m_t (d_i'' + b_i),   d_i = W_i' x,                              (3)
+    -K_i d_i - C_i d_i' - m_i (d_i'' + b_i),   d_i = W_i' x,                              (3)
 
 and along axes that turn with the object by -t x f_i more. The whole load is scaled: the least
 multiple at which a contact reaches its cone at any time is the predicted one. A trial whose
@@ -60,6 +60,8 @@ class HeldDynamics:
     """W_i, (k, 6, 3)."""
     own: Array
     """M_o, (6, 6) [kg, kg m^2]."""
+    tips: Array
+    """m_i, (k, 3, 3) [kg]."""
     mass: Array
     """M, (6, 6) [kg, kg m, kg m^2]."""
     damping: Array
@@ -82,9 +84,10 @@ def held_dynamics(grip: Grip, layout: HeldLayout) -> HeldDynamics:
     own[:3, :3] = layout.mass_kg * np.eye(3)
     own[3:, 3:] = layout.inertia_kg_m2
     dampers = np.einsum("kij,kj,klj->kil", layout.axes, layout.damping, layout.axes)
-    mass = own + layout.tip_mass_kg * np.einsum("kij,klj->il", maps, maps)
+    tips = np.einsum("kij,kj,klj->kil", layout.axes, layout.tip_masses, layout.axes)
+    mass = own + np.einsum("kij,kjl,kml->im", maps, tips, maps)
     damping = np.einsum("kij,kjl,kml->im", maps, dampers, maps)
-    return HeldDynamics(grip, layout, maps, own, mass, damping, dampers)
+    return HeldDynamics(grip, layout, maps, own, tips, mass, damping, dampers)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,7 +177,7 @@ def _load(dynamics: HeldDynamics, drive: Drive) -> tuple[Array, Array]:
     rates = _rates(drive.accelerations)
     load -= drive.accelerations @ dynamics.own.T
     load[:, 3:] -= cross(rates, rates @ layout.inertia_kg_m2)
-    load -= layout.tip_mass_kg * np.einsum("kij,nkj->ni", dynamics.maps, bases)
+    load -= np.einsum("kij,kjl,nkl->ni", dynamics.maps, dynamics.tips, bases)
     return load, bases
 
 
@@ -203,10 +206,10 @@ def _rates(accelerations: Array) -> Array:
 
 def _responses(dynamics: HeldDynamics, loads: Array, bases: Array) -> tuple[Array, Array]:
     """Return x, (drives, n, 6), and the contact forces' changes by (3), (drives, n, k, 3)."""
-    grip, layout = dynamics.grip, dynamics.layout
+    grip = dynamics.grip
     motion, speed, acceleration = _solved(dynamics, loads)
     turned_maps = dynamics.maps.transpose(0, 2, 1)
-    inertia = layout.tip_mass_kg * (turned_maps @ acceleration + bases[..., None])
+    inertia = dynamics.tips @ (turned_maps @ acceleration + bases[..., None])
     forces = grip.stiffness @ turned_maps @ motion + dynamics.dampers @ turned_maps @ speed
     turns = np.array([cross_matrix(force) for force in grip.squeeze])
     changes = turns @ motion[..., 3:, :] - forces - inertia

@@ -1,10 +1,11 @@
 """What a motion says of a hold: how far contacts slipped, how far the object moved, when it began.
 
-Everything is seen from the palm. In the object's frame the centre of tip i is u_i, and a fingertip
-that does not turn rolls when the object turns, so with the turn dt since the last sample and the
-inward normal n_i the point of contact slides on the object by the tangential part of
+Everything is seen from the palm. In the object's frame the centre of tip i is u_i. A fingertip that
+turns against the object by dt since the last sample, as one on springs does when the object turns
+by -dt, rolls on it, so with the inward normal n_i the point of contact slides on the object by the
+tangential part of
 
-    du_i - rho_i dt x n_i.                                                                (1)
+    du_i + rho_i dt x n_i.                                                                (1)
 
 The load of first slip is taken from the contact forces. They are (n, t) at rest and change by
 (a, b), in the frames of the contacts, so a load that is larger by the factor s would change them by
@@ -27,6 +28,7 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices, cross
 from grasp_core.execution.first_slip import slip_steps
 from scenes.execution.held import HeldLayout
+from scenes.execution.turns import hinged, rotations
 from sim_validate.execution.bench import HeldMotion
 from sim_validate.execution.drives import Drive
 
@@ -53,6 +55,9 @@ class Seen:
     """Displacement of the object's centre of mass, (n, 3) [m]."""
     turned: Array
     """Orientation of the object, (n, 3, 3)."""
+    spun: Array
+    """Orientations of the fingertips in the object's frame, (n, k, 3, 3), or (n, 1, 3, 3) where
+    they turn alike."""
     tips: Array
     """Centres of the fingertips in the object's frame, (n, k, 3) [m]."""
     forces: Array
@@ -80,14 +85,16 @@ class Outcome:
 
 def seen(motion: HeldMotion, layout: HeldLayout) -> Seen:
     """Look at a motion from the palm and from the object."""
-    palm = _hinged(motion.palm[:, 3:])
+    palm = hinged(motion.palm[:, 3:])
     turned = palm.transpose(0, 2, 1) @ rotations(motion.turned)
     moved = np.einsum("nji,nj->ni", palm, motion.moved - motion.palm[:, :3])
     centers = layout.tip_centers + np.einsum("kij,nkj->nki", layout.axes, motion.tips)
     tips = np.einsum("nji,nkj->nki", turned, centers - moved[:, None])
     along = np.einsum("kij,nkj->nki", layout.axes, motion.forces)
     own = np.einsum("nji,nkj->nki", turned, along)
-    return Seen(moved, turned, tips, np.einsum("kij,nki->nkj", layout.frames, own))
+    back: Array = turned.transpose(0, 2, 1)[:, None]
+    spun = back if motion.tip_turns is None else back @ motion.tip_turns
+    return Seen(moved, turned, spun, tips, np.einsum("kij,nki->nkj", layout.frames, own))
 
 
 def outcome(
@@ -131,13 +138,13 @@ def _slid(found: Seen, layout: HeldLayout, begun: int) -> Array:
     """Return the displacement of each point of contact by (1) since a sample, (n, k, 3) [m]."""
     normals = layout.frames[:, :, 0]
     steps = np.diff(found.tips[begun:], axis=0)
-    turned = found.turned[begun:]
-    change = turned[:-1].transpose(0, 2, 1) @ turned[1:]
+    spun = found.spun[begun:]
+    change: Array = spun[:-1] @ spun[1:].transpose(0, 1, 3, 2)  # its axis is that of minus dt
     turns = 0.5 * np.stack(
-        [change[:, 2, 1] - change[:, 1, 2], change[:, 0, 2] - change[:, 2, 0],
-         change[:, 1, 0] - change[:, 0, 1]], axis=1,
+        [change[..., 2, 1] - change[..., 1, 2], change[..., 0, 2] - change[..., 2, 0],
+         change[..., 1, 0] - change[..., 0, 1]], axis=-1,
     )  # fmt: skip
-    rolled = layout.tip_radius_m[:, None] * cross(turns[:, None], normals)
+    rolled = layout.tip_radius_m[:, None] * cross(turns, normals)
     slid = steps - rolled
     slid -= np.einsum("nki,ki->nk", slid, normals)[..., None] * normals
     return np.concatenate([np.zeros((1, *slid.shape[1:])), np.cumsum(slid, axis=0)])
@@ -196,28 +203,3 @@ def _extrapolated(found: Seen, shares: Array, friction: Array, begun: int, at: I
     steps = slip_steps(np.tile(rest, (len(at), 1)), changes, np.tile(friction, len(at)))
     least = steps.reshape(len(at), -1).min(axis=1)
     return np.multiply(shares[at], least, out=np.full(len(at), np.inf), where=np.isfinite(least))
-
-
-def rotations(quaternions: Array) -> Array:
-    """Return the rotation matrices of unit quaternions (w, x, y, z), (n, 4), as (n, 3, 3)."""
-    w, x, y, z = quaternions.T
-    return np.stack(
-        [
-            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=1),
-            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=1),
-            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1),
-        ],
-        axis=1,
-    )
-
-
-def _hinged(angles: Array) -> Array:
-    """Return the palm's rotation, (n, 3, 3): about x, then the turned y, then the turned z."""
-    half = 0.5 * angles
-    zero = np.zeros(len(angles))
-    turn = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
-    for axis in range(3):
-        parts = [np.cos(half[:, axis]), zero, zero, zero]
-        parts[axis + 1] = np.sin(half[:, axis])
-        turn = turn @ rotations(np.stack(parts, axis=1))
-    return turn

@@ -92,7 +92,7 @@ def _no_size(setting: str) -> str:
 
 
 def _lift(body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings) -> Trial | Skipped:
-    rest = resting(body, layout.tip_centers, layout.tip_radius_m)
+    rest = resting(body, *layout.above_table)
     if rest is None:
         return Skipped(
             "lift", "a fingertip is in the way of the table on every face that the object rests on"

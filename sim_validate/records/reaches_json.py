@@ -1,6 +1,7 @@
 """Writes `reaches.json`: in which grasps a hand can stand, with poses, and why not in others."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,9 +14,11 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from sim_validate.hands.hand_verdict import HandVerdict
+from sim_validate.hands.jobs import ExecutedHand
 from sim_validate.records.hand_model import model_record
 from sim_validate.records.reaches_schema import (
     AskedRecord,
+    ExecutedHandRecord,
     PoseRecord,
     ReachedContactRecord,
     ReachesFile,
@@ -30,9 +33,19 @@ from sim_validate.records.verdicts_json import object_record
 SCHEMA = 1
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class HandTrials:
+    """What the hand did in simulation, by the ids of the grasps."""
+
+    verdicts: Mapping[str, HandVerdict] = field(default_factory=dict[str, HandVerdict])
+    """What it held."""
+    executions: Mapping[str, ExecutedHand] = field(default_factory=dict[str, ExecutedHand])
+    """What came of executing the grasps with it."""
+
+
 def reaches_to_json(  # noqa: PLR0913 - the parts of the file
     hand: Hand, body: Polyhedron, friction: float, asked: AskedRecord, found: Sequence[HandReach],
-    *, complete: bool, grasps: Sequence[Grasp], verdicts: Mapping[str, HandVerdict] | None = None,
+    *, complete: bool, grasps: Sequence[Grasp], tried: HandTrials | None = None,
 ) -> str:  # fmt: skip
     """Write the text of `reaches.json`; equal results give equal texts.
 
@@ -44,7 +57,7 @@ def reaches_to_json(  # noqa: PLR0913 - the parts of the file
         found: The results, one per grasp.
         complete: Whether every grasp that was asked for was looked at.
         grasps: The grasps that were asked for.
-        verdicts: What the hand held in simulation, by the ids of the grasps.
+        tried: What the hand did in simulation; None for nothing.
     """
     planned = {grasp.id: contacts_sha256(grasp.contacts) for grasp in grasps}
     document: ReachesFile = {
@@ -62,8 +75,7 @@ def reaches_to_json(  # noqa: PLR0913 - the parts of the file
         "asked": asked,
         "summary": reaches_summary(found, complete=complete),
         "reaches": [
-            _record(hand, each, planned[each.grasp], (verdicts or {}).get(each.grasp))
-            for each in found
+            _record(hand, each, planned[each.grasp], tried or HandTrials()) for each in found
         ],
         "versions": versions(),
     }
@@ -84,7 +96,7 @@ def reaches_summary(found: Sequence[HandReach], *, complete: bool) -> ReachesSum
     }
 
 
-def _record(hand: Hand, found: HandReach, planned: str, verdict: HandVerdict | None) -> ReachRecord:
+def _record(hand: Hand, found: HandReach, planned: str, tried: HandTrials) -> ReachRecord:
     record: ReachRecord = {
         "id": found.grasp,
         "contacts_sha256": planned,
@@ -94,9 +106,32 @@ def _record(hand: Hand, found: HandReach, planned: str, verdict: HandVerdict | N
         "starts": found.starts,
         "pose": _pose(hand, found),
     }
-    if verdict is not None:
-        record["simulated"] = _simulated(verdict)
+    if found.grasp in tried.verdicts:
+        record["simulated"] = _simulated(tried.verdicts[found.grasp])
+    if found.grasp in tried.executions:
+        record["executed"] = _executed(tried.executions[found.grasp])
     return record
+
+
+def _executed(found: ExecutedHand) -> ExecutedHandRecord:
+    execution = found.execution
+    if execution is None:
+        return {"refused": found.refused, "execution": None}
+    losses = [trial.predicted_loss for trial in execution.trials]
+    return {
+        "refused": "",
+        "execution": {
+            "mass_kg": execution.mass_kg,
+            "survived": execution.survived,
+            "trials": len(execution.trials),
+            "lost": [trial.name for trial in execution.trials if not trial.survived],
+            "skipped": [f"{each.kind}: {each.reason}" for each in execution.skipped],
+            "least_predicted_loss": min(losses) if losses else None,
+            "payload_kg": execution.payload_kg,
+            "squeeze_n": [_triple(force) for force in execution.squeeze],
+            "controls_held": [each.name for each in execution.controls if not each.let_go],
+        },
+    }
 
 
 def _simulated(verdict: HandVerdict) -> SimulatedHandRecord:

@@ -76,6 +76,35 @@ class SimulatedHandRecord(TypedDict):
     """Where the simulation contradicts the analysis, a sentence each."""
 
 
+class HandExecutionRecord(TypedDict):
+    """Fields about the trials of one grasp, executed with a hand."""
+
+    mass_kg: Positive
+    survived: bool
+    trials: Count
+    lost: list[str]
+    """Names of the trials that the object did not survive."""
+    skipped: list[str]
+    """Kinds of trials that were left out, with the reasons."""
+    least_predicted_loss: Annotated[float, Field(ge=0.0)] | None
+    """Least multiple of a trial's load at which the object is predicted to be lost; null without a
+    trial."""
+    payload_kg: NotNegative
+    """Largest mass that the squeeze is certified to carry slowly, in any direction."""
+    squeeze_n: list[Triple]
+    """Contact forces at rest, on the object."""
+    controls_held: list[str]
+    """Names of negative controls that did not slip, though they must; empty if all did."""
+
+
+class ExecutedHandRecord(TypedDict):
+    """Fields about executing one grasp with a hand."""
+
+    refused: str
+    """Why the grasp cannot be executed; empty if it was."""
+    execution: HandExecutionRecord | None
+
+
 class ReachRecord(TypedDict):
     """Fields about one grasp."""
 
@@ -89,6 +118,8 @@ class ReachRecord(TypedDict):
     pose: PoseRecord | None
     simulated: NotRequired[SimulatedHandRecord]
     """What the hand held in simulation; absent where no simulation was asked for."""
+    executed: NotRequired[ExecutedHandRecord]
+    """What came of executing the grasp with the hand; absent where it was not asked for."""
 
 
 class ReachesSummary(TypedDict):

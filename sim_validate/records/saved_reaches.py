@@ -24,6 +24,7 @@ from sim_validate.records.hand_model import ModelRecord, hand_of_model
 from sim_validate.records.reaches_json import SCHEMA
 from sim_validate.records.reaches_schema import (
     AskedRecord,
+    ExecutedHandRecord,
     HandRecord,
     PoseRecord,
     ReachesFile,
@@ -56,6 +57,8 @@ class SavedReaches:
     """Names of the hand's fingers."""
     simulated: Mapping[str, SimulatedHandRecord]
     """What the hand held in simulation, by the ids of the grasps in which it was simulated."""
+    executed: Mapping[str, ExecutedHandRecord]
+    """What came of executing grasps with the hand, by their ids."""
 
     @property
     def reached(self) -> int:
@@ -109,6 +112,9 @@ def _saved(record: ReachesFile) -> SavedReaches:
         fingers=tuple(own["fingers"]),
         simulated={
             each["id"]: each["simulated"] for each in record["reaches"] if "simulated" in each
+        },
+        executed={
+            each["id"]: each["executed"] for each in record["reaches"] if "executed" in each
         },
     )  # fmt: skip
 

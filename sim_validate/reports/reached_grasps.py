@@ -13,6 +13,7 @@ from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record
 
 if TYPE_CHECKING:
     from grasp_core.hands.reach import HandReach
+    from sim_validate.records.reaches_schema import ExecutedHandRecord
     from sim_validate.records.saved_reaches import SavedReaches
 
 MILLI = 1e3
@@ -31,6 +32,8 @@ WITHIN = "where the fingertips touch; force closure is proved again with these c
 OPENING = "joint angles at which the fingers are 3 to 15 mm open, with the palm where it is"
 MOTORS = "in simulation, each at 80 % of what contacts and motors resist by the analysis"
 WEAKEST = "that contacts and motors resist; torques over the object's radius"
+LOSS = "multiple of a trial's load at which the object is lost, by the analysis"
+PAYLOAD = "that it is certified to carry slowly, in any direction, within the motors' torques"
 WAY = "over 60 mm, with open fingers and nothing in the way"
 
 
@@ -144,7 +147,23 @@ def _facts(reaches: "SavedReaches", found: "HandReach") -> Iterable[tuple[str, s
         let_go = sum(control["let_go"] for control in held["controls"])
         controls = ", ".join(control["name"].replace("_", " ") for control in held["controls"])
         yield "Controls let go", f"{let_go} of {len(held['controls'])}", controls
+    if (tried := reaches.executed.get(found.grasp)) is not None:
+        yield from _executed(tried)
     yield "Starts tried", str(found.starts), "postures from which a pose was sought"
+
+
+def _executed(tried: "ExecutedHandRecord") -> Iterable[tuple[str, str, str]]:
+    """Yield name, value and meaning of what came of executing a grasp with the hand."""
+    found = tried["execution"]
+    if found is None:
+        yield "Executed with the hand", "not tried", tried["refused"]
+        return
+    kept, lost = found["trials"] - len(found["lost"]), ", ".join(found["lost"])
+    said = f"{kept} of {found['trials']} trials survived"
+    yield "Executed with the hand", said, f"lost: {lost}" if lost else "; ".join(found["skipped"])
+    loss = found["least_predicted_loss"]
+    yield "Least predicted loss", "none" if loss is None else number(loss), LOSS
+    yield "Payload of the squeeze", f"{number(found['payload_kg'])} kg", PAYLOAD
 
 
 def _found(value: object) -> str:

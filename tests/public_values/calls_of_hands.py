@@ -8,6 +8,7 @@ from tests.public_values.bad_values import (
     FRICTION,
     NOT_NEGATIVE,
     PATH,
+    POSITIVE,
     SEED,
     SEVERAL,
     SWITCH,
@@ -44,12 +45,16 @@ CALLS = [
     }),
     Call("scenes.write_hand_scene", lambda: {
         "scene": scenes.build_hand_scene(**standing()), "path": "no/such/hand.xml",
-    }, {"scene": VALUE, "path": PATH}),
+    }, {"scene": VALUE, "path": PATH}, succeeds_in="tests/scenes/hands/test_hand_mjcf.py"),
     Call("sv.hand_setup", dict, {}),
     Call("sv.validate_hand", standing, {
         "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": FRICTION, "down": DOWN,
         "agenda": optional(VALUE), "setup": optional(VALUE),
     }),
+    Call("sv.execute_hand", lambda: standing() | {"mass_kg": 0.1}, {
+        "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": FRICTION,
+        "settings": optional(VALUE), "mass_kg": POSITIVE, "threads": AT_LEAST_ONE,
+    }, succeeds_in="tests/sim_validate/hands/test_execute_hand.py"),
     Call("gc.load_hand", lambda: {"name": "leap"}, {"name": WORD}),
     Call("gc.reach_with", reaching, {
         "hand": VALUE,

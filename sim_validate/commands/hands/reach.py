@@ -12,15 +12,15 @@ from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
+from sim_validate.commands.hands.executed import executed, show_executed
 from sim_validate.commands.hands.hand import asked_hand
 from sim_validate.commands.hands.simulated import show_simulated, simulated, with_motors
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import REACHES, remove_reaches
-from sim_validate.hands.hand_verdict import HandVerdict
 from sim_validate.parallel.compiling_hands import compile_for_hands, must_compile
 from sim_validate.parallel.reaching import ReachJob, reached
 from sim_validate.records.grasps import grasp_with_id
-from sim_validate.records.reaches_json import reaches_summary, reaches_to_json
+from sim_validate.records.reaches_json import HandTrials, reaches_summary, reaches_to_json
 from sim_validate.records.reaches_schema import AskedRecord
 from sim_validate.reports.run_folder import GRASPS
 
@@ -37,20 +37,22 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
         saved = replace(saved, grasps=(grasp_with_id(command.grasps, saved, command.grasp),))
     chosen = chosen_grasps(saved, friction=command.friction, seed=None, limit=command.limit)
     with alone_in(command.out):
-        found, verdicts, text = _reach(command, hand, chosen, reporter)
+        found, tried, text = _reach(command, hand, chosen, reporter)
     reporter.text(text)
     _show(hand, found, reporter)
-    show_simulated(verdicts, reporter)
+    show_simulated(tried.verdicts, reporter)
+    show_executed(tried.executions, reporter)
     if any(each.reached for each in found):
         say_where_to_look(command, reporter)
-    good = all(each.reached for each in found) and all(each.good for each in verdicts.values())
+    results = (*tried.verdicts.values(), *tried.executions.values())
+    good = all(each.reached for each in found) and all(each.good for each in results)
     return Exit.GOOD if good else Exit.NEGATIVE
 
 
 def _reach(
     command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, reporter: Reporter
-) -> tuple[list[HandReach], dict[str, HandVerdict], str]:
-    """Look for poses, test them, and write what is done even if the run is interrupted."""
+) -> tuple[list[HandReach], HandTrials, str]:
+    """Look for poses, try them, and write what is done even if the run is interrupted."""
     if command.out is not None:
         remove_reaches(command.out)
     jobs = [
@@ -68,7 +70,7 @@ def _reach(
         "seed": command.seed,
     }
     found: list[HandReach] = []
-    verdicts: dict[str, HandVerdict] = {}
+    tried = HandTrials()
     if jobs and must_compile():
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_for_hands(hand, saved.body, command.seed, command.jobs)
@@ -78,18 +80,25 @@ def _reach(
                 found.append(each)
                 good = sum(one.reached for one in found)
                 steps.update(len(found), len(jobs), f"({good} reached)")
-        verdicts = simulated(command, hand, saved, found, reporter)
+        tried = HandTrials(simulated(command, hand, saved, found, reporter))
+        tried = HandTrials(tried.verdicts, executed(command, hand, saved, found, reporter))
     finally:
-        done = sum(each.reached for each in found) == len(verdicts) or not command.simulate
-        complete = len(found) == len(jobs) and done
+        complete = len(found) == len(jobs) and _all_tried(command, found, tried)
         text = reaches_to_json(
             hand, saved.body, saved.friction, asked, found, complete=complete,
-            grasps=saved.grasps, verdicts=verdicts,
+            grasps=saved.grasps, tried=tried,
         )  # fmt: skip
         if command.out is not None and found:
             path = write_text(command.out / REACHES, text)
             reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
-    return found, verdicts, text
+    return found, tried, text
+
+
+def _all_tried(command: hand_flags.Reach, found: Sequence[HandReach], tried: HandTrials) -> bool:
+    """Return whether all that was asked for was done in each grasp that is reached."""
+    reached = sum(each.reached for each in found)
+    held = len(tried.verdicts) == reached or not command.simulate
+    return held and (len(tried.executions) == reached or command.mass_kg is None)
 
 
 def _show(hand: Hand, found: Sequence[HandReach], reporter: Reporter) -> None:

@@ -24,9 +24,10 @@ def with_motors(hand: Hand, command: hand_flags.Reach) -> Hand:
     if command.torque_limit_n_m is not None:
         hand = hand.with_torque_limits(command.torque_limit_n_m, GIVEN)
     missing = [joint.name for joint in hand.joints if joint.torque_limit_n_m is None]
-    if command.simulate and missing:
+    asked = "--simulate" if command.simulate else "--mass-kg"
+    if (command.simulate or command.mass_kg is not None) and missing:
         raise InputError(
-            f"--simulate needs a torque limit for each joint, but {hand.name} has none for "
+            f"{asked} needs a torque limit for each joint, but {hand.name} has none for "
             f"{missing[0]}; give one for all joints with --torque-limit-n-m, or each in the hand's "
             "file (actuatorfrcrange of its joint)"
         )

@@ -48,7 +48,7 @@ def cases_of(
     return tuple(
         HeldCase(
             mass_kg=_rounded(layout.mass_kg),
-            stiffness_n_per_m=_rounded(float(layout.stiffness.max())),
+            stiffness_n_per_m=_rounded(layout.stiffest),
             push_n=_rounded(push_n),
             friction=friction,
             radius_m=_rounded(layout.radius_m),

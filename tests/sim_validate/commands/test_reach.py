@@ -168,3 +168,42 @@ def test_a_simulated_hand_holds_and_its_grasps_are_ranked(grasps, tmp_path, caps
 def test_a_hand_without_torque_limits_is_not_simulated(grasps, capsys):
     assert main(["reach", str(grasps), "--simulate"]) == Exit.INPUT
     assert "give one for all joints with --torque-limit-n-m" in capsys.readouterr().err
+    assert main(["reach", str(grasps), "--mass-kg", "0.1"]) == Exit.INPUT
+    assert "--mass-kg needs a torque limit for each joint" in capsys.readouterr().err
+
+
+def test_a_hand_executes_the_grasps_that_it_reaches(grasps, tmp_path, capsys):
+    shutil.copy(grasps, tmp_path / "grasps.json")
+    words = ["reach", str(tmp_path / "grasps.json"), "--hand", "allegro", "--limit", "2"]
+    main([*words, "--mass-kg", "0.05", "--torque-limit-n-m", "0.5", "--out", str(tmp_path)])
+    said = capsys.readouterr().out
+    record = record_of(ReachesFile, (tmp_path / REACHES).read_text(), REACHES, schema=1)
+    assert record["summary"]["complete"]
+    reached = [each for each in record["reaches"] if each["reached"]]
+    assert reached, said
+    for each in reached:
+        assert "simulated" not in each
+        found = each["executed"]["execution"]
+        assert found["mass_kg"] == 0.05
+        assert found["trials"] >= 20
+        assert found["survived"] == (not found["lost"])
+        assert found["controls_held"] == []
+        assert found["payload_kg"] > 0.05
+    survived = [each for each in reached if each["executed"]["execution"]["survived"]]
+    assert f"{len(survived)} of {len(reached)} grasps survived every trial with the hand" in said
+    assert main(["report", str(tmp_path), "-q"]) == Exit.GOOD
+    page = (tmp_path / "report" / "grasps" / f"{reached[0]['id']}.html").read_text()
+    assert "Executed with the hand" in page
+    assert "Payload of the squeeze" in page
+
+
+def test_a_hand_too_weak_for_an_object_says_so(grasps, tmp_path, capsys):
+    words = ["reach", str(grasps), "--hand", "leap", "--limit", "1", "--mass-kg", "5"]
+    code = main([*words, "--torque-limit-n-m", "0.01", "--out", str(tmp_path)])
+    assert code == Exit.NEGATIVE
+    record = record_of(ReachesFile, (tmp_path / REACHES).read_text(), REACHES, schema=1)
+    (one,) = record["reaches"]
+    assert one["reached"]
+    assert one["executed"]["execution"] is None
+    assert "cannot carry its own links" in one["executed"]["refused"]
+    assert "not tried" in capsys.readouterr().out

@@ -51,7 +51,7 @@ def test_fingertips_meet_the_same_points_of_triangles_nearby_as_of_all(bracket, 
 def test_a_slip_in_the_first_sample_of_a_load_has_a_multiple():
     """Before it nothing has changed and no load is there: nothing can be extrapolated from that."""
     forces = np.array([[[1.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]], [[1.0, 0.6, 0.0]]])
-    still = np.zeros((3, 1, 3))
-    found = slips.Seen(still[:, 0], np.tile(np.eye(3), (3, 1, 1)), still, forces)
+    still, unmoved = np.zeros((3, 1, 3)), np.tile(np.eye(3), (3, 1, 1))
+    found = slips.Seen(still[:, 0], unmoved, unmoved[:, None], still, forces)
     shares = np.array([0.0, 0.0, 0.3])
     assert slips._first_slip(found, shares, np.array([FRICTION]), 0) == 0.3

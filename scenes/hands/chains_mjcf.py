@@ -1,0 +1,134 @@
+"""Writes the palm and fingers of a hand in a pose as MJCF bodies: chains of links on hinges.
+
+Each link is a body on a hinge, turned as in the pose, so that all hinges stand at zero. Fingertips
+are the balls that the analysis knows. Shapes of links may touch those of other fingers and of the
+palm, except pairs that the hand lets overlap.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from grasp_core.arrays import Array, to_digits
+from grasp_core.hands.hand import PALM, Hand, HandFinger, Link, LinkShape
+from scenes.mjcf_text import Element, add_element, quaternion
+
+NOMINAL_KG = 1e-3
+"""Mass of a link whose own is not known, or does not count [kg]."""
+NOMINAL_M = 0.01
+"""Radius of gyration of links [m]: small beside the inertia that servos are given."""
+THIN_M = 1e-6
+"""Least half-size of a box, for shapes that are flat [m]."""
+SHAPES = 1 << 20
+"""Bit of what the shapes of links may touch."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chains:
+    """A hand in a pose, with what its joints, shapes and fingertips are to be in a scene."""
+
+    hand: Hand
+    joints: Array
+    """Joint angles of the pose, (j,) [rad]."""
+    armature_kg_m2: float
+    """Inertia that each joint has besides that of its links."""
+    tips: tuple[Mapping[str, object], ...]
+    """Attributes of each finger's fingertip: what it touches, and how."""
+    weighs: bool = False
+    """Whether gravity pulls at links whose masses are known."""
+    touches: int = 0
+    """Bits of what palm and links touch besides each other; last links touch none of it, as their
+    fingertips do."""
+    contact: Mapping[str, object] | None = None
+    """Attributes of these contacts."""
+
+
+def add_fingers(palm: Element, chains: Chains) -> None:
+    """Add the shapes of the palm, and the fingers, to the body of the palm."""
+    for place, shape in enumerate(chains.hand.palm):
+        _shape(palm, f"{PALM}_{place}", shape, chains)
+    angles = iter(chains.joints.tolist())
+    for finger, tip in zip(chains.hand.fingers, chains.tips, strict=True):
+        parent = palm
+        for link in finger.links:
+            parent = _link(parent, chains, (link, link is finger.links[-1]), next(angles))
+        _tip(parent, finger, tip)
+
+
+def _tip(last: Element, finger: HandFinger, attributes: Mapping[str, object]) -> None:
+    ball = {"name": f"tip_{finger.name}", "type": "sphere", "size": finger.tip.radius,
+            "pos": finger.tip.center, "contype": 0, "conaffinity": 0, "mass": 0.0, "group": 0,
+            "rgba": (0.8, 0.25, 0.2, 1.0)}  # fmt: skip
+    add_element(last, "geom", ball | dict(attributes))
+
+
+def _link(parent: Element, chains: Chains, numbered: tuple[Link, bool], angle: float) -> Element:
+    (link, is_last), mass, center = numbered, NOMINAL_KG, np.zeros(3)
+    joint = link.joint
+    if chains.weighs and link.mass_kg is not None and link.center_of_mass is not None:
+        mass, center = link.mass_kg, link.center_of_mass
+    turned = joint.rotation @ rotation_about(joint.axis, angle)
+    body = add_element(
+        parent, "body",
+        {"name": link.name, "gravcomp": 0.0 if chains.weighs else 1.0,
+         **placed(joint.position, turned)},
+    )  # fmt: skip
+    add_element(
+        body, "joint",
+        {"name": joint.name, "type": "hinge", "axis": joint.axis, "pos": (0.0, 0.0, 0.0),
+         "limited": "false", "damping": 0.0, "stiffness": 0.0,
+         "armature": chains.armature_kg_m2, "frictionloss": 0.0},
+    )  # fmt: skip
+    inertia = (mass * NOMINAL_M**2,) * 3
+    add_element(body, "inertial", {"pos": center, "mass": mass, "diaginertia": inertia})
+    for place, shape in enumerate(link.shapes):
+        _shape(body, f"{link.name}_{place}", shape, chains, touches=not is_last)
+    return body
+
+
+def placed(position: Array, rotation: Array) -> dict[str, object]:
+    """Return the attributes of a body or shape at a position (3,) [m] with axes (3, 3)."""
+    return {"pos": to_digits(position), "quat": quaternion(rotation)}
+
+
+def rotation_about(axis: Array, angle: float) -> Array:
+    """Return the rotation by an angle about a unit axis, (3, 3)."""
+    x, y, z = axis.tolist()
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
+
+
+def _shape(
+    body: Element, name: str, shape: LinkShape, chains: Chains, *, touches: bool = True
+) -> None:
+    """Add a shape: a ball, a capsule, or the box inside a rounded one that meets its corners."""
+    long = np.flatnonzero(shape.half_sizes > 0.0)
+    bits = SHAPES | chains.touches if touches else SHAPES
+    own: dict[str, object] = {"name": name, "contype": SHAPES, "conaffinity": bits,
+                              "mass": 0.0, "group": 2, "rgba": (0.62, 0.66, 0.72, 1.0)}  # fmt: skip
+    turned = shape.rotation
+    if not long.size:
+        own |= {"type": "sphere", "size": shape.radius}
+    elif long.size == 1 and shape.radius:
+        axis = int(long[0])
+        turned = turned[:, [(axis + 1) % 3, (axis + 2) % 3, axis]]
+        own |= {"type": "capsule", "size": (shape.radius, shape.half_sizes[axis])}
+    else:
+        own |= {
+            "type": "box",
+            "size": np.maximum(shape.half_sizes + shape.radius / math.sqrt(3.0), THIN_M),
+        }
+    add_element(body, "geom", own | dict(chains.contact or {}) | placed(shape.position, turned))
+
+
+def add_exclusions(contact: Element, hand: Hand) -> None:
+    """Let neighbours of a chain overlap, and what the hand lets overlap."""
+    pairs = {tuple(sorted(pair)) for pair in hand.ignored_pairs}
+    for finger in hand.fingers:
+        chain = [PALM, *(link.name for link in finger.links)]
+        pairs |= {tuple(sorted(pair)) for pair in pairwise(chain)}
+    for one, other in sorted(pairs):
+        add_element(contact, "exclude", {"body1": one, "body2": other})

@@ -1,0 +1,259 @@
+"""What a scene consists of in which a hand with its real chains holds an object of true mass.
+
+A servo of stiffness k_q turns each joint. With the levers L_i of contact i, (joints, 3), a change
+df of the contact force turns the joints of its finger by -L_i df / k_q, and so moves the finger's
+point of contact by -L_i' L_i df / k_q. To small motions a finger is therefore a fingertip on
+springs of the stiffness
+
+    K_i = k_q (L_i' L_i)^-1,                                                              (1)
+
+and so are joint inertia a and dampers c_q: m_i = a (L_i' L_i)^-1, C_i = c_q (L_i' L_i)^-1. This
+needs joints that let the point of contact move in all directions. A stretched finger, or one with
+two joints, is rigid in some direction, which no grip of springs describes.
+
+Servos, inertia and dampers are chosen as for fingertips on springs (see `scenes.execution.held`)
+at the root mean square l of the levers: k_q = K l^2, a = m_t l^2, c_q = c l^2. Motors have the
+torque limits that are left when they carry their links in any orientation (see `Motors`), so links
+weigh nothing in the scene. Links that turn with their joints bend (1) by the squeeze over the
+length of links, some percent, which is left out of predictions and is there in simulation.
+"""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from grasp_core.arrays import Array, cross, to_digits
+from grasp_core.errors import InputError
+from grasp_core.execution.grips import Grip
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand_motors import hand_motors
+from grasp_core.hands.kinematics import HandPlaces, places
+from grasp_core.hands.reach import HandReach
+from grasp_core.hands.stance import Stance, stance_of
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.motors import Motors
+from scenes.execution.held import FingersSeen, HeldLayout, HeldSettings, held_layout
+from scenes.hands.hand_layout import mean_lever, touching
+
+STRETCHED = 0.02
+"""Least singular value of a finger's levers, over the root mean square of all, with which it
+counts as free to move in all directions."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class HeldHandLayout(HeldLayout):
+    """A scene of execution whose fingertips stand on the chains of a hand.
+
+    Springs, dampers and masses of the fingertips are those of (1).
+    """
+
+    hand: Hand
+    angles: Array
+    """Joint angles of the pose, (j,) [rad]."""
+    palm_pose: Array
+    """Pose of the palm in the world frame at rest, (4, 4)."""
+    used_fingers: tuple[int, ...]
+    """The hand's finger at each contact."""
+    motors: Motors
+    servo_n_m_per_rad: float
+    damping_n_m_s_per_rad: float
+    armature_kg_m2: float
+    """Inertia that each joint has besides that of its links."""
+    inertias: Array
+    """Inertia of each fingertip along its springs by (1), (k, 3) [kg]."""
+
+    @property
+    def tip_names(self) -> tuple[str, ...]:
+        """Return the names of the fingertips' shapes in the scene."""
+        return tuple(f"tip_{self.hand.fingers[finger].name}" for finger in self.used_fingers)
+
+    @property
+    def tip_masses(self) -> Array:
+        """Return the inertia of each fingertip along its springs, (k, 3) [kg]."""
+        return self.inertias
+
+    @property
+    def stiffest(self) -> float:
+        """Return the stiffness K that the servos amount to at the levers' root mean square [N/m].
+
+        A fingertip is stiffer where its levers are short, and its inertia is larger by as much.
+        """
+        return self.servo_n_m_per_rad / self.armature_kg_m2 * self.tip_mass_kg
+
+    @property
+    def fastest_ring(self) -> float:
+        """Return a bound on the natural frequencies of the held object [rad/s].
+
+        By (1) stiffness and inertia of the fingers are alike in all directions, and the object only
+        adds inertia.
+        """
+        return float(np.sqrt(self.servo_n_m_per_rad / self.armature_kg_m2))
+
+    @property
+    def fastest_tip(self) -> float:
+        """Return the largest rate at which a loose finger swings or comes to rest [1/s]."""
+        return max(self.fastest_ring, self.damping_n_m_s_per_rad / self.armature_kg_m2)
+
+    @property
+    def above_table(self) -> tuple[Array, Array]:
+        """Return balls that a table must not meet: middles (n, 3) and radii (n,) [m].
+
+        They are the fingertips, and the corners of the shapes of links and palm.
+        """
+        found = self._places(np.zeros((1, len(self.angles))))
+        hand, pose = self.hand, self.palm_pose
+        parts = [(shape, pose[:3, :3], pose[:3, 3]) for shape in hand.palm]
+        for number, link in enumerate(hand.links):
+            frame = found.link_rotations[0, number], found.link_positions[0, number]
+            parts += [(shape, *frame) for shape in link.shapes]
+        signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3)
+        corners = [
+            origin + (shape.position + signs * shape.half_sizes @ shape.rotation.T) @ turned.T
+            for shape, turned, origin in parts
+        ]
+        radii = [np.full(len(signs), shape.radius) for shape, _, _ in parts]
+        every = [finger.tip.radius for finger in hand.fingers]
+        return np.vstack([*corners, found.tips[0]]), np.concatenate([*radii, every])
+
+    def joints(self, reached: Array) -> Array:
+        """Find how far joints turn to move the fingertips by displacements (k, 3) [m], (j,) [rad].
+
+        The displacements are along the fingertips' springs.
+        """
+        rest = self._places(np.zeros((1, len(self.angles)))).tips[0, list(self.used_fingers)]
+        goals = rest + np.einsum("kij,kj->ki", self.axes, reached)
+        return touching(self._stance, goals) - self.angles
+
+    def commands(self, shares: Array, reached: Array | None) -> Array:
+        """Find what the servos are told, (n, j) [rad] (see `HeldLayout.commands`)."""
+        base = 0.0 if reached is None else self.joints(reached)
+        forces = shares[:, :, None] * self.squeeze
+        return base + forces.reshape(len(shares), -1) @ self.motors.levers.T / (
+            self.servo_n_m_per_rad
+        )
+
+    def fingers_seen(self, joints: Array, loads: Array, turned: Array) -> FingersSeen:
+        """See what fingers did (see `HeldLayout.fingers_seen`).
+
+        Contact forces are those that load the joints of their finger with its torques, at the
+        points where fingertips touch: behind their middles, along normals that turn with the
+        object.
+        """
+        used = list(self.used_fingers)
+        found = self._places(joints)
+        rest = self._places(np.zeros((1, len(self.angles))))
+        tips, last = found.tips[:, used], [self._chain(finger).stop - 1 for finger in used]
+        normals = np.einsum("nij,kj->nki", turned, self.frames[:, :, 0])
+        points = tips + self.tip_radius_m[:, None] * normals
+        forces = np.stack(
+            [self._force(found, points[:, k], loads, finger) for k, finger in enumerate(used)],
+            axis=1,
+        )
+        moved = tips - rest.tips[:, used]
+        back: Array = rest.link_rotations[:, last].transpose(0, 1, 3, 2)
+        return FingersSeen(
+            tips=np.einsum("kij,nki->nkj", self.axes, moved),
+            forces=np.einsum("kij,nki->nkj", self.axes, forces),
+            turns=found.link_rotations[:, last] @ back,
+        )
+
+    def _force(self, found: HandPlaces, points: Array, loads: Array, finger: int) -> Array:
+        """Return the contact force of a finger whose torques are known, (n, 3) [N]."""
+        own = self._chain(finger)
+        arms = points[:, None] - found.link_positions[:, own]
+        levers: Array = cross(found.joint_axes[:, own], arms)
+        square: Array = levers.transpose(0, 2, 1) @ levers
+        known = np.isfinite(square).all(axis=(1, 2))
+        square[~known] = np.eye(3)  # where the simulator diverged
+        asked = -np.einsum("nji,nj->ni", levers, loads[:, own])
+        return np.asarray(np.linalg.solve(square, asked[..., None]), dtype=np.float64)[..., 0]
+
+    def _chain(self, finger: int) -> slice:
+        """Return the numbers of a finger's joints."""
+        first = sum(len(each.links) for each in self.hand.fingers[:finger])
+        return slice(first, first + len(self.hand.fingers[finger].links))
+
+    def _places(self, joints: Array) -> HandPlaces:
+        return places(self.hand, self.angles + joints, self.palm_pose)
+
+    @property
+    def _stance(self) -> Stance:
+        return Stance(self.hand, self.angles, self.palm_pose, (), self.used_fingers, self.squeeze)
+
+
+def finger_springs(motors: Motors, stiffness_n_per_m: float) -> Array:
+    """Compute the stiffness (1) of each finger of a hand, (k, 3, 3) [N/m].
+
+    Args:
+        motors: The hand's joints in its pose.
+        stiffness_n_per_m: Stiffness K that sets the servos': k_q = K l^2.
+
+    Raises:
+        InputError: A finger is rigid in some direction.
+    """
+    size = mean_lever(motors)
+    levers = motors.levers.reshape(len(motors.limits), -1, 3).transpose(1, 0, 2)
+    least = np.sqrt(np.maximum(np.linalg.eigvalsh(levers.transpose(0, 2, 1) @ levers)[:, 0], 0.0))
+    if not (least >= STRETCHED * size).all():
+        raise InputError(
+            f"the finger at contact {int(np.argmin(least))} is stretched, or has fewer than three "
+            "joints: its fingertip cannot move in all directions, so no springs stand for its "
+            "joints; use another pose, or validate_hand"
+        )
+    springs = stiffness_n_per_m * size**2 * np.linalg.inv(levers.transpose(0, 2, 1) @ levers)
+    return 0.5 * (springs + springs.transpose(0, 2, 1))
+
+
+def strong_motors(hand: Hand, reach: HandReach) -> Motors:
+    """Return the motors of a pose, which carry the links in any orientation if they weigh.
+
+    Raises:
+        InputError: A joint has no torque limit, or a motor cannot carry the links.
+    """
+    weighs = all(link.mass_kg is not None and link.center_of_mass is not None
+                 for link in hand.links)  # fmt: skip
+    return hand_motors(hand, reach, any_orientation=weighs)
+
+
+def held_hand_layout(  # noqa: PLR0913, PLR0917 - a hand, an object, and how they meet
+    hand: Hand, body: Polyhedron, reach: HandReach, grip: Grip, mass_kg: float,
+    settings: HeldSettings, reach_m: float | None = None,
+) -> HeldHandLayout:  # fmt: skip
+    """Place an object of a given mass in a hand.
+
+    Args:
+        hand: The hand, with a torque limit for each joint.
+        body: The object.
+        reach: The pose in which the hand stands.
+        grip: The pose's contacts with their squeeze, on the springs of `finger_springs`.
+        mass_kg: Mass of the object [kg].
+        settings: Masses and damping of the fingers, and the direction of gravity.
+        reach_m: See `held_layout`.
+
+    Raises:
+        InputError: The mass is out of range.
+    """
+    base = held_layout(body, grip, mass_kg, settings, reach_m)
+    stance, motors = stance_of(hand, reach), strong_motors(hand, reach)
+    size = mean_lever(motors) ** 2
+    levers = motors.levers.reshape(len(motors.limits), -1, 3).transpose(1, 0, 2)
+    shares = np.einsum("kij,kli,klm,kmj->kj", base.axes, levers, levers, base.axes)  # L'L, diagonal
+    servo = float((base.stiffness * shares).mean())  # equal in all, by (1)
+    armature = settings.tip_mass_kg * size
+    share_kg = mass_kg / len(base.contacts) + settings.tip_mass_kg
+    damping = 2.0 * settings.damping_ratio * np.sqrt(servo * share_kg * size)
+    pose = stance.palm_pose.copy()
+    pose[:3, 3] -= body.center_of_mass
+    angles = touching(replace(stance, palm_pose=pose), base.tip_centers)
+    own = {each.name: getattr(base, each.name) for each in fields(base)}
+    own["damping"] = damping / shares
+    return HeldHandLayout(
+        **own, hand=hand, angles=to_digits(angles), palm_pose=to_digits(pose),
+        used_fingers=stance.fingers, motors=motors, servo_n_m_per_rad=_rounded(servo),
+        damping_n_m_s_per_rad=_rounded(damping), armature_kg_m2=_rounded(armature),
+        inertias=armature / shares,
+    )  # fmt: skip
+
+
+def _rounded(value: float) -> float:
+    return float(to_digits(np.array(value)))

@@ -1,0 +1,116 @@
+"""Executes a grasp with a hand: the trials of `execute` on real chains of joints with servos.
+
+The squeeze is the best one for fingertips on the springs that the servos amount to, within the
+torques of the motors (see `scenes.hands.held_hand`). Servos are told its torques once, and nothing
+is replanned. Palm and links touch the object where it comes to them.
+"""
+
+from dataclasses import replace
+
+from grasp_core.checked import instance, whole
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.errors import InputError, NoForcesError
+from grasp_core.execution.best_squeeze import BestSqueeze, best_squeeze
+from grasp_core.execution.loads import any_direction
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.reach import HandReach
+from grasp_core.hands.stance import stance_of
+from grasp_core.objects.on_faces import check_body
+from grasp_core.objects.polyhedron import Polyhedron
+from scenes.hands.held_hand import finger_springs, strong_motors
+from scenes.hands.held_hand_mjcf import held_hand_scene
+from sim_validate.execution.execute import executed, surface_reach
+from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.execution.verdict import Execution
+from sim_validate.hands.validate_hand import MOST_PUSH_N
+from sim_validate.simulation.setup import MOST_THREADS
+
+
+def execute_hand(  # noqa: PLR0913 - `mass_kg` is the one setting that has no default
+    hand: Hand,
+    body: Polyhedron,
+    reach: HandReach,
+    friction: float,
+    settings: ExecutionSettings | None = None,
+    *,
+    mass_kg: float | None = None,
+    threads: int = 1,
+) -> Execution:
+    """Simulate a grasp as a hand would execute it, and predict the outcome.
+
+    Args:
+        hand: The hand, with a torque limit for each joint (`hand.with_torque_limits`), whose
+            fingers have at least three joints.
+        body: The object.
+        reach: The pose in which the hand stands (see `gc.reach_with`).
+        friction: Coulomb coefficient at every contact.
+        settings: Mass, stiffness, trials and thresholds; None for those of
+            `hand_execution_settings`. The stiffness sets that of the servos, and fingertips are
+            those of the hand.
+        mass_kg: Mass of the object, in place of that of the settings [kg].
+        threads: Number of the simulator's threads; results do not depend on it.
+
+    Raises:
+        InputError: Hand, object and pose do not belong together, a finger cannot give in all
+            directions, or a number is out of range.
+        NoForcesError: No squeeze within the motors' torques carries the weight, or the grip is
+            unstable under the best one.
+        UnfaithfulError: The simulator fails on a case with a known answer, or failed in a trial.
+    """
+    if settings is not None:
+        instance(settings, ExecutionSettings, "settings")
+        settings = settings if mass_kg is None else replace(settings, mass_kg=mass_kg)
+    elif mass_kg is not None:
+        settings = hand_execution_settings(mass_kg)
+    else:
+        raise InputError(
+            "execute_hand: expected mass_kg or settings, got neither; give mass_kg=0.3"
+        )
+    whole(threads, "threads", least=1, most=MOST_THREADS)
+    best = hand_squeeze(hand, body, reach, friction, settings)
+    scene = held_hand_scene(
+        hand, body, reach, best.grip, settings.mass_kg, settings.hand,
+        surface_reach(body, best.grip, settings),
+    )  # fmt: skip
+    return executed(body, best, scene, settings, threads)
+
+
+def hand_execution_settings(mass_kg: float) -> ExecutionSettings:
+    """Return the usual settings for hands, in which motors alone limit how hard fingers push.
+
+    Args:
+        mass_kg: Mass of the object [kg].
+
+    Raises:
+        InputError: The mass is out of range.
+    """
+    return ExecutionSettings(mass_kg=mass_kg, push_n=MOST_PUSH_N)
+
+
+def hand_squeeze(
+    hand: Hand, body: Polyhedron, reach: HandReach, friction: float, settings: ExecutionSettings
+) -> BestSqueeze:
+    """Choose the squeeze within the motors' torques that carries most of the weight.
+
+    Raises:
+        InputError: Hand, object and pose do not belong together, or a number is out of range.
+        NoForcesError: No squeeze carries any weight, or the grip is unstable under the best one.
+    """
+    check_body(body)
+    stance = stance_of(hand, reach)
+    if not force_closure(stance.contacts, friction=friction).closed:
+        raise InputError(
+            f"the contacts of {reach.grasp} are not in force closure at friction {friction}"
+        )
+    motors = strong_motors(hand, reach)
+    best = best_squeeze(
+        body, stance.contacts, friction, any_direction(settings.mass_kg),
+        max_push_n=settings.push_n, stiffness=finger_springs(motors, settings.stiffness_n_per_m),
+        tip_radius_m=stance.tip_radii, motors=motors,
+    )  # fmt: skip
+    if best.scale == 0.0:
+        raise NoForcesError(
+            "no squeeze within the motors' torques carries any part of the weight in every "
+            "direction; use stronger motors, another pose, or more friction"
+        )
+    return best

@@ -1,0 +1,27 @@
+"""Hands that stand in grasps of an object, with the scene in which they execute them."""
+
+from functools import lru_cache
+
+import grasp_core as gc
+from scenes.hands.held_hand_mjcf import held_hand_scene
+from sim_validate.hands.execute_hand import hand_execution_settings, hand_squeeze
+from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
+
+OBJECT, RADIUS, MASS, TORQUE = "dodecahedron", 0.035, 0.1, 0.35
+
+
+@lru_cache(maxsize=4)
+def stood(name):
+    """Return a pose of a hand with motors, and that hand."""
+    reach = next(each for each in reaches(name, OBJECT, RADIUS) if each.reached)
+    return reach, gc.load_hand(name).with_torque_limits(TORQUE, "a test")
+
+
+@lru_cache(maxsize=4)
+def standing(name):
+    """Return a pose of a hand, the hand, its scene with an object, and the squeeze."""
+    reach, hand = stood(name)
+    body, settings = scaled(OBJECT, RADIUS), hand_execution_settings(MASS)
+    best = hand_squeeze(hand, body, reach, FRICTION, settings)
+    scene = held_hand_scene(hand, body, reach, best.grip, MASS, settings.hand)
+    return reach, hand, scene, best

@@ -1,0 +1,93 @@
+"""Grasps executed with a hand end as they are predicted to, and weak hands lose the object."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import sim_validate as sv
+from grasp_core.errors import InputError, NoForcesError
+from sim_validate.hands.execute_hand import hand_execution_settings, hand_squeeze
+from tests.grasp_core.hands.gripping import FRICTION, scaled
+from tests.sim_validate.hands.executing import MASS, OBJECT, RADIUS, TORQUE, stood
+
+HANDS = ("allegro", "leap")
+STIFF = 20_000.0
+"""Stiffness at which what springs leave out, the squeeze over links' lengths, is small [N/m]."""
+NEAR = 0.05
+"""Relative error of multiples of first slip that is left then: some percent."""
+
+
+def executed(name, **changes):
+    reach, hand = stood(name)
+    settings = replace(hand_execution_settings(MASS), **changes)
+    return sv.execute_hand(hand, scaled(OBJECT, RADIUS), reach, FRICTION, settings)
+
+
+@pytest.mark.parametrize("name", HANDS)
+def test_a_hand_keeps_a_light_object_and_its_controls_let_go(name):
+    found = executed(name, trials=("weight", "shake", "stop", "misplaced"))
+    assert len(found.trials) == 18
+    assert found.survived, [trial for trial in found.trials if not trial.survived]
+    assert len(found.controls) == 3
+    assert found.controls_let_go
+    assert found.load_multiple > 1.0
+
+
+@pytest.mark.parametrize("name", HANDS)
+def test_stiff_hands_slip_where_they_are_predicted_to(name):
+    found = executed(name, trials=("weight", "stop"), stiffness_n_per_m=STIFF)
+    multiples = np.array(
+        [(trial.predicted_first_slip, trial.simulated_first_slip) for trial in found.trials]
+    )
+    assert len(multiples) == 7
+    assert multiples.min() > 1.0
+    errors = multiples[:, 1] / multiples[:, 0] - 1.0
+    assert np.abs(errors).max() < NEAR, errors
+
+
+def test_an_object_ten_times_as_heavy_as_motors_carry_is_lost():
+    reach, hand = stood("allegro")
+    body = scaled(OBJECT, RADIUS)
+    able = hand_squeeze(hand, body, reach, FRICTION, hand_execution_settings(MASS))
+    heavy = 10.0 * able.scale * MASS
+    found = sv.execute_hand(
+        hand, body, reach, FRICTION, replace(hand_execution_settings(heavy), trials=("weight",))
+    )
+    assert not found.survived
+    assert found.least_predicted_loss < 1.0
+
+
+def test_what_a_hand_carries_grows_with_its_motors():
+    """Without weight of links, forces and loads scale with torque limits: the same cones."""
+    reach, hand = stood("allegro")
+    body, settings = scaled(OBJECT, RADIUS), replace(hand_execution_settings(MASS), push_n=1e4)
+    stiff = replace(settings, stiffness_n_per_m=1e6)  # squeezes change no stiffness then
+    some = hand_squeeze(hand, body, reach, FRICTION, stiff).scale
+    twice = hand.with_torque_limits(2.0 * TORQUE, "a test")
+    assert hand_squeeze(twice, body, reach, FRICTION, stiff).scale == pytest.approx(
+        2.0 * some, rel=1e-2
+    )
+
+
+def test_what_cannot_be_executed_is_refused():
+    reach, hand = stood("allegro")
+    body = scaled(OBJECT, RADIUS)
+    with pytest.raises(InputError, match="expected mass_kg or settings"):
+        sv.execute_hand(hand, body, reach, FRICTION)
+    with pytest.raises(InputError, match="torque limit for each joint"):
+        sv.execute_hand(gc.load_hand("allegro"), body, reach, FRICTION, mass_kg=MASS)
+    with pytest.raises(InputError, match="not in force closure"):
+        sv.execute_hand(hand, body, reach, 0.001, mass_kg=MASS)
+    with pytest.raises((InputError, NoForcesError)):
+        sv.execute_hand(hand, body, reach, FRICTION, mass_kg=-1.0)
+
+
+def test_threads_and_repetitions_change_nothing():
+    reach, hand = stood("leap")
+    body = scaled(OBJECT, RADIUS)
+    settings = replace(hand_execution_settings(MASS), trials=("stop",))
+    one = sv.execute_hand(hand, body, reach, FRICTION, settings)
+    two = sv.execute_hand(hand, body, reach, FRICTION, settings, threads=2)
+    assert one == two
