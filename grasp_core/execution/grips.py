@@ -138,6 +138,11 @@ class Grip(ByValue):
 
     @cached_property
     def geometric_stiffness(self) -> Array:
+        """What a squeeze adds to the springs' stiffness, (6, 6) [N m]: K_g of (5)."""
+        return self.rolling_stiffness
+
+    @cached_property
+    def rolling_stiffness(self) -> Array:
         """K_g of (5), (6, 6) [N m]: what the squeeze adds because contacts move with the object."""
         reach = self.arms + self.tip_radius_m[:, None] * self.normals  # s_i
         total = np.zeros((WRENCH, WRENCH))
@@ -164,6 +169,11 @@ class Grip(ByValue):
         return self.least_stiffness > STIFF * float(np.linalg.norm(self._scaled, 2))
 
     @cached_property
+    def force_changes(self) -> Array:
+        """Change of each contact force per motion of the object by (3), (k, 3, 6), world axes."""
+        return -self.stiffness @ self._maps.transpose(0, 2, 1)
+
+    @cached_property
     def _scaled(self) -> Array:
         """K + K_g with torques and turns in units of the size, (6, 6) [N/m]."""
         scale = np.repeat([1.0, 1.0 / self.size], 3)
@@ -178,7 +188,7 @@ class Grip(ByValue):
         """
         turned = np.zeros((len(self.arms), 3, WRENCH))
         turned[:, :, 3:] = [cross_matrix(force) for force in self.squeeze]
-        moved = turned - self.stiffness @ self._maps.transpose(0, 2, 1)
+        moved = turned + self.force_changes
         turned_back: Array = self.frames.transpose(0, 2, 1)
         return turned_back @ moved @ self.compliance
 

@@ -83,7 +83,7 @@ def _limits(hand: Hand) -> Array:
     return np.array([joint.torque_limit_n_m for joint in hand.joints])
 
 
-def _chains(hand: Hand) -> list[range]:
+def chains(hand: Hand) -> list[range]:
     """Return the numbers of each finger's joints."""
     ends = np.cumsum([0, *(len(finger.links) for finger in hand.fingers)]).tolist()
     return [range(first, end) for first, end in pairwise(ends)]
@@ -91,10 +91,10 @@ def _chains(hand: Hand) -> list[range]:
 
 def _levers(hand: Hand, found: HandPlaces, points: Array, fingers: tuple[int, ...]) -> Array:
     """Return the first factors of (1) for all contacts, (joints, 3k) [m]."""
-    chains = _chains(hand)
+    own = chains(hand)
     levers = np.zeros((len(hand.joints), len(points), 3))
     for contact, finger in enumerate(fingers):
-        joints = list(chains[finger])
+        joints = list(own[finger])
         arms = points[contact] - found.link_positions[0, joints]
         levers[joints, contact] = cross(found.joint_axes[0, joints], arms)
     return levers.reshape(len(levers), -1)
@@ -108,7 +108,7 @@ def _weights(hand: Hand, found: HandPlaces) -> Array:
     """
     weights = np.zeros((len(hand.joints), 3))
     links = hand.links
-    for chain in _chains(hand):
+    for chain in chains(hand):
         for number in chain:
             link = links[number]
             if link.mass_kg is None or link.center_of_mass is None:

@@ -122,6 +122,11 @@ class HeldLayout:
         return np.full(self.stiffness.shape, self.tip_mass_kg)
 
     @property
+    def tips_carried(self) -> Array:
+        """Return the mass of each fingertip that the palm carries along, (k,) [kg]."""
+        return np.full(len(self.contacts), self.tip_mass_kg)
+
+    @property
     def stiffest(self) -> float:
         """Return the stiffness of the stiffest spring [N/m]."""
         return float(self.stiffness.max())

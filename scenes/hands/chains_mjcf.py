@@ -37,6 +37,8 @@ class Chains:
     """Inertia that each joint has besides that of its links."""
     tips: tuple[Mapping[str, object], ...]
     """Attributes of each finger's fingertip: what it touches, and how."""
+    light_kg: float = NOMINAL_KG
+    """Mass of a link whose own is not known, or does not count [kg]."""
     weighs: bool = False
     """Whether gravity pulls at links whose masses are known."""
     touches: int = 0
@@ -66,7 +68,7 @@ def _tip(last: Element, finger: HandFinger, attributes: Mapping[str, object]) ->
 
 
 def _link(parent: Element, chains: Chains, numbered: tuple[Link, bool], angle: float) -> Element:
-    (link, is_last), mass, center = numbered, NOMINAL_KG, np.zeros(3)
+    (link, is_last), mass, center = numbered, chains.light_kg, np.zeros(3)
     joint = link.joint
     if chains.weighs and link.mass_kg is not None and link.center_of_mass is not None:
         mass, center = link.mass_kg, link.center_of_mass

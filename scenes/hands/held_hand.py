@@ -7,15 +7,16 @@ springs of the stiffness
 
     K_i = k_q (L_i' L_i)^-1,                                                              (1)
 
-and so are joint inertia a and dampers c_q: m_i = a (L_i' L_i)^-1, C_i = c_q (L_i' L_i)^-1. This
-needs joints that let the point of contact move in all directions. A stretched finger, or one with
-two joints, is rigid in some direction, which no grip of springs describes.
+and so are joint inertia a and dampers c_q: m_i = a (L_i' L_i)^-1, C_i = c_q (L_i' L_i)^-1. The
+inertia is that of rotors, which a moving palm does not load. What the squeeze adds to (1), as links
+turn under it, is in `grasp_core.hands.hand_grips`. (1) needs joints that let the point of contact
+move in all directions. A stretched finger, or one with two joints, is rigid in some direction,
+which no grip of springs describes.
 
 Servos, inertia and dampers are chosen as for fingertips on springs (see `scenes.execution.held`)
 at the root mean square l of the levers: k_q = K l^2, a = m_t l^2, c_q = c l^2. Motors have the
 torque limits that are left when they carry their links in any orientation (see `Motors`), so links
-weigh nothing in the scene. Links that turn with their joints bend (1) by the squeeze over the
-length of links, some percent, which is left out of predictions and is there in simulation.
+weigh nothing in the scene.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -71,6 +72,11 @@ class HeldHandLayout(HeldLayout):
     def tip_masses(self) -> Array:
         """Return the inertia of each fingertip along its springs, (k, 3) [kg]."""
         return self.inertias
+
+    @property
+    def tips_carried(self) -> Array:
+        """Return zeros, (k,) [kg]: rotors of motors resist turning joints, not a moving palm."""
+        return np.zeros(len(self.contacts))
 
     @property
     def stiffest(self) -> float:
@@ -191,7 +197,7 @@ def finger_springs(motors: Motors, stiffness_n_per_m: float) -> Array:
     Raises:
         InputError: A finger is rigid in some direction.
     """
-    size = mean_lever(motors)
+    servo, size = servo_stiffness(motors, stiffness_n_per_m), mean_lever(motors)
     levers = motors.levers.reshape(len(motors.limits), -1, 3).transpose(1, 0, 2)
     least = np.sqrt(np.maximum(np.linalg.eigvalsh(levers.transpose(0, 2, 1) @ levers)[:, 0], 0.0))
     if not (least >= STRETCHED * size).all():
@@ -200,8 +206,13 @@ def finger_springs(motors: Motors, stiffness_n_per_m: float) -> Array:
             "joints: its fingertip cannot move in all directions, so no springs stand for its "
             "joints; use another pose, or validate_hand"
         )
-    springs = stiffness_n_per_m * size**2 * np.linalg.inv(levers.transpose(0, 2, 1) @ levers)
+    springs = servo * np.linalg.inv(levers.transpose(0, 2, 1) @ levers)
     return 0.5 * (springs + springs.transpose(0, 2, 1))
+
+
+def servo_stiffness(motors: Motors, stiffness_n_per_m: float) -> float:
+    """Return the stiffness k_q of the servos that amount to a stiffness K of fingertips."""
+    return _rounded(stiffness_n_per_m * mean_lever(motors) ** 2)
 
 
 def strong_motors(hand: Hand, reach: HandReach) -> Motors:

@@ -25,6 +25,9 @@ from scenes.mjcf_text import Element, add_element, document
 from scenes.physics import PhysicsSettings
 
 WRIST = "wrist"
+LIGHT_KG = 1e-5
+"""Mass of links: ten thousand times less than objects', so that no joint feels the wrist's motion
+through them."""
 
 
 def held_hand_scene(  # noqa: PLR0913, PLR0917 - a hand, an object, and how they meet
@@ -49,8 +52,8 @@ def held_hand_text(layout: HeldHandLayout, physics: PhysicsSettings) -> str:
                         **physics.contact()}  # fmt: skip
     touching = {**physics.contact(), "friction": (float(layout.friction.max()), 0.0, 0.0)}
     chains = Chains(
-        layout.hand, layout.angles, layout.armature_kg_m2, tuple(tips), touches=FINGERTIPS,
-        contact=touching,
+        layout.hand, layout.angles, layout.armature_kg_m2, tuple(tips), light_kg=LIGHT_KG,
+        touches=FINGERTIPS, contact=touching,
     )  # fmt: skip
     add_fingers(palm, chains)
     add_exclusions(add_element(root, "contact", {}), layout.hand)

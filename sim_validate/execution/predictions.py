@@ -7,17 +7,18 @@ against the palm as a mass on springs:
     M = M_o + sum_i W_i m_i W_i',   C = sum_i W_i C_i W_i',
 
 with the maps W_i and the grasp stiffness K of `grasp_core.execution.grips`, the object's mass
-matrix M_o, the tips' masses m_i, (3, 3), and the dampers C_i. In the palm's axes, the load w is the
-object's weight and what else acts on it, less the inertial forces of the palm's acceleration (a, e)
-and rate of turning o:
+matrix M_o, the tips' inertia m_i, (3, 3), and the dampers C_i. Of m_i the palm carries m'_i along:
+all of a fingertip on slides, and nothing of one whose inertia is that of motors' rotors. In the
+palm's axes, the load w is the object's weight and what else acts on it, less the inertial forces of
+the palm's acceleration (a, e) and rate of turning o:
 
-    w = (m g, 0) + w_e - M_o (a, e) - (0, o x I o) - sum_i W_i m_i b_i,                   (2)
+    w = (m g, 0) + w_e - M_o (a, e) - (0, o x I o) - sum_i W_i m'_i b_i,                   (2)
     b_i = a + e x c_i + o x (o x c_i),
 
 with the object's inertia I and the tips' centres c_i. The contact force on the object then changes
 by
 
-    -K_i d_i - C_i d_i' - m_i (d_i'' + b_i),   d_i = W_i' x,                              (3)
+    -K_i d_i - C_i d_i' - m_i d_i'' - m'_i b_i,   d_i = W_i' x,                              (3)
 
 and along axes that turn with the object by -t x f_i more. The whole load is scaled: the least
 multiple at which a contact reaches its cone at any time is the predicted one. A trial whose
@@ -62,6 +63,8 @@ class HeldDynamics:
     """M_o, (6, 6) [kg, kg m^2]."""
     tips: Array
     """m_i, (k, 3, 3) [kg]."""
+    carried: Array
+    """Masses on which the acceleration of the fingers' bases acts, (k,) [kg]."""
     mass: Array
     """M, (6, 6) [kg, kg m, kg m^2]."""
     damping: Array
@@ -87,7 +90,7 @@ def held_dynamics(grip: Grip, layout: HeldLayout) -> HeldDynamics:
     tips = np.einsum("kij,kj,klj->kil", layout.axes, layout.tip_masses, layout.axes)
     mass = own + np.einsum("kij,kjl,kml->im", maps, tips, maps)
     damping = np.einsum("kij,kjl,kml->im", maps, dampers, maps)
-    return HeldDynamics(grip, layout, maps, own, tips, mass, damping, dampers)
+    return HeldDynamics(grip, layout, maps, own, tips, layout.tips_carried, mass, damping, dampers)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -177,7 +180,7 @@ def _load(dynamics: HeldDynamics, drive: Drive) -> tuple[Array, Array]:
     rates = _rates(drive.accelerations)
     load -= drive.accelerations @ dynamics.own.T
     load[:, 3:] -= cross(rates, rates @ layout.inertia_kg_m2)
-    load -= np.einsum("kij,kjl,nkl->ni", dynamics.maps, dynamics.tips, bases)
+    load -= np.einsum("kij,k,nkj->ni", dynamics.maps, dynamics.carried, bases)
     return load, bases
 
 
@@ -209,8 +212,9 @@ def _responses(dynamics: HeldDynamics, loads: Array, bases: Array) -> tuple[Arra
     grip = dynamics.grip
     motion, speed, acceleration = _solved(dynamics, loads)
     turned_maps = dynamics.maps.transpose(0, 2, 1)
-    inertia = dynamics.tips @ (turned_maps @ acceleration + bases[..., None])
-    forces = grip.stiffness @ turned_maps @ motion + dynamics.dampers @ turned_maps @ speed
+    inertia = dynamics.tips @ turned_maps @ acceleration
+    inertia += dynamics.carried[:, None, None] * bases[..., None]
+    forces = -grip.force_changes @ motion + dynamics.dampers @ turned_maps @ speed
     turns = np.array([cross_matrix(force) for force in grip.squeeze])
     changes = turns @ motion[..., 3:, :] - forces - inertia
     return motion[:, :, 0, :, 0], np.einsum("kij,...kil->...kj", grip.frames, changes)

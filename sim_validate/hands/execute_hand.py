@@ -10,14 +10,16 @@ from dataclasses import replace
 from grasp_core.checked import instance, whole
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, NoForcesError
-from grasp_core.execution.best_squeeze import BestSqueeze, best_squeeze
+from grasp_core.execution.best_squeeze import BestSqueeze, searched
+from grasp_core.execution.grips import unsqueezed
 from grasp_core.execution.loads import any_direction
 from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand_grips import hand_grip
 from grasp_core.hands.reach import HandReach
 from grasp_core.hands.stance import stance_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.hands.held_hand import finger_springs, strong_motors
+from scenes.hands.held_hand import finger_springs, servo_stiffness, strong_motors
 from scenes.hands.held_hand_mjcf import held_hand_scene
 from sim_validate.execution.execute import executed, surface_reach
 from sim_validate.execution.settings import ExecutionSettings
@@ -103,11 +105,12 @@ def hand_squeeze(
             f"the contacts of {reach.grasp} are not in force closure at friction {friction}"
         )
     motors = strong_motors(hand, reach)
-    best = best_squeeze(
-        body, stance.contacts, friction, any_direction(settings.mass_kg),
-        max_push_n=settings.push_n, stiffness=finger_springs(motors, settings.stiffness_n_per_m),
-        tip_radius_m=stance.tip_radii, motors=motors,
+    loose = unsqueezed(
+        body, stance.contacts, friction, tip_radius_m=stance.tip_radii,
+        stiffness=finger_springs(motors, settings.stiffness_n_per_m),
     )  # fmt: skip
+    start = hand_grip(hand, stance, loose, servo_stiffness(motors, settings.stiffness_n_per_m))
+    best = searched(start, any_direction(settings.mass_kg), settings.push_n, motors)
     if best.scale == 0.0:
         raise NoForcesError(
             "no squeeze within the motors' torques carries any part of the weight in every "

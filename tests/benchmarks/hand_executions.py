@@ -86,8 +86,8 @@ def main():
             f"{stiffness:g} N/m: {len(runs)} executions, {len(trials)} trials, "
             f"{np.mean([trial.survived for trial in trials]):.1%} survived; first slip of "
             f"{len(clear)} that stuck: median {np.median(errors):.2f} %, 95 % within "
-            f"{np.quantile(errors, 0.95):.2f} %; predicted lost and kept {np.mean(lost & kept):.1%},"
-            f" predicted kept and lost {np.mean(~lost & ~kept):.1%}; controls that slipped "
+            f"{np.quantile(errors, 0.95):.2f} %; predicted lost, kept {np.mean(lost & kept):.1%},"
+            f" kept and lost {np.mean(~lost & ~kept):.1%}; controls that slipped "
             f"{sum(controls)} of {len(controls)}; median {np.median(seconds):.2f} s"
         )
     return 1 if bad else 0
