@@ -112,18 +112,35 @@ def hand_text(layout: HandLayout, physics: PhysicsSettings) -> str:
     root, world = opened(layout, physics, SCALED)
     contact = as_texts(physics.contact())
     add_object(world, layout, contact, weightless=bool(layout.gravity.any()))
+    add_hand(root, world, layout, physics)
+    return document(root)
+
+
+def add_hand(
+    root: Element, world: Element, layout: HandLayout, physics: PhysicsSettings,
+    shapes: dict[str, str] | None = None,
+) -> None:  # fmt: skip
+    """Add the hand with its servos to a scene.
+
+    Args:
+        root: The scene.
+        world: Its world, to which the palm is fixed.
+        layout: The hand's pose and servos.
+        physics: Settings of the contacts of fingertips.
+        shapes: Attributes that the shapes of links have besides their own.
+    """
+    contact, other = as_texts(physics.contact()), shapes or {}
     pose = layout.palm_pose
     palm = add_element(world, "body", {"name": PALM, **_placed(pose[:3, 3], pose[:3, :3])})
     for place, shape in enumerate(layout.hand.palm):
-        _shape(palm, f"{PALM}_{place}", shape)
+        _shape(palm, f"{PALM}_{place}", shape, other)
     angles = iter(layout.joints.tolist())
     for number, finger in enumerate(layout.hand.fingers):
-        _finger(palm, layout, (number, finger), angles, contact)
+        _finger(palm, layout, (number, finger), angles, (contact, other))
     _exclusions(add_element(root, "contact", {}), layout.hand)
     actuators = add_element(root, "actuator", {})
     for joint, limit in zip(layout.hand.joints, layout.motors.limits.tolist(), strict=True):
         _servo(actuators, layout, joint.name, limit)
-    return document(root)
 
 
 def _placed(position: Array, rotation: Array) -> dict[str, object]:
@@ -132,12 +149,13 @@ def _placed(position: Array, rotation: Array) -> dict[str, object]:
 
 def _finger(
     palm: Element, layout: HandLayout, numbered: tuple[int, HandFinger], angles: Iterator[float],
-    contact: dict[str, str],
+    contacts: tuple[dict[str, str], dict[str, str]],
 ) -> None:  # fmt: skip
-    number, finger = numbered
+    """Add a finger; `contacts` are attributes of what touches: the fingertip, and other shapes."""
+    (number, finger), (contact, other) = numbered, contacts
     parent = palm
     for link in finger.links:
-        parent = _link(parent, layout, link, next(angles))
+        parent = _link(parent, layout, link, next(angles), other)
     touching = [place for place, used in enumerate(layout.used_fingers) if used == number]
     tip = {"name": f"tip_{finger.name}", "type": "sphere", "size": finger.tip.radius,
            "pos": finger.tip.center, "contype": 0, "conaffinity": 0, "mass": 0.0, "group": 0,
@@ -148,7 +166,9 @@ def _finger(
     add_element(parent, "geom", tip | contact)
 
 
-def _link(parent: Element, layout: HandLayout, link: Link, angle: float) -> Element:
+def _link(
+    parent: Element, layout: HandLayout, link: Link, angle: float, other: dict[str, str]
+) -> Element:
     joint, mass, center = link.joint, NOMINAL_KG, np.zeros(3)
     pulled = bool(layout.gravity.any())
     if pulled and link.mass_kg is not None and link.center_of_mass is not None:
@@ -168,7 +188,7 @@ def _link(parent: Element, layout: HandLayout, link: Link, angle: float) -> Elem
     inertia = (mass * NOMINAL_M**2,) * 3
     add_element(body, "inertial", {"pos": center, "mass": mass, "diaginertia": inertia})
     for place, shape in enumerate(link.shapes):
-        _shape(body, f"{link.name}_{place}", shape)
+        _shape(body, f"{link.name}_{place}", shape, other)
     return body
 
 
@@ -179,7 +199,7 @@ def rotation_about(axis: Array, angle: float) -> Array:
     return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
 
 
-def _shape(body: Element, name: str, shape: LinkShape) -> None:
+def _shape(body: Element, name: str, shape: LinkShape, other: dict[str, str]) -> None:
     """Add a shape: a ball, a capsule, or the box inside a rounded one that meets its corners."""
     long = np.flatnonzero(shape.half_sizes > 0.0)
     own: dict[str, object] = {"name": name, "contype": SHAPES, "conaffinity": SHAPES,
@@ -196,7 +216,7 @@ def _shape(body: Element, name: str, shape: LinkShape) -> None:
             "type": "box",
             "size": np.maximum(shape.half_sizes + shape.radius / math.sqrt(3.0), THIN_M),
         }
-    add_element(body, "geom", own | _placed(shape.position, turned))
+    add_element(body, "geom", own | other | _placed(shape.position, turned))
 
 
 def _exclusions(contact: Element, hand: Hand) -> None:
