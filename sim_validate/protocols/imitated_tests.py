@@ -136,7 +136,7 @@ GENDEXGRASP = PublishedProtocol(
             for way in (SIX[1], SIX[0], SIX[3], SIX[2], SIX[5], SIX[4])
         ),
     ),
-    passing=Passing(most_m=0.02, since="before closing"),
+    passing=Passing(most_m=0.02, since="each step"),
     physics=OUR_PHYSICS,
 )  # fmt: skip
 MGG_SOURCES = (
@@ -153,7 +153,7 @@ MGG_G = 9.81
 DOWN: Triple = (0.0, 0.0, -1.0)
 MULTIGRIPPERGRASP = PublishedProtocol(
     name="multigrippergrasp",
-    version="branch iros_2024, test gravity, 3 s",
+    version="branch main, test gravity, 3 s",
     sources=MGG_SOURCES,
     imitates=f"{PHYSX}.",
     ours=MGG_OURS,
@@ -167,7 +167,7 @@ MULTIGRIPPERGRASP = PublishedProtocol(
 )
 MULTIGRIPPERGRASP_AXES = PublishedProtocol(
     name="multigrippergrasp-axes",
-    version="branch iros_2024, test axes_forces, 6 s",
+    version="branch main, test axes_forces, 6 s",
     sources=MGG_SOURCES,
     imitates=f"{PHYSX}.",
     ours=MGG_OURS,
@@ -176,12 +176,12 @@ MULTIGRIPPERGRASP_AXES = PublishedProtocol(
     close_s=0.4,
     squeeze_s=0.4,
     runs=(tuple(Step(1.0, per_kg=scaled(way, 0.5), look_s=0.1) for way in SIX),),
-    passing=Passing(most_m=0.02, since="before closing"),
+    passing=Passing(most_m=0.02),
     physics=OUR_PHYSICS,
 )
 MULTIGRIPPERGRASP_RAMP = PublishedProtocol(
     name="multigrippergrasp-ramp",
-    version="branch iros_2024, test gradual_gravity, 3 s",
+    version="branch main, test gradual_gravity, 3 s",
     sources=MGG_SOURCES,
     imitates=f"{PHYSX}.",
     ours=MGG_OURS,

@@ -16,7 +16,7 @@ from grasp_core.arrays import Array
 from scenes.physics import PhysicsSettings
 
 Triple: TypeAlias = tuple[float, float, float]
-From: TypeAlias = Literal["before closing", "after closing"]
+From: TypeAlias = Literal["before closing", "after closing", "each step"]
 NOWHERE: Triple = (0.0, 0.0, 0.0)
 
 
