@@ -7,6 +7,12 @@ from sim_validate.execution.verdict import ExecutionTrial as ExecutionTrial
 from sim_validate.hands.hand_verdict import HandVerdict as HandVerdict
 from sim_validate.hands.validate_hand import hand_setup as hand_setup
 from sim_validate.hands.validate_hand import validate_hand as validate_hand
+from sim_validate.protocols.judgement import Judgement as Judgement
+from sim_validate.protocols.judging import judge_by as judge_by
+from sim_validate.protocols.judging import judge_hand_by as judge_hand_by
+from sim_validate.protocols.named_protocols import protocol as protocol
+from sim_validate.protocols.named_protocols import protocol_names as protocol_names
+from sim_validate.protocols.published import PublishedProtocol as PublishedProtocol
 from sim_validate.records.executions_json import Executions as Executions
 from sim_validate.records.executions_json import load_executions as load_executions
 from sim_validate.records.regions import load_regions as load_regions

@@ -27,7 +27,7 @@ OPEN_M, OPEN_SIZES = 0.01, 0.25
 """Distance from which fingertips come: the smaller of the two [m, grasp sizes]."""
 
 
-def fingertip_scene(  # noqa: PLR0913 - the grasp, and what a test states about it
+def fingertip_scene(
     body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float, mass_kg: float,
     physics: PhysicsSettings, fingers: FingerSettings,
 ) -> TestedScene:  # fmt: skip

@@ -4,6 +4,7 @@ Fingertips and links all touch the object's own surface. The joints' servos have
 the test states, and the torque limits of the hand's motors, which most tests leave out.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +19,9 @@ from scenes.physics import PhysicsSettings
 from scenes.tested.tested_object import TestedScene, begun, ended, mass_properties
 
 ARMATURE_KG_M2 = 1e-4
-"""Inertia of each joint's motor: links have no masses of their own here."""
+"""Least inertia of each joint's motor: links have no masses of their own here."""
+RING_RAD = 0.5
+"""Largest angle by which a joint on its servo rings in a step; stiffer servos get more inertia."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +29,18 @@ class HandServos:
     """Stiffness and damping of the servos on all joints."""
 
     stiffness_n_m_per_rad: float
-    damping_n_m_s_per_rad: float = 0.1
-    """Damping; 0.1 is that of the Allegro hand in DexGraspBench."""
+    least_damping_n_m_s_per_rad: float = 0.1
+    """Damping, unless that of no overshoot is larger; 0.1 is that of the Allegro hand in
+    DexGraspBench."""
+
+    def armature(self, step_s: float) -> float:
+        """Return the inertia of each joint's motor [kg m^2]."""
+        return max(ARMATURE_KG_M2, self.stiffness_n_m_per_rad * (step_s / RING_RAD) ** 2)
+
+    def damping(self, step_s: float) -> float:
+        """Return the damping of each servo [N m s/rad]."""
+        critical = 2.0 * math.sqrt(self.stiffness_n_m_per_rad * self.armature(step_s))
+        return max(self.least_damping_n_m_s_per_rad, critical)
 
 
 def hand_scene(  # noqa: PLR0913, PLR0917 - the grasp, and what a test states about it
@@ -77,7 +90,6 @@ def tested_layout(  # noqa: PLR0913, PLR0917 - the grasp, and what a test states
     return replace(
         base, center=np.zeros(3), mass_kg=mass, inertia_kg_m2=inertia,
         torsion_m=physics.torsion_m, servo_n_m_per_rad=servos.stiffness_n_m_per_rad,
-        damping_n_m_s_per_rad=servos.damping_n_m_s_per_rad, armature_kg_m2=ARMATURE_KG_M2,
+        damping_n_m_s_per_rad=servos.damping(physics.timestep),
+        armature_kg_m2=servos.armature(physics.timestep),
     )  # fmt: skip
-
-

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import OmitArgPrefixes, Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from sim_validate.cli.flag_bounds import at_least
-from sim_validate.cli.flag_groups import Count, Direction, Friction, Seed, Speech
+from sim_validate.cli.flag_groups import Count, Direction, Friction, ProtocolName, Seed, Speech
 from sim_validate.parallel.processes import available_cores
 
 MOST_STARTS = 10_000
@@ -61,6 +61,9 @@ class Reach:
     simulate: bool = False
     """Hold test wrenches in simulation with the hand's links and motors, and try negative controls;
     every joint needs a torque limit."""
+    protocol: UseAppendAction[tuple[ProtocolName, ...]] = ()
+    """With --simulate: judge the hand by the published test of another tool, beside our verdict
+    under its loads and the predicted margin, and write judgements.json; may be repeated."""
     friction: Friction | None = None
     """Coulomb coefficient to prove force closure with; if not given, the one planned for."""
     seed: Seed = 0

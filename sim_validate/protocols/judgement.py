@@ -112,7 +112,7 @@ def judged_run(
 
 
 def _begin(motion: Motion, run: Timeline, first: int, passing: Passing) -> Array:
-    if passing.since == "before closing" or run.closed == 0 and passing.since == "after closing":
+    if passing.since == "before closing" or (run.closed == 0 and passing.since == "after closing"):
         return motion.start
     sample = run.closed if passing.since == "after closing" else first
     return motion.poses[sample - 1] if sample else motion.start

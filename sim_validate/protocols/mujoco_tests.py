@@ -1,6 +1,5 @@
 """Published tests that run in MuJoCo, with the numbers of their own files."""
 
-
 from scenes.physics import PhysicsSettings
 from sim_validate.protocols.published import Passing, PublishedProtocol, Run, Source, Step, Triple
 
@@ -20,7 +19,7 @@ def scaled(way: Triple, size: float) -> Triple:
 def _pulls(acceleration: float, seconds: float, look_s: float) -> tuple[Run, ...]:
     """Return one run for each of the six directions."""
     return tuple(
-        (Step(seconds, per_kg=scaled(way, acceleration), look_s=look_s),) for way in SIX
+        (Step(seconds, pull_m_s2=scaled(way, acceleration), look_s=look_s),) for way in SIX
     )
 
 

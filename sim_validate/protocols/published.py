@@ -37,7 +37,7 @@ class Step:
     """A part of a run: what acts on the object, and how the palm moves, for some time."""
 
     seconds: float
-    per_kg: Triple = NOWHERE
+    pull_m_s2: Triple = NOWHERE
     """Force on the object over its mass [m/s^2]."""
     force_n: Triple = NOWHERE
     """Force on the object, whatever its mass [N]."""
@@ -54,7 +54,7 @@ class Step:
 
     def force(self, mass_kg: float) -> Array:
         """Return the force on an object of a mass, (3,) [N]."""
-        return mass_kg * np.array(self.per_kg) + np.array(self.force_n)
+        return mass_kg * np.array(self.pull_m_s2) + np.array(self.force_n)
 
 
 Run: TypeAlias = tuple[Step, ...]

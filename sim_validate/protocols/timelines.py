@@ -52,9 +52,7 @@ def timeline(protocol: PublishedProtocol, scene: TestedScene, run: Run) -> Timel
     wrenches = np.zeros((n, 6))
     wrenches[len(closing) :] = _wrenches(run, counts, scene, sample_s)
     held = np.broadcast_to(scene.squeezing, (sum(counts), len(scene.squeezing)))
-    return Timeline(
-        np.vstack([closing, held]), wrenches, tuple(looks), len(closing), sample_s
-    )
+    return Timeline(np.vstack([closing, held]), wrenches, tuple(looks), len(closing), sample_s)
 
 
 def _samples(seconds: float, sample_s: float) -> int:

@@ -13,7 +13,13 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
 from sim_validate.commands.hands.hand import asked_hand
-from sim_validate.commands.hands.simulated import show_simulated, simulated, with_motors
+from sim_validate.commands.hands.simulated import (
+    show_simulated,
+    simulated,
+    tries_ours,
+    with_motors,
+)
+from sim_validate.commands.judging.by_protocols import judge_hands
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import REACHES, remove_reaches
 from sim_validate.hands.hand_verdict import HandVerdict
@@ -38,13 +44,19 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
     chosen = chosen_grasps(saved, friction=command.friction, seed=None, limit=command.limit)
     with alone_in(command.out):
         found, verdicts, text = _reach(command, hand, chosen, reporter)
+        _show(hand, found, reporter)
+        judged = Exit.GOOD
+        if command.protocol:
+            judged, text = judge_hands(
+                chosen, hand, found, command.protocol, seed=command.seed, jobs=command.jobs,
+                folder=command.out, reporter=reporter,
+            )  # fmt: skip
     reporter.text(text)
-    _show(hand, found, reporter)
     show_simulated(verdicts, reporter)
     if any(each.reached for each in found):
         say_where_to_look(command, reporter)
     good = all(each.reached for each in found) and all(each.good for each in verdicts.values())
-    return Exit.GOOD if good else Exit.NEGATIVE
+    return judged if good else Exit.NEGATIVE
 
 
 def _reach(
@@ -80,7 +92,7 @@ def _reach(
                 steps.update(len(found), len(jobs), f"({good} reached)")
         verdicts = simulated(command, hand, saved, found, reporter)
     finally:
-        done = sum(each.reached for each in found) == len(verdicts) or not command.simulate
+        done = sum(each.reached for each in found) == len(verdicts) or not tries_ours(command)
         complete = len(found) == len(jobs) and done
         text = reaches_to_json(
             hand, saved.body, saved.friction, asked, found, complete=complete,
