@@ -69,8 +69,9 @@ def hand_scene(  # noqa: PLR0913, PLR0917 - the grasp, and what a test states ab
     # fingertips have these attributes anyway
     rubbing = {"friction": (friction, physics.torsion_m, 0.0)}
     add_hand(root, world, layout, physics, as_texts(rubbing | physics.contact()))
-    start = reach.joints if reach.pregrasp is None else reach.pregrasp
-    opened = np.zeros(len(layout.joints)) if start is None else start - reach.joints
+    # the layout's joints touch exactly, the pose's within micrometres
+    shut = np.zeros(len(layout.joints))
+    opened = shut if reach.pregrasp is None else reach.pregrasp - layout.joints
     forces = layout.squeeze_forces
     squeezing = layout.commands(forces[None])[0]
     names = tuple(tuple(link.name for link in finger.links) for finger in hand.fingers)

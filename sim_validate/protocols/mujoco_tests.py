@@ -23,13 +23,13 @@ def _pulls(acceleration: float, seconds: float, look_s: float) -> tuple[Run, ...
     )
 
 
-MIXED = {"solref": (0.0125, 1.0), "solimp": (0.7, 0.97, 0.00055, 0.5, 2.0)}
-"""Contacts of a hand's geoms (solref 0.005 1, solimp 0.5 0.99 0.0001) with those of an object
-(MuJoCo's defaults, 0.02 1 and 0.9 0.95 0.001), as MuJoCo mixes them: half of each."""
 DEX_PHYSICS = PhysicsSettings(
     timestep=0.004, integrator="implicitfast", impratio=10.0, noslip_iterations=2, torsion_m=0.02,
-    tolerance=1e-8, jacobian="auto", **MIXED,
+    tolerance=1e-8, jacobian="auto", solref=(0.0125, 1.0), solimp=(0.7, 0.97, 0.00055, 0.5, 2.0),
 )  # fmt: skip
+"""Settings of DexGraspBench and Dexonomy. Contacts of a hand's geoms (solref 0.005 1, solimp 0.5
+0.99 0.0001) with those of an object (MuJoCo's defaults, 0.02 1 and 0.9 0.95 0.001) are mixed by
+MuJoCo: half of each."""
 DEX_OURS = (
     "The palm is fixed, where theirs is welded softly to a body that moves.",
     "Convex objects are themselves, and others are covered with thin convex solids, where theirs "

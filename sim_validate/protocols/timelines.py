@@ -79,7 +79,7 @@ def _looks(first: int, count: int, step: Step, sample_s: float) -> list[int]:
 
 def _wrenches(run: Run, counts: list[int], scene: TestedScene, sample_s: float) -> Array:
     """Return forces of the steps with what the palm's motion adds: (1), (n, 6)."""
-    forces, paths, angles = [], [np.zeros((1, 3))], [np.zeros(1)]
+    forces, paths, angles = list[Array](), [np.zeros((1, 3))], [np.zeros(1)]
     for step, count in zip(run, counts, strict=True):
         time = np.arange(1, count + 1) / count
         forces.append((time if step.rises else np.ones(count))[:, None] * step.force(scene.mass_kg))

@@ -135,7 +135,9 @@ def report(results, names):
             print(f"  {kind} ({count}): {', '.join(told)}")
     print("\nwhy grasps failed tests")
     for name in names:
-        why = Counter(f[name][3].split(",")[0] for k, f in results if k == "grasp" and not f[name][0])
+        why = Counter(
+            f[name][3].split(",")[0] for k, f in results if k == "grasp" and not f[name][0]
+        )
         if why:
             print(f"  {name}: {dict(why.most_common(3))}")
     return good
