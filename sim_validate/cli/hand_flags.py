@@ -64,6 +64,9 @@ class Reach:
     protocol: UseAppendAction[tuple[ProtocolName, ...]] = ()
     """With --simulate: judge the hand by the published test of another tool, beside our verdict
     under its loads and the predicted margin, and write judgements.json; may be repeated."""
+    dexgraspbench: Path | None = None
+    """Folder for records of DexGraspBench, one for each grasp that is reached, and for the object
+    as it wants it, if that is convex."""
     friction: Friction | None = None
     """Coulomb coefficient to prove force closure with; if not given, the one planned for."""
     seed: Seed = 0

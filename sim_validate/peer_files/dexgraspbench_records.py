@@ -53,13 +53,13 @@ class DexRecord(ByValue):
         text(self.object_path, "object_path")
         positive(self.object_scale, "object_scale")
         object.__setattr__(self, "object_pose", _pose(self.object_pose, "object_pose", FREE))
-        size = np.shape(self.grasp)
-        if len(size) != 1 or size[0] <= FREE:
+        size = len(frozen(self.grasp, (None,), "grasp"))
+        if size <= FREE:
             raise InputError(
-                f"grasp must be a pose of {FREE} numbers and at least one joint, got shape {size}"
+                f"grasp must be a pose of {FREE} numbers and at least one joint, got {size} numbers"
             )
         for name in ("pregrasp", "grasp", "squeeze"):
-            object.__setattr__(self, name, _pose(getattr(self, name), name, size[0]))
+            object.__setattr__(self, name, _pose(getattr(self, name), name, size))
 
     def __repr__(self) -> str:
         return summary("DexRecord", self.object_path, joints=len(self.grasp) - FREE)
@@ -76,7 +76,7 @@ def _pose(given: Any, name: str, size: int) -> Array:
     return found
 
 
-def read_dex_record(path: str | Path) -> DexRecord:
+def load_dex_record(path: str | Path) -> DexRecord:
     """Read a record of DexGraspBench; nothing in the file is executed.
 
     Args:

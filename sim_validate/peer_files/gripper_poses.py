@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, cross, frozen, real_array
 from grasp_core.by_value import ByValue
-from grasp_core.checked import number, path_of, positive
+from grasp_core.checked import LARGEST, number, path_of, positive, whole
 from grasp_core.errors import InputError
 from grasp_core.files.strict_json import object_of
 from grasp_core.files.text_files import read_bytes, read_text
@@ -65,7 +65,7 @@ class GripperGrasp(ByValue):
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", _rigid(self.pose, "pose"))
         positive(self.opening_m, "opening_m")
-        number(self.score, "score")
+        number(self.score, "score", least=-LARGEST, most=LARGEST)
 
     def __repr__(self) -> str:
         return summary("GripperGrasp", opening_m=self.opening_m, score=self.score)
@@ -121,7 +121,7 @@ def _first_hit(body: Polyhedron, start: Array, way: Array, most: float) -> Conta
     return Contact(start + distance[first] * way, normal)
 
 
-def read_graspnet(
+def load_graspnet(
     path: str | Path, *, object_number: int | None = None, object_pose: ArrayLike | None = None,
     pad_m: float = PAD_M,
 ) -> tuple[GripperGrasp, ...]:  # fmt: skip
@@ -139,12 +139,14 @@ def read_graspnet(
     """
     place = path_of(path, "path")
     number(pad_m, "pad_m", least=0.0, most=1.0)
-    rows = real_array(read_npy(place), "rows")
-    if rows.ndim != TABLE or rows.shape[1] != ROW:
-        raise InputError(f"{place}: expected an array of rows of {ROW} numbers, as GraspNet's")
     back = np.eye(POSE)
     if object_pose is not None:
         back = np.asarray(np.linalg.inv(_rigid(object_pose, "object_pose")), np.float64)
+    if object_number is not None:
+        whole(object_number, "object_number")
+    rows = real_array(read_npy(place), "rows")
+    if rows.ndim != TABLE or rows.shape[1] != ROW:
+        raise InputError(f"{place}: expected an array of rows of {ROW} numbers, as GraspNet's")
     kept = rows if object_number is None else rows[rows[:, -1] == object_number]
     return tuple(_of_row(row, back, pad_m) for row in kept)
 
@@ -159,7 +161,7 @@ def _of_row(row: Array, back: Array, pad_m: float) -> GripperGrasp:
     return GripperGrasp(back @ pose, width, score)
 
 
-def read_acronym(path: str | Path, *, pad_m: float = PAD_M) -> tuple[GripperGrasp, ...]:
+def load_acronym(path: str | Path, *, pad_m: float = PAD_M) -> tuple[GripperGrasp, ...]:
     """Read the grasps of an ACRONYM file; poses are at the object's scale in that file.
 
     Args:

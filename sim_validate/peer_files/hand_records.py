@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
-from grasp_core.checked import coefficient, instance, number, positive
+from grasp_core.checked import coefficient, instance, number, positive, text
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.geometry.nearest_points import nearest_on_surface
@@ -103,12 +103,15 @@ def dex_record(
         InputError: The pose is another hand's, or none was found.
     """
     stance = stance_of(hand, reach)
+    positive(push_n, "push_n")
+    positive(servo_n_m_per_rad, "servo_n_m_per_rad")
+    text(object_path, "object_path")
     strong = hand.with_torque_limits(STRONG_N_M, "none: only levers are asked for")
     levers = hand_motors(strong, reach).levers
     normals = np.array([contact.normal for contact in stance.contacts])
     largest = float(np.einsum("ki,ki->k", stance.forces, normals).max())
-    forces = positive(push_n, "push_n") / largest * stance.forces
-    told = levers @ forces.ravel() / positive(servo_n_m_per_rad, "servo_n_m_per_rad")
+    forces = push_n / largest * stance.forces
+    told = levers @ forces.ravel() / servo_n_m_per_rad
     root = _seven(stance.palm_pose @ np.linalg.inv(_root(hand)))
     opened = stance.joints if reach.pregrasp is None else reach.pregrasp
     return DexRecord(
@@ -143,11 +146,12 @@ def reach_of_record(
     Raises:
         InputError: The record has not as many joints as the hand.
     """
-    instance(record, DexRecord, "record", "read_dex_record reads one")
+    instance(record, DexRecord, "record", "load_dex_record reads one")
     instance(hand, Hand, "hand", "load_hand makes one")
     check_body(body)
     coefficient(friction)
     number(touch_m, "touch_m", least=0.0, most=1.0)
+    text(name, "name")
     joints = record.grasp[FREE:]
     if len(joints) != len(hand.joints):
         raise InputError(

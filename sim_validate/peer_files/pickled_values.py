@@ -177,6 +177,8 @@ def _called(reader: _Reader, _: Any) -> None:
         raise InputError("the pickle calls what is no function; save plain dictionaries of arrays")
     if (called.module, called.name) == CODECS and given[1] == "latin1":
         reader.stack.append(given[0].encode("latin1"))
+    elif called.name == "bytes" and not given:  # how the second protocol writes none
+        reader.stack.append(b"")
     elif (called.module, called.name) == ("numpy", "dtype"):
         reader.stack.append(_Type(str(given[0])))
     elif called.module in MODULES and called.name in made:
@@ -245,7 +247,8 @@ def _tuple(count: int) -> Callable[[_Reader, Any], None]:
 
 PUSHED = {
     "INT", "BININT", "BININT1", "BININT2", "LONG", "LONG1", "FLOAT", "BINFLOAT", "SHORT_BINBYTES",
-    "BINBYTES", "BINBYTES8", "BYTEARRAY8", "BINUNICODE", "SHORT_BINUNICODE", "BINUNICODE8", "UNICODE",
+    "BINBYTES", "BINBYTES8", "BYTEARRAY8", "BINUNICODE", "SHORT_BINUNICODE", "BINUNICODE8",
+    "UNICODE",
 }  # fmt: skip
 """Opcodes whose argument is the value."""
 IGNORED = {"PROTO", "FRAME"}

@@ -9,7 +9,7 @@ and thresholds are micrometres.
 from collections.abc import Iterable
 from functools import partial
 
-from grasp_core.checked import coefficient, instance, seed_of, several
+from grasp_core.checked import coefficient, instance, one_of, seed_of, several
 from grasp_core.closure.contact_arrays import FEWEST
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
@@ -24,7 +24,7 @@ from scenes.tested.hand_scene import HandServos, hand_scene
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.hands.validate_hand import hand_setup
 from sim_validate.protocols.judgement import Judgement
-from sim_validate.protocols.named_protocols import protocol as protocol_named
+from sim_validate.protocols.named_protocols import PROTOCOLS
 from sim_validate.protocols.our_verdict import our_verdict
 from sim_validate.protocols.published import PublishedProtocol
 from sim_validate.protocols.their_verdict import their_verdict
@@ -143,7 +143,8 @@ def judge_hand_by(  # noqa: PLR0913 - the hand in its grasp, and how it is judge
 def _protocol(given: str | PublishedProtocol) -> PublishedProtocol:
     if isinstance(given, PublishedProtocol):
         return given
-    return protocol_named(given)
+    one_of(given, PROTOCOLS, "protocol")
+    return PROTOCOLS[given]
 
 
 def _given(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> Grasp | tuple[Contact, ...]:

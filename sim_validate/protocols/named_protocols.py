@@ -1,6 +1,6 @@
 """Looks up the published tests by name."""
 
-from grasp_core.errors import InputError
+from grasp_core.checked import one_of
 from sim_validate.protocols.imitated_tests import IMITATED_TESTS
 from sim_validate.protocols.mujoco_tests import MUJOCO_TESTS
 from sim_validate.protocols.published import PublishedProtocol
@@ -22,8 +22,5 @@ def protocol(name: str) -> PublishedProtocol:
     Raises:
         InputError: No test has this name.
     """
-    if name not in PROTOCOLS:
-        raise InputError(
-            f"protocol must be one of {', '.join(PROTOCOLS)}, got {name!r}; choose one of them"
-        )
+    one_of(name, PROTOCOLS, "name")
     return PROTOCOLS[name]

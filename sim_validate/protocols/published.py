@@ -13,6 +13,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.short_text import summary
 from scenes.physics import PhysicsSettings
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -79,7 +80,7 @@ class Passing:
     where the test does not ask."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class PublishedProtocol:
     """The test of another tool as it is published."""
 
@@ -114,6 +115,9 @@ class PublishedProtocol:
     """Largest turn by noise, about each axis [deg]."""
     physics: PhysicsSettings = field(default_factory=PhysicsSettings)
     """Settings of MuJoCo: the published ones, or those that imitate them."""
+
+    def __repr__(self) -> str:
+        return summary("PublishedProtocol", self.label, self.version, runs=len(self.runs))
 
     @property
     def imitation(self) -> bool:

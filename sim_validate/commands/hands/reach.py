@@ -13,6 +13,7 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
 from sim_validate.commands.hands.hand import asked_hand
+from sim_validate.commands.hands.records import write_records
 from sim_validate.commands.hands.simulated import (
     show_simulated,
     simulated,
@@ -45,6 +46,8 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
     with alone_in(command.out):
         found, verdicts, text = _reach(command, hand, chosen, reporter)
         _show(hand, found, reporter)
+        if command.dexgraspbench is not None:
+            write_records(command.dexgraspbench, hand, chosen.body, found, reporter)
         judged = Exit.GOOD
         if command.protocol:
             judged, text = judge_hands(

@@ -15,7 +15,7 @@ from scenes.mjcf_text import quaternion
 from sim_validate.peer_files import pickled_values as reader
 from sim_validate.peer_files.dexgraspbench_records import (
     DexRecord,
-    read_dex_record,
+    load_dex_record,
     write_dex_record,
 )
 from sim_validate.peer_files.hand_records import (
@@ -50,7 +50,7 @@ def test_a_round_trip_keeps_contacts(hand, tmp_path):
     for number, reach in enumerate(found):
         record = dex_record(model, reach, "objects/dodecahedron")
         path = write_dex_record(record, tmp_path / f"{number}.npy")
-        read = read_dex_record(path)
+        read = load_dex_record(path)
         assert read == record
         again = reach_of_record(read, model, body, FRICTION, name=reach.grasp)
         assert again.reached
@@ -175,7 +175,7 @@ def saved(value, path, protocol=None):
 
 @pytest.mark.parametrize("protocol", [2, 3, 4, 5])
 def test_records_of_any_pickle_protocol_are_read(protocol, tmp_path):
-    read = read_dex_record(saved(FIELDS, tmp_path / "0.npy", protocol))
+    read = load_dex_record(saved(FIELDS, tmp_path / "0.npy", protocol))
     assert read.object_scale == 0.06
     assert read.grasp[7] == np.float32(0.2)
     assert len(read.grasp) == 8
@@ -212,7 +212,7 @@ class Runs:
 def test_a_file_that_would_run_code_is_refused_and_runs_nothing(protocol, tmp_path):
     path = saved(FIELDS | {"harm": Runs()}, tmp_path / "0.npy", protocol)
     with pytest.raises(InputError, match=r"calls .*exec.*, which is not executed"):
-        read_dex_record(path)
+        load_dex_record(path)
 
 
 def test_what_holds_itself_or_a_thousand_copies_takes_no_time():
@@ -242,7 +242,7 @@ def test_any_damage_is_refused_with_our_error(tmp_path):
         damaged[rng.integers(len(data))] = rng.integers(256)
         path.write_bytes(bytes(damaged[: rng.integers(1, len(data) + 1)]))
         try:
-            read_dex_record(path)
+            load_dex_record(path)
         except InputError:
             refused += 1
     assert refused > 300
@@ -266,4 +266,4 @@ def test_nothing_but_pickletools_looks_at_a_pickle():
 def test_what_a_record_lacks_is_named(change, said, tmp_path):
     fields = {key: value for key, value in (FIELDS | change).items() if value is not None}
     with pytest.raises(InputError, match=said):
-        read_dex_record(saved(fields, tmp_path / "0.npy"))
+        load_dex_record(saved(fields, tmp_path / "0.npy"))

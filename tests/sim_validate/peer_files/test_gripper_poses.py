@@ -12,8 +12,8 @@ from grasp_core.errors import InputError
 from sim_validate.peer_files.gripper_poses import (
     PANDA_END_M,
     GripperGrasp,
-    read_acronym,
-    read_graspnet,
+    load_acronym,
+    load_graspnet,
 )
 
 SIDE = 0.04
@@ -36,8 +36,8 @@ def test_graspnets_fingers_meet_the_cube_across_the_palm(tmp_path):
     path = tmp_path / "grasps.npy"
     rows = np.array([graspnet_row(), graspnet_row(number=6)])
     np.save(path, rows)
-    one, _ = read_graspnet(path)
-    (only,) = read_graspnet(path, object_number=5)
+    one, _ = load_graspnet(path)
+    (only,) = load_graspnet(path, object_number=5)
     assert one == only
     assert (one.score, one.opening_m) == (0.8, 0.08)
     left, right = one.contacts(BOX)
@@ -50,7 +50,7 @@ def test_graspnets_fingers_meet_the_cube_across_the_palm(tmp_path):
 def test_two_contacts_close_only_as_soft_fingers(tmp_path):
     path = tmp_path / "grasps.npy"
     np.save(path, np.array([graspnet_row()]))
-    contacts = read_graspnet(path)[0].contacts(BOX)
+    contacts = load_graspnet(path)[0].contacts(BOX)
     assert not gc.force_closure(contacts, friction=0.5).closed
     assert gc.force_closure(contacts, friction=0.5, torsion_m=0.005).closed
 
@@ -62,7 +62,7 @@ def test_a_scene_is_taken_back_to_the_object(tmp_path):
     here, there = tmp_path / "here.npy", tmp_path / "there.npy"
     np.save(here, np.array([graspnet_row()]))
     np.save(there, np.array([graspnet_row(rotation=pose[:3, :3], at=pose[:3, 3])]))
-    (one,), (two,) = read_graspnet(here), read_graspnet(there, object_pose=pose)
+    (one,), (two,) = load_graspnet(here), load_graspnet(there, object_pose=pose)
     for a, b in zip(one.contacts(BOX), two.contacts(BOX), strict=True):
         assert a.position == pytest.approx(b.position, abs=1e-12)
 
@@ -86,7 +86,7 @@ def test_acronyms_fingers_meet_the_cube_across_x(tmp_path):
     away = acronym_pose()
     away[0, 3] = 0.5
     path = acronym_file(tmp_path / "a.h5", [acronym_pose(), away], [1, 0])
-    good, bad = read_acronym(path)
+    good, bad = load_acronym(path)
     assert (good.score, bad.score) == (1.0, 0.0)
     assert good.opening_m == pytest.approx(0.082)
     left, right = good.contacts(BOX)
@@ -100,26 +100,26 @@ def test_acronyms_json_says_the_same(tmp_path):
     found = {"transforms": [acronym_pose().tolist()], "quality_flex_object_in_gripper": [1]}
     path.write_text(json.dumps(found))
     other = acronym_file(tmp_path / "a.h5", [acronym_pose()], [1])
-    assert read_acronym(path) == read_acronym(other)
+    assert load_acronym(path) == load_acronym(other)
 
 
 def test_what_is_no_such_file_is_refused(tmp_path):
     table = tmp_path / "table.npy"
     np.save(table, np.zeros((3, 5)))
     with pytest.raises(InputError, match="17 numbers"):
-        read_graspnet(table)
+        load_graspnet(table)
     broken = tmp_path / "broken.h5"
     broken.write_bytes(b"\x89HDF\r\n\x1a\nnothing")
     with pytest.raises(InputError, match=r"broken\.h5"):
-        read_acronym(broken)
+        load_acronym(broken)
     with pytest.raises(InputError, match="a label for each"):
-        read_acronym(acronym_file(tmp_path / "short.h5", [acronym_pose()] * 2, [1]))
+        load_acronym(acronym_file(tmp_path / "short.h5", [acronym_pose()] * 2, [1]))
     with pytest.raises(InputError, match="rotation"):
         GripperGrasp(np.diag([2.0, 1.0, 1.0, 1.0]), 0.08, 1.0)
     text = tmp_path / "a.json"
     text.write_text('{"transforms": []}')
     with pytest.raises(InputError, match="quality_flex"):
-        read_acronym(text)
+        load_acronym(text)
 
 
 def test_a_gripper_that_is_narrower_than_the_object_meets_nothing():
