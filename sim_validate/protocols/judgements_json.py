@@ -62,9 +62,8 @@ COUNTED = ("grasps", "theirs_passed", "ours_held", "predicted", "agree")
 
 def protocol_record(protocol: PublishedProtocol) -> Mapping[str, Any]:
     """Return all numbers of a published test, with units in their names, and its sources."""
-    record = asdict(protocol)
-    record["passing"]["most_m"] = protocol.passing.most_m
-    return {"imitation": protocol.imitation, **record, "physics": protocol.physics.record()}
+    physics = protocol.physics.record()
+    return {"imitation": protocol.imitation, **asdict(protocol), "physics": physics}
 
 
 def _record(each: Judgement) -> Mapping[str, Any]:
