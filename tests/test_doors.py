@@ -40,7 +40,10 @@ DOORS = {
     "ray": "sim_validate/parallel/clusters.py",
     "distributed": "sim_validate/parallel/clusters.py",
     "pyarrow": ("sim_validate/datasets/parquet.py", "sim_validate/datasets/exports/tables.py"),
-    "h5py": "sim_validate/datasets/exports/tables.py",
+    "h5py": (
+        "sim_validate/datasets/exports/tables.py",
+        "sim_validate/peer_files/gripper_poses.py",
+    ),
 }
 
 

@@ -98,18 +98,36 @@ def hand_text(layout: HandLayout, physics: PhysicsSettings) -> str:
     root, world = opened(layout, physics, SCALED)
     contact = as_texts(physics.contact())
     add_object(world, layout, contact, weightless=bool(layout.gravity.any()))
+    add_hand(root, world, layout, physics)
+    return document(root)
+
+
+def add_hand(
+    root: Element, world: Element, layout: HandLayout, physics: PhysicsSettings,
+    shapes: dict[str, str] | None = None,
+) -> None:  # fmt: skip
+    """Add the hand with its servos to a scene.
+
+    Args:
+        root: The scene.
+        world: Its world, to which the palm is fixed.
+        layout: The hand's pose and servos.
+        physics: Settings of the contacts of fingertips.
+        shapes: Attributes that the shapes of links have besides their own.
+    """
+    contact = as_texts(physics.contact())
     pose = layout.palm_pose
     palm = add_element(world, "body", {"name": PALM, **placed(pose[:3, 3], pose[:3, :3])})
     tips = tuple(_tip(layout, number, contact) for number in range(len(layout.hand.fingers)))
     chains = Chains(
-        layout.hand, layout.joints, layout.armature_kg_m2, tips, weighs=bool(layout.gravity.any())
-    )
+        layout.hand, layout.joints, layout.armature_kg_m2, tips, weighs=bool(layout.gravity.any()),
+        contact=shapes,
+    )  # fmt: skip
     add_fingers(palm, chains)
     add_exclusions(add_element(root, "contact", {}), layout.hand)
     actuators = add_element(root, "actuator", {})
     for joint, limit in zip(layout.hand.joints, layout.motors.limits.tolist(), strict=True):
         _servo(actuators, layout, joint.name, limit)
-    return document(root)
 
 
 def _tip(layout: HandLayout, finger: int, contact: Mapping[str, object]) -> Mapping[str, object]:

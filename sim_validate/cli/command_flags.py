@@ -21,6 +21,7 @@ from sim_validate.cli.flag_groups import (
     Mesh,
     NotNegative,
     Planning,
+    ProtocolName,
     Seed,
     Speech,
     Testing,
@@ -87,10 +88,14 @@ class Validate:
     """Simulate only this many grasps, from the first."""
     seed: Seed | None = None
     """Seed of random wrenches and of moved contacts; if not given, the seed of the plan."""
+    protocol: UseAppendAction[tuple[ProtocolName, ...]] = ()
+    """Judge the grasps by the published test of another tool, beside our verdict under its loads
+    and the predicted margin, instead of by our usual trials; may be repeated."""
     testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
-    """Folder for verdicts.json; if not given, no file is written."""
+    """Folder for verdicts.json, or for judgements.json with --protocol; if not given, no file is
+    written."""
 
 
 @dataclass(frozen=True, slots=True)

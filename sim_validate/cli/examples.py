@@ -12,6 +12,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "validate": (
         "validate plan/grasps.json --out plan",
+        "validate plan/grasps.json --protocol dexgraspbench --protocol graspqp --out plan",
         "validate plan/grasps.json --weight-n 3 --down 0 0 -1 --limits ramp --trials 20",
     ),
     "execute": (
@@ -46,6 +47,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "reach": (
         "reach plan/grasps.json --hand allegro --out reached",
         "reach plan/grasps.json --hand my_hand.xml --fingertips ff,mf,rf,th --table 0 0 -1",
+        "reach plan/grasps.json --hand leap --simulate --protocol dexgraspbench --out reached",
     ),
     "hand": (
         "hand allegro",

@@ -38,6 +38,22 @@ Wrench = Annotated[
     tuple[Finite, Finite, Finite, Finite, Finite, Finite], not_zero(SMALLEST, LARGEST)
 ]
 RuleName = Literal["5cm-15deg", "contact-remains", "2cm", "3cm", "six-forces"]
+ProtocolName = Literal[
+    "dexgraspbench",
+    "dexgraspbench-paper",
+    "dexonomy",
+    "mj-grasp-sim",
+    "molmospaces",
+    "graspqp",
+    "graspdatagen",
+    "dexgraspnet",
+    "gendexgrasp",
+    "multigrippergrasp",
+    "multigrippergrasp-axes",
+    "multigrippergrasp-ramp",
+    "get-a-grip",
+]
+"""Names of the published tests, which `sim_validate/protocols` holds."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import OmitArgPrefixes, Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from sim_validate.cli.flag_bounds import at_least
-from sim_validate.cli.flag_groups import Count, Direction, Friction, Seed, Speech
+from sim_validate.cli.flag_groups import Count, Direction, Friction, ProtocolName, Seed, Speech
 from sim_validate.parallel.processes import available_cores
 
 MOST_STARTS = 10_000
@@ -64,6 +64,12 @@ class Reach:
     mass_kg: Annotated[float | None, at_least(1e-6, up_to=1e6)] = None
     """Mass of the object [kg], with which the hand also executes each grasp that it reaches, as
     `execute` does with fingertips on springs; every joint needs a torque limit."""
+    protocol: UseAppendAction[tuple[ProtocolName, ...]] = ()
+    """With --simulate: judge the hand by the published test of another tool, beside our verdict
+    under its loads and the predicted margin, and write judgements.json; may be repeated."""
+    dexgraspbench: Path | None = None
+    """Folder for records of DexGraspBench, one for each grasp that is reached, and for the object
+    as it wants it, if that is convex."""
     friction: Friction | None = None
     """Coulomb coefficient to prove force closure with; if not given, the one planned for."""
     seed: Seed = 0

@@ -13,6 +13,7 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
 from sim_validate.commands.asked.trials import prepared
+from sim_validate.commands.judging.by_protocols import judge_grasps
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import remove_verdicts
 from sim_validate.files.writing import write_arrays
@@ -33,10 +34,16 @@ def validate_file(command: command_flags.Validate, reporter: Reporter) -> int:
         return Exit.NONE
     chosen = chosen_grasps(saved, friction=command.friction, seed=command.seed, limit=command.limit)
     setup, agenda = prepared(command.testing, saved.finger, chosen.seed, command.out)
-    with alone_in(command.out):
-        code, text = simulate_grasps(
-            chosen, setup, agenda, jobs=command.testing.jobs, folder=command.out, reporter=reporter
-        )
+    jobs, folder = command.testing.jobs, command.out
+    with alone_in(folder):
+        if command.protocol:
+            code, text = judge_grasps(
+                chosen, command.protocol, setup, jobs=jobs, folder=folder, reporter=reporter
+            )
+        else:
+            code, text = simulate_grasps(
+                chosen, setup, agenda, jobs=jobs, folder=folder, reporter=reporter
+            )
     reporter.text(text)
     return code
 

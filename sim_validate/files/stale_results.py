@@ -18,6 +18,7 @@ CHARTS_OF_INDEX = ("fidelity.svg", "survival.svg")
 """Files that reports of earlier versions have; the charts now stand in the pages."""
 OF_GRASPS = ("transfer.json", "grasps.json")
 REACHES = "reaches.json"
+JUDGEMENTS = "judgements.json"
 PICTURES, CHARTS, CLIPS = "pictures", "charts", "clips"
 MARK = ".graspproof-report"
 ID = re.compile(r"[cprf](-\d+){4}[\w-]*", re.ASCII)
@@ -30,6 +31,7 @@ def remove_results(folder: Path) -> None:
     remove_regions(folder)
     remove_executions(folder)
     remove_reaches(folder)
+    remove_judgements(folder)
     _remove([*_of_grasps(folder / "scenes", ".xml"), *(folder / name for name in OF_GRASPS)])
 
 
@@ -55,6 +57,11 @@ def remove_reaches(folder: Path) -> None:
     """Remove the poses of a hand in grasps, and pages that show them."""
     remove_report(folder / REPORT)
     _remove([folder / REACHES])
+
+
+def remove_judgements(folder: Path) -> None:
+    """Remove what published tests say of grasps."""
+    _remove([folder / JUDGEMENTS])
 
 
 def _of_grasps(folder: Path, suffix: str) -> list[Path]:

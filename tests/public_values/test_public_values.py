@@ -15,6 +15,7 @@ from tests.public_values import (
     calls_of_analysis,
     calls_of_execution,
     calls_of_hands,
+    calls_of_protocols,
     calls_of_simulation,
     calls_of_values,
 )
@@ -23,7 +24,7 @@ PACKAGES = {"gc": gc, "scenes": scenes, "sv": sv}
 CALLS = [
     *calls_of_analysis.CALLS, *calls_of_execution.CALLS, *calls_of_hands.CALLS,
     *calls_of_values.CALLS,
-    *calls_of_simulation.CALLS,
+    *calls_of_simulation.CALLS, *calls_of_protocols.CALLS,
 ]  # fmt: skip
 BY_NAME = {call.name: call for call in CALLS}
 MADE_BY_FUNCTIONS = {
@@ -58,6 +59,8 @@ MADE_BY_FUNCTIONS = {
     "scenes.Layout": "build_scene",
     "scenes.Scene": "build_scene",
     "scenes.Turntable": "show",
+    "sv.Judgement": "judge_by and judge_hand_by",
+    "sv.PublishedProtocol": "protocol",
     "sv.Execution": "execute",
     "sv.ExecutionTrial": "execute",
     "sv.HandVerdict": "validate_hand",
@@ -81,6 +84,9 @@ NAMED_OTHERWISE = {
     ("sv.load_transfer", "path"): "path|no/such",
     ("gc.load_grasps", "path"): "path|no/such",
     ("sv.load_dataset", "folder"): "folder|no/such",
+    ("sv.load_dex_record", "path"): "path|no/such",
+    ("sv.load_graspnet", "path"): "path|no/such",
+    ("sv.load_acronym", "path"): "path|no/such",
     ("sv.write_report", "folder"): "folder|no/such",
     ("sv.Agenda", "rules"): "rule",
 }

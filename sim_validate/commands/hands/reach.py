@@ -14,7 +14,14 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
 from sim_validate.commands.hands.executed import executed, show_executed
 from sim_validate.commands.hands.hand import asked_hand
-from sim_validate.commands.hands.simulated import show_simulated, simulated, with_motors
+from sim_validate.commands.hands.records import write_records
+from sim_validate.commands.hands.simulated import (
+    show_simulated,
+    simulated,
+    tries_ours,
+    with_motors,
+)
+from sim_validate.commands.judging.by_protocols import judge_hands
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import REACHES, remove_reaches
 from sim_validate.parallel.compiling_hands import compile_for_hands, must_compile
@@ -38,15 +45,23 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
     chosen = chosen_grasps(saved, friction=command.friction, seed=None, limit=command.limit)
     with alone_in(command.out):
         found, tried, text = _reach(command, hand, chosen, reporter)
+        _show(hand, found, reporter)
+        if command.dexgraspbench is not None:
+            write_records(command.dexgraspbench, hand, chosen.body, found, reporter)
+        judged = Exit.GOOD
+        if command.protocol:
+            judged, text = judge_hands(
+                chosen, hand, found, command.protocol, seed=command.seed, jobs=command.jobs,
+                folder=command.out, reporter=reporter,
+            )  # fmt: skip
     reporter.text(text)
-    _show(hand, found, reporter)
     show_simulated(tried.verdicts, reporter)
     show_executed(tried.executions, reporter)
     if any(each.reached for each in found):
         say_where_to_look(command, reporter)
     results = (*tried.verdicts.values(), *tried.executions.values())
     good = all(each.reached for each in found) and all(each.good for each in results)
-    return Exit.GOOD if good else Exit.NEGATIVE
+    return judged if good else Exit.NEGATIVE
 
 
 def _reach(
@@ -97,7 +112,7 @@ def _reach(
 def _all_tried(command: hand_flags.Reach, found: Sequence[HandReach], tried: HandTrials) -> bool:
     """Return whether all that was asked for was done in each grasp that is reached."""
     reached = sum(each.reached for each in found)
-    held = len(tried.verdicts) == reached or not command.simulate
+    held = len(tried.verdicts) == reached or not tries_ours(command)
     return held and (len(tried.executions) == reached or command.mass_kg is None)
 
 

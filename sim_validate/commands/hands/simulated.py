@@ -8,6 +8,7 @@ from grasp_core.hands.reach import HandReach
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.flag_bounds import FlagsError
 from sim_validate.hands.hand_verdict import HandVerdict
 from sim_validate.hands.jobs import HandJob, held_by_hands
 
@@ -19,10 +20,15 @@ def with_motors(hand: Hand, command: hand_flags.Reach) -> Hand:
     """Return the hand with the torque limits that the command gives.
 
     Raises:
-        InputError: A simulation is asked for, and a joint has no torque limit.
+        InputError: A simulation is asked for, and a joint has no torque limit; or a published test
+            is asked for without a simulation.
     """
     if command.torque_limit_n_m is not None:
         hand = hand.with_torque_limits(command.torque_limit_n_m, GIVEN)
+    if command.protocol and not command.simulate:
+        raise FlagsError(
+            "--protocol judges a hand in simulation: give --simulate too, or leave --protocol out"
+        )
     missing = [joint.name for joint in hand.joints if joint.torque_limit_n_m is None]
     asked = "--simulate" if command.simulate else "--mass-kg"
     if (command.simulate or command.mass_kg is not None) and missing:
@@ -34,12 +40,17 @@ def with_motors(hand: Hand, command: hand_flags.Reach) -> Hand:
     return hand
 
 
+def tries_ours(command: hand_flags.Reach) -> bool:
+    """Return whether the hand goes through our own trials, not through those of other tools."""
+    return command.simulate and not command.protocol
+
+
 def simulated(
     command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, found: Sequence[HandReach],
     reporter: Reporter,
 ) -> dict[str, HandVerdict]:  # fmt: skip
     """Test the hand in each grasp that it reaches; return verdicts by the ids of the grasps."""
-    if not command.simulate:
+    if not tries_ours(command):
         return {}
     jobs = [HandJob(hand, saved.body, each, saved.friction) for each in found if each.reached]
     verdicts: dict[str, HandVerdict] = {}

@@ -1,0 +1,196 @@
+"""Published tests that run in MuJoCo, with the numbers of their own files."""
+
+from scenes.physics import PhysicsSettings
+from sim_validate.protocols.published import Passing, PublishedProtocol, Run, Source, Step, Triple
+
+SIX: tuple[Triple, ...] = (
+    (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0),
+    (0.0, 0.0, 1.0),
+)  # fmt: skip
+"""Directions along and against the axes, in the order of DexGraspBench."""
+
+
+def scaled(way: Triple, size: float) -> Triple:
+    """Return a multiple of a direction."""
+    x, y, z = way
+    return size * x, size * y, size * z
+
+
+def _pulls(acceleration: float, seconds: float, look_s: float) -> tuple[Run, ...]:
+    """Return one run for each of the six directions."""
+    return tuple(
+        (Step(seconds, pull_m_s2=scaled(way, acceleration), look_s=look_s),) for way in SIX
+    )
+
+
+DEX_PHYSICS = PhysicsSettings(
+    timestep=0.004, integrator="implicitfast", impratio=10.0, noslip_iterations=2, torsion_m=0.02,
+    tolerance=1e-8, jacobian="auto", solref=(0.0125, 1.0), solimp=(0.7, 0.97, 0.00055, 0.5, 2.0),
+)  # fmt: skip
+"""Settings of DexGraspBench and Dexonomy. Contacts of a hand's geoms (solref 0.005 1, solimp 0.5
+0.99 0.0001) with those of an object (MuJoCo's defaults, 0.02 1 and 0.9 0.95 0.001) are mixed by
+MuJoCo: half of each."""
+DEX_OURS = (
+    "The palm is fixed, where theirs is welded softly to a body that moves.",
+    "Convex objects are themselves, and others are covered with thin convex solids, where theirs "
+    "are unions of convex pieces.",
+)
+DEX_LIMITS = Passing(most_m=0.05, most_deg=15.0, most_overlap_m=0.01)
+ALLEGRO_FILE = "assets/hand/allegro/right_hand.xml"
+DEXGRASPBENCH = PublishedProtocol(
+    name="dexgraspbench",
+    version="branch main",
+    sources=(
+        Source(
+            "JYChen18/DexGraspBench", "1e7a5a6fce27cc92911080cbdc5ce9da56fddbf0",
+            ("config/task/eval.yaml", "src/task/eval_func/fc_mocap.py",
+             "src/task/eval_func/base.py", "src/util/hand_util.py", ALLEGRO_FILE),
+        ),
+    ),
+    imitates="",
+    ours=DEX_OURS,
+    friction=0.6,
+    timestep_s=0.004,
+    mass_kg=0.1,
+    close_s=0.4,
+    squeeze_s=0.4,
+    servo_n_m_per_rad=5.0,
+    runs=_pulls(10.0, 2.0, 0.2),
+    passing=DEX_LIMITS,
+    physics=DEX_PHYSICS,
+)  # fmt: skip
+DEXGRASPBENCH_PAPER = PublishedProtocol(
+    name="dexgraspbench-paper",
+    version="branch baseline, the benchmark of the BODex paper (arXiv 2412.16490)",
+    sources=(
+        Source(
+            "JYChen18/DexGraspBench", "9c961a4e54f1caf7d3821ccd22d142185f083607",
+            ("config/task/eval.yaml", "src/task/eval_func/fc_mocap.py", ALLEGRO_FILE),
+        ),
+        Source(
+            "JYChen18/DexGraspBench", "1e7a5a6fce27cc92911080cbdc5ce9da56fddbf0", ("README.md",)
+        ),
+    ),
+    imitates="",
+    ours=(
+        *DEX_OURS,
+        "The servos' stiffness is the 1 that the README of the main branch gives for the paper; "
+        "the stored branch has 2 for Allegro and 5 for Shadow.",
+    ),
+    friction=0.6,
+    timestep_s=0.004,
+    mass_kg=0.03,
+    close_s=0.4,
+    squeeze_s=0.4,
+    servo_n_m_per_rad=1.0,
+    runs=_pulls(10.0, 2.0, 0.2),
+    passing=DEX_LIMITS,
+    physics=DEX_PHYSICS,
+)  # fmt: skip
+DEXONOMY = PublishedProtocol(
+    name="dexonomy",
+    version="branch main, tasks of the type force_closure, hard: False",
+    sources=(
+        Source(
+            "JYChen18/Dexonomy", "d561ff9df8545deef7a3f9e7cfb4045ef66f6913",
+            ("dexonomy/config/op/eval.yaml", "dexonomy/config/base.yaml",
+             "dexonomy/op/eval_data.py", "dexonomy/sim/mujoco_env.py",
+             "dexonomy/util/traj_util.py"),
+        ),
+    ),
+    imitates="",
+    ours=DEX_OURS,
+    friction=0.6,
+    timestep_s=0.004,
+    mass_kg=0.1,
+    close_s=0.1,
+    squeeze_s=0.1,
+    servo_n_m_per_rad=5.0,
+    runs=_pulls(9.8, 2.0, 0.2),
+    passing=Passing(most_m=0.05, most_deg=15.0),
+    physics=DEX_PHYSICS,
+)  # fmt: skip
+SHAKE_M = 0.02
+MJ_GRASP_SIM = PublishedProtocol(
+    name="mj-grasp-sim",
+    version="branch main, grasp_stability_evaluation_from_joints with its defaults",
+    sources=(
+        Source(
+            "freiberg-roman/mj-grasp-sim", "efff5b32102d1675f64ce8a3984d46be56dff064",
+            ("mgs/env/gravityless_object_grasping.py", "mgs/obj/ycb.py"),
+        ),
+    ),
+    imitates="",
+    ours=(
+        "Lift and shakes are forces on the object, by its mass and the palm's acceleration.",
+        "Steps between looks in a shake are their ends, and every 0.1 s in the lift.",
+        "Contacts have the object's settings, which theirs mix with those of each gripper.",
+        "Objects have the density of water where theirs are weighed.",
+    ),
+    friction=1.0,
+    timestep_s=0.001,
+    close_s=0.4,
+    squeeze_s=0.4,
+    runs=(
+        (
+            Step(3.0, line_m=(0.0, 0.0, 0.1), look_s=0.1),
+            Step(0.5, line_m=(0.0, 0.0, -SHAKE_M)),
+            Step(0.5, line_m=(0.0, SHAKE_M, 0.0)),
+            Step(1.0, line_m=(0.0, -2.0 * SHAKE_M, 0.0)),
+        ),
+    ),
+    passing=Passing(fingers=1),
+    physics=PhysicsSettings(
+        timestep=0.001, integrator="implicitfast", impratio=3.0, noslip_iterations=2,
+        noslip_tolerance=1e-8, tolerance=1e-8, torsion_m=0.3, jacobian="auto",
+        solref=(0.001, 1.0), solimp=(0.998, 0.998, 0.001, 0.5, 2.0),
+    ),
+)  # fmt: skip
+WAVE_S = 4.0
+"""Duration of a shake: twice 1,000 steps of 2 ms."""
+WAVE_M = 0.1
+QUARTER_S = WAVE_S / 4.0
+REST_S = 0.1
+MOLMOSPACES = PublishedProtocol(
+    name="molmospaces",
+    version="branch main, run_rigid.py with its defaults",
+    sources=(
+        Source(
+            "allenai/molmospaces", "1320b266d2b47aaa81c5f7a419cb9d3474e6994d",
+            ("molmo_spaces/grasp_generation/main_scene.xml",
+             "molmo_spaces/grasp_generation/run_rigid.py",
+             "molmo_spaces/grasp_generation/pipeline/perturbations_test.py"),
+        ),
+    ),
+    imitates="",
+    ours=(
+        "Shakes and the turn are forces on the object, by its mass and the palm's acceleration.",
+        "Both fingers of a gripper are two fingers here, whichever they are.",
+        "Looks are at all four quarters of a shake, where theirs leave out two.",
+        "Friction and contacts are MuJoCo's defaults, as theirs come with each object's file; "
+        "objects have the density of water.",
+    ),
+    friction=1.0,
+    timestep_s=0.002,
+    close_s=0.6,
+    squeeze_s=0.6,
+    runs=(
+        (
+            *(
+                step
+                for axis in (SIX[1], SIX[3], SIX[5])
+                for step in (
+                    Step(WAVE_S, wave_m=scaled(axis, WAVE_M), look_s=QUARTER_S), Step(REST_S),
+                ) * 2
+            ),
+            Step(10.0, turn_deg=360.0, look_s=2.5),
+            Step(REST_S),
+        ),
+    ),
+    passing=Passing(fingers=2),
+    physics=PhysicsSettings(
+        timestep=0.002, integrator="implicitfast", impratio=10.0, noslip_iterations=3,
+        tolerance=1e-8, jacobian="sparse", solref=(0.02, 1.0), solimp=(0.9, 0.95, 0.001, 0.5, 2.0),
+    ),
+)  # fmt: skip
+MUJOCO_TESTS = (DEXGRASPBENCH, DEXGRASPBENCH_PAPER, DEXONOMY, MJ_GRASP_SIM, MOLMOSPACES)

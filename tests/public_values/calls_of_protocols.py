@@ -1,0 +1,94 @@
+"""Functions about published tests and other tools' files: a call of each, what they must refuse."""
+
+import numpy as np
+
+import grasp_core as gc
+import sim_validate as sv
+from sim_validate.hands.hand_gate import cube, hinged_hand, stance
+from tests.public_values.bad_values import (
+    FRICTION,
+    NOT_NEGATIVE,
+    NOT_NUMBERS,
+    PATH,
+    POSITIVE,
+    SEED,
+    SEVERAL,
+    TEXT,
+    VALUE,
+    WORD,
+    array,
+    optional,
+    unless,
+)
+from tests.public_values.call import Call, body, grasp
+
+ROOT = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+NAME = unless(WORD, "list") | {"list": ["dexgraspbench"]}
+POSE = array(np.eye(4)) | {"scaled": 2.0 * np.eye(4), "mirrored": np.diag([-1.0, 1.0, 1.0, 1.0])}
+QPOS = array([*ROOT, 0.1]) | {"no turn": np.zeros(8)}
+OF_NUMBER = unless(NOT_NUMBERS, "none") | {"fraction": 0.5, "negative": -1}
+
+
+def record():
+    return sv.dex_record(hinged_hand(), stance(0.5), "object")
+
+
+def recorded():
+    qpos = [*ROOT, 0.1]
+    return {"object_path": "object", "object_scale": 1.0, "object_pose": ROOT, "pregrasp": qpos,
+            "grasp": qpos, "squeeze": qpos}  # fmt: skip
+
+
+CALLS = [
+    Call("sv.protocol_names", dict, {}),
+    Call("sv.protocol", lambda: {"name": "dexonomy"}, {"name": NAME}),
+    Call("sv.judge_by", lambda: {
+        "protocol": "dexonomy", "body": body(), "grasp": grasp(), "friction": 0.5,
+    }, {
+        "protocol": NAME, "body": VALUE, "grasp": SEVERAL, "friction": FRICTION,
+        "setup": optional(VALUE), "seed": SEED,
+    }),
+    Call("sv.judge_hand_by", lambda: {
+        "protocol": "dexonomy", "hand": hinged_hand(), "body": cube(), "reach": stance(0.5),
+        "friction": 0.5,
+    }, {
+        "protocol": NAME, "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": FRICTION,
+        "setup": optional(VALUE), "seed": SEED,
+    }),
+    Call("sv.DexRecord", recorded, {
+        "object_path": TEXT, "object_scale": POSITIVE,
+        "object_pose": array(ROOT) | {"no turn": np.zeros(7)},
+        **dict.fromkeys(("pregrasp", "grasp", "squeeze"), QPOS),
+    }),
+    Call("sv.dex_record", lambda: {
+        "hand": hinged_hand(), "reach": stance(0.5), "object_path": "object",
+    }, {
+        "hand": VALUE, "reach": VALUE, "object_path": TEXT, "push_n": POSITIVE,
+        "servo_n_m_per_rad": POSITIVE,
+    }),
+    Call("sv.reach_of_record", lambda: {
+        "record": record(), "hand": hinged_hand(), "body": cube(), "friction": 0.5,
+    }, {
+        "record": VALUE, "hand": VALUE | {"another": gc.load_hand("leap")}, "body": VALUE,
+        "friction": FRICTION, "touch_m": NOT_NEGATIVE, "name": TEXT,
+    }),
+    Call("sv.load_dex_record", lambda: {"path": "no/such/0.npy"}, {
+        "path": PATH | {"nowhere": "no/such/0.npy"},
+    }, succeeds_in="tests/sim_validate/peer_files/test_dexgraspbench_records.py"),
+    Call("sv.write_dex_record", lambda: {"record": record(), "path": "no/such/0.npy"}, {
+        "record": VALUE, "path": PATH,
+    }, succeeds_in="tests/sim_validate/peer_files/test_dexgraspbench_records.py"),
+    Call("sv.write_dex_object", lambda: {"body": body(), "folder": "no/such"}, {
+        "body": VALUE, "folder": PATH,
+    }, succeeds_in="tests/sim_validate/peer_files/test_dexgraspbench_records.py"),
+    Call("sv.GripperGrasp", lambda: {"pose": np.eye(4), "opening_m": 0.08, "score": 1.0}, {
+        "pose": POSE, "opening_m": POSITIVE, "score": NOT_NUMBERS,
+    }),
+    Call("sv.load_graspnet", lambda: {"path": "no/such/grasps.npy"}, {
+        "path": PATH | {"nowhere": "no/such/grasps.npy"}, "object_number": OF_NUMBER,
+        "object_pose": optional(POSE), "pad_m": NOT_NEGATIVE,
+    }, succeeds_in="tests/sim_validate/peer_files/test_gripper_poses.py"),
+    Call("sv.load_acronym", lambda: {"path": "no/such/grasps.h5"}, {
+        "path": PATH | {"nowhere": "no/such/grasps.h5"}, "pad_m": NOT_NEGATIVE,
+    }, succeeds_in="tests/sim_validate/peer_files/test_gripper_poses.py"),
+]  # fmt: skip

@@ -1,0 +1,98 @@
+"""Scenes of other tools' tests have the mass that is asked for, and commands that squeeze."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from scenes.fingertips import FingerSettings
+from scenes.physics import PhysicsSettings
+from scenes.tested.fingertip_scene import fingertip_scene
+from scenes.tested.hand_scene import HandServos, hand_scene
+from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
+
+BODY = scaled("dodecahedron", 0.05)
+GRASP = gc.plan(BODY, FRICTION, limit=1).grasps[0]
+PHYSICS = PhysicsSettings(torsion_m=0.02)
+
+
+def loaded(scene):
+    model = mujoco.MjModel.from_xml_string(scene.xml)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    return model, data
+
+
+def test_the_object_has_its_mass_and_inertia_and_the_friction_asked_for():
+    scene = fingertip_scene(BODY, GRASP, 0.7, 0.2, PHYSICS, FingerSettings())
+    model, _ = loaded(scene)
+    body = model.body("object")
+    assert body.mass[0] == pytest.approx(0.2)
+    moments = np.linalg.eigvalsh(BODY.inertia) * 0.2 / BODY.volume
+    assert np.sort(body.inertia) == pytest.approx(np.sort(moments))
+    touching = model.geom_contype + model.geom_conaffinity > 0
+    assert (model.geom_friction[touching, :2] == [0.7, 0.02]).all()
+    assert (model.geom_condim[touching] == 4).all()
+    assert not model.opt.gravity.any()
+
+
+@pytest.mark.parametrize("name", ["dodecahedron", "l-bracket"])
+def test_open_fingertips_touch_nothing_and_closed_ones_push_as_told(name):
+    """At rest the contact forces are the servos', and their normal parts add up to those told."""
+    body = scaled(name, 0.05)
+    grasp = gc.plan(body, FRICTION, limit=1).grasps[0]
+    scene = fingertip_scene(body, grasp, FRICTION, 0.2, PhysicsSettings(), FingerSettings())
+    model, data = loaded(scene)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0
+    steps = 200
+    for share in np.linspace(0.0, 1.0, steps):
+        data.ctrl = (1.0 - share) * scene.opened
+        mujoco.mj_step(model, data)
+    for share in np.linspace(0.0, 1.0, steps):
+        data.ctrl = share * scene.squeezing
+        mujoco.mj_step(model, data)
+    mujoco.mj_step(model, data, nstep=steps)
+    pushes = -data.qfrc_constraint[6:].reshape(4, 3)[:, 0]
+    assert pushes.max() == pytest.approx(10.0, rel=0.03)
+    assert np.linalg.norm(data.qpos[:3]) < 1e-3
+
+
+def test_a_hand_starts_open_and_all_its_links_can_touch_the_object():
+    body = scaled("dodecahedron", 0.035)
+    reach = next(
+        each for each in reaches("allegro", "dodecahedron", 0.035) if each.pregrasp is not None
+    )
+    hand = gc.load_hand("allegro").with_torque_limits(0.7, "a test")
+    scene = hand_scene(hand, body, reach, 0.6, 0.1, PHYSICS, HandServos(5.0))
+    model, data = loaded(scene)
+    mujoco.mj_forward(model, data)
+    met = model.geom_bodyid[data.contact.geom]
+    assert not (met == model.body("object").id).any()
+    solid = model.geom("surface0").id
+    touchable = [
+        geom for geom in range(model.ngeom)
+        if geom != solid and model.geom_conaffinity[geom] & model.geom_contype[solid]
+    ]  # fmt: skip
+    assert len(touchable) >= len(hand.links)
+    assert (model.geom_condim[touchable] == 4).all()
+    assert (model.geom_friction[touchable, :2] == [0.6, 0.02]).all()
+    assert model.actuator_gainprm[:, 0] == pytest.approx(5.0)
+    assert scene.opened == pytest.approx(reach.pregrasp - reach.joints, abs=1e-3)
+
+
+def test_stiff_servos_get_inertia_so_that_steps_are_short_beside_their_ring():
+    soft, stiff = HandServos(5.0), HandServos(1000.0)
+    for servos in (soft, stiff):
+        ring = np.sqrt(servos.stiffness_n_m_per_rad / servos.armature(0.002))
+        assert ring * 0.002 <= 0.5 + 1e-12
+    assert soft.damping(0.002) == 0.1
+    assert stiff.damping(0.002) > 1.0
+
+
+def test_fingertips_without_torsion_are_hard():
+    hard = replace(PHYSICS, torsion_m=0.0)
+    scene = fingertip_scene(BODY, GRASP, 0.7, 0.2, hard, FingerSettings())
+    assert (loaded(scene)[0].geom_condim[1:] == 3).all()

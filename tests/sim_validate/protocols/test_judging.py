@@ -1,0 +1,114 @@
+"""Grasps pass the published tests, open contacts do not hold, and each verdict is about its own."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+import sim_validate as sv
+from grasp_core.errors import InputError
+from grasp_core.values import Contact
+from sim_validate.protocols.jobs import GraspCase, judged
+from sim_validate.protocols.judging import judge_by, judge_hand_by
+from sim_validate.protocols.named_protocols import protocol, protocol_names
+from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
+
+BODY = scaled("dodecahedron", 0.05)
+GRASP = gc.plan(BODY, FRICTION, limit=1).grasps[0]
+
+
+@pytest.mark.parametrize("name", protocol_names())
+def test_a_closed_grasp_passes_every_test_and_holds_its_loads(name):
+    """Pushes of 10 N are many times what the tests load this grasp with."""
+    found = judge_by(name, BODY, GRASP, FRICTION)
+    assert found.theirs, [run.reason for run in found.runs]
+    assert found.ours.held
+    assert found.ours.margin > 2.0
+    assert found.predicted
+    assert found.good
+    assert len(found.runs) == len(found.protocol.runs) * found.protocol.copies
+    assert found.push_n == pytest.approx(10.0)
+
+
+def test_three_fingers_on_one_side_hold_nothing_and_ours_says_so_by_proof():
+    top = np.argmax([face.normal @ [0.0, 0.0, -1.0] for face in BODY.faces])
+    face = BODY.faces[top]
+    middle = np.mean(np.concatenate(face.pieces), axis=0)
+    corners = face.pieces[0][:3]
+    contacts = [Contact(middle + 0.5 * (corner - middle), face.normal) for corner in corners]
+    found = judge_by("dexgraspbench", BODY, contacts, FRICTION)
+    assert not found.theirs
+    assert not found.ours.closed
+    assert found.ours.margin == 0.0
+    assert not found.predicted
+    assert "proved" in found.ours.reason
+    assert any("moved by" in run.reason for run in found.runs)
+
+
+def test_more_load_than_the_fingers_can_push_fails_theirs_ours_and_the_prediction():
+    """Twice the predicted margin cannot be held by anybody who obeys statics: no four fingertips
+    that push with at most 10 N carry it, at the friction of the test either."""
+    usual = protocol("dexgraspbench")
+    same = replace(usual, friction=FRICTION, physics=replace(usual.physics, torsion_m=0.0))
+    margin = judge_by(same, BODY, GRASP, FRICTION).ours.margin
+    heavy = replace(same, mass_kg=usual.mass_kg * 2.0 * margin)
+    found = judge_by(heavy, BODY, GRASP, FRICTION)
+    assert found.ours.margin == pytest.approx(0.5, rel=1e-6)
+    assert not found.predicted
+    assert not found.ours.held
+    assert not found.theirs
+
+
+def test_a_test_without_loads_has_no_margin():
+    found = judge_by("molmospaces", BODY, GRASP, FRICTION)
+    assert math.isinf(found.ours.margin)
+
+
+def test_judgements_do_not_depend_on_processes_or_threads():
+    setup = sv.Setup()
+    cases = [
+        GraspCase(name, BODY, GRASP, FRICTION, used, 3)
+        for name in ("get-a-grip", "dexgraspbench")
+        for used in (setup, replace(setup, threads=2))
+    ] * 4
+    one, many = list(judged(cases, 1)), list(judged(cases, 2))
+    assert one == many
+    assert one[0].runs == one[1].runs
+
+
+def test_noise_moves_with_its_seed_and_each_copy_has_its_own():
+    one, same, other = (
+        judge_by("get-a-grip", BODY, GRASP, FRICTION, seed=seed) for seed in (0, 0, 1)
+    )
+    moved = [[run.displacement_m for run in each.runs] for each in (one, same, other)]
+    assert moved[0] == moved[1] != moved[2]
+    assert len(set(moved[0])) == 5
+
+
+@pytest.mark.parametrize("name", ["dexgraspbench", "dexonomy", "graspqp", "get-a-grip"])
+def test_a_hand_passes_tests_as_well(name):
+    body = scaled("dodecahedron", 0.035)
+    reach = next(each for each in reaches("allegro", "dodecahedron", 0.035) if each.reached)
+    hand = gc.load_hand("allegro").with_torque_limits(0.7, "a test")
+    found = judge_hand_by(name, hand, body, reach, FRICTION)
+    assert found.theirs, [run.reason for run in found.runs]
+    assert found.ours.held, found.ours.reason
+    assert found.hand == "allegro"
+    assert found.predicted
+
+
+def test_contacts_that_are_too_few_or_no_contacts_are_refused():
+    for wrong in ([GRASP.contacts[0]], ["contact"] * 3):
+        with pytest.raises(InputError, match="grasp"):
+            judge_by("dexgraspbench", BODY, wrong)
+
+
+def test_the_object_has_the_mass_of_the_test():
+    box = scenes.example_object("box")
+    plan = gc.plan(box, FRICTION, limit=1)
+    found = judge_by("dexgraspnet", box, plan.grasps[0], FRICTION)
+    assert found.mass_kg == pytest.approx(500.0 * box.volume)
+    assert judge_by("dexonomy", box, plan.grasps[0], FRICTION).mass_kg == 0.1

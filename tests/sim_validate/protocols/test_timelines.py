@@ -1,0 +1,88 @@
+"""Runs are laid out as tests say: commands, forces, and what a moving palm does to the object."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from scenes.fingertips import FingerSettings
+from scenes.tested.fingertip_scene import fingertip_scene
+from sim_validate.protocols.named_protocols import protocol
+from sim_validate.protocols.published import Step
+from sim_validate.protocols.timelines import CHUNK, timeline
+from tests.grasp_core.hands.gripping import scaled
+
+BODY = scaled("dodecahedron", 0.05)
+GRASP = gc.plan(BODY, 0.5, limit=1).grasps[0]
+TEST = protocol("dexgraspbench")
+SCENE = fingertip_scene(BODY, GRASP, 0.6, 0.1, TEST.physics, FingerSettings())
+SAMPLE = CHUNK * 0.004
+
+
+def laid(*steps):
+    return timeline(TEST, SCENE, steps)
+
+
+def test_fingers_close_then_squeeze_at_equal_steps():
+    """Ten commands of ten steps from open to touching, ten more to squeezing, as DexGraspBench."""
+    found = laid(Step(0.4))
+    assert found.closed == 20
+    assert found.commands[9] == pytest.approx(np.zeros(12))
+    assert found.commands[4] == pytest.approx(0.5 * SCENE.opened)
+    assert found.commands[14] == pytest.approx(0.5 * SCENE.squeezing)
+    assert (found.commands[19:] == SCENE.squeezing).all()
+    assert not found.wrenches[:20].any()
+
+
+def test_a_force_is_there_at_once_or_rises():
+    found = laid(Step(0.4, pull_m_s2=(0.0, 0.0, -10.0), force_n=(1.0, 0.0, 0.0)))
+    assert (found.wrenches[20:] == [1.0, 0.0, -1.0, 0.0, 0.0, 0.0]).all()
+    rising = laid(Step(0.4, force_n=(2.0, 0.0, 0.0), rises=True)).wrenches[20:, 0]
+    assert rising == pytest.approx(2.0 * np.arange(1, 11) / 10)
+
+
+def test_looks_are_at_their_times_and_at_the_end():
+    found = laid(Step(2.0, look_s=0.2), Step(0.4))
+    samples = [sample for sample, _ in found.looks]
+    assert samples == [20 + 5 * number - 1 for number in range(1, 11)] + [20 + 60 - 1]
+    assert [first for _, first in found.looks] == [20] * 10 + [70]
+
+
+def test_a_palm_that_starts_and_stops_pulls_the_object_back_and_forth():
+    """A velocity of 0.5 m/s after one sample, and none again after another: what acts in between
+    gives the object, seen from the palm, minus that velocity; sums of forces are momenta."""
+    wrenches = laid(Step(0.4, line_m=(0.0, 0.0, 0.2)), Step(0.4)).wrenches[20:]
+    speed = 0.2 / 0.4
+    momenta = np.cumsum(wrenches[:, :3], axis=0) * SAMPLE
+    assert momenta[0] == pytest.approx([0.0, 0.0, -0.1 * speed])
+    assert momenta[9] == pytest.approx([0.0, 0.0, -0.1 * speed])
+    assert momenta[-1] == pytest.approx(np.zeros(3), abs=1e-12)
+
+
+def test_a_wave_pulls_with_its_largest_acceleration():
+    """A sine of amplitude a and period T accelerates by a (2 pi / T)^2; second differences over
+    h are less by a share of (2 pi h / T)^2 / 12."""
+    period, amplitude = 4.0, 0.1
+    found = laid(Step(period, wave_m=(amplitude, 0.0, 0.0))).wrenches[20:, 0]
+    rate = 2.0 * np.pi / period
+    largest = 0.1 * amplitude * rate**2
+    slack = (rate * SAMPLE) ** 2
+    inner = found[1:-1]
+    assert np.abs(inner).max() == pytest.approx(largest, rel=slack)
+    assert inner.mean() == pytest.approx(0.0, abs=slack * largest)
+
+
+def test_a_turn_acts_by_the_inertia_about_its_axis():
+    found = laid(Step(0.4, turn_deg=90.0)).wrenches[20:]
+    rate = 0.5 * np.pi / 0.4
+    assert found[0, 3:] * SAMPLE == pytest.approx(-rate * SCENE.inertia_kg_m2[:, 2])
+    assert not found[1:].round(12).any()
+
+
+def test_a_test_without_closing_starts_with_the_load():
+    at_once = replace(TEST, close_s=0.0, squeeze_s=0.0)
+    found = timeline(at_once, SCENE, (Step(0.4, force_n=(0.0, 1.0, 0.0)),))
+    assert found.closed == 0
+    assert (found.commands == SCENE.squeezing).all()
+    assert (found.wrenches[:, 1] == 1.0).all()
