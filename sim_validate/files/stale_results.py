@@ -60,7 +60,8 @@ def remove_reaches(folder: Path) -> None:
 
 
 def remove_judgements(folder: Path) -> None:
-    """Remove what published tests say of grasps."""
+    """Remove what published tests say of grasps, and pages that show it."""
+    remove_report(folder / REPORT)
     _remove([folder / JUDGEMENTS])
 
 

@@ -5,19 +5,23 @@ simulator says so there and in each record. Numbers that JSON lacks are null: th
 without loads is infinite.
 """
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, cast
 
 from grasp_core.files.json_text import text_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from sim_validate.protocols.judgement import Judgement
+from sim_validate.protocols.judgements_schema import (
+    JudgementRecord,
+    JudgementsFile,
+    ProtocolRecord,
+    RunRecord,
+    TotalsRecord,
+)
 from sim_validate.protocols.published import PublishedProtocol
 from sim_validate.records.verdicts_json import finite, object_record
-
-SCHEMA = 1
 
 
 def judgements_to_json(
@@ -33,8 +37,8 @@ def judgements_to_json(
     """
     listed = list(judgements)
     tests = {each.protocol.name: each.protocol for each in listed}
-    document = {
-        "schema": SCHEMA,
+    document: JudgementsFile = {
+        "schema": 1,
         "object": object_record(body),
         "friction": friction,
         "complete": complete,
@@ -46,30 +50,32 @@ def judgements_to_json(
     return text_of(finite(document))
 
 
-def judgements_summary(judgements: Sequence[Judgement]) -> dict[str, dict[str, int]]:
+def judgements_summary(judgements: Sequence[Judgement]) -> dict[str, TotalsRecord]:
     """Count, for each test, grasps by their verdict, ours, and what was predicted."""
-    counts: dict[str, Counter[str]] = {}
+    named: dict[str, list[Judgement]] = {}
     for each in judgements:
-        found = counts.setdefault(each.protocol.name, Counter(dict.fromkeys(COUNTED, 0)))
-        yes = {"grasps": True, "theirs_passed": each.theirs, "ours_held": each.ours.held,
-               "predicted": each.predicted, "agree": each.theirs == each.ours.held}  # fmt: skip
-        found.update(name for name in COUNTED if yes[name])
-    return {name: dict(found) for name, found in counts.items()}
-
-
-COUNTED = ("grasps", "theirs_passed", "ours_held", "predicted", "agree")
-
-
-def protocol_record(protocol: PublishedProtocol) -> Mapping[str, Any]:
-    """Return all numbers of a published test, with units in their names, and its sources."""
-    physics = protocol.physics.record()
-    return {"imitation": protocol.imitation, **asdict(protocol), "physics": physics}
-
-
-def _record(each: Judgement) -> Mapping[str, Any]:
+        named.setdefault(each.protocol.name, []).append(each)
     return {
+        name: {
+            "grasps": len(found),
+            "theirs_passed": sum(each.theirs for each in found),
+            "ours_held": sum(each.ours.held for each in found),
+            "predicted": sum(each.predicted for each in found),
+            "agree": sum(each.theirs == each.ours.held for each in found),
+        }
+        for name, found in named.items()
+    }
+
+
+def protocol_record(protocol: PublishedProtocol) -> ProtocolRecord:
+    """Return all numbers of a published test, with units in their names, and its sources."""
+    own: Mapping[str, Any] = {**asdict(protocol), "physics": protocol.physics.record()}
+    return cast("ProtocolRecord", {"imitation": protocol.imitation, **own})
+
+
+def _record(each: Judgement) -> JudgementRecord:
+    record: JudgementRecord = {
         "id": each.grasp,
-        **({"hand": each.hand} if each.hand else {}),
         "protocol": each.protocol.name,
         "imitation": each.protocol.imitation,
         "mass_kg": each.mass_kg,
@@ -77,7 +83,7 @@ def _record(each: Judgement) -> Mapping[str, Any]:
         "theirs": {
             "passed": each.theirs,
             "copies_passed": each.copies_passed,
-            "runs": [asdict(run) for run in each.runs],
+            "runs": [cast("RunRecord", asdict(run)) for run in each.runs],
         },
         "ours": {
             "held": each.ours.held,
@@ -86,3 +92,6 @@ def _record(each: Judgement) -> Mapping[str, Any]:
         },
         "predicted": {"resisted": each.predicted, "margin": each.ours.margin},
     }
+    if each.hand:
+        record["hand"] = each.hand
+    return record

@@ -110,7 +110,19 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         mismatches=[f"{each['id']}: {line}" for each in verdicts for line in each["mismatches"]],
         controls=_controls(verdicts),
         executions=_executions(all_executions(runs)),
+        judged=[row for run in runs for row in _judged(run)],
     )
+
+
+def _judged(run: RunFolder) -> Iterable[Record]:
+    """Yield what each published test says of the grasps of a run, for a row of a table."""
+    if run.judgements is None:
+        return
+    summary: Record = run.judgements["summary"]
+    for name, counts in summary.items():
+        test: Record = run.judgements["protocols"][name]
+        label = f"{name} (imitation)" if test["imitation"] else name
+        yield {"name": label, "object": run.saved.body.name, "imitates": test["imitates"], **counts}
 
 
 def all_verdicts(runs: Iterable[RunFolder]) -> list[Record]:

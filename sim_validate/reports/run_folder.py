@@ -11,7 +11,8 @@ from grasp_core.files.complaints import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.execution.jobs import ExecutedGrasp
-from sim_validate.files.stale_results import REACHES
+from sim_validate.files.stale_results import JUDGEMENTS, REACHES
+from sim_validate.protocols.judgements_schema import JudgementsFile
 from sim_validate.records.executions_json import EXECUTIONS, Executions, load_executions
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.regions import REGIONS
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from sim_validate.records.saved_reaches import SavedReaches
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"
-SCHEMAS = {VERDICTS: VERDICTS_SCHEMA, REGIONS: REGIONS_SCHEMA}
+SCHEMAS = {VERDICTS: VERDICTS_SCHEMA, REGIONS: REGIONS_SCHEMA, JUDGEMENTS: 1}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +50,8 @@ class RunFolder:
     """Grasps as a robot executes them; None if the file does not exist."""
     reaches: "SavedReaches | None" = None
     """Where a hand stands in the grasps; None if the file does not exist."""
+    judgements: Record | None = None
+    """What published tests say of the grasps; None if the file does not exist."""
     left_out: int = 0
     """Number of grasps in the files that `saved` leaves out."""
 
@@ -131,6 +134,7 @@ def _run(path: Path) -> RunFolder:
         regions_friction=None if certified is None else certified["friction"],
         executions=_executions(path / EXECUTIONS, saved),
         reaches=reaches_beside(path / GRASPS, saved),
+        judgements=_read(path / JUDGEMENTS, JudgementsFile, saved),
     )
 
 

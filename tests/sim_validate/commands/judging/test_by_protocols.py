@@ -1,6 +1,7 @@
 """`validate --protocol` and `reach --protocol` judge, show, write, and end with the right code."""
 
 import json
+import shutil
 
 import pytest
 
@@ -77,6 +78,43 @@ def test_old_judgements_go_when_new_ones_come(tmp_path):
     old.write_text("old")
     main(["plan", "wedge", "--limit", "1", "--out", str(tmp_path), "-q"])
     assert not old.exists()
+
+
+def test_a_report_shows_what_each_test_says_and_new_judgements_remove_it(grasps, tmp_path):
+    run = tmp_path / "run"
+    run.mkdir()
+    shutil.copy(grasps, run)
+    words = ["validate", str(run / "grasps.json"), "--limit", "1", "--out", str(run), "-q"]
+    main([*words, "--protocol", "dexgraspbench", "--protocol", "dexgraspnet"])
+    main(["report", str(run), "--limit", "1", "-q"])
+    page = (run / "report" / "index.html").read_text()
+    assert "Judged by other tools" in page
+    assert '<th scope="row">dexgraspbench</th>' in page
+    assert '<th scope="row">dexgraspnet (imitation)</th>' in page
+    assert "dexgraspnet (imitation): PhysX" in page
+    main([*words, "--protocol", "dexonomy"])
+    assert not (run / "report").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [(lambda record: record["judgements"][0].pop("ours"), "ours"),
+     (lambda record: record["object"].update(content_sha256="0"), "another object"),
+     (lambda record: record["summary"]["dexonomy"].update(more=1), "more")],
+    ids=["field", "object", "unknown"],
+)  # fmt: skip
+def test_a_report_refuses_judgements_that_do_not_fit(change, said, grasps, tmp_path, capsys):
+    shutil.copy(grasps, tmp_path)
+    own = str(tmp_path / "grasps.json")
+    main(["validate", own, "--limit", "1", "--out", str(tmp_path), "-q", "--protocol", "dexonomy"])
+    path = tmp_path / "judgements.json"
+    record = json.loads(path.read_text())
+    change(record)
+    path.write_text(json.dumps(record))
+    assert main(["report", str(tmp_path), "-q"]) == Exit.INPUT
+    found = capsys.readouterr().err
+    assert "judgements.json" in found
+    assert said in found
 
 
 def test_results_do_not_depend_on_jobs(grasps, tmp_path):
