@@ -51,6 +51,8 @@ TWISTS = 384
 """Random twists to begin with, each moved to where the support of all faces is smaller."""
 FIRST_STEPS = 60
 SMALLEST_GAP, LARGEST_GAP = 1e-4, 0.9
+SAME = 1e-9
+"""Share of a bound that rounding may cost it."""
 MOST_SECONDS = 1e7
 MOST_JOBS = 256
 CUTS = "grasp_core.optimizing.best.cuts_kernel"
@@ -228,7 +230,8 @@ class _Levels:
         steps = max(0, math.ceil(math.log2(WIDEST / gap)))
         try:
             for k in range(steps, -1, -1):
-                while self.best.quality.lower < (1.0 - gap * 2.0**k) * self.bound:
+                reached = (1.0 - gap * 2.0**k) * (1.0 - SAME)
+                while self.best.quality.lower < reached * self.bound:
                     wanted = self.best.quality.lower / (1.0 - gap * 2.0**k)
                     if not self._refuted(wanted):
                         return "time" if self.searching.stop() else "undivided"

@@ -135,11 +135,13 @@ class Searching:
             are better than known.
         """
         trunk = self._part(nodes)
+        trunk.pool = _copied(self.pool)
         parts: list[Part] = []
         better: list[Found] = []
         for part in self._begun(trunk, threshold, known):
             parts.append(part)
         better += trunk.found
+        self.nodes += int(trunk.tree.sizes[0])
         if not trunk.finished:
             return None, better
         with ThreadPoolExecutor(self.jobs) as threads:
@@ -182,7 +184,7 @@ class Searching:
             corners[::-1], counts[::-1], fresh[::-1],
         )  # fmt: skip
         stack.top[0] = n
-        return Part(stack, _empty_tree(FIRST_ROOM), self.pool)
+        return Part(stack, _empty_tree(FIRST_ROOM), None)
 
     def _begun(self, trunk: Part, threshold: float, known: float) -> Iterator[Part]:
         """Search the beginning of a tree, and yield a part for each node that is left."""
