@@ -31,7 +31,9 @@ def remove_results(folder: Path) -> None:
     remove_regions(folder)
     remove_executions(folder)
     remove_reaches(folder)
-    _remove([*_of_grasps(folder / "scenes", ".xml"), *(folder / name for name in (*OF_GRASPS, *BEST))])
+    _remove(
+        [*_of_grasps(folder / "scenes", ".xml"), *(folder / name for name in (*OF_GRASPS, *BEST))]
+    )
 
 
 def remove_verdicts(folder: Path) -> None:

@@ -31,7 +31,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.grounds import Grounds, grounds_of
 from grasp_core.optimizing.best.incumbents import begin, climbed, piece_at
 from grasp_core.optimizing.best.same_places import exact_maps, first_nodes
-from grasp_core.optimizing.best.search import Found, Searching, Steps, Stop
+from grasp_core.optimizing.best.search import EXACT_GAP, Found, Searching, Steps, Stop
 from grasp_core.optimizing.best.support_cuts import (
     CutTree,
     proved_bound,
@@ -51,6 +51,8 @@ TWISTS = 384
 """Random twists to begin with, each moved to where the support of all faces is smaller."""
 FIRST_STEPS = 60
 SMALLEST_GAP, LARGEST_GAP = 1e-4, 0.9
+AIMED = 0.999
+"""Share of the gap that is aimed at, as the grasp's quality is measured anew in the end."""
 SAME = 1e-9
 """Share of a bound that rounding may cost it."""
 MOST_SECONDS = 1e7
@@ -230,9 +232,9 @@ class _Levels:
         steps = max(0, math.ceil(math.log2(WIDEST / gap)))
         try:
             for k in range(steps, -1, -1):
-                reached = (1.0 - gap * 2.0**k) * (1.0 - SAME)
-                while self.best.quality.lower < reached * self.bound:
-                    wanted = self.best.quality.lower / (1.0 - gap * 2.0**k)
+                share = 1.0 - AIMED * gap * 2.0**k
+                while self.best.quality.lower < share * (1.0 - SAME) * self.bound:
+                    wanted = self.best.quality.lower / share
                     if not self._refuted(wanted):
                         return "time" if self.searching.stop() else "undivided"
         except KeyboardInterrupt:
@@ -264,8 +266,7 @@ class _Levels:
             self.progress(now)
 
     def _twists(self) -> Array:
-        """Return twists in which the support of all faces is small, and let the search know them.
-        """
+        """Return twists in which the support of all faces is small, and let the search know them."""
         descend = compiled(DESCENTS).descend
         points = [self.grounds.places(p, at) for p, at in enumerate(self.grounds.polygons())]
         on = np.repeat(np.arange(len(points)), [len(each) for each in points])
@@ -307,7 +308,7 @@ class _Levels:
         grasp = self._grasp(self.best)
         quality = ferrari_canny(
             grasp, friction=self.friction, center=self.body.center_of_mass,
-            torque_scale=self.body.radius,
+            torque_scale=self.body.radius, gap=EXACT_GAP,
         )  # fmt: skip
         return BestGrasp(grasp, quality, self.clearance, proof, ended, tuple(self.history))
 

@@ -41,10 +41,7 @@ def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Foun
     supports = _supports(grounds, searching.friction, on, at, twists)
     sets = np.sort(rng.integers(POINTS, size=(SETS, FINGERS)), axis=1)
     bounds = np.concatenate(
-        [
-            supports[sets[k : k + AT_ONCE]].max(axis=1).min(axis=1)
-            for k in range(0, SETS, AT_ONCE)
-        ]
+        [supports[sets[k : k + AT_ONCE]].max(axis=1).min(axis=1) for k in range(0, SETS, AT_ONCE)]
     )
     tried: set[tuple[int, ...]] = set()
     best: Found | None = None
@@ -89,9 +86,7 @@ def piece_at(grounds: Grounds, place: int) -> FacePiece:
     )  # fmt: skip
 
 
-def _supports(
-    grounds: Grounds, friction: float, on: Indices, at: Array, twists: Array
-) -> Array:
+def _supports(grounds: Grounds, friction: float, on: Indices, at: Array, twists: Array) -> Array:
     """Return the support of each contact's cone in each twist, (m, n)."""
     points = grounds.origins[on] + np.einsum("kij,kj->ki", grounds.frames[on], at)
     normals = grounds.normals[on]

@@ -50,7 +50,9 @@ def read_proof(path: Path) -> CutTree:
     """
     arrays = _arrays(path)
     if str(arrays["format"]) != FORMAT or arrays["schema"] != SCHEMA:
-        raise InputError(f"{path}: expected the text {FORMAT!r} and schema {SCHEMA}; write it again")
+        raise InputError(
+            f"{path}: expected the text {FORMAT!r} and schema {SCHEMA}; write it again"
+        )
     grounds = Grounds(**{name: arrays[name] for name in OF_GROUNDS})
     parts = {name: arrays[name] for name in OF_TREE}
     for name in ("friction", "threshold"):
@@ -78,5 +80,7 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
         raise
     except Exception as error:  # a damaged file can make zipfile and numpy raise anything
         raise InputError(
-            f"{path}: expected an npz file with the arrays {', '.join(wanted)}, got: {error!r}"[:300]
+            f"{path}: expected an npz file with the arrays {', '.join(wanted)}, got: {error!r}"[
+                :300
+            ]
         ) from error

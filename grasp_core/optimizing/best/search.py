@@ -212,7 +212,9 @@ class Searching:
         kernel, pieces = compiled(KERNEL), self.pieces
         work = _room()
         while not self.stop():
-            why = kernel.run(pieces, part.stack, part.pool, part.tree, work, threshold, BUDGET, depth)
+            why = kernel.run(
+                pieces, part.stack, part.pool, part.tree, work, threshold, BUDGET, depth
+            )
             if why == kernel.DONE:
                 part.finished = True
                 return
@@ -291,8 +293,9 @@ def _joined(trunk: Part, parts: Sequence[Part]) -> Steps:
     kernel = compiled(KERNEL)
     trees = [trunk.tree, *(part.tree for part in parts)]
     sizes = np.array([tree.sizes for tree in trees])
-    twist_starts, line_starts = np.cumsum(sizes[:, 1]) - sizes[:, 1], (
-        np.cumsum(sizes[:, 2]) - sizes[:, 2]
+    twist_starts, line_starts = (
+        np.cumsum(sizes[:, 1]) - sizes[:, 1],
+        (np.cumsum(sizes[:, 2]) - sizes[:, 2]),
     )
     each = [
         (tree.deeds[:n], tree.asked[:n] + np.where(tree.deeds[:n] < kernel.BY_PIECES, y, line))

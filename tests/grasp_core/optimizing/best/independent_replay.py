@@ -53,9 +53,7 @@ def replays(arrays):
             if len(places[i]) > 1:
                 return False
             for side in (1, -1):
-                half = {
-                    p: clipped(q, side * a, side * b, side * c) for p, q in places[i].items()
-                }
+                half = {p: clipped(q, side * a, side * b, side * c) for p, q in places[i].items()}
                 waiting.append(child(places, fresh, i, {p: q for p, q in half.items() if q}))
     return not waiting
 
