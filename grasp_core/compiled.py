@@ -24,7 +24,9 @@ _AWAITED: dict[str, Callable[[], object]] = {}
 Loop = TypeVar("Loop", bound=Callable[..., Any])
 
 
-def loop(division: Literal["python", "numpy"] = "python") -> Callable[[Loop], Loop]:
+def loop(
+    division: Literal["python", "numpy"] = "python", *, beside: bool = False
+) -> Callable[[Loop], Loop]:
     """Declare a function that numba compiles on first use and keeps for later processes.
 
     Where no folder can be written, neither a cache folder of the user nor `__pycache__` beside the
@@ -32,11 +34,12 @@ def loop(division: Literal["python", "numpy"] = "python") -> Callable[[Loop], Lo
 
     Args:
         division: What dividing by zero does: raise an error, or give infinity or NaN as NumPy does.
+        beside: Whether other threads of the process run while the function does.
     """
     numba: Any = importlib.import_module("numba")
 
     def declared(function: Loop) -> Loop:
-        made = numba.njit(function, error_model=division)
+        made = numba.njit(function, error_model=division, nogil=beside)
         keep(made, function)
         return cast("Loop", made)
 

@@ -18,9 +18,11 @@ from sim_validate.cli.flag_groups import (
     Edges,
     Fingers,
     Friction,
+    Gap,
     Mesh,
     NotNegative,
     Planning,
+    Positive,
     ProtocolName,
     Seed,
     Speech,
@@ -69,6 +71,15 @@ class Plan:
     object: Positional[str]
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
     planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
+    best: bool = False
+    """Also search for the grasp of the largest Ferrari-Canny quality on any faces, and prove how
+    much better any other can be. It comes first; best.json and best-proof.npz hold the proof. Its
+    contacts stay --edge-clearance-m from edges, or half the radius of the largest disc in a face
+    where that is less; a twentieth of the object's radius if not given."""
+    gap: Gap = 0.05
+    """With --best: share of the proved bound that the quality may be below it."""
+    time_limit_s: Positive | None = None
+    """With --best: time after which the search ends with the gap reached [s]."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)

@@ -1,6 +1,6 @@
 """Runs the command `plan`, which finds certified grasps of an object and writes them to a file.
 
-What only --optimize and --regions need is imported where they ask for it.
+What only --optimize, --regions and --best need is imported where they ask for it.
 """
 
 import math
@@ -30,6 +30,7 @@ from sim_validate.files.stale_results import remove_results
 from sim_validate.parallel.compiling import compiled_beside
 
 if TYPE_CHECKING:
+    from grasp_core.optimizing.best.best_grasp import BestGrasp
     from sim_validate.parallel.certifying import Found
 
 CARRIED = {"payload": "payload kg", "first-slip": "first slip"}
@@ -106,15 +107,21 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
     body = object_to_plan(command.object, command.planning, reporter)
     with alone_in(command.out):
         found = plan_object(body, command.planning, command.jobs, reporter)
+        best = _searched(body, command, reporter)
         if command.out:
             remove_results(command.out)
         found = with_regions(body, found, command.planning, command.out, command.jobs, reporter)
+        planned, found = found.grasps, _with_best(found, best)
         text = plan_to_json(body, found)
         if command.out:
             path = write_text(command.out / "grasps.json", text)
             reporter.say(f"wrote {path}")
-    if reporter.json_only:
-        print(text, end="")  # noqa: T201 - the document itself
+        if best is not None:
+            from sim_validate.commands.best.search import write_best
+
+            write_best(body, best, planned, command.out, reporter)
+        elif reporter.json_only:
+            print(text, end="")  # noqa: T201 - the document itself
     say_counts(body, found, reporter)
     if found.absence:
         reporter.say(found.absence)
@@ -124,7 +131,31 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
     say_cut(len(found.grasps), reporter)
     if found.moves:
         show_gains(found.moves, reporter)
-    return Exit.GOOD
+    if best is None:
+        return Exit.GOOD
+    from sim_validate.commands.best.search import show_best
+
+    return show_best(best, planned, reporter)
+
+
+def _searched(
+    body: Polyhedron, command: command_flags.Plan, reporter: Reporter
+) -> "BestGrasp | None":
+    """Return the best grasp if it is asked for."""
+    if not command.best:
+        return None
+    from sim_validate.commands.best.search import search_best
+
+    return search_best(body, command, reporter)
+
+
+def _with_best(found: Plan, best: "BestGrasp | None") -> Plan:
+    """Put the best grasp before the planned ones if there is one."""
+    if best is None:
+        return found
+    from sim_validate.commands.best.search import with_best
+
+    return with_best(found, best)
 
 
 def _table(

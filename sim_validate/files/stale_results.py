@@ -17,11 +17,12 @@ STATIC = (STYLE, "gallery.js", "tables.js", "turntable.js")
 CHARTS_OF_INDEX = ("fidelity.svg", "survival.svg")
 """Files that reports of earlier versions have; the charts now stand in the pages."""
 OF_GRASPS = ("transfer.json", "grasps.json")
+BEST = ("best.json", "best-proof.npz")
 REACHES = "reaches.json"
 JUDGEMENTS = "judgements.json"
 PICTURES, CHARTS, CLIPS = "pictures", "charts", "clips"
 MARK = ".graspproof-report"
-ID = re.compile(r"[cprf](-\d+){4}[\w-]*", re.ASCII)
+ID = re.compile(r"[bcprf](-\d+){4}[\w-]*", re.ASCII)
 """Pattern of a grasp's id, as plans name grasps."""
 
 
@@ -32,7 +33,9 @@ def remove_results(folder: Path) -> None:
     remove_executions(folder)
     remove_reaches(folder)
     remove_judgements(folder)
-    _remove([*_of_grasps(folder / "scenes", ".xml"), *(folder / name for name in OF_GRASPS)])
+    _remove(
+        [*_of_grasps(folder / "scenes", ".xml"), *(folder / name for name in (*OF_GRASPS, *BEST))]
+    )
 
 
 def remove_verdicts(folder: Path) -> None:

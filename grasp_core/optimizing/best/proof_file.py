@@ -1,0 +1,86 @@
+"""Writes and reads the proof of a best grasp's bound as an npz file, which needs no pickles.
+
+The arrays are those of `CutTree` and of its `Grounds`, by name, and three more: `schema` is 1,
+`format` is the text "graspproof cut tree", and `bound` is what the proof shows, for readers that do
+not compute it.
+"""
+
+import io
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.errors import InputError
+from grasp_core.files.text_files import read_bytes
+from grasp_core.files.whole_files import write_parts
+from grasp_core.optimizing.best.grounds import Grounds
+from grasp_core.optimizing.best.support_cuts import CutTree
+
+SCHEMA, FORMAT = 1, "graspproof cut tree"
+MOST_BYTES = 2**30
+OF_GROUNDS = ("faces", "normals", "origins", "frames", "corners", "counts")
+OF_TREE = ("friction", "maps", "threshold", "deeds", "asked", "twists", "lines")
+SMALL = {"deeds": np.uint8, "asked": np.int32, "faces": np.int32, "counts": np.int32}
+"""Types that hold the whole numbers of the tree in less room."""
+
+
+def write_proof(path: Path, proof: CutTree) -> Path:
+    """Write a proof to an npz file.
+
+    Raises:
+        OSError: The file cannot be written; the error names it.
+    """
+    arrays: dict[str, Any] = {name: getattr(proof.grounds, name) for name in OF_GROUNDS}
+    arrays |= {name: getattr(proof, name) for name in OF_TREE}
+    arrays |= {name: arrays[name].astype(kind) for name, kind in SMALL.items()}
+    arrays |= {"schema": SCHEMA, "format": FORMAT, "bound": proof.bound}
+    stream = io.BytesIO()
+    np.savez_compressed(stream, allow_pickle=False, **arrays)
+    return write_parts(path, [stream.getvalue()])
+
+
+def read_proof(path: Path) -> CutTree:
+    """Read a proof that `write_proof` has written; `CutTree.verify` then checks what it claims.
+
+    Raises:
+        InputError: The file is missing, too large, or no such proof.
+    """
+    arrays = _arrays(path)
+    if str(arrays["format"]) != FORMAT or arrays["schema"] != SCHEMA:
+        raise InputError(
+            f"{path}: expected the text {FORMAT!r} and schema {SCHEMA}; write it again"
+        )
+    grounds = Grounds(**{name: arrays[name] for name in OF_GROUNDS})
+    parts = {name: arrays[name] for name in OF_TREE}
+    for name in ("friction", "threshold"):
+        if parts[name].shape != () or parts[name].dtype.kind != "f":
+            raise InputError(f"{path}: {name} must be one number, got {parts[name].shape}")
+    proof = CutTree(
+        grounds, **(parts | {name: float(parts[name]) for name in ("friction", "threshold")})
+    )
+    if not np.array_equal(arrays["bound"], proof.bound):
+        raise InputError(f"{path}: bound must be the {proof.bound:.17g} that the threshold proves")
+    return proof
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    data = read_bytes(path, MOST_BYTES)
+    wanted = (*OF_GROUNDS, *OF_TREE, "schema", "format", "bound")
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            claimed = sum(each.file_size for each in archive.infolist())
+        if claimed > MOST_BYTES:
+            raise InputError(f"{path}: its arrays take {claimed} bytes, over {MOST_BYTES}")
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            return {name: archive[name] for name in wanted}
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file can make zipfile and numpy raise anything
+        raise InputError(
+            f"{path}: expected an npz file with the arrays {', '.join(wanted)}, got: {error!r}"[
+                :300
+            ]
+        ) from error

@@ -1,0 +1,154 @@
+"""Proves that no four contacts on given faces reach a quality, by asking who answers each twist.
+
+Solved: given a threshold t, a proof that the Ferrari-Canny quality (`l1`, exact circular cones,
+torques over the object's radius, as `ferrari_canny` measures it) of any four contacts on the pieces
+of faces is below t. Several contacts may be on one piece.
+
+Derivation. A contact at x answers the twist y = (v, w), |y| >= 1, with the support of its cone,
+
+    s(y, x) = n.u + mu |u - (n.u) n|,   u = v + w x x,                                  (1)
+
+and the quality of contacts x_1 ... x_4 is the least over unit twists of max_i s(y, x_i). So if they
+reach t, then for every y some contact has s(y, x_i) >= t. Let finger i be known to be in the union
+of convex polygons K_ip, one for each piece p.
+
+* *Ask.* A finger whose polygons have s < t at all corners cannot answer y, as s is convex in x. One
+  of the others does. For each of them there is a child in which its polygons are cut to where it
+  answers. No finger left: no child, the node is refuted.
+* *Cut.* {x in K : s >= t} lies in the hull of the corners that reach t and of a point on each edge
+  between such a corner and one that does not, at which s < t still: what is cut off beyond a chord
+  between two such points is the hull of points with s < t.                            (2)
+* *Divide.* A finger is on one side of a line or on the other, or on one of two sets of pieces.
+* *Fresh fingers.* Contacts can be numbered as one likes. While some fingers have had no part in
+  anything, their polygons are equal, and one child is enough for an answer from any of them.
+
+A tree whose leaves are all refuted is a proof. It names the twists and lines, not the polygons,
+which follow from them.
+
+Rounding. The proof is replayed in doubles. With coordinates and twists of size one or two, a corner
+is off the line or edge it should be on by less than 2e-15, a support computed is off by less than
+2e-15 (1 + mu), and s changes by at most (1 + mu) per unit of distance. By induction over the nodes
+above, a point that answers all questions with s >= t + (1 + mu) d e, after d cuts of error
+e < 2e-15, is within d e of the polygons of its node: its nearest point in the polygon before a cut
+has s >= t still, so that (2) leaves it in. With at most `MOST_CUTS` cuts above any node,
+
+    quality < t + (1 + mu) * ROUNDING                                                     (3)
+
+has room for more than ten times this. Twists of length 1 - 1e-12 are taken for units.
+
+Symmetries. See `same_places`: contacts can be moved by a symmetry, at the cost of its error.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices, frozen, frozen_indices
+from grasp_core.by_value import ByValue
+from grasp_core.compiled import compiled
+from grasp_core.fields import is_array, is_indices, is_number
+from grasp_core.optimizing.best.grounds import Grounds
+from grasp_core.optimizing.best.same_places import first_nodes, fitting
+
+ROUNDING = 1e-9
+"""How far rounding can lift a quality above the threshold, over 1 + mu."""
+MOST_CUTS = 10_000
+"""Largest number of cuts above a node."""
+SEARCHED_BELOW = 1e-9
+"""How far below its threshold a proof is searched for, over 1 + mu, so that replaying it, with
+other roundings, meets no case that is just decided the other way."""
+INEXACT = 1e-7
+"""How far errors of symmetries can lift a quality, over 1 + mu."""
+TWIST_SLACK = 1e-12
+LONGEST_TWIST = 2.0
+KERNEL = "grasp_core.optimizing.best.replay_kernel"
+
+
+def proved_bound(threshold: float, friction: float, maps: int) -> float:
+    """Return what no quality exceeds if a tree refutes the threshold, by (3).
+
+    Args:
+        threshold: The quality whose reaching is refuted.
+        friction: Coulomb coefficient.
+        maps: How many symmetries are used, the identity included.
+    """
+    lost = ROUNDING + (INEXACT if maps > 1 else 0.0)
+    return threshold + (1.0 + friction) * lost
+
+
+def searched_threshold(bound: float, friction: float, maps: int) -> float:
+    """Return the quality to refute by search, so that a bound is proved in the end."""
+    spare = proved_bound(0.0, friction, maps) + (1.0 + friction) * SEARCHED_BELOW
+    return bound - spare
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class CutTree(ByValue):
+    """A proof that contacts on the pieces of faces have a quality below a bound."""
+
+    grounds: Grounds
+    """Where contacts may be, at unit size."""
+    friction: float
+    maps: Array
+    """Symmetries that are used, matrices about the centre of mass, the identity first, (g, 3, 3).
+    """
+    threshold: float
+    """The quality that the tree refutes."""
+    deeds: Indices
+    """What is done at each node, parents before their children, the whole subtree of a child before
+    the next child, (n,): the sum of 2**i over fingers i that may answer; 16 + i if finger i is on
+    some pieces or others; 32 + i if it is on one side of a line or the other."""
+    asked: Indices
+    """Place of the twist, or of the line, (n,)."""
+    twists: Array
+    """Twists, with torques over the object's radius, (m, 6)."""
+    lines: Array
+    """Rows (a, b, c): first a x + b y <= c in the piece's plane, then >=; for pieces (k, 0, 0),
+    first those below k, then the others, (l, 3)."""
+
+    def __post_init__(self) -> None:
+        for name, shape in (("maps", (None, 3, 3)), ("twists", (None, 6)), ("lines", (None, 3))):
+            object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
+        for name in ("deeds", "asked"):
+            object.__setattr__(self, name, frozen_indices(getattr(self, name), (None,), name))
+
+    @property
+    def bound(self) -> float:
+        """Return the quality that no contacts exceed."""
+        return proved_bound(self.threshold, self.friction, len(self.maps))
+
+    def verify(self) -> bool:
+        """Replay the proof without the search, from the pieces, in plain arithmetic."""
+        with np.errstate(all="ignore"):
+            return self._is_sound() and bool(self._replayed())
+
+    def _is_sound(self) -> bool:
+        """Return whether all numbers are of sizes for which (3) is derived."""
+        count = len(self.deeds) if is_indices(self.deeds, None) else 0
+        if not (
+            isinstance(self.grounds, Grounds)
+            and self.grounds.sound()
+            and is_number(self.friction, least=0.0, most=1e3)
+            and is_number(self.threshold, least=1e-6, most=1e3)
+            and count
+            and is_indices(self.asked, count)
+            and is_array(self.twists, None, 6)
+            and is_array(self.lines, None, 3)
+            and is_array(self.maps, None, 3, 3)
+            and len(self.maps)
+        ):
+            return False
+        lengths = np.linalg.norm(self.twists, axis=1)
+        fits = lengths.min(initial=1.0) >= 1.0 - TWIST_SLACK
+        fits = fits and lengths.max(initial=1.0) <= LONGEST_TWIST
+        return bool(fits) and (len(self.maps) == 1 or fitting(self.maps, self.grounds))
+
+    def _replayed(self) -> bool:
+        kernel = compiled(KERNEL)
+        corners, counts, fresh = first_nodes(self.grounds, self.maps)
+        grounds = self.grounds
+        return kernel.replay(
+            kernel.Planes(grounds.normals, grounds.origins, grounds.frames, self.friction),
+            corners, counts, fresh, self.threshold, self.deeds.astype(np.int64),
+            self.asked.astype(np.int64), np.array(self.twists), np.array(self.lines), MOST_CUTS,
+        )  # fmt: skip

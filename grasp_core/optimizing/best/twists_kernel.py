@@ -1,0 +1,145 @@
+"""Keeps twists that have divided or refuted much, and finds new ones by descent, compiled."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import loop
+from grasp_core.optimizing.best.cuts_kernel import SLOPES, Pieces, slopes
+
+TWIST = 6
+OVER = 1.0 + 4e-16
+"""Factor that makes rounded unit twists at least one long."""
+SETTLING = 5
+"""Steps without progress after which a descent aims less far."""
+FIRST_AIM, LAST_AIM = 0.2, 0.004
+"""Share of the value that a step aims below the best one, at first and before a descent ends."""
+
+
+class Pool(NamedTuple):
+    """Twists to ask, with what they ask of each piece."""
+
+    twists: Array
+    """Twists at least one long, with torques over the object's radius, (c, 6)."""
+    asked: Array
+    """The `slopes` of each piece under each twist, (p, 6, c)."""
+    used: Indices
+    """When each was used last, (c,)."""
+    names: Indices
+    """Their places among the twists that a tree names, -1 for none, (c,)."""
+    size: Indices
+    """How many there are, (1,)."""
+
+
+@loop("numpy")
+def learn(pool: Pool, pieces: Pieces, y: Array, now: int) -> int:
+    """Put a twist into the pool, in place of the one unused for longest if that is full."""
+    place = pool.size[0]
+    if place < len(pool.used):
+        pool.size[0] += 1
+    else:
+        place = 0
+        for k in range(len(pool.used)):
+            if pool.used[k] < pool.used[place]:
+                place = k
+    length = 0.0
+    for j in range(TWIST):
+        length += y[j] * y[j]
+    length = np.sqrt(length)
+    for j in range(TWIST):
+        pool.twists[place, j] = y[j] / length * OVER
+    at = np.empty(SLOPES)
+    for p in range(len(pieces.normals)):
+        slopes(pieces, p, pool.twists[place], at)
+        for j in range(SLOPES):
+            pool.asked[p, j, place] = at[j]
+    pool.used[place], pool.names[place] = now, -1
+    return place
+
+
+@loop("numpy")
+def highest(pieces: Pieces, points: Array, on: Indices, m: int, y: Array, slope: Array) -> float:
+    """Return the largest support of contacts at points in a direction; fill in its wrench, (6,).
+
+    Args:
+        pieces: The pieces.
+        points: Points in space, (m, 3) or more.
+        on: The piece of each, (m,) or more.
+        m: How many count.
+        y: The direction, (6,).
+        slope: Array for the wrench that attains the support, (6,).
+    """
+    best, first = -np.inf, 0
+    for i in range(m):
+        u0, u1, u2 = _velocity(points[i], y)
+        n = pieces.normals[on[i]]
+        along = n[0] * u0 + n[1] * u1 + n[2] * u2
+        square = u0 * u0 + u1 * u1 + u2 * u2 - along * along
+        found = along + pieces.friction * np.sqrt(max(square, 0.0))
+        if found > best:
+            best, first = found, i
+    u0, u1, u2 = _velocity(points[first], y)
+    n, x = pieces.normals[on[first]], points[first]
+    along = n[0] * u0 + n[1] * u1 + n[2] * u2
+    across = np.sqrt(max(u0 * u0 + u1 * u1 + u2 * u2 - along * along, 0.0))
+    share = pieces.friction / across if across > 0.0 else 0.0
+    f0 = n[0] + share * (u0 - along * n[0])
+    f1 = n[1] + share * (u1 - along * n[1])
+    f2 = n[2] + share * (u2 - along * n[2])
+    slope[0], slope[1], slope[2] = f0, f1, f2
+    slope[3] = x[1] * f2 - x[2] * f1
+    slope[4] = x[2] * f0 - x[0] * f2
+    slope[5] = x[0] * f1 - x[1] * f0
+    return best
+
+
+@loop("numpy")
+def _velocity(x: Array, y: Array) -> tuple[float, float, float]:
+    return (
+        y[0] + y[4] * x[2] - y[5] * x[1],
+        y[1] + y[5] * x[0] - y[3] * x[2],
+        y[2] + y[3] * x[1] - y[4] * x[0],
+    )
+
+
+@loop("numpy")
+def descend(pieces: Pieces, points: Array, on: Indices, m: int, y: Array, steps: int) -> float:
+    """Move a unit twist to where the largest support of contacts is smaller; return the smallest.
+
+    Each step follows the wrench that attains the support, as far as would lower it to an aim if it
+    stayed the largest.
+    """
+    at, best, slope = y.copy(), np.inf, np.empty(TWIST)
+    aim, idle = FIRST_AIM, 0
+    for _ in range(steps):
+        found = highest(pieces, points, on, m, at, slope)
+        if found < best:
+            idle = 0 if found < best - 0.25 * aim * abs(best) else idle + 1
+            best = found
+            y[:] = at
+        else:
+            idle += 1
+        if idle >= SETTLING:
+            aim, idle = 0.4 * aim, 0
+            at[:] = y
+            if aim < LAST_AIM:
+                break
+            found = highest(pieces, points, on, m, at, slope)
+        along, square = 0.0, 0.0
+        for j in range(TWIST):
+            along += slope[j] * at[j]
+        for j in range(TWIST):
+            slope[j] -= along * at[j]
+            square += slope[j] * slope[j]
+        if square <= 0.0:
+            break
+        step = (found - (best - aim * abs(best))) / square
+        length = 0.0
+        for j in range(TWIST):
+            at[j] -= step * slope[j]
+            length += at[j] * at[j]
+        length = np.sqrt(length)
+        for j in range(TWIST):
+            at[j] /= length
+    return best

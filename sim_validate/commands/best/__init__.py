@@ -1,0 +1,1 @@
+"""How does the command `plan --best` find the best grasp, and say how good the planned ones are?"""
