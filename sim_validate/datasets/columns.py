@@ -117,8 +117,8 @@ TABLES: dict[Name, tuple[Column, ...]] = {"objects": OBJECTS, "grasps": GRASPS, 
 """Tables of a dataset without executions."""
 
 
-def dataset_tables(*, executed: bool) -> Tables:
-    """Return the tables of a dataset, with or without executions."""
+def base_tables(*, executed: bool) -> Tables:
+    """Return the tables of a dataset, with or without executions, without columns on request."""
     if not executed:
         return TABLES
     return {**TABLES, "grasps": (*TABLES["grasps"], *EXECUTED), "executions": EXECUTIONS}

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
 from grasp_core.files.strict_json import shown
-from sim_validate.datasets.columns import KEYS, TABLES, Column, Name, Tables, dataset_tables
+from sim_validate.datasets.columns import KEYS, TABLES, Column, Name, Tables, base_tables
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
 TYPES = {"text": "string", "bool": "bool_", "int": "int64", "float": "float64"}
@@ -160,7 +160,7 @@ def _opened(path: Path, name: Name | None, tables: Tables | None) -> Generator[A
 
 
 def _check_columns(path: Path, came: Any, name: Name | None, tables: Tables | None) -> None:
-    both = [dataset_tables(executed=executed) for executed in (False, True)]
+    both = [base_tables(executed=executed) for executed in (False, True)]
     kinds = both if tables is None else [tables]
     known = [
         (each, schema_of(columns))

@@ -18,6 +18,8 @@ from sim_validate.datasets.execution_rows import (
     for_fingers,
 )
 from sim_validate.datasets.given_contacts import GivenGrasp
+from sim_validate.datasets.learning.variants import ratio_of
+from sim_validate.datasets.learning.varied import VARIED, Tried
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
 from sim_validate.validation.control_trials import ControlVerdict
@@ -29,6 +31,8 @@ Rows: TypeAlias = Mapping[Name, tuple[Row, ...]]
 SPLITS = (("test", 0.1), ("validation", 0.2), ("train", 1.0))
 """Upper ends of each split's share of hashes: an object is in the first split whose end is above
 its hash."""
+PLANNED = "planned"
+"""Kind of the grasps that were planned for their friction."""
 GIVEN = "given"
 """Label of grasps that another tool made."""
 NOT_TRIED = "not_tried"
@@ -81,6 +85,7 @@ class GraspRows:
         """Add the rows of a planned grasp, its negative controls, and the trials of all."""
         about = {
             "label": "grasp",
+            "kind": PLANNED,
             "family": grasp.family,
             "region_radius_m": grasp.radius,
         }
@@ -91,15 +96,41 @@ class GraspRows:
         executed: Executed = None,
     ) -> None:  # fmt: skip
         """Add rows of a force-closed given grasp, its negative controls, and all trials."""
-        about: dict[str, Any] = {"name": given.name, "label": GIVEN, "moved_m": moved_m}
+        about: dict[str, Any] = {
+            "name": given.name, "label": GIVEN, "kind": GIVEN, "moved_m": moved_m,
+        }  # fmt: skip
         if self.body.patches is not None:
             # on curved surfaces the contacts' faces are made for this grasp alone
             about["faces"] = None
         self._add_closed(grasp, verdict, about, executed)
 
+    def add_varied(self, made_from: str, tried: Tried) -> None:
+        """Add the row of a grasp that was varied, with its trials; it may be closed or not."""
+        variant, verdict = tried.variant, tried.verdict
+        name = f"{self.name(made_from)}:{variant.name}"
+        about: dict[str, Any] = {
+            "name": variant.name, "label": VARIED, "kind": variant.kind,
+            "made_from": self.name(made_from), "displaced_m": variant.displaced_m.tolist(),
+            "region_exit_m": list(variant.exits_m), "mass_ratio": variant.mass_ratio,
+            "friction": variant.friction, "control_of": None,
+            "friction_ratio": variant.friction_ratio,
+        }  # fmt: skip
+        if not isinstance(verdict, ControlVerdict):
+            assert isinstance(variant.proved, Grasp)  # noqa: S101 - only closed ones have verdicts
+            if self.body.patches is not None:
+                about["faces"] = None
+            self._add_closed(variant.proved, verdict, about, tried.executed, name)
+            return
+        if variant.critical_friction is not None:
+            about["critical_friction"] = variant.critical_friction
+        self._add_refuted(name, verdict, about, tried.executed)
+
     def add_open(self, given: GivenGrasp, verdict: ControlVerdict, moved_m: float) -> None:
         """Add rows of a given grasp that is not force-closed; it is a negative control."""
-        about = {"name": given.name, "label": GIVEN, "control_of": None, "moved_m": moved_m}
+        about = {
+            "name": given.name, "label": GIVEN, "kind": GIVEN, "control_of": None,
+            "moved_m": moved_m,
+        }  # fmt: skip
         self._add_refuted(self.name(given.id), verdict, about)
 
     def add_untried(self, given: GivenGrasp, why: str) -> None:
@@ -113,6 +144,7 @@ class GraspRows:
             | {
                 "name": given.name,
                 "label": GIVEN,
+                "kind": GIVEN,
                 "control_of": None,
                 "outcome": NOT_TRIED,
                 "note": why,
@@ -122,9 +154,10 @@ class GraspRows:
         )
 
     def _add_closed(
-        self, grasp: Grasp, verdict: Verdict, about: Mapping[str, Any], executed: Executed
-    ) -> None:
-        name = self.name(grasp.id)
+        self, grasp: Grasp, verdict: Verdict, about: Mapping[str, Any], executed: Executed,
+        name: str | None = None,
+    ) -> None:  # fmt: skip
+        name = self.name(grasp.id) if name is None else name
         friction = verdict.critical_friction
         self.grasps.append(
             self._common(name, grasp.contacts)
@@ -144,6 +177,7 @@ class GraspRows:
                 "trials": len(verdict.wrenches),
                 "mismatches": len(verdict.mismatches),
                 "simulated_critical_friction": friction.simulated,
+                "friction_ratio": ratio_of(verdict.friction, grasp.critical_friction),
                 **about,
                 **execution_cells(executed),
             }
@@ -152,10 +186,16 @@ class GraspRows:
         self._add_trials(name, verdict.wrenches, _wrench_row)
         for control in verdict.controls:
             kind = control.control.name
-            said = {"name": about.get("name", grasp.id), "label": kind, "control_of": name}
+            said = {
+                "name": about.get("name", grasp.id), "label": kind, "control_of": name,
+                "kind": kind,
+            }  # fmt: skip
             self._add_refuted(f"{name}:{kind}", control, said)
 
-    def _add_refuted(self, name: str, verdict: ControlVerdict, about: Mapping[str, Any]) -> None:
+    def _add_refuted(
+        self, name: str, verdict: ControlVerdict, about: Mapping[str, Any],
+        executed: Executed = None,
+    ) -> None:  # fmt: skip
         control = verdict.control
         first = next((t for t in verdict.tried if t.hold.outcome is not Outcome.HELD), None)
         self.grasps.append(
@@ -169,8 +209,10 @@ class GraspRows:
                 "trials": len(verdict.tried),
                 "mismatches": int(not verdict.let_go),
                 **about,
+                **execution_cells(executed),
             }
         )
+        self.executions += execution_rows(name, executed)
         self._add_trials(name, verdict.tried, lambda _: {})
 
     def name(self, grasp: str) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from grasp_core.errors import InputError
-from sim_validate.datasets.columns import KEYS, Name
+from sim_validate.datasets.columns import KEYS, TABLES, Name, Tables
 from sim_validate.datasets.parquet import GROUP_ROWS, PAGES, pyarrow, pyarrow_parquet, read_table
 
 FILE_ROWS = 500_000
@@ -31,8 +31,8 @@ class TableFiles:
     in a `with` block; at its end no file is open, whatever happens.
     """
 
-    def __init__(self, folder: Path, about: Mapping[str, str]) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, about: Mapping[str, str], tables: Tables = TABLES) -> None:
+        self._folder, self._tables = folder, tables
         self._about = dict(sorted(about.items()))
         self._parts: dict[tuple[Name, str], _Part] = {}
 
@@ -50,7 +50,7 @@ class TableFiles:
             InputError: A file is damaged, or two rows have the same key.
         """
         arrow, keys = pyarrow(), list(KEYS[name])
-        table = arrow.concat_tables([read_table(path) for path in paths])
+        table = arrow.concat_tables([read_table(path, name, self._tables) for path in paths])
         table = table.sort_by([(key, "ascending") for key in keys])
         if table.group_by(keys).aggregate([]).num_rows < table.num_rows:
             raise InputError(

@@ -22,6 +22,8 @@ from grasp_core.provenance import versions
 from scenes.example_objects import example_object
 from sim_validate.datasets.config import CREDITS, DatasetConfig
 from sim_validate.datasets.given_contacts import GivenGrasp, given_sha256, read_given
+from sim_validate.datasets.learning.settings import TABLE as LEARNING
+from sim_validate.datasets.learning.settings import learning_table
 from sim_validate.execution.asked import TABLE, execution_table
 
 CHUNK = 2**20
@@ -87,8 +89,12 @@ def shared_settings(config: DatasetConfig) -> dict[str, object]:
     settings = {
         each.name: getattr(config, each.name) for each in fields(config) if each.name not in APART
     }
-    executed = settings.pop(TABLE)
-    return settings if executed is None else {**settings, TABLE: execution_table(executed)}
+    executed, learning = settings.pop(TABLE), settings.pop(LEARNING)
+    if executed is not None:
+        settings[TABLE] = execution_table(executed)
+    if learning is not None:
+        settings[LEARNING] = learning_table(learning)
+    return settings
 
 
 def units_of(config: DatasetConfig) -> list[WorkUnit]:

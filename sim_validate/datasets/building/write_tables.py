@@ -60,6 +60,7 @@ def finish(
         units_sha256=units_sha256(units),
         quarantined=len(quarantined),
         executed=config.execution is not None,
+        groups=config.groups,
         files=(*tables, *(listed(folder, path) for path in others)),
     )
     card = write_text(folder / CARD, card_text(config, manifest))
@@ -97,7 +98,7 @@ def _write_tables(
     config: DatasetConfig, good: Sequence[Finished], staging: Staging, folder: Path
 ) -> list[Listed]:
     about = {"schema": str(SCHEMA), "config_sha256": config.sha256}
-    with TableFiles(folder / DATA, about) as files:
+    with TableFiles(folder / DATA, about, config.tables) as files:
         for _, same in groupby(good, key=lambda each: each.object_id):
             of_object = list(same)
             for name in config.tables:

@@ -21,6 +21,7 @@ ROWS: Mapping[Name, str] = {
 LABELS: Mapping[str, str] = {
     "grasp": "a planned grasp, proved to be in force closure",
     "given": "contacts from another source, moved onto the object and judged",
+    "varied": "a grasp at another friction or mass, or with contacts moved; it may hold or not",
     "low_friction": "the contacts of a grasp, tried at a friction below its critical friction",
     "fingers_removed": "only three or two of a grasp's contacts",
     "normal_flipped": "a grasp with one finger that pulls where it should push",

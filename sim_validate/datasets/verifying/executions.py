@@ -5,6 +5,7 @@ alone, so it is proved again for every row. What a trial did is only simulated a
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from grasp_core.planning.given_contacts import seat
 from grasp_core.values import Contact
 from sim_validate.datasets.building.write_tables import CONFIG
 from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.learning.varied import VARIED
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.rows import GIVEN
 from sim_validate.datasets.verifying.rows_by_object import ObjectRows, Row
@@ -99,12 +101,14 @@ def _squeeze_faults(row: Row, body: Polyhedron, asked: AskedExecution) -> Iterat
     count = row["contacts"]
     try:
         settings = asked.settings_for(body)
+        if row.get("mass_ratio") is not None:
+            settings = replace(settings, mass_kg=row["mass_kg"])
         points, normals = row["contact_points_m"][:count], row["contact_normals"][:count]
         contacts = [
             Contact(np.array(point), np.array(normal))
             for point, normal in zip(points, normals, strict=True)
         ]
-        if row["label"] == GIVEN:  # on curved surfaces, fingertips touch faces made for the grasp
+        if row["label"] in (GIVEN, VARIED):  # on curved surfaces they have faces of their own
             body = seat(body, points, normals).body
         held = grip(
             body, contacts, row["friction"], row["squeeze_n"][:count],

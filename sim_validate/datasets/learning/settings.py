@@ -1,0 +1,72 @@
+"""What a dataset holds on request for learners: the table `[learning]` of a settings file."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, cast
+
+from grasp_core.checked import whole
+from grasp_core.errors import InputError
+from grasp_core.files.complaints import settings_of
+from grasp_core.files.strict_json import shown
+
+TABLE = "learning"
+"""Name of the table in a settings file."""
+MOST_VARIED = 100
+"""Largest number of rows of one kind that are made from a grasp."""
+CONTROLS = 5
+"""Number of kinds of synthetic negative controls that a grasp has at most."""
+OF_GRASPS = ("friction_below", "friction_near", "friction_above", "moved_out", "mass_near")
+"""Settings that say how many rows of a kind are made from each grasp; also the kinds' names."""
+
+
+@dataclass(frozen=True, slots=True)
+class Learning:
+    """What is added to the tables, and how many rows of each kind are made from a grasp.
+
+    Raises:
+        InputError: A number is out of range.
+    """
+
+    friction_below: int = 0
+    """Rows per grasp with its contacts at a friction clearly below its critical one."""
+    friction_near: int = 0
+    """Rows per grasp at a friction within some percent of its critical one, on either side."""
+    friction_above: int = 0
+    """Rows per grasp at a friction clearly above its critical one."""
+    moved_out: int = 0
+    """Rows per grasp with contacts moved on their faces, each out of its region."""
+    mass_near: int = 0
+    """Rows per grasp that is executed with a mass near the one at which it is predicted to fail."""
+    synthetic: int = CONTROLS
+    """Largest number of synthetic negative controls of each grasp, drawn from all that exist."""
+
+    def __post_init__(self) -> None:
+        for name in OF_GRASPS:
+            whole(getattr(self, name), name, most=MOST_VARIED)
+        whole(self.synthetic, "synthetic", most=CONTROLS)
+
+    def groups(self) -> dict[str, int]:
+        """Return the groups of columns that the tables have on request, with their sizes."""
+        return {"kinds": 1}
+
+
+def asked_learning(table: object) -> Learning:
+    """Read the table `[learning]` of a settings file.
+
+    Raises:
+        InputError: A setting is unknown or out of range.
+    """
+    if not isinstance(table, Mapping):
+        raise InputError(f"{TABLE}: expected a table of settings, got {shown(table)}")
+    given = cast("Mapping[str, Any]", table)
+    known = [each.name for each in fields(Learning)]
+    if unknown := [name for name in given if name not in known]:
+        raise InputError(
+            f"{TABLE}: no setting is named {shown(unknown[0])}; choose from {', '.join(known)}"
+        )
+    return settings_of(Learning, given, [TABLE])
+
+
+def learning_table(asked: Learning) -> dict[str, Any]:
+    """Return every setting as the table that gives the same settings when it is read."""
+    return {each.name: getattr(asked, each.name) for each in fields(asked)}

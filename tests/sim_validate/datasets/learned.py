@@ -1,0 +1,19 @@
+"""A dataset of two objects with rows of every kind, and its rows."""
+
+import sim_validate as sv
+from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.learning.settings import Learning
+from sim_validate.datasets.open_dataset import select
+from sim_validate.execution.asked import AskedExecution
+
+LEARNED = DatasetConfig(
+    objects=("tetrahedron", "wedge"), families=("concurrent",), limit=1,
+    execution=AskedExecution(sv.ExecutionSettings(mass_kg=1.0, trials=("weight",))),
+    learning=Learning(
+        friction_below=1, friction_near=2, friction_above=1, moved_out=2, mass_near=1, synthetic=1
+    ),
+)  # fmt: skip
+
+
+def rows_of(folder, name):
+    return list(select(folder).rows(name))
