@@ -128,10 +128,10 @@ class DatasetConfig:
                 "objects: expected only one object beside `contacts`, the one that the contacts "
                 "are on"
             )
-        if self.learning is not None and self.learning.mass_near and self.execution is None:
+        if self.learning is not None and self.learning.executes and self.execution is None:
             raise InputError(
-                f"{LEARNING}.mass_near: only executed grasps have a mass; add a table [{TABLE}], "
-                "or leave this setting out"
+                f"{LEARNING}.{self.learning.executes}: only executed grasps have a mass and a "
+                f"squeeze; add a table [{TABLE}], or leave this setting out"
             )
         self._check_words_and_counts()
 
@@ -158,7 +158,9 @@ class DatasetConfig:
     @property
     def groups(self) -> dict[str, int]:
         """Groups of columns that the tables have on request, with their sizes."""
-        return {} if self.learning is None else self.learning.groups()
+        if self.learning is None:
+            return {}
+        return self.learning.groups(executed=self.execution is not None)
 
     @property
     def sha256(self) -> str:

@@ -1,7 +1,7 @@
 """Turns verdicts into rows of a dataset: objects, grasps with negative controls, and trials."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.given_contacts import Seated
 from grasp_core.values import Contact, Grasp
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.execution_rows import (
@@ -18,6 +19,7 @@ from sim_validate.datasets.execution_rows import (
     for_fingers,
 )
 from sim_validate.datasets.given_contacts import GivenGrasp
+from sim_validate.datasets.learning.figures import Figures, symmetry_cells
 from sim_validate.datasets.learning.variants import ratio_of
 from sim_validate.datasets.learning.varied import VARIED, Tried
 from sim_validate.datasets.units import WorkUnit
@@ -89,20 +91,21 @@ class GraspRows:
             "family": grasp.family,
             "region_radius_m": grasp.radius,
         }
-        self._add_closed(grasp, verdict, about, executed)
+        self._add_closed(grasp, verdict, about, executed, self.body)
 
     def add_given(
-        self, given: GivenGrasp, grasp: Grasp, verdict: Verdict, moved_m: float,
+        self, given: GivenGrasp, grasp: Grasp, verdict: Verdict, seated: Seated,
         executed: Executed = None,
     ) -> None:  # fmt: skip
         """Add rows of a force-closed given grasp, its negative controls, and all trials."""
         about: dict[str, Any] = {
-            "name": given.name, "label": GIVEN, "kind": GIVEN, "moved_m": moved_m,
+            "name": given.name, "label": GIVEN, "kind": GIVEN,
+            "moved_m": seated.moved_m,
         }  # fmt: skip
         if self.body.patches is not None:
             # on curved surfaces the contacts' faces are made for this grasp alone
             about["faces"] = None
-        self._add_closed(grasp, verdict, about, executed)
+        self._add_closed(grasp, verdict, about, executed, seated.body)
 
     def add_varied(self, made_from: str, tried: Tried) -> None:
         """Add the row of a grasp that was varied, with its trials; it may be closed or not."""
@@ -119,7 +122,9 @@ class GraspRows:
             assert isinstance(variant.proved, Grasp)  # noqa: S101 - only closed ones have verdicts
             if self.body.patches is not None:
                 about["faces"] = None
-            self._add_closed(variant.proved, verdict, about, tried.executed, name)
+            self._add_closed(
+                variant.proved, verdict, about, tried.executed, variant.seated.body, name
+            )
             return
         if variant.critical_friction is not None:
             about["critical_friction"] = variant.critical_friction
@@ -155,12 +160,13 @@ class GraspRows:
 
     def _add_closed(
         self, grasp: Grasp, verdict: Verdict, about: Mapping[str, Any], executed: Executed,
-        name: str | None = None,
+        body: Polyhedron, name: str | None = None,
     ) -> None:  # fmt: skip
         name = self.name(grasp.id) if name is None else name
+        figures = self._figures
         friction = verdict.critical_friction
         self.grasps.append(
-            self._common(name, grasp.contacts)
+            self._common(name, grasp.contacts, verdict.friction)
             | {
                 "name": grasp.id,
                 "control_of": None,
@@ -178,11 +184,12 @@ class GraspRows:
                 "mismatches": len(verdict.mismatches),
                 "simulated_critical_friction": friction.simulated,
                 "friction_ratio": ratio_of(verdict.friction, grasp.critical_friction),
+                **({} if figures is None else figures.of_grasp(body, grasp, verdict.friction)),
                 **about,
-                **execution_cells(executed),
+                **self._of_executed(body, grasp.contacts, verdict.friction, executed),
             }
         )
-        self.executions += execution_rows(name, executed)
+        self._add_executions(name, executed)
         self._add_trials(name, verdict.wrenches, _wrench_row)
         for control in verdict.controls:
             kind = control.control.name
@@ -199,7 +206,7 @@ class GraspRows:
         control = verdict.control
         first = next((t for t in verdict.tried if t.hold.outcome is not Outcome.HELD), None)
         self.grasps.append(
-            self._common(name, control.contacts)
+            self._common(name, control.contacts, control.friction)
             | {
                 "friction": control.friction,
                 "force_closed": False,
@@ -209,18 +216,49 @@ class GraspRows:
                 "trials": len(verdict.tried),
                 "mismatches": int(not verdict.let_go),
                 **about,
-                **execution_cells(executed),
+                **self._of_executed(self.body, control.contacts, control.friction, executed),
             }
         )
-        self.executions += execution_rows(name, executed)
+        self._add_executions(name, executed)
         self._add_trials(name, verdict.tried, lambda _: {})
+
+    def _add_executions(self, name: str, executed: Executed) -> None:
+        """Add the trials of an execution, each misplaced one with its seed."""
+        asked = self.unit.config.execution
+        if asked is not None:
+            more = () if self._figures is None else self._figures.asked.seeds
+            seeds = (asked.settings.seed, *more)
+            self.executions += execution_rows(name, executed, seeds, asked.settings.misplacements)
+
+    def _of_executed(
+        self, body: Polyhedron, contacts: Sequence[Contact], friction: float, executed: Executed
+    ) -> Mapping[str, Any]:
+        """Return all cells that are about an execution."""
+        cells = execution_cells(executed)
+        if self._figures is None or cells.get("mass_kg") is None:
+            return cells
+        return {**cells, **self._figures.of_executed(body, contacts, friction, cells["mass_kg"])}
+
+    @property
+    def _figures(self) -> Figures | None:
+        config = self.unit.config
+        return None if config.learning is None else Figures(config.learning, config.execution)
+
+    def add_symmetries(self, grasps: Sequence[Grasp]) -> None:
+        """Add to the rows of planned grasps which are the same by symmetry of the object."""
+        names = [self.name(grasp.id) for grasp in grasps]
+        cells = dict(zip(names, symmetry_cells(self.body, grasps, names), strict=True))
+        self.grasps = [{**row, **cells.get(row["grasp_id"], {})} for row in self.grasps]
 
     def name(self, grasp: str) -> str:
         """Return the name of a grasp, which no other grasp of the dataset has."""
         return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
 
-    def _common(self, name: str, contacts: Iterable[Contact]) -> dict[str, Any]:
-        listed = list(contacts)
+    def _common(
+        self, name: str, contacts: Iterable[Contact], friction: float | None = None
+    ) -> dict[str, Any]:
+        listed, figures = list(contacts), self._figures
+        friction = self.unit.friction if friction is None else friction
         unexecuted = {} if self.unit.config.execution is None else {"executed": False}
         return {
             **unexecuted,
@@ -232,6 +270,7 @@ class GraspRows:
             "contacts": len(listed),
             "contact_points_m": for_fingers([c.position.tolist() for c in listed], [None] * 3),
             "contact_normals": for_fingers([c.normal.tolist() for c in listed], [None] * 3),
+            **({} if figures is None else figures.of_contacts(self.body, listed, friction)),
         }
 
     def _add_trials(

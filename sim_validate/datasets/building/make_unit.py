@@ -1,7 +1,7 @@
 """Computes one unit of work: grasps are planned or given, simulated, and turned into rows."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grasp_core.errors import InputError, UndecidedError
@@ -10,7 +10,7 @@ from grasp_core.planning.given_contacts import grasp_of, seat
 from grasp_core.planning.planner import plan
 from grasp_core.values import Grasp
 from sim_validate.datasets.columns import Column
-from sim_validate.datasets.execution_rows import Executed
+from sim_validate.datasets.execution_rows import Executed, executed_by
 from sim_validate.datasets.given_contacts import GivenGrasp
 from sim_validate.datasets.learning.varied import Varying, validated_with
 from sim_validate.datasets.meshes import mesh_path, mesh_text
@@ -82,7 +82,7 @@ class _Making:
 
     def plan(self) -> None:
         """Plan the best grasps of each family separately, and simulate them."""
-        config = self.unit.config
+        config, every = self.unit.config, list[Grasp]()
         for family in config.families:
             planned = plan(
                 self.body, self.unit.friction, families=(family,), cones=config.cones,
@@ -92,6 +92,9 @@ class _Making:
                 tried, executed = self._tried(grasp, self.body), self._executed(grasp, self.body)
                 self.found.add(grasp, tried, executed)
                 self._vary(grasp, self.body, tried, executed)
+                every.append(grasp)
+        if config.learning is not None and "symmetry" in config.learning.figures:
+            self.found.add_symmetries(every)
 
     def judge(self) -> None:
         """Judge the given grasps; a grasp that cannot be simulated gets a row with the reason."""
@@ -113,7 +116,7 @@ class _Making:
         grasp = grasp_of(seated, friction, given.id)
         if isinstance(grasp, Grasp):
             tried, executed = self._tried(grasp, seated.body), self._executed(grasp, seated.body)
-            self.found.add_given(given, grasp, tried, seated.moved_m, executed)
+            self.found.add_given(given, grasp, tried, seated, executed)
             self._vary(grasp, seated.body, tried, executed)
             return
         control = Control(GIVEN, seated.contacts, friction, grasp)
@@ -142,7 +145,11 @@ class _Making:
         if asked is None:
             return None
         try:
-            settings = asked.settings_for(body)
-            return executed_grasp(ExecutionJob(body, grasp, self.unit.friction, settings))
+            settings, learning = asked.settings_for(body), self.unit.config.learning
+            job = ExecutionJob(body, grasp, self.unit.friction, settings)
+            return executed_by(
+                lambda each: executed_grasp(replace(job, settings=each)), settings,
+                () if learning is None else learning.seeds,
+            )  # fmt: skip
         except InputError as error:
             return str(error)

@@ -1,6 +1,7 @@
 """Columns that tables have only on request, in groups; a dataset's manifest names its groups."""
 
 from collections.abc import Mapping
+from typing import TypeAlias
 
 from sim_validate.datasets.columns import Column, Name, Tables, base_tables
 
@@ -13,8 +14,51 @@ KINDS = (
            (4,)),
     Column("mass_ratio", "float", "mass over that at which `made_from` is predicted to fail", "1"),
 )  # fmt: skip
-GROUPS: Mapping[str, tuple[Name, tuple[Column, ...]]] = {"kinds": ("grasps", KINDS)}
-"""Table that a group's columns belong to, and its columns."""
+CLOSURE = (
+    Column("span_angle_rad", "float", "half-angle below which cones positively span", "rad"),
+    Column("min_weight", "float", "min-weight metric of pyramids with eight edges", "1"),
+    Column("hull_volume_n6", "float", "volume of the hull of the pyramids' edges", "N6"),
+    Column("smallest_singular_value", "float", "least singular value of the grasp map", "1"),
+    Column("witness_forces_n", "float", "balanced forces on the object, normal parts sum to one",
+           "N", (4, 3)),
+)  # fmt: skip
+SYMMETRY = (
+    Column("symmetry_class", "text", "first planned grasp that is the same by symmetry"),
+    Column("multiplicity", "int", "number of different grasps that the object's turns make of it"),
+)
+APPROACH = (
+    Column("approach_radius_m", "float", "radius of fingertips that come on free lines", "m"),
+    Column("approach_directions", "float", "along a free line to each contact; null if none", "1",
+           (4, 3)),
+)  # fmt: skip
+PAYLOAD = (
+    Column("payload_fixed_kg", "float", "mass held in any orientation, forces fixed", "kg"),
+    Column("payload_free_kg", "float", "bound of the mass held with forces chosen anew", "kg"),
+)
+MARGINS = (
+    Column("predicted_loss", "float", "least multiple of a trial's load that loses it", "1"),
+    Column("payload_kg", "float", "mass that the squeeze is proved to carry", "kg"),
+    Column("tip_radius_m", "float", "radius of the fingertips of the execution", "m"),
+)
+LEAST_SQUEEZE = (
+    Column("least_push_n", "float", "least largest push that carries the weight any way", "N"),
+    Column("least_squeeze_n", "float", "contact forces at rest with that push", "N", (4, 3)),
+)
+TRIAL_MARGINS = (
+    Column("predicted_loss", "float", "multiple of the load that loses it; null if none", "1"),
+    Column("seed", "int", "seed that a misplaced trial was drawn by; null for others"),
+)
+Group: TypeAlias = Mapping[Name, tuple[Column, ...]]
+GROUPS: Mapping[str, Group] = {
+    "kinds": {"grasps": KINDS},
+    "closure": {"grasps": CLOSURE},
+    "symmetry": {"grasps": SYMMETRY},
+    "approach": {"grasps": APPROACH},
+    "payload": {"grasps": PAYLOAD},
+    "margins": {"grasps": MARGINS, "executions": TRIAL_MARGINS},
+    "least_squeeze": {"grasps": LEAST_SQUEEZE},
+}
+"""Columns of each group, by the table that they belong to."""
 
 
 def dataset_tables(*, executed: bool, groups: Mapping[str, int] | None = None) -> Tables:
@@ -25,7 +69,7 @@ def dataset_tables(*, executed: bool, groups: Mapping[str, int] | None = None) -
         groups: Groups of columns on request, with their sizes.
     """
     tables = dict(base_tables(executed=executed))
-    for group in groups or {}:
-        name, columns = GROUPS[group]
-        tables[name] = (*tables.get(name, ()), *columns)
+    for group in (group for group in GROUPS if group in (groups or {})):
+        for name, columns in GROUPS[group].items():
+            tables[name] = (*tables.get(name, ()), *columns)
     return tables

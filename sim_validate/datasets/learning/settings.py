@@ -2,15 +2,19 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, cast
+from typing import Any, Literal, TypeAlias, cast, get_args
 
-from grasp_core.checked import whole
+from grasp_core.checked import one_of, whole
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import settings_of
 from grasp_core.files.strict_json import shown
 
 TABLE = "learning"
 """Name of the table in a settings file."""
+Figure: TypeAlias = Literal["closure", "symmetry", "approach", "payload", "least_squeeze"]
+"""A group of figures that each grasp has on request."""
+FIGURES: tuple[Figure, ...] = get_args(Figure)
+LEAST_SQUEEZE: Figure = "least_squeeze"
 MOST_VARIED = 100
 """Largest number of rows of one kind that are made from a grasp."""
 CONTROLS = 5
@@ -37,6 +41,10 @@ class Learning:
     """Rows per grasp with contacts moved on their faces, each out of its region."""
     mass_near: int = 0
     """Rows per grasp that is executed with a mass near the one at which it is predicted to fail."""
+    figures: tuple[Figure, ...] = ()
+    """Groups of figures of each grasp; what each takes is in docs/datasets.md."""
+    seeds: tuple[int, ...] = ()
+    """Seeds by which objects are misplaced once more in executions, besides the execution's own."""
     synthetic: int = CONTROLS
     """Largest number of synthetic negative controls of each grasp, drawn from all that exist."""
 
@@ -44,10 +52,27 @@ class Learning:
         for name in OF_GRASPS:
             whole(getattr(self, name), name, most=MOST_VARIED)
         whole(self.synthetic, "synthetic", most=CONTROLS)
+        for name in self.figures:
+            one_of(name, FIGURES, "figures")
+        for seed in self.seeds:
+            whole(seed, "seeds")
+        for name in ("figures", "seeds"):
+            if len(set(getattr(self, name))) < len(getattr(self, name)):
+                raise InputError(f"{name}: expected different items, got one of them twice")
 
-    def groups(self) -> dict[str, int]:
+    def groups(self, *, executed: bool) -> dict[str, int]:
         """Return the groups of columns that the tables have on request, with their sizes."""
-        return {"kinds": 1}
+        chosen = ["kinds", *(["margins"] if executed else []), *self.figures]
+        return dict.fromkeys(chosen, 1)
+
+    @property
+    def executes(self) -> str:
+        """Name of a setting that only executions have a use for; empty if there is none."""
+        used = {
+            "mass_near": self.mass_near, "seeds": self.seeds,
+            "figures": LEAST_SQUEEZE in self.figures,
+        }  # fmt: skip
+        return next((name for name, value in used.items() if value), "")
 
 
 def asked_learning(table: object) -> Learning:

@@ -2,17 +2,19 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
-from sim_validate.datasets.execution_rows import Executed
+from sim_validate.datasets.execution_rows import Executed, executed_by
 from sim_validate.datasets.learning.settings import CONTROLS, Learning
 from sim_validate.datasets.learning.variants import Variant, draws, unmoved, variants, with_mass
 from sim_validate.execution.asked import AskedExecution
 from sim_validate.execution.execute import execute
 from sim_validate.execution.jobs import ExecutedGrasp
+from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.simulation.gate.gate import Gate
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.validation.control_trials import ControlVerdict, try_control
@@ -41,7 +43,7 @@ def validated_with(
     if most == CONTROLS:
         return validate(body, grasp, friction, agenda=agenda)
     verdict = validate(body, grasp, friction, agenda=replace(agenda, controls=False))
-    found = negative_controls(body, grasp, friction, agenda.seed) if most else ()
+    found = list(negative_controls(body, grasp, friction, agenda.seed)) if most else []
     order = draws(agenda.seed, grasp.id, "synthetic", 0).permutation(len(found))
     kept = [found[place] for place in sorted(order[:most].tolist())]
     controls = tuple(try_control(body, each, agenda, Setup()) for each in kept)
@@ -101,16 +103,22 @@ class Varying:
         """Execute the contacts if that is asked for, in force closure or not."""
         if self.execution is None:
             return None
-        contacts = variant.seated.contacts
-        found, reason = None, None
         try:
             settings = self.execution.settings_for(variant.seated.body)
             if variant.mass_kg is not None:
                 settings = replace(settings, mass_kg=variant.mass_kg)
-            found = execute(variant.seated.body, contacts, variant.friction, settings)
-        except NoForcesError as error:
-            reason = str(error)
+            return executed_by(partial(_executed_with, variant), settings, self.asked.seeds)
         except InputError as error:
             return str(error)
-        family = variant.proved.family if isinstance(variant.proved, Grasp) else ""
-        return ExecutedGrasp(variant.name, family, contacts_sha256(contacts), found, reason)
+
+
+def _executed_with(variant: Variant, settings: ExecutionSettings) -> ExecutedGrasp:
+    """Execute the contacts of a variant; contacts without a squeeze are a result with a reason."""
+    contacts = variant.seated.contacts
+    found, reason = None, None
+    try:
+        found = execute(variant.seated.body, contacts, variant.friction, settings)
+    except NoForcesError as error:
+        reason = str(error)
+    family = variant.proved.family if isinstance(variant.proved, Grasp) else ""
+    return ExecutedGrasp(variant.name, family, contacts_sha256(contacts), found, reason)

@@ -98,6 +98,17 @@ def _row_faults(row: Row, trials: Sequence[Row]) -> Iterator[str]:
 
 def _squeeze_faults(row: Row, body: Polyhedron, asked: AskedExecution) -> Iterator[str]:
     """Check the mass, and prove again that the squeeze carries what the row says."""
+    yield from _proved(row, body, asked, "squeeze_n", "load_multiple")
+    if row.get("least_squeeze_n") is not None:
+        # it carries the weight itself, with no larger push
+        least = {**row, "squeeze_n": row["least_squeeze_n"], "load_multiple": 1.0}
+        yield from _proved(least, body, asked, "least_squeeze_n", "least_push_n")
+
+
+def _proved(
+    row: Row, body: Polyhedron, asked: AskedExecution, squeeze: str, claim: str
+) -> Iterator[str]:
+    """Check that a squeeze carries a multiple of the weight, with pushes that are allowed."""
     count = row["contacts"]
     try:
         settings = asked.settings_for(body)
@@ -124,11 +135,12 @@ def _squeeze_faults(row: Row, body: Polyhedron, asked: AskedExecution) -> Iterat
     reactions = survival.reactions(held.local_squeeze)
     multiple = row["load_multiple"] * (1.0 - ROUNDING)
     pushes = reactions.start[:, 0] + multiple * reactions.swing
-    limited = bool((pushes <= settings.push_n * (1.0 + ROUNDING)).all())
+    push_n = row["least_push_n"] if claim == "least_push_n" else settings.push_n
+    limited = bool((pushes <= push_n * (1.0 + ROUNDING)).all())
     if not (limited and reactions.survives(multiple, reactions.multipliers(multiple))):
         yield (
-            f"load_multiple is {row['load_multiple']:.9g}, but the squeeze is not proved to carry "
-            "as much"
+            f"{claim} is {row[claim]:.9g}, but the squeeze is not proved to carry as much "
+            f"({squeeze})"
         )
 
 

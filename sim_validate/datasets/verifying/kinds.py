@@ -29,9 +29,8 @@ def kind_faults(config: DatasetConfig, rows: ObjectRows) -> Iterator[str]:
     for row in rows["grasps"]:
         if row["label"] != VARIED:
             wanted = LABELS.get(row["label"], row["label"])
-            found = (
-                [] if row["kind"] == wanted else [f"kind is {row['kind']}, but {wanted} by label"]
-            )
+            alike = row["kind"] == wanted
+            found = [] if alike else [f"kind is {row['kind']}, but {wanted} by label"]
         else:
             found = list(_varied_faults(row, by_name, is_curved=bool(curved[row["object_id"]])))
         yield from (f"grasps: {row['grasp_id']}: {fault}" for fault in found)

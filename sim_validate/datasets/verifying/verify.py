@@ -23,6 +23,7 @@ from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.quarantine import read_left_out
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
 from sim_validate.datasets.verifying.executions import execution_faults
+from sim_validate.datasets.verifying.figures import figure_faults
 from sim_validate.datasets.verifying.kinds import kind_faults
 from sim_validate.datasets.verifying.redo import Sample, sample_faults
 from sim_validate.datasets.verifying.rows_by_object import ObjectRows, by_object
@@ -91,6 +92,7 @@ def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
             yield from _mesh_faults(folder, rows)
             yield from execution_faults(folder, config, rows)
             yield from kind_faults(config, rows)
+            yield from figure_faults(folder, config, rows)
 
 
 def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:

@@ -8,9 +8,12 @@ from sim_validate.execution.asked import AskedExecution
 
 LEARNED = DatasetConfig(
     objects=("tetrahedron", "wedge"), families=("concurrent",), limit=1,
-    execution=AskedExecution(sv.ExecutionSettings(mass_kg=1.0, trials=("weight",))),
+    execution=AskedExecution(
+        sv.ExecutionSettings(mass_kg=1.0, trials=("weight", "misplaced"), misplacements=2)
+    ),
     learning=Learning(
-        friction_below=1, friction_near=2, friction_above=1, moved_out=2, mass_near=1, synthetic=1
+        friction_below=1, friction_near=2, friction_above=1, moved_out=2, mass_near=1, synthetic=1,
+        figures=("closure", "symmetry", "approach", "payload", "least_squeeze"), seeds=(7,),
     ),
 )  # fmt: skip
 
