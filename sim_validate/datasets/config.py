@@ -128,6 +128,8 @@ class DatasetConfig:
                 "objects: expected only one object beside `contacts`, the one that the contacts "
                 "are on"
             )
+        if self.learning is not None:
+            self.learning.check_names([Path(name).name for name in self.objects])
         if self.learning is not None and self.learning.executes and self.execution is None:
             raise InputError(
                 f"{LEARNING}.{self.learning.executes}: only executed grasps have a mass and a "
@@ -154,6 +156,11 @@ class DatasetConfig:
     def tables(self) -> Tables:
         """Tables of the dataset, with their columns."""
         return dataset_tables(executed=self.execution is not None, groups=self.groups)
+
+    @property
+    def counts_splits(self) -> bool:
+        """Whether splits depend on all objects, not on the hash of each alone."""
+        return self.learning is not None and self.learning.split_by != "hash"
 
     @property
     def groups(self) -> dict[str, int]:
@@ -255,6 +262,9 @@ def _lines(values: Mapping[str, object]) -> str:
 def _as_toml(value: object) -> str:
     if isinstance(value, tuple):
         return f"[{', '.join(map(_as_toml, cast('tuple[object, ...]', value)))}]"
+    if isinstance(value, dict):
+        items = cast("dict[str, object]", value).items()
+        return f"{{{', '.join(f'{quoted(name)} = {_as_toml(each)}' for name, each in items)}}}"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):

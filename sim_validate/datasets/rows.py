@@ -1,9 +1,7 @@
 """Turns verdicts into rows of a dataset: objects, grasps with negative controls, and trials."""
 
-import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -22,6 +20,7 @@ from sim_validate.datasets.given_contacts import GivenGrasp
 from sim_validate.datasets.learning.figures import Figures, symmetry_cells
 from sim_validate.datasets.learning.variants import ratio_of
 from sim_validate.datasets.learning.varied import VARIED, Tried
+from sim_validate.datasets.object_rows import split_of
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
 from sim_validate.validation.control_trials import ControlVerdict
@@ -30,9 +29,6 @@ from sim_validate.validation.wrench_verdict import WrenchVerdict
 
 Row: TypeAlias = Mapping[str, Any]
 Rows: TypeAlias = Mapping[Name, tuple[Row, ...]]
-SPLITS = (("test", 0.1), ("validation", 0.2), ("train", 1.0))
-"""Upper ends of each split's share of hashes: an object is in the first split whose end is above
-its hash."""
 PLANNED = "planned"
 """Kind of the grasps that were planned for their friction."""
 GIVEN = "given"
@@ -47,30 +43,6 @@ SHORT = 16
 def id_beginning(object_id: str, friction: float) -> str:
     """Return the first part of the names of all grasps of one object at one friction."""
     return f"{object_id[:SHORT]}-{friction}-"
-
-
-def split_of(object_id: str, seed: int) -> str:
-    """Choose the split of an object by its hash, so that adding objects moves no other object."""
-    digest = hashlib.sha256(f"{seed} {object_id}".encode()).digest()
-    share = int.from_bytes(digest[:8], "big") / 2.0**64
-    return next(name for name, upto in SPLITS if share < upto)
-
-
-def object_row(body: Polyhedron, unit: WorkUnit) -> Row:
-    """Make the row of a unit's object."""
-    return {
-        "object_id": body.content_sha256,
-        "source_name": Path(unit.object).name,
-        "source_sha256": unit.source_sha256,
-        "split": split_of(body.content_sha256, unit.config.seed),
-        "vertices": len(body.vertices),
-        "triangles": len(body.triangles),
-        "faces": len(body.faces),
-        "curved": body.patches is not None,
-        "volume_m3": body.volume,
-        "radius_m": body.radius,
-        "center_of_mass_m": body.center_of_mass.tolist(),
-    }
 
 
 @dataclass(slots=True)

@@ -10,6 +10,8 @@ from grasp_core.errors import InputError
 from sim_validate.datasets.columns import KEYS, TABLES, Name, Tables
 from sim_validate.datasets.parquet import GROUP_ROWS, PAGES, pyarrow, pyarrow_parquet, read_table
 
+SPLIT = "split"
+"""Column that takes the split that the rows are added to."""
 FILE_ROWS = 500_000
 """Number of rows at which a file is closed and the next one begun, about 100 MB of grasps."""
 
@@ -59,6 +61,10 @@ class TableFiles:
             )
         if not table.num_rows:
             return
+        if SPLIT in table.column_names:
+            place = table.column_names.index(SPLIT)
+            every = arrow.array([split] * table.num_rows, type=arrow.string())
+            table = table.set_column(place, table.schema.field(place), every)
         part = self._parts.setdefault((name, split), _Part(self._folder / name, split))
         part.add(table.replace_schema_metadata(self._about))
 

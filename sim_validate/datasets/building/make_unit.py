@@ -12,9 +12,11 @@ from grasp_core.values import Grasp
 from sim_validate.datasets.columns import Column
 from sim_validate.datasets.execution_rows import Executed, executed_by
 from sim_validate.datasets.given_contacts import GivenGrasp
+from sim_validate.datasets.learning.objects import rest_rows
 from sim_validate.datasets.learning.varied import Varying, validated_with
 from sim_validate.datasets.meshes import mesh_path, mesh_text
-from sim_validate.datasets.rows import GIVEN, GraspRows, Row, Rows, object_row
+from sim_validate.datasets.object_rows import object_row
+from sim_validate.datasets.rows import GIVEN, GraspRows, Row, Rows
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.simulation.setup import Agenda, Setup
@@ -53,7 +55,7 @@ def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
     found = making.found
     every: Rows = {
         "objects": (row,), "grasps": tuple(found.grasps), "trials": tuple(found.trials),
-        "executions": tuple(found.executions),
+        "executions": tuple(found.executions), "rests": tuple(rest_rows(body)),
     }  # fmt: skip
     rows: Rows = {
         name: tuple(only(row, columns) for row in every[name])

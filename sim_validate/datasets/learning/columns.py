@@ -1,6 +1,7 @@
 """Columns that tables have only on request, in groups; a dataset's manifest names its groups."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TypeAlias
 
 from sim_validate.datasets.columns import Column, Name, Tables, base_tables
@@ -48,6 +49,29 @@ TRIAL_MARGINS = (
     Column("predicted_loss", "float", "multiple of the load that loses it; null if none", "1"),
     Column("seed", "int", "seed that a misplaced trial was drawn by; null for others"),
 )
+SHAPE = (
+    Column("shape_class", "text", "class of the shape: as settings say, or by hull and inertia"),
+    Column("box_sides_m", "float", "sides of the box with the same inertia, descending", "m", (3,)),
+)
+UNITS = (
+    Column("unit", "text", "length of one unit in the mesh file"),
+    Column("scale", "float", "factor by which the object was scaled besides", "1"),
+)
+SIZED = -1
+"""Length that stands in a column's shape for the size of its group."""
+POINTS = (
+    Column("cloud_points_m", "float", "points drawn on the surface", "m", (SIZED, 3)),
+    Column("cloud_normals", "float", "unit normals into the object at these", "1", (SIZED, 3)),
+)
+RESTS = (
+    Column("object_id", "text", "object that rests on a table"),
+    Column("rest", "int", "number of the resting pose, the likeliest first, from 0"),
+    Column("down", "float", "direction down in the object's frame, out of the object", "1", (3,)),
+    Column("height_m", "float", "height of the centre of mass above the table", "m"),
+    Column("likelihood", "float", "share of the sphere that the face takes, seen from there", "1"),
+    Column("T_table_object_m", "float", "pose on a table z = 0, centre of mass on the z axis", "m",
+           (4, 4)),
+)  # fmt: skip
 Group: TypeAlias = Mapping[Name, tuple[Column, ...]]
 GROUPS: Mapping[str, Group] = {
     "kinds": {"grasps": KINDS},
@@ -57,6 +81,10 @@ GROUPS: Mapping[str, Group] = {
     "payload": {"grasps": PAYLOAD},
     "margins": {"grasps": MARGINS, "executions": TRIAL_MARGINS},
     "least_squeeze": {"grasps": LEAST_SQUEEZE},
+    "shape": {"objects": SHAPE},
+    "units": {"objects": UNITS},
+    "points": {"objects": POINTS},
+    "rests": {"rests": RESTS},
 }
 """Columns of each group, by the table that they belong to."""
 
@@ -69,7 +97,13 @@ def dataset_tables(*, executed: bool, groups: Mapping[str, int] | None = None) -
         groups: Groups of columns on request, with their sizes.
     """
     tables = dict(base_tables(executed=executed))
-    for group in (group for group in GROUPS if group in (groups or {})):
+    sizes = groups or {}
+    for group, size in ((group, sizes[group]) for group in GROUPS if group in sizes):
         for name, columns in GROUPS[group].items():
-            tables[name] = (*tables.get(name, ()), *columns)
+            tables[name] = (*tables.get(name, ()), *(_sized(each, size) for each in columns))
     return tables
+
+
+def _sized(column: Column, size: int) -> Column:
+    shape = tuple(size if length == SIZED else length for length in column.shape)
+    return replace(column, shape=shape)

@@ -10,9 +10,7 @@ from grasp_core.planning.reach import segment_distances
 from scenes.example_objects import example_object
 from sim_validate.datasets.verifying.verify import verify
 from tests.sim_validate.datasets.forging import forged
-from tests.sim_validate.datasets.learned import LEARNED, rows_of
-
-BODIES = {example_object(name).content_sha256: example_object(name) for name in LEARNED.objects}
+from tests.sim_validate.datasets.learned import BODIES, rows_of
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from sim_validate.datasets.verifying.redo import Sample
 from sim_validate.datasets.verifying.verify import verify
 from tests.sim_validate.datasets.engines import Here, contents, silent
 from tests.sim_validate.datasets.forging import forged
-from tests.sim_validate.datasets.learned import LEARNED, rows_of
+from tests.sim_validate.datasets.learned import BODIES, LEARNED, rows_of
 
 WEDGE = example_object("wedge")
 
@@ -54,13 +54,12 @@ def test_frictions_are_below_near_and_above_the_critical_one_of_the_contacts(by_
 
 def test_moved_contacts_are_out_of_the_regions_of_a_plan_and_on_its_faces(by_id):
     plans = {
-        name: gc.plan(example_object(name), 0.5, families=("concurrent",), limit=1).grasps[0]
-        for name in LEARNED.objects
+        name: gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps[0]
+        for name, body in BODIES.items()
     }
-    names = {example_object(name).content_sha256: name for name in LEARNED.objects}
     moved = 0
     for row in varied(by_id, "moved_out"):
-        grasp = plans[names[row["object_id"]]]
+        grasp = plans[row["object_id"]]
         points = np.array(row["contact_points_m"])
         assert row["displaced_m"] == pytest.approx(
             np.linalg.norm(points - grasp.positions, axis=1), abs=1e-15
