@@ -9,6 +9,7 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, subcommand
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from sim_validate.cli.flag_bounds import FINITE, at_least
 from sim_validate.cli.flag_groups import Count, Friction, Positive, Seed, Speech
+from sim_validate.cli.learning_flags import Learned
 from sim_validate.datasets.columns import ExportFormat, SplitName
 from sim_validate.parallel.processes import available_cores
 
@@ -84,6 +85,7 @@ class Build:
     out: Path
     """Folder of the dataset."""
     planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
+    learned: OmitArgPrefixes[Learned] = field(default_factory=Learned)
     settings: OmitArgPrefixes[Settings] = field(default_factory=Settings)
     work: OmitArgPrefixes[Work] = field(default_factory=Work)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)

@@ -17,6 +17,7 @@ from sim_validate.datasets.building.worker import Limits
 from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
 from sim_validate.datasets.describing.card import CARD
 from sim_validate.datasets.exports.formats import export
+from sim_validate.datasets.learning.settings import Learning
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.open_dataset import splits_in_words
 from sim_validate.datasets.verifying.redo import Sample
@@ -128,8 +129,10 @@ def _asked(command: dataset_flags.Build) -> DatasetConfig:
     """
     first = Path(command.objects[0]) if command.objects else Path()
     if first.suffix == ".toml":
-        unsaid = (dataset_flags.Planning(), dataset_flags.Settings())
-        if len(command.objects) > 1 or (command.planning, command.settings) != unsaid:
+        unsaid = (dataset_flags.Planning(), dataset_flags.Settings(), dataset_flags.Learned())
+        if len(command.objects) > 1 or (
+            (command.planning, command.settings, command.learned) != unsaid
+        ):
             raise InputError(
                 f"{first} holds all settings of the dataset: give no other objects and no flags "
                 "but --out beside it"
@@ -141,6 +144,7 @@ def _asked(command: dataset_flags.Build) -> DatasetConfig:
         families=command.planning.family or METHODS,
         limit=command.planning.limit,
         cones=command.planning.cones,
+        learning=None if (asked := command.learned.asked()) is None else Learning(**asked),
         **_settings(command.settings),
     )
 

@@ -19,7 +19,10 @@ from grasp_core.objects.face import FaceKind
 from grasp_core.objects.polyhedron import UNITS_M
 from grasp_core.planning.request import METHODS, ConeKind
 from grasp_core.values import Method
-from sim_validate.datasets.columns import Tables, dataset_tables
+from sim_validate.datasets.columns import Tables
+from sim_validate.datasets.learning.columns import dataset_tables
+from sim_validate.datasets.learning.settings import TABLE as LEARNING
+from sim_validate.datasets.learning.settings import Learning, asked_learning, learning_table
 from sim_validate.execution.asked import (
     TABLE,
     AskedExecution,
@@ -97,6 +100,8 @@ class DatasetConfig:
     build differ."""
     execution: AskedExecution | None = None
     """How grasps are executed besides: with true mass and springy fingers; None to leave it out."""
+    learning: Learning | None = None
+    """What the tables hold besides for learners; None for nothing."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frictions", tuple(map(float, self.frictions)))
@@ -123,6 +128,13 @@ class DatasetConfig:
                 "objects: expected only one object beside `contacts`, the one that the contacts "
                 "are on"
             )
+        if self.learning is not None:
+            self.learning.check_names([Path(name).name for name in self.objects])
+        if self.learning is not None and self.learning.executes and self.execution is None:
+            raise InputError(
+                f"{LEARNING}.{self.learning.executes}: only executed grasps have a mass and a "
+                f"squeeze; add a table [{TABLE}], or leave this setting out"
+            )
         self._check_words_and_counts()
 
     def _check_words_and_counts(self) -> None:
@@ -143,7 +155,19 @@ class DatasetConfig:
     @property
     def tables(self) -> Tables:
         """Tables of the dataset, with their columns."""
-        return dataset_tables(executed=self.execution is not None)
+        return dataset_tables(executed=self.execution is not None, groups=self.groups)
+
+    @property
+    def counts_splits(self) -> bool:
+        """Whether splits depend on all objects, not on the hash of each alone."""
+        return self.learning is not None and self.learning.split_by != "hash"
+
+    @property
+    def groups(self) -> dict[str, int]:
+        """Groups of columns that the tables have on request, with their sizes."""
+        if self.learning is None:
+            return {}
+        return self.learning.groups(executed=self.execution is not None)
 
     @property
     def sha256(self) -> str:
@@ -184,6 +208,8 @@ def _typed(name: str, value: Any) -> Any:
     """Check a setting, and convert it to the type it has in the configuration."""
     if name == TABLE:
         return asked_execution(value)
+    if name == LEARNING:
+        return asked_learning(value)
     kinds = {**LISTS, **dict.fromkeys(LEAST, int), **dict.fromkeys(SWITCHES, bool)}
     wanted = kinds.get(name, str)
     if name not in LISTS:
@@ -215,12 +241,18 @@ def _is_date(text: str) -> bool:
 
 def config_to_toml(config: DatasetConfig) -> str:
     """Write every setting in the order of the class; equal configurations give equal texts."""
-    own = {each.name: getattr(config, each.name) for each in fields(config) if each.name != TABLE}
-    if config.execution is None:
-        return _lines(own)
-    table = execution_table(config.execution)
-    hand = table.pop("hand")
-    return f"{_lines(own)}\n[{TABLE}]\n{_lines(table)}\n[{TABLE}.hand]\n{_lines(hand)}"
+    tables = (TABLE, LEARNING)
+    own = {
+        each.name: getattr(config, each.name) for each in fields(config) if each.name not in tables
+    }
+    parts = [_lines(own)]
+    if config.execution is not None:
+        table = execution_table(config.execution)
+        hand = table.pop("hand")
+        parts += [f"[{TABLE}]\n{_lines(table)}", f"[{TABLE}.hand]\n{_lines(hand)}"]
+    if config.learning is not None:
+        parts += [f"[{LEARNING}]\n{_lines(learning_table(config.learning))}"]
+    return "\n".join(parts)
 
 
 def _lines(values: Mapping[str, object]) -> str:
@@ -230,6 +262,9 @@ def _lines(values: Mapping[str, object]) -> str:
 def _as_toml(value: object) -> str:
     if isinstance(value, tuple):
         return f"[{', '.join(map(_as_toml, cast('tuple[object, ...]', value)))}]"
+    if isinstance(value, dict):
+        items = cast("dict[str, object]", value).items()
+        return f"{{{', '.join(f'{quoted(name)} = {_as_toml(each)}' for name, each in items)}}}"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):

@@ -7,7 +7,7 @@ versions give equal bytes.
 
 import hashlib
 import json
-from dataclasses import asdict
+from dataclasses import asdict, field
 from pathlib import Path
 from typing import Annotated
 
@@ -16,9 +16,10 @@ from pydantic.dataclasses import dataclass
 
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import complaint
-from grasp_core.files.strict_json import object_of, place
+from grasp_core.files.strict_json import object_of, place, shown
 from grasp_core.files.text_files import read_text, write_text
-from sim_validate.datasets.columns import Name, Tables, dataset_tables
+from sim_validate.datasets.columns import Name, Tables
+from sim_validate.datasets.learning.columns import GROUPS, dataset_tables
 from sim_validate.files.paths import require_inside
 
 SCHEMA = 1
@@ -62,10 +63,20 @@ class Manifest:
     executed: bool = False
     """Whether the dataset has executions; a manifest without them does not mention this."""
 
+    groups: dict[str, Count] = field(default_factory=dict[str, Count])
+    """Groups of columns that the dataset has on request, with their sizes; a manifest without any
+    does not mention this."""
+
+    def __post_init__(self) -> None:
+        if unknown := [name for name in self.groups if name not in GROUPS]:
+            raise InputError(
+                f"groups: expected some of {', '.join(GROUPS)}, got {shown(unknown[0])}"
+            )
+
     @property
     def tables(self) -> Tables:
         """Tables of the dataset, with their columns."""
-        return dataset_tables(executed=self.executed)
+        return dataset_tables(executed=self.executed, groups=self.groups)
 
     def rows(self) -> dict[Name, int]:
         """Number of rows of each table."""
@@ -96,6 +107,8 @@ def manifest_to_json(manifest: Manifest) -> str:
     record = asdict(manifest)
     if not manifest.executed:
         del record["executed"]
+    if not manifest.groups:
+        del record["groups"]
     record["files"] = [
         {name: value for name, value in asdict(each).items() if value is not None}
         for each in sorted(manifest.files, key=lambda each: each.path)

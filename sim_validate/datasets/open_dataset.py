@@ -11,8 +11,8 @@ from grasp_core.errors import InputError
 from sim_validate.datasets.columns import Name, Tables
 from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
 from sim_validate.datasets.manifest import Listed, Manifest, listed, read_manifest
+from sim_validate.datasets.object_rows import SPLITS
 from sim_validate.datasets.parquet import Columns, each_batch, read_columns
-from sim_validate.datasets.rows import SPLITS
 from sim_validate.files.paths import path_inside
 
 

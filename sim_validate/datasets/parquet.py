@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
 from grasp_core.files.strict_json import shown
-from sim_validate.datasets.columns import KEYS, TABLES, Column, Name, Tables, dataset_tables
+from sim_validate.datasets.columns import KEYS, TABLES, Column, Name, Tables, base_tables
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
 TYPES = {"text": "string", "bool": "bool_", "int": "int64", "float": "float64"}
@@ -61,7 +61,17 @@ def parquet_bytes(
     name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[str, str],
     tables: Tables = TABLES,
 ) -> bytes:  # fmt: skip
-    """Encode one table as the bytes of a file.
+    """Encode one table as the bytes of a file (see `arrow_table`)."""
+    held = io.BytesIO()
+    pyarrow_parquet().write_table(arrow_table(name, rows, about, tables), held, **PAGES)
+    return held.getvalue()
+
+
+def arrow_table(
+    name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[str, str],
+    tables: Tables = TABLES,
+) -> Any:  # fmt: skip
+    """Make an Arrow table of rows.
 
     Args:
         name: Name of the table.
@@ -73,7 +83,7 @@ def parquet_bytes(
     Raises:
         InputError: Two rows have the same key, or a cell is not of its column's type.
     """
-    arrow, parquet = pyarrow(), pyarrow_parquet()
+    arrow = pyarrow()
     listed = sorted(rows, key=lambda row: _key(name, row))
     for one, other in itertools.pairwise(listed):
         if _key(name, one) == _key(name, other):
@@ -86,12 +96,9 @@ def parquet_bytes(
     try:
         arrays = [arrow.array(values, type=each.type)
                   for values, each in zip(columns, schema, strict=True)]  # fmt: skip
-        table = arrow.Table.from_arrays(arrays, schema=schema)
+        return arrow.Table.from_arrays(arrays, schema=schema)
     except (arrow.ArrowInvalid, arrow.ArrowTypeError) as error:
         raise InputError(f"table {name}: a cell does not fit its column: {error}") from error
-    held = io.BytesIO()
-    parquet.write_table(table, held, **PAGES)
-    return held.getvalue()
 
 
 def as_read(
@@ -160,7 +167,7 @@ def _opened(path: Path, name: Name | None, tables: Tables | None) -> Generator[A
 
 
 def _check_columns(path: Path, came: Any, name: Name | None, tables: Tables | None) -> None:
-    both = [dataset_tables(executed=executed) for executed in (False, True)]
+    both = [base_tables(executed=executed) for executed in (False, True)]
     kinds = both if tables is None else [tables]
     known = [
         (each, schema_of(columns))

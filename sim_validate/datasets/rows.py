@@ -1,14 +1,13 @@
 """Turns verdicts into rows of a dataset: objects, grasps with negative controls, and trials."""
 
-import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.given_contacts import Seated
 from grasp_core.values import Contact, Grasp
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.execution_rows import (
@@ -18,6 +17,10 @@ from sim_validate.datasets.execution_rows import (
     for_fingers,
 )
 from sim_validate.datasets.given_contacts import GivenGrasp
+from sim_validate.datasets.learning.figures import Figures, symmetry_cells
+from sim_validate.datasets.learning.variants import ratio_of
+from sim_validate.datasets.learning.varied import VARIED, Tried
+from sim_validate.datasets.object_rows import split_of
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
 from sim_validate.validation.control_trials import ControlVerdict
@@ -26,9 +29,8 @@ from sim_validate.validation.wrench_verdict import WrenchVerdict
 
 Row: TypeAlias = Mapping[str, Any]
 Rows: TypeAlias = Mapping[Name, tuple[Row, ...]]
-SPLITS = (("test", 0.1), ("validation", 0.2), ("train", 1.0))
-"""Upper ends of each split's share of hashes: an object is in the first split whose end is above
-its hash."""
+PLANNED = "planned"
+"""Kind of the grasps that were planned for their friction."""
 GIVEN = "given"
 """Label of grasps that another tool made."""
 NOT_TRIED = "not_tried"
@@ -41,30 +43,6 @@ SHORT = 16
 def id_beginning(object_id: str, friction: float) -> str:
     """Return the first part of the names of all grasps of one object at one friction."""
     return f"{object_id[:SHORT]}-{friction}-"
-
-
-def split_of(object_id: str, seed: int) -> str:
-    """Choose the split of an object by its hash, so that adding objects moves no other object."""
-    digest = hashlib.sha256(f"{seed} {object_id}".encode()).digest()
-    share = int.from_bytes(digest[:8], "big") / 2.0**64
-    return next(name for name, upto in SPLITS if share < upto)
-
-
-def object_row(body: Polyhedron, unit: WorkUnit) -> Row:
-    """Make the row of a unit's object."""
-    return {
-        "object_id": body.content_sha256,
-        "source_name": Path(unit.object).name,
-        "source_sha256": unit.source_sha256,
-        "split": split_of(body.content_sha256, unit.config.seed),
-        "vertices": len(body.vertices),
-        "triangles": len(body.triangles),
-        "faces": len(body.faces),
-        "curved": body.patches is not None,
-        "volume_m3": body.volume,
-        "radius_m": body.radius,
-        "center_of_mass_m": body.center_of_mass.tolist(),
-    }
 
 
 @dataclass(slots=True)
@@ -81,25 +59,55 @@ class GraspRows:
         """Add the rows of a planned grasp, its negative controls, and the trials of all."""
         about = {
             "label": "grasp",
+            "kind": PLANNED,
             "family": grasp.family,
             "region_radius_m": grasp.radius,
         }
-        self._add_closed(grasp, verdict, about, executed)
+        self._add_closed(grasp, verdict, about, executed, self.body)
 
     def add_given(
-        self, given: GivenGrasp, grasp: Grasp, verdict: Verdict, moved_m: float,
+        self, given: GivenGrasp, grasp: Grasp, verdict: Verdict, seated: Seated,
         executed: Executed = None,
     ) -> None:  # fmt: skip
         """Add rows of a force-closed given grasp, its negative controls, and all trials."""
-        about: dict[str, Any] = {"name": given.name, "label": GIVEN, "moved_m": moved_m}
+        about: dict[str, Any] = {
+            "name": given.name, "label": GIVEN, "kind": GIVEN,
+            "moved_m": seated.moved_m,
+        }  # fmt: skip
         if self.body.patches is not None:
             # on curved surfaces the contacts' faces are made for this grasp alone
             about["faces"] = None
-        self._add_closed(grasp, verdict, about, executed)
+        self._add_closed(grasp, verdict, about, executed, seated.body)
+
+    def add_varied(self, made_from: str, tried: Tried) -> None:
+        """Add the row of a grasp that was varied, with its trials; it may be closed or not."""
+        variant, verdict = tried.variant, tried.verdict
+        name = f"{self.name(made_from)}:{variant.name}"
+        about: dict[str, Any] = {
+            "name": variant.name, "label": VARIED, "kind": variant.kind,
+            "made_from": self.name(made_from), "displaced_m": variant.displaced_m.tolist(),
+            "region_exit_m": list(variant.exits_m), "mass_ratio": variant.mass_ratio,
+            "friction": variant.friction, "control_of": None,
+            "friction_ratio": variant.friction_ratio,
+        }  # fmt: skip
+        if not isinstance(verdict, ControlVerdict):
+            assert isinstance(variant.proved, Grasp)  # noqa: S101 - only closed ones have verdicts
+            if self.body.patches is not None:
+                about["faces"] = None
+            self._add_closed(
+                variant.proved, verdict, about, tried.executed, variant.seated.body, name
+            )
+            return
+        if variant.critical_friction is not None:
+            about["critical_friction"] = variant.critical_friction
+        self._add_refuted(name, verdict, about, tried.executed)
 
     def add_open(self, given: GivenGrasp, verdict: ControlVerdict, moved_m: float) -> None:
         """Add rows of a given grasp that is not force-closed; it is a negative control."""
-        about = {"name": given.name, "label": GIVEN, "control_of": None, "moved_m": moved_m}
+        about = {
+            "name": given.name, "label": GIVEN, "kind": GIVEN, "control_of": None,
+            "moved_m": moved_m,
+        }  # fmt: skip
         self._add_refuted(self.name(given.id), verdict, about)
 
     def add_untried(self, given: GivenGrasp, why: str) -> None:
@@ -113,6 +121,7 @@ class GraspRows:
             | {
                 "name": given.name,
                 "label": GIVEN,
+                "kind": GIVEN,
                 "control_of": None,
                 "outcome": NOT_TRIED,
                 "note": why,
@@ -122,12 +131,14 @@ class GraspRows:
         )
 
     def _add_closed(
-        self, grasp: Grasp, verdict: Verdict, about: Mapping[str, Any], executed: Executed
-    ) -> None:
-        name = self.name(grasp.id)
+        self, grasp: Grasp, verdict: Verdict, about: Mapping[str, Any], executed: Executed,
+        body: Polyhedron, name: str | None = None,
+    ) -> None:  # fmt: skip
+        name = self.name(grasp.id) if name is None else name
+        figures = self._figures
         friction = verdict.critical_friction
         self.grasps.append(
-            self._common(name, grasp.contacts)
+            self._common(name, grasp.contacts, verdict.friction)
             | {
                 "name": grasp.id,
                 "control_of": None,
@@ -144,22 +155,30 @@ class GraspRows:
                 "trials": len(verdict.wrenches),
                 "mismatches": len(verdict.mismatches),
                 "simulated_critical_friction": friction.simulated,
+                "friction_ratio": ratio_of(verdict.friction, grasp.critical_friction),
+                **({} if figures is None else figures.of_grasp(body, grasp, verdict.friction)),
                 **about,
-                **execution_cells(executed),
+                **self._of_executed(body, grasp.contacts, verdict.friction, executed),
             }
         )
-        self.executions += execution_rows(name, executed)
+        self._add_executions(name, executed)
         self._add_trials(name, verdict.wrenches, _wrench_row)
         for control in verdict.controls:
             kind = control.control.name
-            said = {"name": about.get("name", grasp.id), "label": kind, "control_of": name}
+            said = {
+                "name": about.get("name", grasp.id), "label": kind, "control_of": name,
+                "kind": kind,
+            }  # fmt: skip
             self._add_refuted(f"{name}:{kind}", control, said)
 
-    def _add_refuted(self, name: str, verdict: ControlVerdict, about: Mapping[str, Any]) -> None:
+    def _add_refuted(
+        self, name: str, verdict: ControlVerdict, about: Mapping[str, Any],
+        executed: Executed = None,
+    ) -> None:  # fmt: skip
         control = verdict.control
         first = next((t for t in verdict.tried if t.hold.outcome is not Outcome.HELD), None)
         self.grasps.append(
-            self._common(name, control.contacts)
+            self._common(name, control.contacts, control.friction)
             | {
                 "friction": control.friction,
                 "force_closed": False,
@@ -169,16 +188,49 @@ class GraspRows:
                 "trials": len(verdict.tried),
                 "mismatches": int(not verdict.let_go),
                 **about,
+                **self._of_executed(self.body, control.contacts, control.friction, executed),
             }
         )
+        self._add_executions(name, executed)
         self._add_trials(name, verdict.tried, lambda _: {})
+
+    def _add_executions(self, name: str, executed: Executed) -> None:
+        """Add the trials of an execution, each misplaced one with its seed."""
+        asked = self.unit.config.execution
+        if asked is not None:
+            more = () if self._figures is None else self._figures.asked.seeds
+            seeds = (asked.settings.seed, *more)
+            self.executions += execution_rows(name, executed, seeds, asked.settings.misplacements)
+
+    def _of_executed(
+        self, body: Polyhedron, contacts: Sequence[Contact], friction: float, executed: Executed
+    ) -> Mapping[str, Any]:
+        """Return all cells that are about an execution."""
+        cells = execution_cells(executed)
+        if self._figures is None or cells.get("mass_kg") is None:
+            return cells
+        return {**cells, **self._figures.of_executed(body, contacts, friction, cells["mass_kg"])}
+
+    @property
+    def _figures(self) -> Figures | None:
+        config = self.unit.config
+        return None if config.learning is None else Figures(config.learning, config.execution)
+
+    def add_symmetries(self, grasps: Sequence[Grasp]) -> None:
+        """Add to the rows of planned grasps which are the same by symmetry of the object."""
+        names = [self.name(grasp.id) for grasp in grasps]
+        cells = dict(zip(names, symmetry_cells(self.body, grasps, names), strict=True))
+        self.grasps = [{**row, **cells.get(row["grasp_id"], {})} for row in self.grasps]
 
     def name(self, grasp: str) -> str:
         """Return the name of a grasp, which no other grasp of the dataset has."""
         return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
 
-    def _common(self, name: str, contacts: Iterable[Contact]) -> dict[str, Any]:
-        listed = list(contacts)
+    def _common(
+        self, name: str, contacts: Iterable[Contact], friction: float | None = None
+    ) -> dict[str, Any]:
+        listed, figures = list(contacts), self._figures
+        friction = self.unit.friction if friction is None else friction
         unexecuted = {} if self.unit.config.execution is None else {"executed": False}
         return {
             **unexecuted,
@@ -190,6 +242,7 @@ class GraspRows:
             "contacts": len(listed),
             "contact_points_m": for_fingers([c.position.tolist() for c in listed], [None] * 3),
             "contact_normals": for_fingers([c.normal.tolist() for c in listed], [None] * 3),
+            **({} if figures is None else figures.of_contacts(self.body, listed, friction)),
         }
 
     def _add_trials(

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from grasp_core.errors import InputError
-from sim_validate.datasets.columns import KEYS, Name
+from sim_validate.datasets.columns import KEYS, TABLES, Name, Tables
 from sim_validate.datasets.parquet import GROUP_ROWS, PAGES, pyarrow, pyarrow_parquet, read_table
 
+SPLIT = "split"
+"""Column that takes the split that the rows are added to."""
 FILE_ROWS = 500_000
 """Number of rows at which a file is closed and the next one begun, about 100 MB of grasps."""
 
@@ -31,8 +33,8 @@ class TableFiles:
     in a `with` block; at its end no file is open, whatever happens.
     """
 
-    def __init__(self, folder: Path, about: Mapping[str, str]) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, about: Mapping[str, str], tables: Tables = TABLES) -> None:
+        self._folder, self._tables = folder, tables
         self._about = dict(sorted(about.items()))
         self._parts: dict[tuple[Name, str], _Part] = {}
 
@@ -49,8 +51,16 @@ class TableFiles:
         Raises:
             InputError: A file is damaged, or two rows have the same key.
         """
+        every = [read_table(path, name, self._tables) for path in paths]
+        self.add_table(name, split, pyarrow().concat_tables(every))
+
+    def add_table(self, name: Name, split: str, table: Any) -> None:
+        """Add the rows of an Arrow table; their keys must come after all that were added before.
+
+        Raises:
+            InputError: Two rows have the same key.
+        """
         arrow, keys = pyarrow(), list(KEYS[name])
-        table = arrow.concat_tables([read_table(path) for path in paths])
         table = table.sort_by([(key, "ascending") for key in keys])
         if table.group_by(keys).aggregate([]).num_rows < table.num_rows:
             raise InputError(
@@ -59,6 +69,10 @@ class TableFiles:
             )
         if not table.num_rows:
             return
+        if SPLIT in table.column_names:
+            place = table.column_names.index(SPLIT)
+            every = arrow.array([split] * table.num_rows, type=arrow.string())
+            table = table.set_column(place, table.schema.field(place), every)
         part = self._parts.setdefault((name, split), _Part(self._folder / name, split))
         part.add(table.replace_schema_metadata(self._about))
 

@@ -17,11 +17,13 @@ from types import MappingProxyType
 
 from grasp_core.errors import GraspError, InputError
 from grasp_core.mesh_files.reading import FORMATS
-from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
+from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron, polyhedron_from_mesh
 from grasp_core.provenance import versions
 from scenes.example_objects import example_object
 from sim_validate.datasets.config import CREDITS, DatasetConfig
 from sim_validate.datasets.given_contacts import GivenGrasp, given_sha256, read_given
+from sim_validate.datasets.learning.settings import TABLE as LEARNING
+from sim_validate.datasets.learning.settings import learning_table
 from sim_validate.execution.asked import TABLE, execution_table
 
 CHUNK = 2**20
@@ -87,8 +89,12 @@ def shared_settings(config: DatasetConfig) -> dict[str, object]:
     settings = {
         each.name: getattr(config, each.name) for each in fields(config) if each.name not in APART
     }
-    executed = settings.pop(TABLE)
-    return settings if executed is None else {**settings, TABLE: execution_table(executed)}
+    executed, learning = settings.pop(TABLE), settings.pop(LEARNING)
+    if executed is not None:
+        settings[TABLE] = execution_table(executed)
+    if learning is not None:
+        settings[LEARNING] = learning_table(learning)
+    return settings
 
 
 def units_of(config: DatasetConfig) -> list[WorkUnit]:
@@ -110,7 +116,8 @@ def units_of(config: DatasetConfig) -> list[WorkUnit]:
 
 def of_unit(config: DatasetConfig, name: str, friction: float) -> DatasetConfig:
     """Return the settings of one unit, whose size does not grow with the number of objects."""
-    return replace(config, objects=(name,), frictions=(friction,))
+    learning = None if config.learning is None else config.learning.of_object(name)
+    return replace(config, objects=(name,), frictions=(friction,), learning=learning)
 
 
 def _parts(config: DatasetConfig) -> list[tuple[GivenGrasp, ...]]:
@@ -129,7 +136,7 @@ def body_of(unit: WorkUnit) -> Polyhedron:
         WorkerError: The file is missing, or has changed since the build began.
     """
     if unit.path is None:
-        return example_object(unit.object)
+        return _scaled(example_object(unit.object), unit)
     if not unit.path.is_file():
         raise WorkerError(
             f"{unit.path}: a worker process cannot find this mesh; all processes must share a "
@@ -139,7 +146,23 @@ def body_of(unit: WorkUnit) -> Polyhedron:
         raise WorkerError(
             f"{unit.path}: this mesh has changed since the build began; start the build again"
         )
-    return load_polyhedron(unit.path, unit=unit.config.unit, faces=unit.config.faces)
+    config = unit.config
+    length = config.unit
+    if config.learning is not None:
+        length = config.learning.unit_of(unit.object, config.unit)
+    return _scaled(load_polyhedron(unit.path, unit=length, faces=config.faces), unit)
+
+
+def _scaled(body: Polyhedron, unit: WorkUnit) -> Polyhedron:
+    """Return an object at the scale that is asked for."""
+    asked = unit.config.learning
+    scale = 1.0 if asked is None else asked.scale_of(unit.object)
+    if scale == 1.0:
+        return body
+    return polyhedron_from_mesh(
+        body.vertices * scale, body.triangles, name=body.name, source_sha256=body.source_sha256,
+        faces=unit.config.faces,
+    )  # fmt: skip
 
 
 def is_mesh_file(name: str) -> bool:

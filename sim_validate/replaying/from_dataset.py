@@ -6,6 +6,7 @@ from pathlib import Path
 from grasp_core.errors import InputError
 from grasp_core.planning.given_contacts import seat
 from grasp_core.values import Contact
+from sim_validate.datasets.learning.varied import VARIED
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.open_dataset import Selection, select
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
@@ -41,7 +42,7 @@ def from_dataset(folder: Path, wanted: Wanted) -> Recorded:
     ]
     source = _source_name(chosen, row["object_id"])
     body = stored_body(folder, row["object_id"], source, config.faces)
-    if row["label"] == GIVEN:  # on curved surfaces given contacts have faces of their own
+    if row["label"] in (GIVEN, VARIED):  # on curved surfaces given contacts have faces of their own
         body = seat(body, row["contact_points_m"], row["contact_normals"]).body
     return Recorded(
         name=name,

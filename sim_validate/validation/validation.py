@@ -22,7 +22,7 @@ from grasp_core.values import Grasp
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene
 from sim_validate.simulation.critical_friction import CriticalFriction, released_friction
-from sim_validate.simulation.gate.gate import require_faithful
+from sim_validate.simulation.gate.gate import Gate, require_faithful
 from sim_validate.simulation.gate.mesh_contacts import require_touch
 from sim_validate.simulation.hold_verdict import invalid_start, judge
 from sim_validate.simulation.loads import PlannedLoad, planned_loads
@@ -74,9 +74,30 @@ def validate(
             f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"
         )
     gate = require_faithful(setup, friction, body.radius)
+    return validated(
+        body, replace(grasp, critical_friction=critical), friction, gate, agenda, setup
+    )
+
+
+def validated(
+    body: Polyhedron, grasp: Grasp, friction: float, gate: Gate, agenda: Agenda, setup: Setup
+) -> Verdict:
+    """Test a grasp whose closure is proved, with a simulator that was checked before.
+
+    Args:
+        body: The object.
+        grasp: A grasp in force closure at this friction, with its critical friction.
+        friction: Coulomb coefficient at every contact.
+        gate: Checks of the simulator, perhaps at another friction.
+        agenda: Which trials to run.
+        setup: How trials are simulated.
+
+    Raises:
+        InputError: On the mesh of the object, fingertips do not touch where they should.
+    """
     require_touch(body, grasp.contacts, setup)
     scene = setup.scene(body, grasp, friction)
-    trial = _Bout(body, replace(grasp, critical_friction=critical), friction, scene, agenda, setup)
+    trial = _Bout(body, grasp, friction, scene, agenda, setup)
     wrenches = trial.wrenches()
     return Verdict(
         id=grasp.id,

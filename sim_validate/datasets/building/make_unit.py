@@ -1,7 +1,7 @@
 """Computes one unit of work: grasps are planned or given, simulated, and turned into rows."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grasp_core.errors import InputError, UndecidedError
@@ -9,17 +9,20 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import grasp_of, seat
 from grasp_core.planning.planner import plan
 from grasp_core.values import Grasp
-from sim_validate.datasets.execution_rows import Executed
+from sim_validate.datasets.columns import Column
+from sim_validate.datasets.execution_rows import Executed, executed_by
 from sim_validate.datasets.given_contacts import GivenGrasp
+from sim_validate.datasets.learning.objects import rest_rows
+from sim_validate.datasets.learning.varied import Varying, validated_with
 from sim_validate.datasets.meshes import mesh_path, mesh_text
-from sim_validate.datasets.rows import GIVEN, GraspRows, Rows, object_row
+from sim_validate.datasets.object_rows import object_row
+from sim_validate.datasets.rows import GIVEN, GraspRows, Row, Rows
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.validation.control_trials import try_control
 from sim_validate.validation.controls import Control
 from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.validation import validate
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +55,18 @@ def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
     found = making.found
     every: Rows = {
         "objects": (row,), "grasps": tuple(found.grasps), "trials": tuple(found.trials),
-        "executions": tuple(found.executions),
+        "executions": tuple(found.executions), "rests": tuple(rest_rows(body)),
     }  # fmt: skip
-    rows: Rows = {name: every[name] for name in unit.config.tables}
+    rows: Rows = {
+        name: tuple(only(row, columns) for row in every[name])
+        for name, columns in unit.config.tables.items()
+    }
     return Made(body.content_sha256, row["split"], rows, making.files)
+
+
+def only(row: Row, columns: Iterable[Column]) -> Row:
+    """Return the cells of a row that its table has columns for."""
+    return {each.name: row[each.name] for each in columns if each.name in row}
 
 
 class _Making:
@@ -73,16 +84,19 @@ class _Making:
 
     def plan(self) -> None:
         """Plan the best grasps of each family separately, and simulate them."""
-        config = self.unit.config
+        config, every = self.unit.config, list[Grasp]()
         for family in config.families:
             planned = plan(
                 self.body, self.unit.friction, families=(family,), cones=config.cones,
                 limit=config.limit, seed=config.seed,
             )  # fmt: skip
             for grasp in planned.grasps:
-                self.found.add(
-                    grasp, self._tried(grasp, self.body), self._executed(grasp, self.body)
-                )
+                tried, executed = self._tried(grasp, self.body), self._executed(grasp, self.body)
+                self.found.add(grasp, tried, executed)
+                self._vary(grasp, self.body, tried, executed)
+                every.append(grasp)
+        if config.learning is not None and "symmetry" in config.learning.figures:
+            self.found.add_symmetries(every)
 
     def judge(self) -> None:
         """Judge the given grasps; a grasp that cannot be simulated gets a row with the reason."""
@@ -104,17 +118,28 @@ class _Making:
         grasp = grasp_of(seated, friction, given.id)
         if isinstance(grasp, Grasp):
             tried, executed = self._tried(grasp, seated.body), self._executed(grasp, seated.body)
-            self.found.add_given(given, grasp, tried, seated.moved_m, executed)
+            self.found.add_given(given, grasp, tried, seated, executed)
+            self._vary(grasp, seated.body, tried, executed)
             return
         control = Control(GIVEN, seated.contacts, friction, grasp)
         verdict = try_control(seated.body, control, self.agenda, Setup())
         self.found.add_open(given, verdict, seated.moved_m)
 
     def _tried(self, grasp: Grasp, body: Polyhedron) -> Verdict:
-        verdict = validate(body, grasp, self.unit.friction, agenda=self.agenda)
+        asked = self.unit.config.learning
+        verdict = validated_with(body, grasp, self.unit.friction, self.agenda, asked)
         if self.unit.config.scenes:
             self.files[f"scenes/{self.found.name(grasp.id)}.xml"] = verdict.scene.xml
         return verdict
+
+    def _vary(self, grasp: Grasp, body: Polyhedron, verdict: Verdict, executed: Executed) -> None:
+        """Add the grasps that are made from a grasp, if any are asked for."""
+        config = self.unit.config
+        if config.learning is None:
+            return
+        varying = Varying(config.learning, self.unit.friction, self.agenda, config.execution)
+        for each in varying.of(body, grasp, verdict, executed):
+            self.found.add_varied(grasp.id, each)
 
     def _executed(self, grasp: Grasp, body: Polyhedron) -> Executed:
         """Execute a grasp if that is asked for, or say why its execution is refused."""
@@ -122,7 +147,11 @@ class _Making:
         if asked is None:
             return None
         try:
-            settings = asked.settings_for(body)
-            return executed_grasp(ExecutionJob(body, grasp, self.unit.friction, settings))
+            settings, learning = asked.settings_for(body), self.unit.config.learning
+            job = ExecutionJob(body, grasp, self.unit.friction, settings)
+            return executed_by(
+                lambda each: executed_grasp(replace(job, settings=each)), settings,
+                () if learning is None else learning.seeds,
+            )  # fmt: skip
         except InputError as error:
             return str(error)

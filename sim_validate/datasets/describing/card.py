@@ -23,7 +23,7 @@ from sim_validate.datasets.describing.statements import (
     summary,
 )
 from sim_validate.datasets.manifest import Manifest
-from sim_validate.datasets.rows import SPLITS
+from sim_validate.datasets.object_rows import SPLITS
 
 CARD = "README.md"
 FIRST: Name = "grasps"
@@ -72,7 +72,7 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
         f"```toml\n{config_to_toml(config)}```\n",
         f"## Tables\n\n{_counts(manifest)}",
         *(_table(name, columns) for name, columns in config.tables.items()),
-        f"## Splits\n\n{splitting()}\n",
+        f"## Splits\n\n{splitting(config)}\n",
         f"## Negative controls and labels\n\n{_labels()}",
         f"## Units and frames\n\n{CONVENTIONS}\n",
         f"## Limits\n\n{_list(limits(config))}",

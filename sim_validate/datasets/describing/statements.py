@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from sim_validate.datasets.columns import Name
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.manifest import Manifest
-from sim_validate.datasets.rows import SPLITS
+from sim_validate.datasets.object_rows import SPLITS
 
 KEYWORDS = (
     "robotics", "grasping", "force-closure", "multi-finger grasps", "contact mechanics",
@@ -16,11 +16,13 @@ ROWS: Mapping[Name, str] = {
     "grasps": "four contacts on an object at one friction, or a negative control made from them",
     "trials": "a grasp or control under one wrench, in simulation",
     "executions": "a grasp in one trial of its execution, in simulation",
+    "rests": "a pose in which an object rests on a table",
 }
 """Meaning of one row of each table."""
 LABELS: Mapping[str, str] = {
     "grasp": "a planned grasp, proved to be in force closure",
     "given": "contacts from another source, moved onto the object and judged",
+    "varied": "a grasp at another friction or mass, or with contacts moved; it may hold or not",
     "low_friction": "the contacts of a grasp, tried at a friction below its critical friction",
     "fingers_removed": "only three or two of a grasp's contacts",
     "normal_flipped": "a grasp with one finger that pulls where it should push",
@@ -76,6 +78,15 @@ WITH_EXECUTIONS = {
     "alike; those in `executions` are in `mass_kg`.",
 }
 """Statements on limits that read otherwise where grasps are executed."""
+COUNTED = {
+    "object": "A tenth of the objects, at least one, is for testing, and as many for validation; "
+    "the seed chooses them. All grasps, controls and trials of an object are where the object is.",
+    "class": "Objects of one `shape_class` are in one split: classes that the seed chooses are for "
+    "testing and for validation until each has a tenth of the objects, never the largest class. Of "
+    "two classes one is for testing, and validation takes objects of the other. All grasps, "
+    "controls and trials of an object are where the object is.",
+}
+"""How objects are assigned to splits whose places are counted."""
 SOURCES = (
     "Objects are made from meshes whose own licences hold for `meshes/` and all that is derived "
     "from them; they are not recorded here, so whoever publishes the dataset has to state them."
@@ -130,8 +141,10 @@ def limits(config: DatasetConfig) -> tuple[str, ...]:
     return tuple(other.get(line, line) for line in LIMITS)
 
 
-def splitting() -> str:
+def splitting(config: DatasetConfig) -> str:
     """Say how objects are assigned to splits."""
+    if config.learning is not None and config.counts_splits:
+        return COUNTED[config.learning.split_by]
     shares, before = list[str](), 0.0
     for name, upto in SPLITS:
         shares.append(f"{name} {upto - before:.0%}")

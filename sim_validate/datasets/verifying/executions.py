@@ -5,6 +5,7 @@ alone, so it is proved again for every row. What a trial did is only simulated a
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from grasp_core.planning.given_contacts import seat
 from grasp_core.values import Contact
 from sim_validate.datasets.building.write_tables import CONFIG
 from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.learning.varied import VARIED
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.rows import GIVEN
 from sim_validate.datasets.verifying.rows_by_object import ObjectRows, Row
@@ -96,15 +98,28 @@ def _row_faults(row: Row, trials: Sequence[Row]) -> Iterator[str]:
 
 def _squeeze_faults(row: Row, body: Polyhedron, asked: AskedExecution) -> Iterator[str]:
     """Check the mass, and prove again that the squeeze carries what the row says."""
+    yield from _proved(row, body, asked, "squeeze_n", "load_multiple")
+    if row.get("least_squeeze_n") is not None:
+        # it carries the weight itself, with no larger push
+        least = {**row, "squeeze_n": row["least_squeeze_n"], "load_multiple": 1.0}
+        yield from _proved(least, body, asked, "least_squeeze_n", "least_push_n")
+
+
+def _proved(
+    row: Row, body: Polyhedron, asked: AskedExecution, squeeze: str, claim: str
+) -> Iterator[str]:
+    """Check that a squeeze carries a multiple of the weight, with pushes that are allowed."""
     count = row["contacts"]
     try:
         settings = asked.settings_for(body)
+        if row.get("mass_ratio") is not None:
+            settings = replace(settings, mass_kg=row["mass_kg"])
         points, normals = row["contact_points_m"][:count], row["contact_normals"][:count]
         contacts = [
             Contact(np.array(point), np.array(normal))
             for point, normal in zip(points, normals, strict=True)
         ]
-        if row["label"] == GIVEN:  # on curved surfaces, fingertips touch faces made for the grasp
+        if row["label"] in (GIVEN, VARIED):  # on curved surfaces they have faces of their own
             body = seat(body, points, normals).body
         held = grip(
             body, contacts, row["friction"], row["squeeze_n"][:count],
@@ -120,11 +135,12 @@ def _squeeze_faults(row: Row, body: Polyhedron, asked: AskedExecution) -> Iterat
     reactions = survival.reactions(held.local_squeeze)
     multiple = row["load_multiple"] * (1.0 - ROUNDING)
     pushes = reactions.start[:, 0] + multiple * reactions.swing
-    limited = bool((pushes <= settings.push_n * (1.0 + ROUNDING)).all())
+    push_n = row["least_push_n"] if claim == "least_push_n" else settings.push_n
+    limited = bool((pushes <= push_n * (1.0 + ROUNDING)).all())
     if not (limited and reactions.survives(multiple, reactions.multipliers(multiple))):
         yield (
-            f"load_multiple is {row['load_multiple']:.9g}, but the squeeze is not proved to carry "
-            "as much"
+            f"{claim} is {row[claim]:.9g}, but the squeeze is not proved to carry as much "
+            f"({squeeze})"
         )
 
 

@@ -15,6 +15,7 @@ from grasp_core.values import FINGERS
 from sim_validate.datasets.building.write_tables import CONFIG, QUARANTINE
 from sim_validate.datasets.columns import KEYS
 from sim_validate.datasets.config import config_from_toml
+from sim_validate.datasets.learning.varied import VARIED
 from sim_validate.datasets.manifest import MANIFEST, Listed, Manifest, listed, read_manifest
 from sim_validate.datasets.meshes import stored_surface
 from sim_validate.datasets.open_dataset import Selection
@@ -22,6 +23,9 @@ from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.quarantine import read_left_out
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
 from sim_validate.datasets.verifying.executions import execution_faults
+from sim_validate.datasets.verifying.figures import figure_faults
+from sim_validate.datasets.verifying.kinds import kind_faults
+from sim_validate.datasets.verifying.objects import object_faults, split_faults
 from sim_validate.datasets.verifying.redo import Sample, sample_faults
 from sim_validate.datasets.verifying.rows_by_object import ObjectRows, by_object
 from sim_validate.files.paths import path_inside
@@ -88,6 +92,10 @@ def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
             yield from _row_faults(rows, config.frictions)
             yield from _mesh_faults(folder, rows)
             yield from execution_faults(folder, config, rows)
+            yield from kind_faults(config, rows)
+            yield from figure_faults(folder, config, rows)
+            yield from object_faults(folder, config, rows)
+    yield from split_faults(Selection(folder, manifest, None), config)
 
 
 def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
@@ -132,6 +140,8 @@ def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
     config = config_from_toml(folder / CONFIG)
     if config.sha256 != manifest.config_sha256:
         yield f"{CONFIG}: the file is not the configuration that the manifest names"
+    if manifest.groups != config.groups:
+        yield f"{MANIFEST}: `groups` is {manifest.groups}, unlike {CONFIG}"
     if manifest.executed != (config.execution is not None):
         yield f"{MANIFEST}: `executed` is {manifest.executed}, unlike {CONFIG}"
     lines = len(read_left_out(folder / QUARANTINE))
@@ -161,7 +171,8 @@ def _row_faults(rows: ObjectRows, frictions: Sequence[float]) -> Iterator[str]:
             *_reference_faults(row, splits, names),
             *_outcome_faults(row, ended.get(name, [])),
         ]
-        if row["control_of"] is None and row["friction"] not in frictions:
+        own = row["control_of"] is None and row["label"] != VARIED
+        if own and row["friction"] not in frictions:
             faults.append(f"friction {row['friction']} is not among those of {CONFIG}")
         if row["outcome"] != NOT_TRIED:
             faults += _contact_faults(row)

@@ -10,7 +10,7 @@ from sim_validate.datasets.parquet import parquet_bytes, read_rows
 def forged(folder, name, change):
     """Change rows of one table of a dataset, and write the hashes that match."""
     path = next(folder.glob(f"data/{name}/*.parquet"))
-    rows = read_rows(path)
+    rows = read_rows(path, name, read_manifest(folder).tables)
     change(rows)
     data = parquet_bytes(name, rows, {}, read_manifest(folder).tables)
     path.write_bytes(data)

@@ -24,7 +24,7 @@ from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.exports.formats import EXPORTERS, export
 from sim_validate.datasets.exports.isaac import yaml_number
-from sim_validate.datasets.rows import SPLITS
+from sim_validate.datasets.object_rows import SPLITS
 from sim_validate.files.writing import whole_folder
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, silent

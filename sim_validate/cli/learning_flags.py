@@ -1,0 +1,28 @@
+"""Flags for what a dataset holds on request for learners."""
+
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any
+
+from sim_validate.cli.flag_bounds import at_least
+
+Varied = Annotated[int, at_least(0, up_to=100)]
+
+
+@dataclass(frozen=True, slots=True)
+class Learned:
+    """What a dataset holds besides for learners; a TOML file can ask for more."""
+
+    friction_below: Varied = 0
+    """Rows per grasp with its contacts clearly below their critical friction."""
+    friction_near: Varied = 0
+    """Rows per grasp within some percent of the critical friction, on either side."""
+    friction_above: Varied = 0
+    """Rows per grasp clearly above the critical friction."""
+    moved_out: Varied = 0
+    """Rows per grasp with contacts moved on their faces, each out of its region."""
+    synthetic: Annotated[int, at_least(0, up_to=5)] = 5
+    """Largest number of synthetic negative controls of each grasp."""
+
+    def asked(self) -> dict[str, Any] | None:
+        """Return the settings that were given; None if all are the usual ones."""
+        return None if self == Learned() else asdict(self)

@@ -1,0 +1,109 @@
+"""Columns that tables have only on request, in groups; a dataset's manifest names its groups."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TypeAlias
+
+from sim_validate.datasets.columns import Column, Name, Tables, base_tables
+
+KINDS = (
+    Column("kind", "text", "planned, given, the name of a negative control, or how it is varied"),
+    Column("made_from", "text", "the grasp that a varied one was made from; null for others"),
+    Column("friction_ratio", "float", "friction over critical friction; null if not known", "1"),
+    Column("displaced_m", "float", "distance of each contact from that of `made_from`", "m", (4,)),
+    Column("region_exit_m", "float", "how far the region reached that way; null if unmoved", "m",
+           (4,)),
+    Column("mass_ratio", "float", "mass over that at which `made_from` is predicted to fail", "1"),
+)  # fmt: skip
+CLOSURE = (
+    Column("span_angle_rad", "float", "half-angle below which cones positively span", "rad"),
+    Column("min_weight", "float", "min-weight metric of pyramids with eight edges", "1"),
+    Column("hull_volume_n6", "float", "volume of the hull of the pyramids' edges", "N6"),
+    Column("smallest_singular_value", "float", "least singular value of the grasp map", "1"),
+    Column("witness_forces_n", "float", "balanced forces on the object, normal parts sum to one",
+           "N", (4, 3)),
+)  # fmt: skip
+SYMMETRY = (
+    Column("symmetry_class", "text", "first planned grasp that is the same by symmetry"),
+    Column("multiplicity", "int", "number of different grasps that the object's turns make of it"),
+)
+APPROACH = (
+    Column("approach_radius_m", "float", "radius of fingertips that come on free lines", "m"),
+    Column("approach_directions", "float", "along a free line to each contact; null if none", "1",
+           (4, 3)),
+)  # fmt: skip
+PAYLOAD = (
+    Column("payload_fixed_kg", "float", "mass held in any orientation, forces fixed", "kg"),
+    Column("payload_free_kg", "float", "bound of the mass held with forces chosen anew", "kg"),
+)
+MARGINS = (
+    Column("predicted_loss", "float", "least multiple of a trial's load that loses it", "1"),
+    Column("payload_kg", "float", "mass that the squeeze is proved to carry", "kg"),
+    Column("tip_radius_m", "float", "radius of the fingertips of the execution", "m"),
+)
+LEAST_SQUEEZE = (
+    Column("least_push_n", "float", "least largest push that carries the weight any way", "N"),
+    Column("least_squeeze_n", "float", "contact forces at rest with that push", "N", (4, 3)),
+)
+TRIAL_MARGINS = (
+    Column("predicted_loss", "float", "multiple of the load that loses it; null if none", "1"),
+    Column("seed", "int", "seed that a misplaced trial was drawn by; null for others"),
+)
+SHAPE = (
+    Column("shape_class", "text", "class of the shape: as settings say, or by hull and inertia"),
+    Column("box_sides_m", "float", "sides of the box with the same inertia, descending", "m", (3,)),
+)
+UNITS = (
+    Column("unit", "text", "length of one unit in the mesh file"),
+    Column("scale", "float", "factor by which the object was scaled besides", "1"),
+)
+SIZED = -1
+"""Length that stands in a column's shape for the size of its group."""
+POINTS = (
+    Column("cloud_points_m", "float", "points drawn on the surface", "m", (SIZED, 3)),
+    Column("cloud_normals", "float", "unit normals into the object at these", "1", (SIZED, 3)),
+)
+RESTS = (
+    Column("object_id", "text", "object that rests on a table"),
+    Column("rest", "int", "number of the resting pose, the likeliest first, from 0"),
+    Column("down", "float", "direction down in the object's frame, out of the object", "1", (3,)),
+    Column("height_m", "float", "height of the centre of mass above the table", "m"),
+    Column("likelihood", "float", "share of the sphere that the face takes, seen from there", "1"),
+    Column("T_table_object_m", "float", "pose on a table z = 0, centre of mass on the z axis", "m",
+           (4, 4)),
+)  # fmt: skip
+Group: TypeAlias = Mapping[Name, tuple[Column, ...]]
+GROUPS: Mapping[str, Group] = {
+    "kinds": {"grasps": KINDS},
+    "closure": {"grasps": CLOSURE},
+    "symmetry": {"grasps": SYMMETRY},
+    "approach": {"grasps": APPROACH},
+    "payload": {"grasps": PAYLOAD},
+    "margins": {"grasps": MARGINS, "executions": TRIAL_MARGINS},
+    "least_squeeze": {"grasps": LEAST_SQUEEZE},
+    "shape": {"objects": SHAPE},
+    "units": {"objects": UNITS},
+    "points": {"objects": POINTS},
+    "rests": {"rests": RESTS},
+}
+"""Columns of each group, by the table that they belong to."""
+
+
+def dataset_tables(*, executed: bool, groups: Mapping[str, int] | None = None) -> Tables:
+    """Return the tables of a dataset with their columns.
+
+    Args:
+        executed: Whether the dataset has executions.
+        groups: Groups of columns on request, with their sizes.
+    """
+    tables = dict(base_tables(executed=executed))
+    sizes = groups or {}
+    for group, size in ((group, sizes[group]) for group in GROUPS if group in sizes):
+        for name, columns in GROUPS[group].items():
+            tables[name] = (*tables.get(name, ()), *(_sized(each, size) for each in columns))
+    return tables
+
+
+def _sized(column: Column, size: int) -> Column:
+    shape = tuple(size if length == SIZED else length for length in column.shape)
+    return replace(column, shape=shape)

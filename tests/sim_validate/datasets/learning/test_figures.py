@@ -1,0 +1,142 @@
+"""Figures of grasps are what the analysis says of their contacts, and forged ones are named."""
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.closure.contact_arrays import stacked
+from grasp_core.objects.symmetries import orbit_sizes
+from grasp_core.planning.reach import segment_distances
+from scenes.example_objects import example_object
+from sim_validate.datasets.verifying.verify import verify
+from tests.sim_validate.datasets.forging import forged
+from tests.sim_validate.datasets.learned import BODIES, rows_of
+
+
+@pytest.fixture(scope="module")
+def grasps(learned):
+    return rows_of(learned, "grasps")
+
+
+def contacts_of(row):
+    return [
+        gc.Contact(point, normal)
+        for point, normal in zip(row["contact_points_m"], row["contact_normals"], strict=True)
+        if point[0] is not None
+    ]
+
+
+def test_closure_figures_are_those_of_the_contacts(grasps):
+    rows = [row for row in grasps if row["contacts"] == 4]
+    assert len({row["kind"] for row in rows}) >= 6
+    for row in rows:
+        body, contacts, friction = BODIES[row["object_id"]], contacts_of(row), row["friction"]
+        about = {"center": body.center_of_mass, "torque_scale": body.radius}
+        assert row["min_weight"] == gc.min_weight(contacts, friction=friction)
+        assert row["hull_volume_n6"] == gc.hull_volume(contacts, friction=friction, **about)
+        assert row["smallest_singular_value"] == gc.smallest_singular_value(contacts, **about)
+        assert row["span_angle_rad"] == gc.span_angle(stacked(contacts)[1])
+
+
+def test_witness_forces_balance_within_the_cones(grasps):
+    """Forces whose normal parts sum to one leave less than the certificates' tolerance."""
+    rows = [row for row in grasps if row["witness_forces_n"] is not None]
+    assert {row["force_closed"] for row in rows} == {True}
+    for row in rows:
+        forces, points = np.array(row["witness_forces_n"]), np.array(row["contact_points_m"])
+        arms = points - points.mean(axis=0)
+        size = np.linalg.norm(arms, axis=1).max()
+        assert np.abs(forces.sum(axis=0)).max() <= 1e-6
+        assert np.abs(np.cross(arms, forces).sum(axis=0)).max() <= 1e-6 * size
+        pushes = np.einsum("ki,ki->k", forces, np.array(row["contact_normals"]))
+        assert pushes.sum() == pytest.approx(1.0, abs=1e-6)
+
+
+def test_payloads_are_those_of_the_contacts(grasps):
+    row = next(row for row in grasps if row["kind"] == "planned")
+    body, contacts = BODIES[row["object_id"]], contacts_of(row)
+    radius = row["approach_radius_m"]
+    found = gc.payload(body, contacts, row["friction"], max_push_n=10.0, tip_radius_m=radius)
+    assert row["payload_fixed_kg"] == found.mass_kg
+    assert row["payload_free_kg"] == found.bound_kg
+    assert row["payload_fixed_kg"] <= row["payload_free_kg"]
+
+
+def test_multiplicities_count_the_images_under_the_object_s_turns(grasps):
+    rows = [row for row in grasps if row["kind"] == "planned"]
+    for row in rows:
+        assert row["symmetry_class"] == row["grasp_id"]
+        assert row["multiplicity"] >= 1
+    others = [row for row in grasps if row["kind"] != "planned"]
+    assert {row["symmetry_class"] for row in others} == {None}
+
+
+def test_orbits_of_a_tetrahedron_divide_the_number_of_its_turns():
+    """A regular tetrahedron has twelve rotations; one grasp's images number twelve over those
+    that keep it."""
+    body = example_object("tetrahedron")
+    grasps = gc.plan(body, 0.5, limit=6).grasps
+    sizes = orbit_sizes(body, grasps)
+    assert len(sizes) == len(grasps) > 2
+    assert all(12 % size == 0 for size in sizes)
+
+
+def test_fingers_come_on_free_lines(grasps):
+    rows = [row for row in grasps if row["approach_directions"] is not None]
+    assert rows
+    for row in rows:
+        body, radius = BODIES[row["object_id"]], row["approach_radius_m"]
+        corners = body.vertices[body.triangles]
+        tips = np.array(row["contact_points_m"]) - radius * np.array(row["contact_normals"])
+        for tip, way in zip(tips, np.array(row["approach_directions"]), strict=True):
+            assert np.linalg.norm(way) == pytest.approx(1.0, abs=1e-12)
+            gap = segment_distances(tip - body.radius * way, tip, corners).min()
+            assert gap >= radius - 2e-6 * body.radius
+
+
+def test_margins_follow_from_the_trials(grasps, learned):
+    trials = rows_of(learned, "executions")
+    rows = [row for row in grasps if row["executed"]]
+    assert rows
+    for row in rows:
+        own = [each for each in trials if each["grasp_id"] == row["grasp_id"]]
+        assert row["predicted_loss"] == min(each["predicted_loss"] for each in own)
+        assert row["payload_kg"] == row["load_multiple"] * row["mass_kg"]
+        assert row["tip_radius_m"] > 0.0
+        assert [each["seed"] for each in own] == [None, 0, 0, 7, 7]
+        assert [each["name"] for each in own][1:] == [f"misplaced {i}" for i in range(4)]
+    unlike = [each["slip_m"] for each in trials if each["grasp_id"] == rows[0]["grasp_id"]]
+    assert len(set(unlike)) == len(unlike)
+
+
+def test_the_least_squeeze_is_no_stronger_than_the_best_one_needs(grasps):
+    rows = [row for row in grasps if row["least_push_n"] is not None]
+    assert rows
+    for row in rows:
+        pushes = np.einsum(
+            "ki,ki->k", np.array(row["least_squeeze_n"]), np.array(row["contact_normals"])
+        )
+        assert (pushes <= row["least_push_n"] * (1.0 + 1e-9)).all()
+        if row["load_multiple"] >= 1.0:
+            assert row["least_push_n"] <= 10.0 * (1.0 + 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("cells", "message"),
+    [
+        ({"min_weight": 0.5}, "min_weight is 0.5, but from the contacts"),
+        ({"hull_volume_n6": None}, "hull_volume_n6 is None, but from the contacts"),
+        ({"witness_forces_n": [[0.1] * 3] * 4}, "no balanced forces"),
+        ({"symmetry_class": "x"}, "is not the first of its class"),
+        ({"approach_directions": [[0.0, 0.0, 1.0]] * 4}, "meets the object"),
+        ({"payload_kg": 9.0}, "payload_kg is 9.0, but load_multiple times"),
+        ({"predicted_loss": 9.0}, "predicted_loss is 9.0, but not by"),
+        ({"least_push_n": 0.01}, "least_push_n is 0.01, but the squeeze is not proved"),
+    ],
+)
+def test_forged_figures_are_named(spoiled, cells, message):
+    def change(rows):
+        next(row for row in rows if row["kind"] == "planned").update(cells)
+
+    forged(spoiled, "grasps", change)
+    assert any(message in fault for fault in verify(spoiled))
