@@ -28,7 +28,7 @@ from grasp_core.families.free_contacts import closed_at, of_general_type
 from grasp_core.fields import is_a, is_number
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.grounds import Grounds, grounds_of
+from grasp_core.optimizing.best.grounds import grounds_of
 from grasp_core.optimizing.best.incumbents import begin, climbed, piece_at
 from grasp_core.optimizing.best.same_places import exact_maps, first_nodes
 from grasp_core.optimizing.best.search import EXACT_GAP, Found, Searching, Steps, Stop
@@ -198,7 +198,7 @@ def _stopping(seconds: float | None) -> Generator[Stop]:
 class _Levels:
     """The levels of a search, with the best contacts and the best bound so far."""
 
-    def __init__(  # noqa: PLR0913 - each is a quantity of its own
+    def __init__(  # noqa: PLR0913, PLR0917 - each is a quantity of its own
         self, body: Polyhedron, friction: float, clearance: float, seed: int, jobs: int, stop: Stop,
         progress: Callable[[GapAt], None] | None,
     ) -> None:  # fmt: skip
@@ -266,7 +266,7 @@ class _Levels:
             self.progress(now)
 
     def _twists(self) -> Array:
-        """Return twists in which the support of all faces is small, and let the search know them."""
+        """Return twists in which all faces have little support, and let the search know them."""
         descend = compiled(DESCENTS).descend
         points = [self.grounds.places(p, at) for p, at in enumerate(self.grounds.polygons())]
         on = np.repeat(np.arange(len(points)), [len(each) for each in points])
@@ -294,7 +294,7 @@ class _Levels:
         spare = searched_threshold(0.0, self.friction, len(self.maps))
         count = len(self.nodes[0])
         steps = Steps(
-            np.zeros(count, np.uint8), np.zeros(count, np.int32), twists[best : best + 1],
+            np.zeros(count, np.int64), np.zeros(count, np.int64), twists[best : best + 1],
             np.empty((0, 3)),
         )  # fmt: skip
         return steps, float(reached[best]) - spare
