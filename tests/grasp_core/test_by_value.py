@@ -48,7 +48,7 @@ def results(body, plan):
         gc.force_closure(grasp, friction=FRICTION), gc.force_closure(grasp, friction=0.01),
         gc.critical_friction_interval(grasp), gc.certify_regions(body, grasp, FRICTION),
         gc.ferrari_canny(grasp, friction=FRICTION, torque_scale=body.radius),
-        gc.quality_ceiling(body, grasp.faces, FRICTION), scenes.build_scene(body, grasp, FRICTION),
+        gc.quality_ceiling(body, grasp.faces, FRICTION), gc.best_grasp(body, FRICTION, gap=0.6), scenes.build_scene(body, grasp, FRICTION),
         sv.validate(body, grasp, FRICTION),
         sv.execute(body, grasp, FRICTION, mass_kg=0.2),
         carried, transfer_from_json(transfer_to_json(carried)),

@@ -305,7 +305,8 @@ def _joined(trunk: Part, parts: Sequence[Part]) -> Steps:
     each: list[tuple[Indices, Indices]] = []
     for tree, (n, _, _), (_, twists, lines) in zip(trees, sizes, starts, strict=True):
         deeds: Indices = tree.deeds[:n]
-        asked: Indices = tree.asked[:n] + np.where(deeds < nodes.BY_PIECES, twists, lines)
+        shifts = np.where(deeds < int(nodes.BY_PIECES), int(twists), int(lines))
+        asked: Indices = np.asarray(tree.asked[:n], dtype=np.int64) + shifts
         each.append((deeds, asked))
     deeds, asked = each[0]
     rows: list[tuple[Indices, Indices]] = []
