@@ -20,8 +20,10 @@ import grasp_core as gc
 from grasp_core.objects.face_pieces import unit_pieces
 from scenes.example_objects import example_object
 
-OBJECTS = ("tetrahedron", "prism", "box", "hexagonal-pyramid", "octahedron", "wedge",
-           "double-wedge-bar", "l-bracket", "dodecahedron", "icosahedron", "hex-nut", "cross")  # fmt: skip
+OBJECTS = (
+    "tetrahedron", "prism", "box", "hexagonal-pyramid", "octahedron", "wedge", "double-wedge-bar",
+    "l-bracket", "dodecahedron", "icosahedron", "hex-nut", "cross",
+)  # fmt: skip
 FRICTIONS = (0.3, 0.5, 0.8)
 OPTIMIZED = 3
 SLACK = 1e-9
