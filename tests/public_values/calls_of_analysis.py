@@ -125,6 +125,17 @@ CALLS = [
         "gap": POSITIVE | {"one": 1.0, "too fine": 1e-9},
         "torsion_m": TORSION,
     }),
+    Call("gc.best_grasp", lambda: {"body": body(), "gap": 0.5, "time_limit_s": 0.0}, {
+        "body": VALUE,
+        "friction": FRICTION,
+        "gap": POSITIVE | {"one": 1.0},
+        "time_limit_s": optional(NOT_NEGATIVE),
+        "measure": WORD,
+        "clearance": optional(NOT_NEGATIVE) | {"larger than the object": 1.0},
+        "seed": SEED,
+        "jobs": AT_LEAST_ONE,
+        "progress": {"number": 3, "text": "a"},
+    }),
     Call("gc.quality_ceiling", lambda: {"body": body(), "faces": (0, 1, 2, 3), "parts": 3}, {
         "body": VALUE,
         "faces": FACE_INDICES,

@@ -34,6 +34,7 @@ MADE_BY_FUNCTIONS = {
     "sv.SavedTransfer": "load_transfer",
     "sv.SavedVerdict": "load_verdicts",
     "sv.SavedVerdicts": "load_verdicts",
+    "gc.BestGrasp": "best_grasp",
     "gc.BestSqueeze": "best_squeeze",
     "gc.FirstSlip": "first_slip",
     "gc.FreeMass": "payload",

@@ -17,7 +17,14 @@ from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.regions.certify_regions import certify_regions
 from sim_validate.records.regions import SHAPES, proof_arrays, regions_of
 from tests.judges import random_contacts
-from tests.tampering import exact_closure, on_planes, soft_contacts, squeezes, wrench_bounds
+from tests.tampering import (
+    best_grasps,
+    exact_closure,
+    on_planes,
+    soft_contacts,
+    squeezes,
+    wrench_bounds,
+)
 
 SIZES = (1e-3, 0.1, 1.0, 100.0)
 FRICTIONS = (0.0, 0.05, 0.3, 0.5, 1.0, 3.0)
@@ -248,6 +255,16 @@ def payload(seed):
     return gc.payload(*contacts, max_push_n=10.0, motors=hand, **springs)
 
 
+@cache
+def best(seed):
+    name, friction = (("tetrahedron", 0.5), ("random-4-1", 0.5), ("tetrahedron", 0.8))[seed % 3]
+    return gc.best_grasp(scenes.example_object(name), friction, gap=0.35)
+
+
+def cut_tree(seed):
+    return best(seed).proof
+
+
 ProofFile = dataclasses.make_dataclass(
     "ProofFile", SHAPES, frozen=True, eq=False,
     namespace={"verify": lambda self: regions_of(vars(self)).verify()},
@@ -284,6 +301,8 @@ TABLE = {
     "a quality with torsion": Row(soft_quality, wrench_bounds.quality),
     "a wrench limit with torsion": Row(soft_wrench_limit, lambda c, _: soft_contacts.limit(c)),
     "BestSqueeze": Row(best_squeeze, lambda c, _: squeezes.squeeze(c), 0.8),
+    "CutTree": Row(cut_tree, best_grasps.proof, 0.8),
+    "BestGrasp": Row(best, best_grasps.best, 0.4),
     "Payload": Row(payload, lambda c, _: squeezes.payload(c), 0.4),
     "proof file of regions": Row(
         proof_file, lambda c, rng: on_planes.regions(regions_of(vars(c)), rng), 0.4

@@ -20,7 +20,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
-from grasp_core.checked import coefficient, number, one_of, seed_of, whole
+from grasp_core.checked import coefficient, function, number, one_of, seed_of, whole
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
 from grasp_core.families.constructions import point_region, regions_of
@@ -28,7 +28,8 @@ from grasp_core.families.free_contacts import closed_at, of_general_type
 from grasp_core.fields import is_a, is_number
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.grounds import Grounds, grounds_of
+from grasp_core.optimizing.best.contacts_of_proof import are_contacts_of
+from grasp_core.optimizing.best.grounds import grounds_of
 from grasp_core.optimizing.best.incumbents import begin, climbed, piece_at
 from grasp_core.optimizing.best.same_places import exact_maps, first_nodes
 from grasp_core.optimizing.best.search import EXACT_GAP, Found, Searching, Steps, Stop
@@ -108,8 +109,9 @@ class BestGrasp(ByValue):
     def verify(self) -> bool:
         """Check the grasp's quality and replay the proof of the bound, without any search.
 
-        Whether the polygons of the proof are those of an object's faces can only be checked with
-        the object, by `grounds_of`.
+        The contacts must be those of the quality, and lie on polygons of the proof. Whether these
+        are those of an object's faces, this far from edges, can only be checked with the object, by
+        `grounds_of`.
         """
         return (
             is_a(self.quality, FerrariCanny)
@@ -118,6 +120,7 @@ class BestGrasp(ByValue):
             and self.quality.verify()
             and self.proof.verify()
             and self.quality.lower <= self.bound
+            and are_contacts_of(self.grasp, self.quality.wrenches, self.proof)
         )
 
 
@@ -170,6 +173,8 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
     number(gap, "gap", least=SMALLEST_GAP, most=LARGEST_GAP)
     one_of(measure, ("ferrari-canny",), "measure")
     whole(jobs, "jobs", least=1, most=MOST_JOBS)
+    if progress is not None:
+        function(progress, "progress")
     if time_limit_s is not None:
         number(time_limit_s, "time_limit_s", least=0.0, most=MOST_SECONDS)
     if clearance is None:
@@ -198,7 +203,7 @@ def _stopping(seconds: float | None) -> Generator[Stop]:
 class _Levels:
     """The levels of a search, with the best contacts and the best bound so far."""
 
-    def __init__(  # noqa: PLR0913 - each is a quantity of its own
+    def __init__(  # noqa: PLR0913, PLR0917 - each is a quantity of its own
         self, body: Polyhedron, friction: float, clearance: float, seed: int, jobs: int, stop: Stop,
         progress: Callable[[GapAt], None] | None,
     ) -> None:  # fmt: skip
@@ -266,7 +271,7 @@ class _Levels:
             self.progress(now)
 
     def _twists(self) -> Array:
-        """Return twists in which the support of all faces is small, and let the search know them."""
+        """Return twists in which all faces have little support, and let the search know them."""
         descend = compiled(DESCENTS).descend
         points = [self.grounds.places(p, at) for p, at in enumerate(self.grounds.polygons())]
         on = np.repeat(np.arange(len(points)), [len(each) for each in points])
@@ -294,7 +299,7 @@ class _Levels:
         spare = searched_threshold(0.0, self.friction, len(self.maps))
         count = len(self.nodes[0])
         steps = Steps(
-            np.zeros(count, np.uint8), np.zeros(count, np.int32), twists[best : best + 1],
+            np.zeros(count, np.int64), np.zeros(count, np.int64), twists[best : best + 1],
             np.empty((0, 3)),
         )  # fmt: skip
         return steps, float(reached[best]) - spare

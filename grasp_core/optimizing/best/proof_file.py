@@ -54,13 +54,12 @@ def read_proof(path: Path) -> CutTree:
             f"{path}: expected the text {FORMAT!r} and schema {SCHEMA}; write it again"
         )
     grounds = Grounds(**{name: arrays[name] for name in OF_GROUNDS})
-    parts = {name: arrays[name] for name in OF_TREE}
+    parts: dict[str, Any] = {name: arrays[name] for name in OF_TREE}
     for name in ("friction", "threshold"):
         if parts[name].shape != () or parts[name].dtype.kind != "f":
             raise InputError(f"{path}: {name} must be one number, got {parts[name].shape}")
-    proof = CutTree(
-        grounds, **(parts | {name: float(parts[name]) for name in ("friction", "threshold")})
-    )
+        parts[name] = float(parts[name])
+    proof = CutTree(grounds, **parts)
     if not np.array_equal(arrays["bound"], proof.bound):
         raise InputError(f"{path}: bound must be the {proof.bound:.17g} that the threshold proves")
     return proof

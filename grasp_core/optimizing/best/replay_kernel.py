@@ -32,7 +32,7 @@ class Planes(NamedTuple):
 
 
 @loop("numpy", beside=True)
-def replay(
+def replay(  # noqa: C901, PLR0913, PLR0917 - the arrays of a tree
     planes: Planes, first: Array, first_counts: Indices, first_fresh: Indices, t: float,
     deeds: Indices, asked: Indices, twists: Array, lines: Array, most_cuts: int,
 ) -> bool:  # fmt: skip
@@ -130,7 +130,7 @@ def _copy(corners: Array, counts: Indices, fresh: Indices, source: int, place: i
 
 
 @loop("numpy")
-def _answered(
+def _answered(  # noqa: C901, PLR0912, PLR0913, PLR0917 - the arrays of nodes
     planes: Planes, corners: Array, counts: Indices, fresh: Indices, node: int, deed: int, y: Array,
     t: float,
 ) -> int:  # fmt: skip
@@ -166,10 +166,10 @@ def _answered(
 @loop("numpy")
 def _is_empty(counts: Indices, node: int) -> bool:
     """Return whether some finger of a node has nowhere to be."""
+    full = 0
     for i in range(FINGERS):
-        if counts[node, i].sum() == 0:
-            return True
-    return False
+        full += counts[node, i].sum() > 0
+    return full < FINGERS
 
 
 @loop("numpy")
@@ -198,7 +198,7 @@ def _cut(planes: Planes, p: int, corners: Array, count: int, y: Array, t: float)
 
 
 @loop("numpy")
-def _follow(
+def _follow(  # noqa: PLR0913, PLR0917 - an edge, and what is asked
     planes: Planes, p: int, low: Array, high: Array, y: Array, t: float, out: Array
 ) -> None:
     """Fill in a point of the edge at which s < t, as near as doubles tell to where s = t."""

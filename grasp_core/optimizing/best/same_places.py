@@ -70,7 +70,7 @@ def _images(maps: Array, grounds: Grounds) -> Indices:
     found = np.full((len(maps), len(in_space)), -1)
     turned = grounds.normals @ maps.transpose(0, 2, 1)
     apart = np.abs(turned[:, :, None] - grounds.normals[None, None]).max(axis=3)
-    for g, p, q in np.argwhere(apart <= EXACT):
+    for g, p, q in np.argwhere(apart <= EXACT).tolist():
         same = len(in_space[p]) == len(in_space[q])
         if same and _same_points(in_space[p] @ maps[g].T, in_space[q]):
             found[g, p] = q

@@ -24,6 +24,7 @@ from grasp_core.quality.ferrari_canny import FerrariCanny, wrench_set_quality
 from grasp_core.values import FINGERS
 
 KERNEL = "grasp_core.optimizing.best.search_kernel"
+NODES = "grasp_core.optimizing.best.nodes_kernel"
 CUTS, TWISTS = "grasp_core.optimizing.best.cuts_kernel", "grasp_core.optimizing.best.twists_kernel"
 POOL = 512
 """Twists that a search keeps."""
@@ -66,8 +67,6 @@ class Part:
     pool: Any
     found: list[Found] = field(default_factory=list[Found])
     finished: bool = False
-    beaten: bool = False
-    """Whether contacts were found that reach the threshold, so that it cannot be refuted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,11 +168,11 @@ class Searching:
             self.stop.now()
             raise
 
-    def _part(self, nodes: tuple[Array, Indices, Indices]) -> Part:
-        kernel, pieces = compiled(KERNEL), len(self.grounds.counts)
-        corners, counts, fresh = nodes
+    def _part(self, first: tuple[Array, Indices, Indices]) -> Part:
+        nodes, pieces = compiled(NODES), len(self.grounds.counts)
+        corners, counts, fresh = first
         deep = max(DEEP, len(corners) + FINGERS + 1)
-        stack = kernel.Stack(
+        stack = nodes.Stack(
             np.zeros((deep, FINGERS, pieces, ROOM, 2)),
             np.zeros((deep, FINGERS, pieces), np.int64),
             np.zeros((deep, FINGERS), np.int64), np.zeros(deep, np.int64), np.zeros(1, np.int64),
@@ -209,30 +208,31 @@ class Searching:
 
     def _runs(self, part: Part, threshold: float, known: float, depth: int) -> Iterator[int]:
         """Run the kernel until a part is done, and yield why it pauses for the caller."""
-        kernel, pieces = compiled(KERNEL), self.pieces
+        kernel, nodes, pieces = compiled(KERNEL), compiled(NODES), self.pieces
         work = _room()
         while not self.stop():
-            why = kernel.run(
-                pieces, part.stack, part.pool, part.tree, work, threshold, BUDGET, depth
-            )
+            search = nodes.Search(pieces, part.stack, part.pool, part.tree, work, threshold)
+            why = kernel.run(search, BUDGET, depth)
             if why == kernel.DONE:
                 part.finished = True
                 return
             if why == kernel.LOST:
                 return
             if why == kernel.FULL:
-                if int(part.stack.top[0]) + FINGERS >= len(part.stack.depths):
-                    part.stack = _doubled(part.stack)
-                part.tree = _larger(part.tree)
-            elif why == kernel.FOUND:
-                found = self.measured(work.on, work.middle)
-                if found.quality.lower > known:
-                    part.found.append(found)
-                if found.quality.upper >= threshold:
-                    part.beaten = True
-                    return
-                self.learn(found.quality.direction[None], part.pool, int(part.tree.sizes[0]))
+                _enlarge(part)
+            elif why == kernel.FOUND and not self._is_refuted(part, work, threshold, known):
+                return
             yield why
+
+    def _is_refuted(self, part: Part, work: Any, threshold: float, known: float) -> bool:
+        """Return whether contacts found are below the threshold; learn the twist that shows it."""
+        found = self.measured(work.on, work.middle)
+        if found.quality.lower > known:
+            part.found.append(found)
+        if found.quality.upper >= threshold:
+            return False
+        self.learn(found.quality.direction[None], part.pool, int(part.tree.sizes[0]))
+        return True
 
     def measured(self, on: Indices, at: Array) -> Found:
         """Bound the quality of contacts on pieces, (4,), at plane coordinates, (4, 2)."""
@@ -261,7 +261,7 @@ def _copied(pool: Any) -> Any:
 
 
 def _empty_tree(room: int) -> Any:
-    return compiled(KERNEL).Tree(
+    return compiled(NODES).Tree(
         np.zeros(room, np.int64), np.zeros(room, np.int64), np.zeros((room, 6)),
         np.zeros((room, 3)), np.zeros(3, np.int64),
     )  # fmt: skip
@@ -275,6 +275,13 @@ def _larger(tree: Any) -> Any:
     return new
 
 
+def _enlarge(part: Part) -> None:
+    """Make room in a part's tree, and in its stack where that is full."""
+    if int(part.stack.top[0]) + FINGERS >= len(part.stack.depths):
+        part.stack = _doubled(part.stack)
+    part.tree = _larger(part.tree)
+
+
 def _doubled(stack: Any) -> Any:
     return type(stack)(
         *(np.concatenate([array, np.zeros_like(array)]) for array in stack[:4]), stack.top
@@ -282,36 +289,35 @@ def _doubled(stack: Any) -> Any:
 
 
 def _room() -> Any:
-    return compiled(KERNEL).Work(
+    return compiled(NODES).Work(
         np.zeros((FINGERS, POOL)), np.zeros((FINGERS, POOL)), np.zeros(POOL), np.zeros(POOL),
         np.zeros(FINGERS), np.zeros((FINGERS, 2)), np.zeros(FINGERS, np.int64),
+        np.full(1, -1),
     )  # fmt: skip
 
 
 def _joined(trunk: Part, parts: Sequence[Part]) -> Steps:
     """Put the trees of parts into their places in the trunk's tree."""
-    kernel = compiled(KERNEL)
+    nodes = compiled(NODES)
     trees = [trunk.tree, *(part.tree for part in parts)]
-    sizes = np.array([tree.sizes for tree in trees])
-    twist_starts, line_starts = (
-        np.cumsum(sizes[:, 1]) - sizes[:, 1],
-        (np.cumsum(sizes[:, 2]) - sizes[:, 2]),
-    )
-    each = [
-        (tree.deeds[:n], tree.asked[:n] + np.where(tree.deeds[:n] < kernel.BY_PIECES, y, line))
-        for tree, n, y, line in zip(trees, sizes[:, 0], twist_starts, line_starts, strict=True)
-    ]
+    sizes = np.array([tree.sizes for tree in trees], dtype=np.int64)
+    starts = np.cumsum(sizes, axis=0) - sizes
+    each: list[tuple[Indices, Indices]] = []
+    for tree, (n, _, _), (_, twists, lines) in zip(trees, sizes, starts, strict=True):
+        deeds: Indices = tree.deeds[:n]
+        shifts = np.where(deeds < int(nodes.BY_PIECES), int(twists), int(lines))
+        asked: Indices = np.asarray(tree.asked[:n], dtype=np.int64) + shifts
+        each.append((deeds, asked))
     deeds, asked = each[0]
-    holes = np.flatnonzero(deeds == kernel.SPLICE)
-    pieces: list[tuple[Indices, Indices]] = []
+    rows: list[tuple[Indices, Indices]] = []
     start = 0
-    for hole, part in zip(holes.tolist(), each[1:], strict=True):
-        pieces += [(deeds[start:hole], asked[start:hole]), part]
+    for hole, part in zip(np.flatnonzero(deeds == nodes.SPLICE).tolist(), each[1:], strict=True):
+        rows += [(deeds[start:hole], asked[start:hole]), part]
         start = hole + 1
-    pieces.append((deeds[start:], asked[start:]))
+    rows.append((deeds[start:], asked[start:]))
     return Steps(
-        np.concatenate([one for one, _ in pieces]).astype(np.uint8),
-        np.concatenate([two for _, two in pieces]).astype(np.int32),
+        np.concatenate([one for one, _ in rows]),
+        np.concatenate([two for _, two in rows]),
         np.concatenate([tree.twists[:m] for tree, m in zip(trees, sizes[:, 1], strict=True)]),
         np.concatenate([tree.lines[:m] for tree, m in zip(trees, sizes[:, 2], strict=True)]),
     )

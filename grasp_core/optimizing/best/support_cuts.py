@@ -46,7 +46,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices
 from grasp_core.by_value import ByValue
 from grasp_core.compiled import compiled
-from grasp_core.fields import is_array, is_indices, is_number
+from grasp_core.fields import is_a, is_array, is_indices, is_number
 from grasp_core.optimizing.best.grounds import Grounds
 from grasp_core.optimizing.best.same_places import first_nodes, fitting
 
@@ -126,7 +126,7 @@ class CutTree(ByValue):
         """Return whether all numbers are of sizes for which (3) is derived."""
         count = len(self.deeds) if is_indices(self.deeds, None) else 0
         if not (
-            isinstance(self.grounds, Grounds)
+            is_a(self.grounds, Grounds)
             and self.grounds.sound()
             and is_number(self.friction, least=0.0, most=1e3)
             and is_number(self.threshold, least=1e-6, most=1e3)

@@ -104,7 +104,9 @@ def _velocity(x: Array, y: Array) -> tuple[float, float, float]:
 
 
 @loop("numpy")
-def descend(pieces: Pieces, points: Array, on: Indices, m: int, y: Array, steps: int) -> float:
+def descend(  # noqa: C901 - loops that are written out
+    pieces: Pieces, points: Array, on: Indices, m: int, y: Array, steps: int
+) -> float:
     """Move a unit twist to where the largest support of contacts is smaller; return the smallest.
 
     Each step follows the wrench that attains the support, as far as would lower it to an aim if it

@@ -10,7 +10,7 @@ FINE = 36
 """Binary digits of the place of a point on an edge."""
 
 
-def replays(arrays):
+def replays(arrays):  # noqa: C901, PLR0912 - all rules in one place
     """Whether the tree refutes that any four contacts on the polygons reach the threshold."""
     pieces = [
         (exact(arrays["normals"][p]), exact(arrays["origins"][p]), exact(arrays["frames"][p].T))
