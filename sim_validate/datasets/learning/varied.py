@@ -43,7 +43,9 @@ def validated_with(
     if most == CONTROLS:
         return validate(body, grasp, friction, agenda=agenda)
     verdict = validate(body, grasp, friction, agenda=replace(agenda, controls=False))
-    found = list(negative_controls(body, grasp, friction, agenda.seed)) if most else []
+    found = list[Control]()
+    if most:
+        found += negative_controls(body, grasp, friction, agenda.seed)
     order = draws(agenda.seed, grasp.id, "synthetic", 0).permutation(len(found))
     kept = [found[place] for place in sorted(order[:most].tolist())]
     controls = tuple(try_control(body, each, agenda, Setup()) for each in kept)
