@@ -250,7 +250,7 @@ def _objects(
         for name in OF_OBJECTS:
             if name in merged:
                 merged[name] = rows[0][name]
-        about_grasps = [name for name in config.tables if name not in OF_OBJECTS]
+        about_grasps: list[Name] = [name for name in config.tables if name not in OF_OBJECTS]
         for friction in config.frictions:
             beginning = id_beginning(object_id, friction)
             for reader, own in zip(having, rows, strict=True):
@@ -268,7 +268,9 @@ class Reader:
 
     def __init__(self, part: Part, tables: Tables) -> None:
         self.part = part
-        self._streams = {name: self._groups(name) for name in tables}
+        self._streams: dict[Name, Iterator[tuple[str, list[Row]]]] = {
+            name: self._groups(name) for name in tables
+        }
         self._heads: dict[Name, tuple[str, list[Row]] | None] = {
             name: next(stream, None) for name, stream in self._streams.items()
         }
