@@ -20,6 +20,7 @@ from sim_validate.cli import (
     dataset_flags,
     execution_flags,
     hand_flags,
+    look_flags,
     showing_flags,
     transfer_flags,
 )
@@ -50,6 +51,9 @@ ACTIONS: dict[type[Any], str] = {
     dataset_flags.Import: "dataset:import_dataset",
     dataset_flags.Verify: "dataset:verify_dataset",
     dataset_flags.Export: "dataset:export_dataset",
+    look_flags.Merge: "datasets.looks:merge_datasets",
+    look_flags.Stats: "datasets.looks:count_dataset",
+    look_flags.SampleRows: "datasets.looks:sample_dataset",
     baseline_flags.Record: "baseline:record_baseline",
     baseline_flags.Check: "baseline:check_baseline",
     command_flags.Inspect: "objects:inspect_object",

@@ -20,6 +20,7 @@ from sim_validate.cli.execution_flags import TRIALS, Executing
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
 from sim_validate.datasets.given_contacts import read_given
+from sim_validate.datasets.learning.settings import Learning
 from sim_validate.execution.verdict import Fate
 from sim_validate.main import main
 from sim_validate.records.setup_toml import setup_from_file
@@ -279,12 +280,16 @@ def test_the_page_of_errors_lists_all_there_are():
 
 
 def test_the_settings_of_a_dataset_are_all_shown(tmp_path):
-    (text,) = blocks(DATASETS, "toml")
+    text, more = blocks(DATASETS, "toml")
     path = tmp_path / "grasps.toml"
+    path.write_text(more)
+    learning = config_from_toml(path).learning
+    assert set(Learning.__dataclass_fields__) == set(tomllib.loads(more)["learning"])
+    assert learning.scale_of("wedge") == 0.5
     path.write_text(text)
     config = config_from_toml(path)
     shown = set(tomllib.loads(text))
-    assert set(DatasetConfig.__dataclass_fields__) - shown == {"contacts", "outward"}
+    assert set(DatasetConfig.__dataclass_fields__) - shown == {"contacts", "outward", "learning"}
     assert config.execution.settings.mass_kg == 0.3
     plain = DatasetConfig(objects=config.objects)
     told = {"objects", "frictions", "title", "license", "creator", "url", "published", "execution"}

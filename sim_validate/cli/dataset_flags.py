@@ -10,6 +10,7 @@ from grasp_core.checked import MOST_RANDOM_WRENCHES
 from sim_validate.cli.flag_bounds import FINITE, at_least
 from sim_validate.cli.flag_groups import Count, Friction, Positive, Seed, Speech
 from sim_validate.cli.learning_flags import Learned
+from sim_validate.cli.look_flags import Merge, SampleRows, Stats
 from sim_validate.datasets.columns import ExportFormat, SplitName
 from sim_validate.parallel.processes import available_cores
 
@@ -139,13 +140,16 @@ class Export:
 
 @dataclass(frozen=True, slots=True)
 class Dataset:
-    """Build a dataset of grasps of many objects, check a dataset, or export it."""
+    """Build a dataset of grasps of many objects; check, merge, show or export datasets."""
 
     action: OmitArgPrefixes[
         Annotated[Build, subcommand("build", prefix_name=False)]
         | Annotated[Import, subcommand("import", prefix_name=False)]
         | Annotated[Verify, subcommand("verify", prefix_name=False)]
         | Annotated[Export, subcommand("export", prefix_name=False)]
+        | Annotated[Merge, subcommand("merge", prefix_name=False)]
+        | Annotated[Stats, subcommand("stats", prefix_name=False)]
+        | Annotated[SampleRows, subcommand("sample", prefix_name=False)]
     ]
 
     @property

@@ -1,7 +1,9 @@
 """Flags for what a dataset holds on request for learners."""
 
 from dataclasses import asdict, dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
+
+from tyro.conf import UseAppendAction
 
 from sim_validate.cli.flag_bounds import at_least
 
@@ -20,6 +22,19 @@ class Learned:
     """Rows per grasp clearly above the critical friction."""
     moved_out: Varied = 0
     """Rows per grasp with contacts moved on their faces, each out of its region."""
+    figures: UseAppendAction[
+        tuple[Literal["closure", "symmetry", "approach", "payload", "least_squeeze"], ...]
+    ] = ()
+    """Figures that each grasp has; may be repeated (see docs/datasets.md for what each costs)."""
+    rests: bool = False
+    """Write a table of the poses in which objects rest."""
+    points: Annotated[int, at_least(0, up_to=100_000)] = 0
+    """Number of points with normals to draw on each object's surface."""
+    split_by: Literal["hash", "object", "class"] = "hash"
+    """How objects are divided: by the hash of each, or counted by object or by class of shape, so
+    that no split is empty."""
+    units_in_names: bool = False
+    """Read units from file names, as in bracket.mm.stl."""
     synthetic: Annotated[int, at_least(0, up_to=5)] = 5
     """Largest number of synthetic negative controls of each grasp."""
 

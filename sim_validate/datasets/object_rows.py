@@ -24,7 +24,9 @@ def split_of(object_id: str, seed: int) -> str:
 def object_row(body: Polyhedron, unit: WorkUnit) -> Mapping[str, Any]:
     """Make the row of a unit's object."""
     asked, config = unit.config.learning, unit.config
-    more = {} if asked is None else object_cells(body, unit.object, asked, config.unit, config.seed)
+    more: Mapping[str, Any] = {}
+    if asked is not None:
+        more = object_cells(body, unit.object, asked, config.unit, config.seed)
     return {
         "object_id": body.content_sha256,
         "source_name": Path(unit.object).name,

@@ -250,11 +250,12 @@ def _objects(
         for name in OF_OBJECTS:
             if name in merged:
                 merged[name] = rows[0][name]
+        about_grasps: list[Name] = [name for name in config.tables if name not in OF_OBJECTS]
         for friction in config.frictions:
             beginning = id_beginning(object_id, friction)
             for reader, own in zip(having, rows, strict=True):
                 if reader.part.has(object_id, friction):
-                    for name in merged.keys() - set(OF_OBJECTS):
+                    for name in about_grasps:
                         merged[name] += [
                             row for row in own[name] if row["grasp_id"].startswith(beginning)
                         ]
@@ -267,8 +268,12 @@ class Reader:
 
     def __init__(self, part: Part, tables: Tables) -> None:
         self.part = part
-        self._streams = {name: self._groups(name) for name in tables}
-        self._heads = {name: next(stream, None) for name, stream in self._streams.items()}
+        self._streams: dict[Name, Iterator[tuple[str, list[Row]]]] = {
+            name: self._groups(name) for name in tables
+        }
+        self._heads: dict[Name, tuple[str, list[Row]] | None] = {
+            name: next(stream, None) for name, stream in self._streams.items()
+        }
 
     def rows_of(self, object_id: str) -> dict[Name, list[Row]]:
         """Return the rows of an object, whose name is after those that were asked for before."""

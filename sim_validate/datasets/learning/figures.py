@@ -44,14 +44,18 @@ class Figures:
         if "closure" not in self.asked.figures:
             return {}
         points, normals = stacked(contacts)
-        about = {"center": body.center_of_mass, "torque_scale": body.radius}
+        center, scale = body.center_of_mass, body.radius
         cells: dict[str, Any] = {}
         if len(contacts) == FINGERS:
             cells["span_angle_rad"] = span_angle(normals)
         ways = {
             "min_weight": lambda: min_weight(points, normals, friction),
-            "hull_volume_n6": lambda: hull_volume(points, normals, friction, **about),
-            "smallest_singular_value": lambda: smallest_singular_value(points, **about),
+            "hull_volume_n6": lambda: hull_volume(
+                points, normals, friction, center=center, torque_scale=scale
+            ),
+            "smallest_singular_value": lambda: smallest_singular_value(
+                points, center=center, torque_scale=scale
+            ),
         }
         for name, way in ways.items():
             try:

@@ -21,7 +21,9 @@ COMPACT, LONG = 0.6, 0.5
 middle to the longest side of a long one; others are flat."""
 
 
-def object_cells(body: Polyhedron, name: str, asked: Learning, unit: str, seed: int) -> Any:
+def object_cells(
+    body: Polyhedron, name: str, asked: Learning, unit: str, seed: int
+) -> Mapping[str, Any]:
     """Return the cells of an object's row that are there on request.
 
     Args:
@@ -75,18 +77,19 @@ def cloud(body: Polyhedron, count: int, seed: int) -> tuple[Array, Array]:
     """
     digest = hashlib.sha256(f"{seed} {body.content_sha256} cloud".encode()).digest()
     rng = np.random.default_rng(int.from_bytes(digest[:16], "big"))
-    corners = body.vertices[body.triangles]
+    corners: Array = body.vertices[body.triangles]
     inward = np.cross(corners[:, 2] - corners[:, 0], corners[:, 1] - corners[:, 0])
-    sizes = np.linalg.norm(inward, axis=1)
+    sizes: Array = np.linalg.norm(inward, axis=1)
+    drawn: Array = rng.random(count) * sizes.sum()
     chosen = np.minimum(
-        np.searchsorted(np.cumsum(sizes), rng.random(count) * sizes.sum(), side="right"),
+        np.searchsorted(np.cumsum(sizes), drawn, side="right"),
         int(np.flatnonzero(sizes)[-1]),
     )
-    u, v = rng.random((2, count))
-    over = u + v > 1.0
-    u, v = np.where(over, 1.0 - u, u)[:, None], np.where(over, 1.0 - v, v)[:, None]
+    ways: Array = rng.random((count, 2, 1))
+    ways = np.where(ways.sum(axis=1, keepdims=True) > 1.0, 1.0 - ways, ways)  # back into the half
     own = corners[chosen]
-    points = own[:, 0] + u * (own[:, 1] - own[:, 0]) + v * (own[:, 2] - own[:, 0])
+    sides = own[:, 1:] - own[:, :1]
+    points: Array = own[:, 0] + (ways * sides).sum(axis=1)
     return points, inward[chosen] / sizes[chosen, None]
 
 

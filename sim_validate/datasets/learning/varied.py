@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.objects.polyhedron import Polyhedron
@@ -43,9 +45,11 @@ def validated_with(
     if most == CONTROLS:
         return validate(body, grasp, friction, agenda=agenda)
     verdict = validate(body, grasp, friction, agenda=replace(agenda, controls=False))
-    found = list(negative_controls(body, grasp, friction, agenda.seed)) if most else []
+    found = list[Control]()
+    if most:
+        found += negative_controls(body, grasp, friction, agenda.seed)
     order = draws(agenda.seed, grasp.id, "synthetic", 0).permutation(len(found))
-    kept = [found[place] for place in sorted(order[:most].tolist())]
+    kept = [found[int(place)] for place in np.sort(order[:most])]
     controls = tuple(try_control(body, each, agenda, Setup()) for each in kept)
     return replace(verdict, controls=controls, agenda=agenda)
 

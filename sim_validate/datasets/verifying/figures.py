@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from grasp_core.arrays import Array
 from grasp_core.geometry.nearest_points import nearest_on_triangles
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
@@ -96,7 +97,8 @@ def _approach_faults(row: Row, body: Polyhedron) -> Iterator[str]:
         return
     radius, corners = row["approach_radius_m"], body.vertices[body.triangles]
     tips = np.array(row["contact_points_m"]) - radius * np.array(row["contact_normals"])
-    for tip, way in zip(tips, np.array(row["approach_directions"]), strict=True):
+    ways: Array = np.array(row["approach_directions"], dtype=np.float64)
+    for tip, way in zip(tips, ways, strict=True):
         for place in tip - np.linspace(0.0, body.radius, STEPS)[:, None] * way:
             away = nearest_on_triangles(corners, place) - place
             if np.linalg.norm(away, axis=1).min() < FREE * radius:

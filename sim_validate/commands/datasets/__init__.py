@@ -1,0 +1,1 @@
+"""Runs the commands that merge datasets and that show what they hold."""

@@ -1,0 +1,67 @@
+"""Runs the commands that merge datasets, count what one holds, and show some of its rows."""
+
+from pathlib import Path
+
+from grasp_core.errors import InputError
+from sim_validate.cli import look_flags
+from sim_validate.cli.console import Reporter
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.datasets.building.merge import merge
+from sim_validate.datasets.describing.stats import Stats, stats_of
+from sim_validate.datasets.open_dataset import select, splits_in_words
+from sim_validate.reports.datasets.sample_page import write_sample
+from sim_validate.reports.datasets.stats_page import write_stats
+
+
+def merge_datasets(command: look_flags.Merge, reporter: Reporter) -> int:
+    """Merge finished datasets into a new one."""
+    manifest = merge(command.datasets, command.out)
+    counts = ", ".join(f"{count} {name}" for name, count in manifest.rows().items())
+    reporter.say(f"{command.out}: {len(command.datasets)} datasets merged; {counts}")
+    reporter.say(splits_in_words(manifest))
+    reporter.document({"out": str(command.out), "rows": manifest.rows()})
+    return Exit.GOOD
+
+
+def count_dataset(command: look_flags.Stats, reporter: Reporter) -> int:
+    """Count what a dataset holds, and write a page about it if asked to."""
+    chosen = select(command.dataset, command.split)
+    stats = stats_of(chosen)
+    for line in _lines(stats):
+        reporter.say(line)
+    if command.out is not None:
+        _refuse_own(command.out, command.dataset)
+        page = write_stats(command.out, chosen.config().title, stats)
+        reporter.say(f"{page}")
+    reporter.document(stats.to_json())
+    return Exit.GOOD
+
+
+def sample_dataset(command: look_flags.SampleRows, reporter: Reporter) -> int:
+    """Write a page with some rows of a dataset and their pictures."""
+    chosen = select(command.dataset, command.split)
+    _refuse_own(command.out, command.dataset)
+    title = chosen.config().title
+    count = write_sample(command.out, chosen, title, command.count, command.seed)
+    reporter.say(f"{command.out}: {count} rows")
+    reporter.document({"out": str(command.out), "rows": count})
+    return Exit.GOOD
+
+
+def _lines(stats: Stats) -> list[str]:
+    lines = [", ".join(f"{count} {name}" for name, count in stats.rows.items())]
+    for name, counts in stats.counts.items():
+        total = sum(counts.values())
+        each = sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
+        shares = ", ".join(f"{word} {count} ({count / total:.0%})" for word, count in each)
+        lines.append(f"{name}: {shares}")
+    for kind, counts in stats.survival.items():
+        outcomes = ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items()))
+        lines.append(f"{kind}: {outcomes}")
+    return lines
+
+
+def _refuse_own(out: Path, dataset: Path) -> None:
+    """Refuse to write into the dataset, which would then have a file that is not its own."""
+    if out.resolve().is_relative_to(dataset.resolve()):
+        raise InputError(f"{out}: this folder is in the dataset {dataset}; give another --out")
