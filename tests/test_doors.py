@@ -10,7 +10,7 @@ from typing import get_args
 
 import pytest
 
-from sim_validate.cli import baseline_flags, dataset_flags, look_flags
+from sim_validate.cli import baseline_flags, dataset_flags
 from sim_validate.cli.command_flags import Command
 from sim_validate.main import ACTIONS
 
@@ -150,7 +150,7 @@ def test_a_plan_that_finds_its_loops_imports_only_what_planning_needs(tmp_path):
 def test_every_command_has_its_function():
     flags = dataset_flags
     actions = {flags.Build, flags.Import, flags.Verify, flags.Export}
-    actions |= {look_flags.Merge, look_flags.Stats, look_flags.SampleRows}
+    actions |= {dataset_flags.Merge, dataset_flags.Stats, dataset_flags.SampleRows}
     actions |= {baseline_flags.Record, baseline_flags.Check}
     named = set(get_args(Command)) - {flags.Dataset, baseline_flags.Baseline} | actions
     assert set(ACTIONS) == named

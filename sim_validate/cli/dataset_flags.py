@@ -10,7 +10,6 @@ from grasp_core.checked import MOST_RANDOM_WRENCHES
 from sim_validate.cli.flag_bounds import FINITE, at_least
 from sim_validate.cli.flag_groups import Count, Friction, Positive, Seed, Speech
 from sim_validate.cli.learning_flags import Learned
-from sim_validate.cli.look_flags import Merge, SampleRows, Stats
 from sim_validate.datasets.columns import ExportFormat, SplitName
 from sim_validate.parallel.processes import available_cores
 
@@ -135,6 +134,48 @@ class Export:
     """Folder to write to; it must be empty or not exist."""
     split: SplitName | None = None
     """Export only the objects of this split; if not given, all objects."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
+@dataclass(frozen=True, slots=True)
+class Merge:
+    """Merge finished datasets of the same settings; their objects and frictions may differ."""
+
+    datasets: Positional[tuple[Path, ...]]
+    """Folders of the datasets; of an object that several have, the first counts."""
+    out: Path
+    """Folder of the merged dataset; it must be empty or not exist."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
+@dataclass(frozen=True, slots=True)
+class Stats:
+    """Count a dataset's rows by kind and outcome, and show how its numbers spread."""
+
+    dataset: Positional[Path]
+    """Folder of the dataset."""
+    out: Path | None = None
+    """Folder for a page with charts and for the numbers as JSON; if not given, only counts are
+    printed."""
+    split: SplitName | None = None
+    """Count only the objects of this split; if not given, all objects."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
+@dataclass(frozen=True, slots=True)
+class SampleRows:
+    """Show some rows of a dataset on a page, with pictures of their contacts."""
+
+    dataset: Positional[Path]
+    """Folder of the dataset."""
+    out: Path
+    """Folder for the page."""
+    count: Annotated[int, at_least(1, up_to=1000)] = 50
+    """Number of rows."""
+    seed: Seed = 0
+    """Seed of the random choice of the rows."""
+    split: SplitName | None = None
+    """Show only objects of this split; if not given, all objects."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 

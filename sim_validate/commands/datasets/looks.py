@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from grasp_core.errors import InputError
-from sim_validate.cli import look_flags
+from sim_validate.cli import dataset_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.building.merge import merge
@@ -13,7 +13,7 @@ from sim_validate.reports.datasets.sample_page import write_sample
 from sim_validate.reports.datasets.stats_page import write_stats
 
 
-def merge_datasets(command: look_flags.Merge, reporter: Reporter) -> int:
+def merge_datasets(command: dataset_flags.Merge, reporter: Reporter) -> int:
     """Merge finished datasets into a new one."""
     manifest = merge(command.datasets, command.out)
     counts = ", ".join(f"{count} {name}" for name, count in manifest.rows().items())
@@ -23,7 +23,7 @@ def merge_datasets(command: look_flags.Merge, reporter: Reporter) -> int:
     return Exit.GOOD
 
 
-def count_dataset(command: look_flags.Stats, reporter: Reporter) -> int:
+def count_dataset(command: dataset_flags.Stats, reporter: Reporter) -> int:
     """Count what a dataset holds, and write a page about it if asked to."""
     chosen = select(command.dataset, command.split)
     stats = stats_of(chosen)
@@ -37,7 +37,7 @@ def count_dataset(command: look_flags.Stats, reporter: Reporter) -> int:
     return Exit.GOOD
 
 
-def sample_dataset(command: look_flags.SampleRows, reporter: Reporter) -> int:
+def sample_dataset(command: dataset_flags.SampleRows, reporter: Reporter) -> int:
     """Write a page with some rows of a dataset and their pictures."""
     chosen = select(command.dataset, command.split)
     _refuse_own(command.out, command.dataset)

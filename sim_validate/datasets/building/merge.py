@@ -56,8 +56,9 @@ class Part:
     def has(self, object_id: str, friction: float) -> bool:
         """Return whether the dataset has an object at a friction."""
         row = self.objects.get(object_id)
-        here = row is not None and friction in self.config.frictions
-        return here and (row["source_sha256"], friction) not in self.gone
+        if row is None or friction not in self.config.frictions:
+            return False
+        return (row["source_sha256"], friction) not in self.gone
 
 
 def merge(folders: Sequence[Path], out: Path) -> Manifest:
