@@ -39,7 +39,7 @@ def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Foun
     polygons = grounds.polygons()
     at = np.empty((POINTS, 2))
     for place, p in enumerate(on.tolist()):
-        at[place] = rng.dirichlet(np.ones(len(polygons[p]))) @ polygons[p]
+        at[place] = rng.dirichlet(np.ones(int(grounds.counts[p]))) @ polygons[p]
     supports = _supports(grounds, searching.friction, on, at, twists)
     sets = np.sort(rng.integers(POINTS, size=(SETS, FINGERS)), axis=1)
     bounds = np.concatenate(
