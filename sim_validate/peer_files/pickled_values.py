@@ -92,7 +92,9 @@ class _Reader:
 
     def items(self) -> list[Any]:
         """Take the items above the last mark."""
-        place = max(i for i, each in enumerate(self.stack) if each is _End)
+        place = len(self.stack) - 1  # looked for from the top, so that each item is met once
+        while self.stack[place] is not _End:
+            place -= 1
         found = self.stack[place + 1 :]
         del self.stack[place:]
         return found

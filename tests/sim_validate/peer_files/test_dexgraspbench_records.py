@@ -225,6 +225,9 @@ def test_what_holds_itself_or_a_thousand_copies_takes_no_time():
     circle.append(circle)
     with pytest.raises(InputError, match="holds itself"):
         pickled_value(pickle.dumps({"circle": circle}))
+    for wrong in (b"u.", b"\x80\x02]u.", b"\x80\x02(."):
+        with pytest.raises(InputError):
+            pickled_value(wrong)
     deep = []
     for _ in range(30):
         deep = [deep]
