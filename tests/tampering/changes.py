@@ -16,6 +16,8 @@ def places(value, name=""):
     """Names of all fields in a value, with their nearest dataclass, without repeats."""
     if dataclasses.is_dataclass(value):
         for field in dataclasses.fields(value):
+            if not field.init:
+                continue  # kept beside the fields, and no part of what is claimed
             inner = f"{name}.{field.name}" if name else field.name
             yield from dict.fromkeys(places(getattr(value, field.name), inner))
         return

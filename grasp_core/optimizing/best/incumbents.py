@@ -38,8 +38,9 @@ def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Foun
     on = rng.integers(len(grounds.counts), size=POINTS)
     polygons = grounds.polygons()
     at = np.empty((POINTS, 2))
-    for place, p in enumerate(on.tolist()):
-        at[place] = rng.dirichlet(np.ones(int(grounds.counts[p]))) @ polygons[p]
+    for place in range(POINTS):
+        polygon = polygons[int(on[place])]
+        at[place] = rng.dirichlet(np.ones(len(polygon))) @ polygon
     supports = _supports(grounds, searching.friction, on, at, twists)
     sets = np.sort(rng.integers(POINTS, size=(SETS, FINGERS)), axis=1)
     bounds = np.concatenate(

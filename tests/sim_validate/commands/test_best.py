@@ -1,0 +1,62 @@
+"""The command `plan --best`."""
+
+import json
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.optimizing.best.proof_file import read_proof
+from sim_validate.main import main
+
+ASKED = ["plan", "tetrahedron", "--limit", "2", "--family", "concurrent", "--best"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("best")
+    assert main([*ASKED, "--gap", "0.2", "--out", str(folder), "-q"]) == 0
+    return folder
+
+
+def test_the_best_grasp_comes_first_and_its_proof_holds(folder):
+    best = json.loads((folder / "best.json").read_text())
+    grasps = gc.load_grasps(folder / "grasps.json")
+    proof = read_proof(folder / best["proof"])
+    assert proof.verify()
+    assert proof.bound == best["bound_n"]
+    assert grasps[0].id == best["grasp"]["id"]
+    assert np.allclose(grasps[0].positions, best["grasp"]["positions_m"], rtol=0.0, atol=1e-12)
+    assert best["quality_n"][0] <= best["bound_n"]
+    assert best["gap"] <= 0.2
+    assert best["ended"] == "gap"
+    assert [now["bound_n"] for now in best["history"]][-1] == best["bound_n"]
+
+
+def test_planned_grasps_are_compared_with_the_bound(folder):
+    best = json.loads((folder / "best.json").read_text())
+    assert len(best["planned"]) == len(gc.load_grasps(folder / "grasps.json")) - 1 > 0
+    for grasp in best["planned"]:
+        assert grasp["share_of_bound"] == grasp["quality_n"][0] / best["bound_n"]
+
+
+def test_json_is_one_document(capsys):
+    assert main([*ASKED, "--gap", "0.3", "--json"]) == 0
+    out = capsys.readouterr().out
+    assert json.loads(out)["proof"] is None
+
+
+def test_a_time_limit_ends_with_the_gap_reached(capsys):
+    assert main([*ASKED, "--gap", "0.001", "--time-limit-s", "0.1"]) == 6
+    assert "the time limit is reached" in capsys.readouterr().out
+
+
+def test_new_results_replace_old_ones(tmp_path):
+    (tmp_path / "best.json").write_text("{}")
+    assert main(["plan", "tetrahedron", "--limit", "1", "--out", str(tmp_path), "-q"]) == 0
+    assert not (tmp_path / "best.json").exists()
+
+
+@pytest.mark.parametrize("flags", [["--gap", "0"], ["--gap", "1"], ["--time-limit-s", "0"]])
+def test_values_out_of_range_are_usage_errors(flags):
+    assert main([*ASKED, *flags]) == 2
