@@ -21,10 +21,10 @@ import sim_validate
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 
 FOLDS = 5
-HIDDEN = 32
-STEPS = 1500
+HIDDEN = 16
+STEPS = 600
 RATE = 3e-3
-DECAY = 1e-3
+DECAY = 0.1
 NETWORKS = 5
 """Number of networks, each started elsewhere, whose predictions are averaged."""
 HARD = ("planned", "moved_out", "mass_near")
@@ -85,8 +85,8 @@ def rows_of(folder: Path) -> Rows:
     shape = invariants(points, grasps["contact_normals"])
     figures = np.column_stack([np.nan_to_num(grasps[name]) for name in FIGURES])
     quality = np.nan_to_num(grasps["ferrari_canny_lower_n"])
-    inputs = np.column_stack([shape, figures, np.log(grasps["friction"]), np.log(weight),
-                              np.log(radius), np.log(quality + LEAST), quality / weight])  # fmt: skip
+    logarithms = np.log(np.column_stack([grasps["friction"], weight, radius, quality + LEAST]))
+    inputs = np.column_stack([shape, figures, logarithms, quality / weight])
     return Rows(
         inputs=inputs,
         survived=np.asarray(grasps["survived"], dtype=float),
