@@ -21,12 +21,15 @@ import sim_validate
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 
 FOLDS = 5
-HIDDEN = 32
-STEPS = 1500
+HIDDEN = 16
+STEPS = 600
 RATE = 3e-3
-DECAY = 1e-3
+DECAY = 0.1
 NETWORKS = 5
 """Number of networks, each started elsewhere, whose predictions are averaged."""
+HARD = ("planned", "moved_out", "mass_near")
+LEAST = 1e-3
+"""Quality below which grasps are not told apart [N]."""
 FIGURES = ("closure_margin", "min_weight", "hull_volume_n6", "smallest_singular_value")
 SETTINGS = """\
 objects = [{objects}]
@@ -59,6 +62,8 @@ class Rows:
     planned: np.ndarray
     quality: np.ndarray
     """Ferrari-Canny's quality; 0 where contacts are not in force closure, (n,) [N]."""
+    hard: np.ndarray
+    """Whether a row is of a kind that the friction alone does not decide, (n,)."""
     weight: np.ndarray
     objects: np.ndarray
     """Number of the object, (n,)."""
@@ -79,13 +84,16 @@ def rows_of(folder: Path) -> Rows:
     points = (grasps["contact_points_m"] - center[:, None]) / radius[:, None, None]
     shape = invariants(points, grasps["contact_normals"])
     figures = np.column_stack([np.nan_to_num(grasps[name]) for name in FIGURES])
-    inputs = np.column_stack([shape, figures, grasps["friction"], np.log(weight), np.log(radius)])
+    quality = np.nan_to_num(grasps["ferrari_canny_lower_n"])
+    logarithms = np.log(np.column_stack([grasps["friction"], weight, radius, quality + LEAST]))
+    inputs = np.column_stack([shape, figures, logarithms, quality / weight])
     return Rows(
         inputs=inputs,
         survived=np.asarray(grasps["survived"], dtype=float),
         controls=np.array([each is not None for each in grasps["control_of"]]),
         planned=grasps["kind"] == "planned",
-        quality=np.nan_to_num(grasps["ferrari_canny_lower_n"]),
+        quality=quality,
+        hard=np.isin(grasps["kind"], HARD),
         weight=weight,
         objects=number,
     )
@@ -154,14 +162,14 @@ def predicted(rows: Rows, learned: np.ndarray, labels: np.ndarray, asked: np.nda
     return found / NETWORKS
 
 
-def scores_of(rows: Rows) -> dict[str, list[float]]:
-    """Return the area under the curve of each score in each part of the objects."""
+def scores_of(rows: Rows) -> dict[str, list[tuple[float, float]]]:
+    """Return the areas under the curve of each score, of all rows and of hard ones, by part."""
     order = np.random.default_rng(0).permutation(rows.objects.max() + 1)
     part = np.empty(len(order), dtype=int)
     part[order] = np.arange(len(order)) % FOLDS
     known = ~np.isnan(rows.survived)
     synthetic = rows.controls | rows.planned
-    found: dict[str, list[float]] = {}
+    found: dict[str, list[tuple[float, float]]] = {}
     for fold in range(FOLDS):
         seen = part[rows.objects] != fold
         asked = ~seen & known
@@ -176,7 +184,9 @@ def scores_of(rows: Rows) -> dict[str, list[float]]:
             "network, survival": predicted(rows, seen & known, rows.survived, asked),
         }
         for name, values in scores.items():
-            found.setdefault(name, []).append(area_under_curve(values, labels))
+            hard = rows.hard[asked]
+            areas = area_under_curve(values, labels), area_under_curve(values[hard], labels[hard])
+            found.setdefault(name, []).append(areas)
     return found
 
 
@@ -217,8 +227,9 @@ def main() -> None:
         f"{int((known & (rows.quality > 0.0) & (rows.survived == 0.0)).sum())} of these in closure"
     )
     for name, areas in scores_of(rows).items():
-        listed = ", ".join(f"{area:.3f}" for area in areas)
-        print(f"{name:30} {np.mean(areas):.3f}  ({listed})")
+        every, hard = np.array(areas).T
+        listed = ", ".join(f"{area:.3f}" for area in hard)
+        print(f"{name:30} all {every.mean():.3f}, {', '.join(HARD)} {hard.mean():.3f} ({listed})")
 
 
 if __name__ == "__main__":

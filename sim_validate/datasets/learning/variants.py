@@ -30,7 +30,7 @@ from sim_validate.validation.controls import LEAST_FRICTION
 RATIOS = {
     "friction_below": (0.6, 0.9),
     "friction_near": (0.95, 1.05),
-    "friction_above": (1.1, 1.6),
+    "friction_above": (1.1, 5.0),
     "mass_near": (0.6, 1.6),
 }
 """Least and largest ratio of a varied friction or mass to the one at which the verdict changes.

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from grasp_core.closure.contact_arrays import contacts_sha256
-from grasp_core.errors import InputError, NoForcesError
+from grasp_core.errors import InputError, NoForcesError, UnfaithfulError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from sim_validate.datasets.execution_rows import Executed, executed_by
@@ -112,7 +112,8 @@ class Varying:
             if variant.mass_kg is not None:
                 settings = replace(settings, mass_kg=variant.mass_kg)
             return executed_by(partial(_executed_with, variant), settings, self.asked.seeds)
-        except InputError as error:
+        except (InputError, UnfaithfulError) as error:
+            # a varied mass or friction may be beyond what the simulator is faithful for
             return str(error)
 
 

@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.errors import UnfaithfulError
 from grasp_core.values import Contact, ContactRegion
 from scenes.example_objects import example_object
 from sim_validate.datasets.building.build import build
 from sim_validate.datasets.config import config_from_toml, config_to_toml
+from sim_validate.datasets.execution_rows import execution_cells
+from sim_validate.datasets.learning import varied as varied_grasps
 from sim_validate.datasets.learning.settings import OF_GRASPS, Learning
 from sim_validate.datasets.learning.variants import RATIOS, region_exit, variants
+from sim_validate.datasets.learning.varied import Varying
 from sim_validate.datasets.verifying.redo import Sample
 from sim_validate.datasets.verifying.verify import verify
+from sim_validate.simulation.setup import Agenda
+from sim_validate.validation.validation import validate
 from tests.sim_validate.datasets.engines import Here, contents, silent
 from tests.sim_validate.datasets.forging import forged
 from tests.sim_validate.datasets.learned import BODIES, LEARNED, rows_of
@@ -165,6 +171,22 @@ def test_draws_depend_on_the_seed_and_not_on_what_else_is_asked_for():
     assert len(alone) == len(other) == 1
     assert np.array_equal(alone[0].displaced_m, first.displaced_m)
     assert not np.array_equal(alone[0].displaced_m, other[0].displaced_m)
+
+
+def test_a_varied_grasp_beyond_the_simulator_leaves_the_others(monkeypatch):
+    """The row says why its survival is not known."""
+
+    def unfaithful(*_, **__):
+        raise UnfaithfulError("the simulator is not faithful here")
+
+    (grasp,) = gc.plan(WEDGE, 0.5, families=("concurrent",), limit=1).grasps
+    varying = Varying(Learning(moved_out=1), 0.5, Agenda(), LEARNED.execution)
+    verdict = validate(WEDGE, grasp, 0.5, agenda=Agenda(controls=False))
+    monkeypatch.setattr(varied_grasps, "execute", unfaithful)
+    (tried,) = varying.of(WEDGE, grasp, verdict, None)
+    assert tried.executed == "the simulator is not faithful here"
+    assert execution_cells(tried.executed)["executed"] is False
+    assert "survived" not in execution_cells(tried.executed)
 
 
 def test_a_square_region_ends_at_its_side():
