@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array, to_digits
+from grasp_core.arrays import Array
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.polyhedron import Polyhedron
 from sim_validate.datasets.learning.settings import Learning
@@ -106,5 +106,5 @@ def rest_rows(body: Polyhedron) -> Iterator[Mapping[str, Any]]:
             "down": rest.down.tolist(),
             "height_m": rest.height,
             "likelihood": rest.likelihood,
-            "T_table_object_m": to_digits(pose).tolist(),
+            "T_table_object_m": pose.tolist(),
         }

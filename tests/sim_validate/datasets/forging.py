@@ -8,10 +8,19 @@ from sim_validate.datasets.parquet import parquet_bytes, read_rows
 
 
 def forged(folder, name, change):
-    """Change rows of one table of a dataset, and write the hashes that match."""
-    path = next(folder.glob(f"data/{name}/*.parquet"))
-    rows = read_rows(path, name, read_manifest(folder).tables)
-    change(rows)
+    """Change rows of one table of a dataset, and write the hashes that match.
+
+    The rows are those of the first file in which the change finds what it looks for.
+    """
+    for path in folder.glob(f"data/{name}/*.parquet"):
+        rows = read_rows(path, name, read_manifest(folder).tables)
+        try:
+            change(rows)
+        except StopIteration:
+            continue
+        break
+    else:
+        raise LookupError(f"no row of {name} is as the change wants it")
     data = parquet_bytes(name, rows, {}, read_manifest(folder).tables)
     path.write_bytes(data)
     manifest, name = read_manifest(folder), path.relative_to(folder).as_posix()

@@ -80,13 +80,13 @@ def test_an_object_rests_on_the_table_with_its_centre_of_mass_above(learned):
     assert set(Counter(row["object_id"] for row in rows)) == set(BODIES)
     for row in rows:
         body, pose = BODIES[row["object_id"]], np.array(row["T_table_object_m"])
-        assert pose[:3, :3] @ pose[:3, :3].T == pytest.approx(np.eye(3), abs=1e-7)  # to digits
+        assert pose[:3, :3] @ pose[:3, :3].T == pytest.approx(np.eye(3), abs=1e-9)
         placed = body.vertices @ pose[:3, :3].T + pose[:3, 3]
         assert placed[:, 2].min() == pytest.approx(0.0, abs=1e-7 * body.radius)
         assert (placed[:, 2] < 1e-6 * body.radius).sum() >= 3
         center = pose[:3, :3] @ body.center_of_mass + pose[:3, 3]
         assert center == pytest.approx([0.0, 0.0, row["height_m"]], abs=1e-7 * body.radius)
-        assert pose[:3, :3] @ row["down"] == pytest.approx([0.0, 0.0, -1.0], abs=1e-7)
+        assert pose[:3, :3] @ row["down"] == pytest.approx([0.0, 0.0, -1.0], abs=1e-9)
 
 
 def test_the_likelihoods_of_a_box_fill_the_sphere():
