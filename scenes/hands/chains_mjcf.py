@@ -134,3 +134,22 @@ def add_exclusions(contact: Element, hand: Hand) -> None:
         pairs |= {tuple(sorted(pair)) for pair in pairwise(chain)}
     for one, other in sorted(pairs):
         add_element(contact, "exclude", {"body1": one, "body2": other})
+
+
+def add_servo(
+    actuators: Element, joint: str, stiffness: float, damping: float, limit: float
+) -> None:  # fmt: skip
+    """Add the servo of a joint.
+
+    Args:
+        actuators: The scene's actuators.
+        joint: Name of the joint, and of its servo.
+        stiffness: Torque per angle from the command [N m/rad].
+        damping: Torque per speed [N m s/rad].
+        limit: Largest torque either way [N m].
+    """
+    servo = {
+        "name": joint, "joint": joint, "kp": stiffness, "kv": damping, "ctrllimited": "false",
+        "forcelimited": "true", "forcerange": (-limit, limit),
+    }  # fmt: skip
+    add_element(actuators, "position", servo)

@@ -18,7 +18,13 @@ from grasp_core.files.whole_files import write_parts
 from grasp_core.hands.hand import PALM, Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.hands.chains_mjcf import Chains, add_exclusions, add_fingers, placed
+from scenes.hands.chains_mjcf import (
+    Chains,
+    add_exclusions,
+    add_fingers,
+    add_servo,
+    placed,
+)
 from scenes.hands.hand_layout import HandLayout, hand_layout
 from scenes.mjcf import Scene, add_object, opened
 from scenes.mjcf_text import Element, add_element, as_texts, document
@@ -127,7 +133,9 @@ def add_hand(
     add_exclusions(add_element(root, "contact", {}), layout.hand)
     actuators = add_element(root, "actuator", {})
     for joint, limit in zip(layout.hand.joints, layout.motors.limits.tolist(), strict=True):
-        _servo(actuators, layout, joint.name, limit)
+        add_servo(
+            actuators, joint.name, layout.servo_n_m_per_rad, layout.damping_n_m_s_per_rad, limit
+        )
 
 
 def _tip(layout: HandLayout, finger: int, contact: Mapping[str, object]) -> Mapping[str, object]:
@@ -135,12 +143,3 @@ def _tip(layout: HandLayout, finger: int, contact: Mapping[str, object]) -> Mapp
     touching = [place for place, used in enumerate(layout.used_fingers) if used == finger]
     pads = {"conaffinity": 1 << touching[0]} if touching else {}
     return {"friction": (layout.friction, layout.torsion_m, 0.0), **contact, **pads}
-
-
-def _servo(actuators: Element, layout: HandLayout, name: str, limit: float) -> None:
-    servo = {
-        "name": name, "joint": name, "kp": layout.servo_n_m_per_rad,
-        "kv": layout.damping_n_m_s_per_rad, "ctrllimited": "false", "forcelimited": "true",
-        "forcerange": (-limit, limit),
-    }  # fmt: skip
-    add_element(actuators, "position", servo)

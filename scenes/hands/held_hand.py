@@ -24,9 +24,11 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from grasp_core.arrays import Array, cross, to_digits
+from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
 from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand_grips import HandGrip
 from grasp_core.hands.hand_motors import hand_motors
 from grasp_core.hands.kinematics import HandPlaces, places
 from grasp_core.hands.reach import HandReach
@@ -236,7 +238,7 @@ def held_hand_layout(  # noqa: PLR0913, PLR0917 - a hand, an object, and how the
         hand: The hand, with a torque limit for each joint.
         body: The object.
         reach: The pose in which the hand stands.
-        grip: The pose's contacts with their squeeze, on the springs of `finger_springs`.
+        grip: The pose's contacts with their squeeze, on the servos of `servo_stiffness`.
         mass_kg: Mass of the object [kg].
         settings: Masses and damping of the fingers, and the direction of gravity.
         reach_m: See `held_layout`.
@@ -249,7 +251,7 @@ def held_hand_layout(  # noqa: PLR0913, PLR0917 - a hand, an object, and how the
     size = mean_lever(motors) ** 2
     levers = motors.levers.reshape(len(motors.limits), -1, 3).transpose(1, 0, 2)
     shares = np.einsum("kij,kli,klm,kmj->kj", base.axes, levers, levers, base.axes)  # L'L, diagonal
-    servo = float((base.stiffness * shares).mean())  # equal in all, by (1)
+    servo = instance(grip, HandGrip, "grip", "hand_grip makes one").servo_n_m_per_rad
     armature = settings.tip_mass_kg * size
     share_kg = mass_kg / len(base.contacts) + settings.tip_mass_kg
     damping = 2.0 * settings.damping_ratio * np.sqrt(servo * share_kg * size)
@@ -260,7 +262,7 @@ def held_hand_layout(  # noqa: PLR0913, PLR0917 - a hand, an object, and how the
     own["damping"] = damping / shares
     return HeldHandLayout(
         **own, hand=hand, angles=to_digits(angles), palm_pose=to_digits(pose),
-        used_fingers=stance.fingers, motors=motors, servo_n_m_per_rad=_rounded(servo),
+        used_fingers=stance.fingers, motors=motors, servo_n_m_per_rad=servo,
         damping_n_m_s_per_rad=_rounded(damping), armature_kg_m2=_rounded(armature),
         inertias=armature / shares,
     )  # fmt: skip

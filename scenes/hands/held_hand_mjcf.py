@@ -19,9 +19,15 @@ from scenes.execution.held_mjcf import (
     held_physics,
     opened,
 )
-from scenes.hands.chains_mjcf import Chains, add_exclusions, add_fingers, placed
+from scenes.hands.chains_mjcf import (
+    Chains,
+    add_exclusions,
+    add_fingers,
+    add_servo,
+    placed,
+)
 from scenes.hands.held_hand import HeldHandLayout, held_hand_layout
-from scenes.mjcf_text import Element, add_element, document
+from scenes.mjcf_text import add_element, document
 from scenes.physics import PhysicsSettings
 
 WRIST = "wrist"
@@ -60,19 +66,12 @@ def held_hand_text(layout: HeldHandLayout, physics: PhysicsSettings) -> str:
     actuators = add_element(root, "actuator", {})
     limits = layout.motors.limits.tolist()
     for joint, limit in zip(layout.hand.joints, limits, strict=True):
-        _servo(actuators, layout, joint.name, limit)
+        add_servo(
+            actuators, joint.name, layout.servo_n_m_per_rad, layout.damping_n_m_s_per_rad, limit
+        )
     add_start(root, layout)
     return document(root)
 
 
 def _rubbing(layout: HeldHandLayout, contact: int) -> tuple[float, float, float]:
     return float(layout.friction[contact]), 0.0, 0.0
-
-
-def _servo(actuators: Element, layout: HeldHandLayout, name: str, limit: float) -> None:
-    servo = {
-        "name": name, "joint": name, "kp": layout.servo_n_m_per_rad,
-        "kv": layout.damping_n_m_s_per_rad, "ctrllimited": "false", "forcelimited": "true",
-        "forcerange": (-limit, limit),
-    }  # fmt: skip
-    add_element(actuators, "position", servo)

@@ -45,9 +45,9 @@ class DexRecord(ByValue):
     pregrasp: Array
     """Pose of the hand's root, then joint angles, (7 + j,) [m, rad]."""
     grasp: Array
-    """The same where the hand touches, (7 + j,)."""
+    """Pose of the root and joint angles where the hand touches, (7 + j,) [m, rad]."""
     squeeze: Array
-    """The same as servos are told to squeeze, (7 + j,)."""
+    """Pose of the root and joint angles that servos are told to squeeze with, (7 + j,) [m, rad]."""
 
     def __post_init__(self) -> None:
         text(self.object_path, "object_path")

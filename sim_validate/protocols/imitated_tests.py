@@ -3,6 +3,8 @@
 MuJoCo reproduces none of their contacts, so each is an imitation, and says so.
 """
 
+from dataclasses import replace
+
 from scenes.physics import PhysicsSettings
 from sim_validate.protocols.mujoco_tests import SIX, scaled
 from sim_validate.protocols.published import Passing, PublishedProtocol, Run, Source, Step, Triple
@@ -164,30 +166,17 @@ MULTIGRIPPERGRASP = PublishedProtocol(
     passing=Passing(most_m=0.3, since="after closing"),
     physics=OUR_PHYSICS,
 )
-MULTIGRIPPERGRASP_AXES = PublishedProtocol(
+MULTIGRIPPERGRASP_AXES = replace(
+    MULTIGRIPPERGRASP,
     name="multigrippergrasp-axes",
     version="branch main, test axes_forces, 6 s",
-    sources=MGG_SOURCES,
-    imitates=f"{PHYSX}.",
-    ours=MGG_OURS,
-    friction=1.0,
-    timestep_s=1.0 / 240.0,
-    close_s=0.4,
-    squeeze_s=0.4,
     runs=(tuple(Step(1.0, pull_m_s2=scaled(way, 0.5), look_s=0.1) for way in SIX),),
     passing=Passing(most_m=0.02),
-    physics=OUR_PHYSICS,
 )
-MULTIGRIPPERGRASP_RAMP = PublishedProtocol(
+MULTIGRIPPERGRASP_RAMP = replace(
+    MULTIGRIPPERGRASP,
     name="multigrippergrasp-ramp",
     version="branch main, test gradual_gravity, 3 s",
-    sources=MGG_SOURCES,
-    imitates=f"{PHYSX}.",
-    ours=MGG_OURS,
-    friction=1.0,
-    timestep_s=1.0 / 240.0,
-    close_s=0.4,
-    squeeze_s=0.4,
     runs=(
         (
             Step(2.1, pull_m_s2=scaled(DOWN, MGG_G), rises=True, look_s=0.1),
@@ -195,7 +184,6 @@ MULTIGRIPPERGRASP_RAMP = PublishedProtocol(
         ),
     ),
     passing=Passing(most_m=0.1, since="after closing"),
-    physics=OUR_PHYSICS,
 )
 LIFT_S = 125.0 / 60.0 * 0.8
 """Eight of ten parts of the last phase, which has 125 of 200 steps of 1/60 s, lift the object."""

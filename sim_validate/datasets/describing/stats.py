@@ -24,7 +24,7 @@ class Spread:
     table: Name
     column: Column
     values: Array
-    """Those that are known, in ascending order, (n,)."""
+    """The numbers that are known, in ascending order, (n,)."""
     missing: int
 
     @property

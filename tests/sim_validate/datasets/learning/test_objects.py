@@ -55,7 +55,7 @@ def example_names():
 
 
 def test_points_lie_on_the_surface_with_its_normals_and_fill_it_evenly():
-    """Of n points a face with the share p of the area gets n p, give or take five deviations."""
+    """A face with the share p of the area gets n p of n points, within five deviations."""
     body, count = box(0.1, 0.2, 0.3), 6000
     points, normals = cloud(body, count, 0)
     for face in body.faces:
