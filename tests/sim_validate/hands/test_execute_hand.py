@@ -13,10 +13,9 @@ from tests.grasp_core.hands.gripping import FRICTION, scaled
 from tests.sim_validate.hands.executing import MASS, OBJECT, RADIUS, TORQUE, stood
 
 HANDS = ("allegro", "leap")
-STIFF = 20_000.0
-"""Stiffness at which what springs leave out, the squeeze over links' lengths, is small [N/m]."""
-NEAR = 0.05
-"""Relative error of multiples of first slip that is left then: some percent."""
+NEAR = 0.02
+"""Relative error of multiples of first slip: predictions are linear, and under these loads objects
+move by a hundredth of their radius; contacts in simulation creep by as much again at most."""
 
 
 def executed(name, **changes):
@@ -36,12 +35,14 @@ def test_a_hand_keeps_a_light_object_and_its_controls_let_go(name):
 
 
 @pytest.mark.parametrize("name", HANDS)
-def test_stiff_hands_slip_where_they_are_predicted_to(name):
-    found = executed(name, trials=("weight", "stop"), stiffness_n_per_m=STIFF)
+def test_hands_slip_where_they_are_predicted_to(name):
+    found = executed(name, trials=("weight", "shake", "stop"))
+    most = max(trial.displacement_m for trial in found.trials)
+    assert most <= 0.5 * NEAR * RADIUS
     multiples = np.array(
         [(trial.predicted_first_slip, trial.simulated_first_slip) for trial in found.trials]
     )
-    assert len(multiples) == 7
+    assert len(multiples) == 13
     assert multiples.min() > 1.0
     errors = multiples[:, 1] / multiples[:, 0] - 1.0
     assert np.abs(errors).max() < NEAR, errors
