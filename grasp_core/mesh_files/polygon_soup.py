@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
@@ -77,9 +78,28 @@ class Polygons:
         ):
             if wrong:
                 outside(where, corner + self.first, len(points))
-        for where, corners in self.large:
-            _check_fan(points[list(corners)], where)
+        self._check_fans(points)
         return points, np.array(self.triangles, dtype=np.int64).reshape(-1, 3)
+
+    def _check_fans(self, points: Array) -> None:
+        """Refuse the first polygon whose fan of triangles is ambiguous."""
+        of_size: dict[int, list[int]] = {}  # polygons of as many corners are checked together
+        for number, (_, corners) in enumerate(self.large):
+            of_size.setdefault(len(corners), []).append(number)
+        wrong = [
+            numbers[0]
+            for alike in of_size.values()
+            if len(numbers := np.array(alike)[_ambiguous_fans(self._corners(alike, points))])
+        ]
+        if wrong:
+            where = self.large[min(wrong)][0]
+            message = (
+                f"{where}: a face is dented or bent, so its shape is ambiguous; export triangles"
+            )
+            raise MeshError(MeshRefusal.POLYGON, message)
+
+    def _corners(self, numbers: list[int], points: Array) -> Array:
+        return points[np.array([self.large[number][1] for number in numbers])]
 
 
 def points_of(coordinates: "array[float]") -> Array:
@@ -97,16 +117,17 @@ def too_many(triangles: int, most: int) -> None:
     raise MeshError(MeshRefusal.TOO_MANY, message)
 
 
-def _check_fan(corners: Array, where: str) -> None:
-    """Refuse a polygon whose fan of triangles around the first corner overlaps or leaves it."""
+def _ambiguous_fans(corners: Array) -> NDArray[np.bool_]:
+    """Return which polygons (n, k, 3) overlap their fan around the first corner, or lie outside."""
     with np.errstate(over="ignore", invalid="ignore"):  # sizes are judged later
-        spokes = corners[1:] - corners[0]
-        crosses = np.cross(spokes[:-1], spokes[1:])
-        whole = crosses.sum(axis=0)
-        areas, dots = np.linalg.norm(crosses, axis=1), (spokes[:-1] * spokes[1:]).sum(axis=1)
-        folds = ((crosses @ whole) < -FOLDED * (whole @ whole)).any()
-        winds = np.arctan2(areas, dots).sum() > 2.0 * np.pi + FOLDED
-        flat = np.linalg.norm(whole) < FLATTEST * areas.sum()
-    if folds or winds or flat:
-        message = f"{where}: a face is dented or bent, so its shape is ambiguous; export triangles"
-        raise MeshError(MeshRefusal.POLYGON, message)
+        spokes = corners[:, 1:] - corners[:, :1]
+        crosses = np.cross(spokes[:, :-1], spokes[:, 1:])
+        whole = crosses.sum(axis=1)
+        areas = np.linalg.norm(crosses, axis=2)
+        dots = (spokes[:, :-1] * spokes[:, 1:]).sum(axis=2)
+        along = np.einsum("nij,nj->ni", crosses, whole)
+        length = np.linalg.norm(whole, axis=1)
+        folds = (along < -FOLDED * length[:, None] ** 2).any(axis=1)
+        winds = np.arctan2(areas, dots).sum(axis=1) > 2.0 * np.pi + FOLDED
+        flat = length < FLATTEST * areas.sum(axis=1)
+    return folds | winds | flat
