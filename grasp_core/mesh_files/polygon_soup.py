@@ -86,20 +86,21 @@ class Polygons:
         of_size: dict[int, list[int]] = {}  # polygons of as many corners are checked together
         for number, (_, corners) in enumerate(self.large):
             of_size.setdefault(len(corners), []).append(number)
-        wrong = [
-            numbers[0]
+        wrong = (
+            number
             for alike in of_size.values()
-            if len(numbers := np.array(alike)[_ambiguous_fans(self._corners(alike, points))])
-        ]
-        if wrong:
-            where = self.large[min(wrong)][0]
+            for number, ambiguous in zip(alike, self._ambiguous(alike, points), strict=True)
+            if ambiguous
+        )
+        if (first := min(wrong, default=None)) is not None:
+            where = self.large[first][0]
             message = (
                 f"{where}: a face is dented or bent, so its shape is ambiguous; export triangles"
             )
             raise MeshError(MeshRefusal.POLYGON, message)
 
-    def _corners(self, numbers: list[int], points: Array) -> Array:
-        return points[np.array([self.large[number][1] for number in numbers])]
+    def _ambiguous(self, numbers: list[int], points: Array) -> NDArray[np.bool_]:
+        return _ambiguous_fans(points[np.array([self.large[number][1] for number in numbers])])
 
 
 def points_of(coordinates: "array[float]") -> Array:
