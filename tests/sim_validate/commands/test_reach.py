@@ -163,6 +163,10 @@ def test_a_simulated_hand_holds_and_its_grasps_are_ranked(grasps, tmp_path, caps
     page = (tmp_path / "report" / "grasps" / f"{best}.html").read_text()
     assert "Held with its motors" in page
     assert "13 of 13 wrenches" in page
+    first = (tmp_path / "report" / "index.html").read_text()
+    assert '<option value="-hand">hand resists most</option>' in first
+    for each in reached:
+        assert f'data-hand="{each["simulated"]["weakest_n"]}"' in first
 
 
 def test_a_hand_without_torque_limits_is_not_simulated(grasps, capsys):
@@ -195,6 +199,11 @@ def test_a_hand_executes_the_grasps_that_it_reaches(grasps, tmp_path, capsys):
     page = (tmp_path / "report" / "grasps" / f"{reached[0]['id']}.html").read_text()
     assert "Executed with the hand" in page
     assert "Payload of the squeeze" in page
+    trials = reached[0]["executed"]["execution"]
+    said = f"survived {trials['trials'] - len(trials['lost'])} of {trials['trials']} trials"
+    first = (tmp_path / "report" / "index.html").read_text()
+    assert said in first
+    assert "hand resists most" not in first  # nothing was simulated for it
 
 
 def test_a_hand_too_weak_for_an_object_says_so(grasps, tmp_path, capsys):
