@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.hands.by_identity import kept_by_identity
 from grasp_core.hands.hand import PALM, Hand, LinkShape
 from grasp_core.hands.loop_values import HandArrays
 
@@ -32,6 +33,7 @@ class _Part:
     shape: LinkShape
 
 
+@kept_by_identity(16)
 @lru_cache(maxsize=16)
 def hand_arrays(hand: Hand) -> HandArrays:
     """Lay a hand out as arrays; equal hands share them."""

@@ -1,6 +1,6 @@
 """Writes `reaches.json`: in which grasps a hand can stand, with poses, and why not in others."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -35,11 +35,11 @@ SCHEMA = 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandTrials:
-    """What the hand did in simulation, by the ids of the grasps."""
+    """What the hand did in simulation, by the ids of the grasps, as far as it was tried."""
 
-    verdicts: Mapping[str, HandVerdict] = field(default_factory=dict[str, HandVerdict])
+    verdicts: dict[str, HandVerdict] = field(default_factory=dict[str, HandVerdict])
     """What it held."""
-    executions: Mapping[str, ExecutedHand] = field(default_factory=dict[str, ExecutedHand])
+    executions: dict[str, ExecutedHand] = field(default_factory=dict[str, ExecutedHand])
     """What came of executing the grasps with it."""
 
 

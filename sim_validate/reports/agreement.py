@@ -122,7 +122,7 @@ GOOD, BAD, QUIET = "good", "bad", "quiet"
 def said_of(verdict: Record | None) -> tuple[str, str]:
     """Say in words what the verdict on a grasp is, and of which kind: good, bad or quiet."""
     if verdict is None:
-        return "not simulated", QUIET
+        return "not validated", QUIET
     outcome, controls = str(verdict["outcome"]), verdict["controls"].values()
     if outcome not in (HELD, *GONE):
         return outcome.replace("_", " "), BAD

@@ -30,6 +30,7 @@ from sim_validate.reports.grasp_page import MILLI, MIRRORED, Copy
 from sim_validate.reports.pages import page
 from sim_validate.reports.reached_grasps import (
     described_reaches,
+    held_by_hand,
     reach_settings,
     said_of_reach,
 )
@@ -98,6 +99,7 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         cards=cards,
         waiting=waiting,
         hands=any(run.reaches is not None for run in runs),
+        by_hand=any(card["by_hand"] is not None for card in cards),
         choices={
             name: sorted({str(card[name]) for card in cards})
             for name in ("object", "family", "verdict")
@@ -172,6 +174,7 @@ def _card(shown: Shown) -> dict[str, Any]:
         "executed": execution_row(executed) if shown.run.executions else None,
         "reached": said_of_reach(shown.run.reaches, grasp) if shown.run.reaches else None,
         "weakest": None if verdict is None else _weakest(verdict),
+        "by_hand": held_by_hand(shown.run.reaches, grasp),
     }
 
 

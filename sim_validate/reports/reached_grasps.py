@@ -71,14 +71,28 @@ def said_of_reach(reaches: "SavedReaches | None", grasp: Grasp) -> tuple[str, st
         return f"{name}: not asked", QUIET
     if not found.reached:
         return f"{name}: not reached, {REASONS[found.reason]}", QUIET
-    said = f"{name}: reached, {_where(found)}"
-    held = reaches.simulated.get(grasp.id)
-    if held is None:
-        return said, GOOD
-    strength = f"{number(held['weakest_n'])} N with its motors"
-    if held["held"]:
-        return f"{said}, held: {strength}", GOOD
-    return f"{said}, not held in simulation", BAD
+    said, tone = [f"{name}: reached, {_where(found)}"], GOOD
+    if (held := reaches.simulated.get(grasp.id)) is not None:
+        strength = f"held: {number(held['weakest_n'])} N with its motors"
+        said.append(strength if held["held"] else "not held in simulation")
+        tone = tone if held["held"] else BAD
+    if (tried := reaches.executed.get(grasp.id)) is not None:
+        if (trials := tried["execution"]) is None:
+            said.append("not executed")
+        else:
+            lost = len(trials["lost"])
+            said.append(f"survived {trials['trials'] - lost} of {trials['trials']} trials")
+            tone = BAD if lost else tone
+    return ", ".join(said), tone
+
+
+def held_by_hand(reaches: "SavedReaches | None", grasp: Grasp) -> float | None:
+    """Return the weakest wrench that a hand resists in a grasp [N]; None if it was not simulated.
+
+    Torques count over the object's radius.
+    """
+    held = None if reaches is None else reaches.simulated.get(grasp.id)
+    return None if held is None else float(held["weakest_n"])
 
 
 def _where(found: "HandReach") -> str:

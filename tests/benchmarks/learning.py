@@ -1,6 +1,6 @@
 """What a small network learns from a dataset: survival of grasps on objects it has not seen.
 
-    python -m tests.benchmarks.learning FOLDER --make 40     (writes meshes and a settings file)
+    python -m tests.benchmarks.learning FOLDER --make 178 --meshes SCANS     (meshes, settings)
     graspproof dataset build FOLDER/learning.toml --out DS
     python -m tests.benchmarks.learning DS
 
@@ -19,6 +19,7 @@ import numpy as np
 
 import sim_validate
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from tests.benchmarks.made_objects import write_objects
 
 FOLDS = 5
 HIDDEN = 16
@@ -33,7 +34,7 @@ LEAST = 1e-3
 FIGURES = ("closure_margin", "min_weight", "hull_volume_n6", "smallest_singular_value")
 SETTINGS = """\
 objects = [{objects}]
-frictions = [0.5]
+frictions = [0.3, 0.5]
 families = ["concurrent", "free"]
 limit = 1
 [execution]
@@ -190,23 +191,13 @@ def scores_of(rows: Rows) -> dict[str, list[tuple[float, float]]]:
     return found
 
 
-def make(folder: Path, count: int) -> None:
-    """Write random hulls and cut boxes as meshes, and settings for a dataset of them."""
-    import trimesh
-
-    folder.mkdir(parents=True)
-    rng = np.random.default_rng(0)
-    names = list[str]()
-    for number in range(count):
-        points = rng.normal(size=(int(rng.integers(6, 14)), 3)) * rng.uniform(0.5, 1.0, 3)
-        if number % 2:  # a box whose corners are cut
-            points = np.concatenate([rng.choice([-1.0, 1.0], (40, 3)), 1.3 * np.eye(3)])
-            points *= rng.uniform(0.4, 1.0, (1, 3)) * rng.uniform(0.85, 1.0, points.shape)
-        mesh = trimesh.convex.convex_hull(points * 0.06 / np.linalg.norm(points, axis=1).max())
-        path = folder / f"hull-{number:03}.stl"
-        path.write_bytes(mesh.export(file_type="stl"))
-        names.append(f'"{path}"')
-    text = SETTINGS.format(objects=", ".join(names))
+def make(folder: Path, count: int, meshes: Path | None) -> None:
+    """Write meshes of many shapes, and settings for a dataset of them and of scans."""
+    files = write_objects(folder, count)
+    if meshes is not None:
+        files += sorted(path for path in meshes.rglob("*") if path.suffix in {".ply", ".obj"})
+    listed = ", ".join(f'"{path}"' for path in files)
+    text = SETTINGS.format(objects=listed)
     (folder / "learning.toml").write_text(text, encoding="utf-8")
 
 
@@ -215,9 +206,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--make", type=int, default=0, help="write so many meshes and settings")
+    parser.add_argument("--meshes", type=Path, help="folder of more meshes, PLY or OBJ in metres")
     args = parser.parse_args()
     if args.make:
-        make(args.folder, args.make)
+        make(args.folder, args.make, args.meshes)
         return
     rows = rows_of(args.folder)
     known = ~np.isnan(rows.survived)

@@ -175,6 +175,9 @@ def many(poses, hands, limit):
 def main():
     """Print a line per hand and object, and the sums; 1 if a pose is not what it claims."""
     words = sys.argv
+    if "--help" in words:
+        print(__doc__)
+        return 0
     quick = "--quick" in words
     limit = 5 if quick else int(words[words.index("--limit") + 1]) if "--limit" in words else 100
     folder = words[words.index("--meshes") + 1] if "--meshes" in words else None

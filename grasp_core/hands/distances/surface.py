@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.hands.by_identity import kept_by_identity
 from grasp_core.hands.loop_values import SurfaceTree
 from grasp_core.objects.polyhedron import Polyhedron
 
@@ -12,6 +13,7 @@ LEAF = 4
 """Largest number of triangles of a node without children."""
 
 
+@kept_by_identity(8)
 @lru_cache(maxsize=8)
 def surface_tree(body: Polyhedron) -> SurfaceTree:
     """Sort the triangles of an object; equal objects share the tree."""

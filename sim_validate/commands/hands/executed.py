@@ -17,22 +17,23 @@ ABSENT = "-"
 
 def executed(
     command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, found: Sequence[HandReach],
-    reporter: Reporter,
-) -> dict[str, ExecutedHand]:  # fmt: skip
-    """Execute each grasp that the hand reaches; return what was found by the ids of the grasps."""
+    reporter: Reporter, results: dict[str, ExecutedHand],
+) -> None:  # fmt: skip
+    """Execute each grasp that the hand reaches, and enter what is found by the ids of the grasps.
+
+    What is entered stays there if the run is interrupted.
+    """
     if command.mass_kg is None:
-        return {}
+        return
     settings = hand_execution_settings(command.mass_kg)
     jobs = [
         HandJob(hand, saved.body, each, saved.friction, settings) for each in found if each.reached
     ]
-    results: dict[str, ExecutedHand] = {}
     with reporter.progress("executing") as steps:
         for each in executed_by_hands(jobs, command.jobs):
             results[each.grasp] = each
             kept = sum(one.survived for one in results.values())
             steps.update(len(results), len(jobs), f"({kept} survived)")
-    return results
 
 
 def show_executed(results: Mapping[str, ExecutedHand], reporter: Reporter) -> None:

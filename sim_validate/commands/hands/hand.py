@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from grasp_core.hands.hand import Hand, HandFinger
+from grasp_core.hands.named_hands import HANDS
 from grasp_core.short_text import counted
 from scenes.hand_files.loading import load_hand
 from sim_validate.cli import hand_flags
@@ -12,6 +13,10 @@ from sim_validate.cli.exit_codes import Exit
 
 MM = 1e3
 NONE_STATED = "none stated"
+SMALL_RANGE = math.radians(10.0)
+"""Fingers whose joints all turn by less hardly open [rad]."""
+SHAPES_WEIGH = "MuJoCo gives links without inertia in the file that of their shapes at 1,000 kg/m^3"
+IN_DEGREES = """MJCF counts angles in degrees unless it has <compiler angle="radian"/>"""
 
 
 def asked_hand(command: hand_flags.Hand | hand_flags.Reach) -> Hand:
@@ -38,9 +43,31 @@ def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
         listed = ", ".join(" and ".join(pair) for pair in hand.ignored_pairs)
         reporter.say(f"Links that may overlap, besides neighbours: {listed}.")
     reporter.say(f"Torque limits: {hand.torque_source}.")
+    for line in (_weight(hand), _small_ranges(hand)):
+        if line:
+            reporter.say(line)
     for source in hand.sources:
         reporter.say(f"Source: {source}.")
     return Exit.GOOD
+
+
+def _weight(hand: Hand) -> str:
+    """Say what the links weigh and where their masses come from; nothing if it is unknown."""
+    masses = [link.mass_kg for link in hand.links]
+    stated = [mass for mass in masses if mass is not None]
+    if len(stated) < len(masses):
+        return "Masses of links: unknown; without them gravity does not load the motors."
+    said = f"The links of the fingers weigh {1e3 * sum(stated):.3g} g together"
+    return said + ("." if hand.name in HANDS else f"; {SHAPES_WEIGH}.")
+
+
+def _small_ranges(hand: Hand) -> str:
+    """Say what may be wrong where no joint turns as far as joints of hands do; else nothing."""
+    joints = hand.joints
+    if any(joint.highest - joint.lowest >= SMALL_RANGE for joint in joints):
+        return ""
+    degrees = math.degrees(SMALL_RANGE)
+    return f"Every joint turns by less than {degrees:g} degrees: {IN_DEGREES}."
 
 
 def _shapes(finger: HandFinger) -> int:

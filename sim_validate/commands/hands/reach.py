@@ -95,8 +95,8 @@ def _reach(
                 found.append(each)
                 good = sum(one.reached for one in found)
                 steps.update(len(found), len(jobs), f"({good} reached)")
-        tried = HandTrials(simulated(command, hand, saved, found, reporter))
-        tried = HandTrials(tried.verdicts, executed(command, hand, saved, found, reporter))
+        simulated(command, hand, saved, found, reporter, tried.verdicts)
+        executed(command, hand, saved, found, reporter, tried.executions)
     finally:
         complete = len(found) == len(jobs) and _all_tried(command, found, tried)
         text = reaches_to_json(

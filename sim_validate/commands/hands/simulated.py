@@ -47,19 +47,20 @@ def tries_ours(command: hand_flags.Reach) -> bool:
 
 def simulated(
     command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, found: Sequence[HandReach],
-    reporter: Reporter,
-) -> dict[str, HandVerdict]:  # fmt: skip
-    """Test the hand in each grasp that it reaches; return verdicts by the ids of the grasps."""
+    reporter: Reporter, verdicts: dict[str, HandVerdict],
+) -> None:  # fmt: skip
+    """Test the hand in each grasp that it reaches, and enter verdicts by the ids of the grasps.
+
+    What is entered stays there if the run is interrupted.
+    """
     if not tries_ours(command):
-        return {}
+        return
     jobs = [HandJob(hand, saved.body, each, saved.friction) for each in found if each.reached]
-    verdicts: dict[str, HandVerdict] = {}
     with reporter.progress("simulating") as steps:
         for verdict in held_by_hands(jobs, command.jobs):
             verdicts[verdict.grasp] = verdict
             good = sum(each.good for each in verdicts.values())
             steps.update(len(verdicts), len(jobs), f"({good} held)")
-    return verdicts
 
 
 def show_simulated(verdicts: Mapping[str, HandVerdict], reporter: Reporter) -> None:

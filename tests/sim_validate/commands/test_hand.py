@@ -2,7 +2,10 @@
 
 import json
 import math
+import re
+from pathlib import Path
 
+import mujoco
 import pytest
 
 from sim_validate.cli.exit_codes import Exit
@@ -54,6 +57,26 @@ def test_fingers_that_meet_in_the_middle_of_their_ranges_are_not_listed(tmp_path
     assert main(["hand", str(path), "--fingertips", ",".join(THREE_TIPS), "--json"]) == Exit.GOOD
     pairs = json.loads(capsys.readouterr().out)["may_overlap"]
     assert pairs == []
+
+
+def test_ranges_that_were_meant_in_radians_are_pointed_out(words, capsys):
+    path = Path(words[1])
+    path.write_text(re.sub(r'range="-?[0-9.]+ -?[0-9.]+"', 'range="-1.5 1.5"', path.read_text()))
+    assert main(words) == Exit.GOOD
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Every joint turns by less than 10 degrees: MJCF counts angles in degrees" in said
+
+
+def test_the_weight_of_links_is_said_with_its_source(words, capsys):
+    assert main(words) == Exit.GOOD
+    said = " ".join(capsys.readouterr().out.split())
+    weight = mujoco.MjModel.from_xml_path(words[1]).body_mass[2:].sum()
+    assert f"The links of the fingers weigh {1e3 * weight:.3g} g together; MuJoCo gives" in said
+    assert "Every joint turns" not in said
+    assert main(["hand", "leap"]) == Exit.GOOD
+    assert "The links of the fingers weigh" in capsys.readouterr().out
+    assert main(["hand", "allegro"]) == Exit.GOOD
+    assert "Masses of links: unknown" in capsys.readouterr().out
 
 
 def test_a_file_without_named_fingertips_is_refused(words, capsys):

@@ -11,8 +11,10 @@ from grasp_core.files.complaints import record_of
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.hand_flags import Reach
+from sim_validate.commands.hands import simulated
 from sim_validate.commands.hands.reach import say_where_to_look
 from sim_validate.files.stale_results import REACHES
+from sim_validate.hands.jobs import held_by_hands
 from sim_validate.main import main
 from sim_validate.records.reaches_schema import ReachesFile
 from sim_validate.records.saved_reaches import read_reaches
@@ -163,6 +165,25 @@ def test_a_simulated_hand_holds_and_its_grasps_are_ranked(grasps, tmp_path, caps
     page = (tmp_path / "report" / "grasps" / f"{best}.html").read_text()
     assert "Held with its motors" in page
     assert "13 of 13 wrenches" in page
+    first = (tmp_path / "report" / "index.html").read_text()
+    assert '<option value="-hand">hand resists most</option>' in first
+    for each in reached:
+        assert f'data-hand="{each["simulated"]["weakest_n"]}"' in first
+
+
+def test_what_was_tried_before_an_interrupt_is_kept(grasps, tmp_path, monkeypatch):
+    def one_and_stop(jobs, processes):
+        yield from held_by_hands(jobs[:1], processes)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(simulated, "held_by_hands", one_and_stop)
+    words = ["reach", str(grasps), "--simulate", "--torque-limit-n-m", "0.35", "--jobs", "1"]
+    assert main([*words, "--out", str(tmp_path)]) == Exit.INTERRUPTED
+    record = record_of(ReachesFile, (tmp_path / REACHES).read_text(), REACHES, schema=1)
+    assert not record["summary"]["complete"]
+    reached = [each for each in record["reaches"] if each["reached"]]
+    assert len(reached) >= 2
+    assert ["simulated" in each for each in reached] == [True] + [False] * (len(reached) - 1)
 
 
 def test_a_hand_without_torque_limits_is_not_simulated(grasps, capsys):
@@ -195,6 +216,11 @@ def test_a_hand_executes_the_grasps_that_it_reaches(grasps, tmp_path, capsys):
     page = (tmp_path / "report" / "grasps" / f"{reached[0]['id']}.html").read_text()
     assert "Executed with the hand" in page
     assert "Payload of the squeeze" in page
+    trials = reached[0]["executed"]["execution"]
+    said = f"survived {trials['trials'] - len(trials['lost'])} of {trials['trials']} trials"
+    first = (tmp_path / "report" / "index.html").read_text()
+    assert said in first
+    assert "hand resists most" not in first  # nothing was simulated for it
 
 
 def test_a_hand_too_weak_for_an_object_says_so(grasps, tmp_path, capsys):

@@ -138,7 +138,7 @@ def test_cards_filters_and_pages_say_how_closure_and_execution_ended(run, report
     """Cards whose object was lost are marked as such, whatever became of the grasp's closure."""
     text = (report / "index.html").read_text()
     ends = ("lost", "survived", "no squeeze")
-    wanted = [f"closure: not simulated; execution: {end}" for end in ends]
+    wanted = [f"closure: not validated; execution: {end}" for end in ends]
     assert re.findall(r'data-verdict="([^"]*)"', text) == wanted
     assert re.findall(r'class="verdict (\w+)"', text) == ["bad", "good", "bad"]
     for each in wanted:

@@ -220,7 +220,7 @@ def test_without_verdicts_grasps_are_shown(copy, tmp_path):
     report = write_report(copy, tmp_path / "out", jobs=1)
     index = Page(report.index.read_text())
     assert report.grasps == 3
-    assert index.said.count("not simulated") == 4  # three cards, and the choice
+    assert index.said.count("not validated") == 4  # three cards, and the choice
     assert 'id="fidelity"' not in report.index.read_text()
 
 
@@ -233,7 +233,7 @@ def test_an_interrupted_run_is_called_that(copy, tmp_path):
     changed(copy / "verdicts.json", interrupted)
     said = " ".join(Page(write_report(copy, tmp_path / "out", jobs=1).index.read_text()).said)
     assert "the run was interrupted" in said
-    assert "not simulated" in said
+    assert "not validated" in said
 
 
 def test_of_many_grasps_those_with_bad_news_are_shown(copy, tmp_path):
