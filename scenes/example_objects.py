@@ -10,6 +10,7 @@ import difflib
 import math
 import re
 from collections.abc import Callable
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -34,7 +35,7 @@ def example_names() -> tuple[str, ...]:
 
 
 def example_object(name: str) -> Polyhedron:
-    """Build an example object.
+    """Return an example object, built once in a process.
 
     Args:
         name: A name from `example_names`, for instance "wedge" or "random-20-7". Underscores count
@@ -45,17 +46,26 @@ def example_object(name: str) -> Polyhedron:
     """
     text(name, "name")
     key = name.strip().lower().replace("_", "-")
+    body = _built(key)
+    if body is not None:
+        return body
+    near = [] if len(key) > SHOWN else difflib.get_close_matches(key, example_names(), n=3)
+    hint = f"did you mean {' or '.join(near)}?" if near else "see `graspproof objects`"
+    if key.startswith("random"):
+        hint = f"write random-FACES-SEED, FACES from {RANDOM_FACES[0]} to {RANDOM_FACES[-1]}"
+    raise InputError(f"there is no built-in object {shown(name)}; {hint}")
+
+
+@lru_cache(maxsize=64)
+def _built(key: str) -> Polyhedron | None:
+    """Build the object of a name; None if there is none."""
     match = RANDOM_NAME.fullmatch(key)
     if match and int(match[1]) in RANDOM_FACES:
         solid = _random(int(match[1]), int(match[2]))
     elif key in OBJECTS:
         solid = OBJECTS[key]()
     else:
-        near = [] if len(key) > SHOWN else difflib.get_close_matches(key, example_names(), n=3)
-        hint = f"did you mean {' or '.join(near)}?" if near else "see `graspproof objects`"
-        if key.startswith("random"):
-            hint = f"write random-FACES-SEED, FACES from {RANDOM_FACES[0]} to {RANDOM_FACES[-1]}"
-        raise InputError(f"there is no built-in object {shown(name)}; {hint}")
+        return None
     return Polyhedron.from_mesh(solid.vertices, solid.triangles, name=key)
 
 

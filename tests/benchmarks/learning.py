@@ -35,7 +35,7 @@ FIGURES = ("closure_margin", "min_weight", "hull_volume_n6", "smallest_singular_
 SETTINGS = """\
 objects = [{objects}]
 frictions = [0.3, 0.5]
-families = ["concurrent", "free"]
+families = ["free"]
 limit = 1
 [execution]
 mass_kg = 0.5
@@ -43,8 +43,8 @@ trials = ["weight", "knock"]
 [learning]
 friction_near = 1
 friction_above = 1
-moved_out = 3
-mass_near = 2
+moved_out = 2
+mass_near = 1
 figures = ["closure"]
 split_by = "object"
 """

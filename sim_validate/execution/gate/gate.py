@@ -61,7 +61,7 @@ def cases_of(
     )
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=256)
 def measured_case(case: HeldCase) -> Gate:
     """Check the simulator on all known cases, once per process for the same settings."""
     checks = (*held_box(case), *free_box(case), *surfaces(case))
