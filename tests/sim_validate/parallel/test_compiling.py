@@ -31,7 +31,9 @@ def waiting():
     loops.wait_for({})
 
 
-@pytest.mark.parametrize(("jobs", "found"), [("2", "1 0"), ("1", "0 1")])
+@pytest.mark.parametrize(
+    ("jobs", "found"), [("2", "1 0"), pytest.param("1", "0 1", marks=pytest.mark.slow)]
+)
 def test_what_another_process_compiles_is_waited_for_and_found(jobs, found, tmp_path):
     script = tmp_path / "script.py"
     script.write_text(SCRIPT)

@@ -67,6 +67,7 @@ def test_a_test_without_loads_has_no_margin():
     assert math.isinf(found.ours.margin)
 
 
+@pytest.mark.slow
 def test_judgements_do_not_depend_on_processes_or_threads():
     setup = sv.Setup()
     cases = [

@@ -103,7 +103,7 @@ def test_torsion_adds_what_a_missing_turn_about_one_axis_needs():
         assert found.verify()
 
 
-@pytest.mark.parametrize("count", [2, 3, 4])
+@pytest.mark.parametrize("count", [2, 3, pytest.param(4, marks=pytest.mark.slow)])
 def test_pyramids_inside_and_around_the_cones_agree(count):
     """Pyramids inside that close prove closure, pyramids around that do not prove the opposite."""
     rng = np.random.default_rng(count)
