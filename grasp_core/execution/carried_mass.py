@@ -26,7 +26,7 @@ from grasp_core.solvers.ties import first_best
 
 GAP = 1e-3
 """Gap between the bounds, relative to the lower one, at which no more rays follow."""
-RAYS = 300
+RAYS = 500
 """Most rays; twenty to forty are usual, and more than a hundred where motors hardly matter."""
 PASSES = 3
 """Times that the first rays are cast, each at the mass that bounds those before."""
