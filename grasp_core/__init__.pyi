@@ -18,6 +18,7 @@ from grasp_core.errors import SolverError as SolverError
 from grasp_core.errors import UndecidedError as UndecidedError
 from grasp_core.errors import UnfaithfulError as UnfaithfulError
 from grasp_core.execution.best_squeeze import best_squeeze as best_squeeze
+from grasp_core.execution.carrying_hand import HandPayload as HandPayload
 from grasp_core.execution.first_slip import FirstSlip as FirstSlip
 from grasp_core.execution.first_slip import first_slip as first_slip
 from grasp_core.execution.grips import Grip as Grip
@@ -31,6 +32,7 @@ from grasp_core.execution.squeeze_certificate import BestSqueeze as BestSqueeze
 from grasp_core.forces.contact_forces import contact_forces as contact_forces
 from grasp_core.hands.hand import Hand as Hand
 from grasp_core.hands.hand_motors import hand_motors as hand_motors
+from grasp_core.hands.hand_payload import hand_payload as hand_payload
 from grasp_core.hands.named_hands import load_hand as load_hand
 from grasp_core.hands.reach import HandReach as HandReach
 from grasp_core.hands.reach import reach_with as reach_with

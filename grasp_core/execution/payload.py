@@ -15,9 +15,7 @@ where y_F is the force part of y. So the free mass is at most h(y) / (g |y_F|) f
 at least the distance of the origin from the hull of the points lambda d. The next ray goes through
 the hull's nearest facet.
 
-That a hull contains a ball about the origin is shown by its triangles: if they have the origin on
-their inner side, and every edge belongs to two of them in opposite directions, then the cones over
-them cover all directions, and the ball of the least distance of their planes is inside.    (2)
+That a hull contains a ball about the origin is shown by its triangles, (1) of `ball_in_hull`.  (2)
 
 With the same limits on pushes and torques the fixed mass is at most the free one where fingertips
 do not roll, as the forces at rest plus their change balance the load at the contacts. Rolling moves
@@ -31,10 +29,8 @@ h(y) the support under these bounds, (3) of `wrench_limits`. The hand turns with
 the weight of its links turns: `Motors.in_any_orientation` has limits that leave room for it.
 """
 
-import importlib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,6 +40,7 @@ from grasp_core.by_value import ByValue
 from grasp_core.checked import positive
 from grasp_core.closure.wrenches import WRENCH
 from grasp_core.errors import InputError
+from grasp_core.execution.ball_in_hull import ball_in, least_distance, nearest_facet, outward
 from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
 from grasp_core.execution.loads import GRAVITY_M_PER_S2, any_direction
@@ -53,7 +50,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit
 from grasp_core.short_text import summary
-from grasp_core.solvers.ties import first_best, on_grid
+from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
 
 GAP = 1e-3
@@ -142,12 +139,8 @@ class Payload(ByValue):
             return False
         if self.free.lower == 0.0:
             return True
-        ends, triangles = _ends(self.free.rays), self.free.triangles
-        if not (len(triangles) and triangles.min() >= 0 and triangles.max() < len(ends)):
-            return False
-        if not _is_closed(triangles):
-            return False
-        return self.free.lower <= _least_distance(ends[triangles]) * (1.0 + ROUNDING)
+        radius = ball_in(_ends(self.free.rays), self.free.triangles)
+        return self.free.lower <= radius * (1.0 + ROUNDING)
 
 
 def payload(  # noqa: PLR0913 - each is a quantity of its own
@@ -215,14 +208,14 @@ def _free_mass(body: WrenchBody) -> FreeMass:
     if weakest.limit <= none or _outer(rays) <= none:
         return _nothing_held(rays)
     while True:
-        normal, distance, triangles = _nearest_facet(_ends(rays))
+        normal, distance, triangles = nearest_facet(_ends(rays))
         if _outer(rays) <= none:
             return _nothing_held(rays)
         if _outer(rays) <= distance * (1.0 + GAP) or len(rays) == RAYS:
             break
         rays.append(_ray(body, normal))
-    triangles = _outward(_ends(rays), triangles)
-    lower = _least_distance(_ends(rays)[triangles])
+    triangles = outward(_ends(rays), triangles)
+    lower = least_distance(_ends(rays)[triangles])
     return FreeMass(lower, max(_outer(rays), lower), tuple(rays), triangles)
 
 
@@ -241,52 +234,10 @@ def _ends(rays: Iterable[WrenchLimit]) -> Array:
     return np.array([ray.limit * ray.wrench[:3] / GRAVITY_M_PER_S2 for ray in rays])
 
 
-def _nearest_facet(ends: Array) -> tuple[Array, float, Indices]:
-    """Find the facet of the hull of points (n, 3) that is nearest to the origin, inside the hull.
-
-    Returns:
-        The facet's outward unit normal, (3,), its distance from the origin, and all triangles of
-        the hull, (t, 3).
-    """
-    spatial: Any = importlib.import_module("scipy.spatial")
-    hull = spatial.ConvexHull(ends)
-    equations: Array = hull.equations
-    # equally near facets are taken in the order of their normals, the same on every machine
-    equations = equations[np.lexsort(on_grid(equations[:, :3]).T)]
-    nearest = equations[first_best(equations[:, 3])]
-    return nearest[:3], -float(nearest[3]), np.asarray(hull.simplices, dtype=np.int64)
-
-
 def _outer(rays: Iterable[WrenchLimit]) -> float:
     """Return the least bound (1) of rays on the free mass [kg]; infinite if there is none."""
     forces = [(ray.upper, GRAVITY_M_PER_S2 * float(np.linalg.norm(ray.facet[:3]))) for ray in rays]
     return min((upper / force for upper, force in forces if force > 0.0), default=np.inf)
-
-
-def _outward(ends: Array, triangles: Indices) -> Indices:
-    """Turn triangles, (t, 3), so that the origin is on their inner side."""
-    turned = np.linalg.det(ends[triangles]) < 0.0
-    return np.where(turned[:, None], triangles[:, ::-1], triangles)
-
-
-def _least_distance(corners: Array) -> float:
-    """Return the least distance of the origin from planes of triangles, (t, 3, 3).
-
-    The distance is negative where a triangle has the origin on its outer side.
-    """
-    a, b, c = np.moveaxis(corners, 1, 0)
-    normals = np.cross(b - a, c - a)
-    lengths = np.linalg.norm(normals, axis=1)
-    if not (lengths > 0.0).all():
-        return -np.inf
-    return float((np.einsum("ti,ti->t", normals, a) / lengths).min())
-
-
-def _is_closed(triangles: Indices) -> bool:
-    """Return whether every edge belongs to two triangles, in opposite directions."""
-    edges = [tuple(edge) for t in triangles.tolist() for edge in zip(t, t[1:] + t[:1], strict=True)]
-    known = set(edges)
-    return len(known) == len(edges) and all((b, a) in known for a, b in edges)
 
 
 def _is_weight(fixed: BestSqueeze) -> bool:

@@ -15,15 +15,16 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, cross, frozen
+from grasp_core.arrays import Array, cross, frozen, frozen_copy
 from grasp_core.checked import switch
 from grasp_core.errors import InputError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.kinematics import HandPlaces, places
 from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import stance_of
+from grasp_core.hands.stance import Stance, stance_of
 from grasp_core.quality.motors import Motors
+from grasp_core.values import Contact
 
 
 def hand_motors(
@@ -49,15 +50,36 @@ def hand_motors(
     stance = stance_of(hand, reach)
     switch(any_orientation, "any_orientation")
     way = None if down is None else direction(down)
-    found = places(hand, stance.joints, stance.palm_pose)
-    points = np.array([contact.position for contact in stance.contacts])
-    levers = _levers(hand, found, points, stance.fingers)
-    limits = _limits(hand)
+    found, levers, limits = _joints(hand, stance)
     if any_orientation:
         return Motors.in_any_orientation(levers, limits, GRAVITY_M_PER_S2 * _weights(hand, found))
     if way is None:
         return Motors.of(levers, limits)
     return Motors.of(levers, limits, GRAVITY_M_PER_S2 * _weights(hand, found) @ way)
+
+
+def turned_motors(hand: Hand, reach: HandReach) -> tuple[Motors, Array, tuple[Contact, ...]]:
+    """Derive what joints and links of a hand ask for when it is turned with its object.
+
+    Returns:
+        Motors without gravity; the torque of each joint that carries the weight of the links, per
+        unit vector of the direction of gravity, (joints, 3) [N m]; and the contacts.
+
+    Raises:
+        InputError: As `hand_motors` does, also where a motor cannot carry the links somewhere.
+    """
+    stance = stance_of(hand, reach)
+    found, levers, limits = _joints(hand, stance)
+    weights = frozen_copy(GRAVITY_M_PER_S2 * _weights(hand, found))
+    Motors.in_any_orientation(levers, limits, weights)  # refuses motors that are too weak
+    return Motors.of(levers, limits), weights, stance.contacts
+
+
+def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
+    """Return where the hand's links are, the levers of its contacts and the torque limits."""
+    found = places(hand, stance.joints, stance.palm_pose)
+    points = np.array([contact.position for contact in stance.contacts])
+    return found, _levers(hand, found, points, stance.fingers), _limits(hand)
 
 
 def direction(down: ArrayLike) -> Array:

@@ -326,34 +326,59 @@ class WrenchBody:
 
     def limit(self, wrench: Array) -> WrenchLimit:
         """Find the largest multiple of an external wrench that is resisted, with its proof."""
-        unit = self._about_middle(wrench)
-        length = float(np.linalg.norm(unit))
-        A = self.A.copy()
-        # a wrench of unit length keeps lambda of order one; it is scaled back below
-        A[:6, -1] = unit / length
-        q = np.zeros(A.shape[1])
-        q[-1] = -1.0
-        k, joints = self.count, len(self.levers)
-        answer = minimize(ConicProgram(q, A, self.b, 6, 2 * (k + joints), (self.width,) * k))
-        share = self.max_normal_force / length
-        # the equations' multipliers, scaled to (2), and those of the torques alike
-        power = -float(answer.z[:6] @ unit)
-        facet = answer.z[:6] / power
-        more, less = answer.z[6 + 2 * k : 6 + 2 * (k + joints)].reshape(2, joints)
-        multipliers = self.max_normal_force * (more - less) / (power * -self.motors.limits)
-        limit = max(share * float(answer.x[-1]), 0.0)
-        local = answer.x[:-1].reshape(k, self.width)
+        multiple, local, twist, multipliers = self.largest(wrench, np.zeros(len(self.levers)))
+        limit = max(multiple, 0.0)
         return WrenchLimit(
             wrench=wrench,
             limit=limit,
-            upper=max(limit, self._support(facet, multipliers)),
-            forces=self.max_normal_force * np.einsum("kij,kj->ki", self.frames, local[:, :3]),
-            facet=self._about_center(facet / self.scale),
+            upper=max(limit, self._support(twist, multipliers)),
+            forces=self.in_object_frame(local),
+            facet=self.about_center(twist / self.scale),
             motor_multipliers=multipliers,
             torques=None
             if self.lengths is None
             else self.max_normal_force * self.lengths * local[:, 3],
         )
+
+    def largest(self, wrench: Array, carried: Array) -> tuple[float, Array, Array, Array]:
+        """Find the largest multiple of a wrench that is resisted while joints carry as many times.
+
+        Args:
+            wrench: External wrench, (6,).
+            carried: Torques q that each joint has to add for one wrench, (joints,) [N m].
+
+        Returns:
+            The multiple; local forces over the largest normal force, (k, 3) or (k, 4); and a facet,
+            a twist y that is scaled and about the contacts' mean, with multipliers m of the joints,
+            so that m.q - y.w = 1 and no multiple above (3) is resisted.
+        """
+        unit = self._about_middle(wrench)
+        length = float(np.linalg.norm(unit))
+        A = self.A.copy()
+        k, joints = self.count, len(self.levers)
+        # a wrench of unit length keeps lambda of order one; it is scaled back below
+        A[:6, -1] = unit / length
+        share = self.max_normal_force / length
+        torques = 6 + 2 * k + np.arange(2 * joints)
+        asked = carried / self.motors.limits
+        A[torques, -1] = share * np.concatenate([asked, -asked])
+        q = np.zeros(A.shape[1])
+        q[-1] = -1.0
+        answer = minimize(ConicProgram(q, A, self.b, 6, 2 * (k + joints), (self.width,) * k))
+        # the equations' multipliers, scaled to (2), and those of the torques alike
+        more, less = answer.z[torques].reshape(2, joints)
+        power = -float(answer.z[:6] @ unit) - self.max_normal_force * float((more - less) @ asked)
+        multipliers = self.max_normal_force * (more - less) / (power * -self.motors.limits)
+        local = answer.x[:-1].reshape(k, self.width)
+        return share * float(answer.x[-1]), local, answer.z[:6] / power, multipliers
+
+    def in_object_frame(self, local: Array) -> Array:
+        """Turn local forces over the largest normal force, (k, 3) or (k, 4), to forces (k, 3)."""
+        return self.max_normal_force * np.einsum("kij,kj->ki", self.frames, local[:, :3])
+
+    def support(self, facet: Array, multipliers: Array) -> float:
+        """Bound the support of the body by (3), for a twist about the centre, (6,)."""
+        return self._support(self._scaled(facet), multipliers)
 
     def _support(self, twist: Array, multipliers: Array) -> float:
         """Bound the support of the body by (3), for a scaled twist about the contacts' mean."""
@@ -371,7 +396,7 @@ class WrenchBody:
         allowed = self.bounded.holds(shares.ravel()[None], HELD * self.bounded.size)
         # rows of torques are met as all rows of the program are, by shares of the motors' limits
         torques = np.abs(self.motors.torques(found.forces)) / self.motors.limits
-        return balanced and allowed and bool((torques <= 1.0 + HELD * self._strongest).all())
+        return balanced and allowed and bool((torques <= 1.0 + HELD * self.strongest).all())
 
     def _shares(self, found: WrenchLimit) -> Array:
         """Return the local forces of a limit over the largest normal force, (k, 3) or (k, 4)."""
@@ -385,7 +410,7 @@ class WrenchBody:
         return np.column_stack([shares, turns])
 
     @property
-    def _strongest(self) -> float:
+    def strongest(self) -> float:
         """Return how many times its limit a joint's torque is at most under unit pushes, or one."""
         shares = np.linalg.norm(self.levers.reshape(-1, 3), axis=1).max(initial=0.0)
         weakest = self.motors.limits.min(initial=np.inf)
@@ -393,9 +418,7 @@ class WrenchBody:
 
     def bounds(self, found: WrenchLimit) -> bool:
         """Return whether the facet proves that no multiple above the upper one is resisted."""
-        load, twist = self._about_middle(found.wrench), found.facet * self.scale
-        slides = _across(found.facet[3:], self.middle)
-        twist[:3] += slides
+        load, twist = self._about_middle(found.wrench), self._scaled(found.facet)
         power = float(twist @ load)
         lengths = float(np.linalg.norm(twist) * np.linalg.norm(load))
         # (3): h(y) is at most the upper limit, and y.w = -1, each but for rounding
@@ -434,7 +457,14 @@ class WrenchBody:
         moved = np.append(wrench[:3], wrench[3:] - _across(self.middle, wrench[:3]))
         return moved / self.scale
 
-    def _about_center(self, facet: Array) -> Array:
+    def _scaled(self, facet: Array) -> Array:
+        """Move a facet about the centre to a scaled twist about the contacts' mean."""
+        twist = facet * self.scale
+        twist[:3] += _across(facet[3:], self.middle)
+        return twist
+
+    def about_center(self, facet: Array) -> Array:
+        """Move a facet about the contacts' mean to the centre, (6,)."""
         slides = _across(facet[3:], self.middle)
         return np.concatenate([facet[:3] - slides, facet[3:]])
 

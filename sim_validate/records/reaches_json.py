@@ -7,6 +7,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.execution.carrying_hand import HandPayload
 from grasp_core.files.json_text import text_of
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
@@ -35,8 +36,10 @@ SCHEMA = 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandTrials:
-    """What the hand did in simulation, by the ids of the grasps, as far as it was tried."""
+    """What the hand carries and did in simulation, by the ids of grasps, as far as it was tried."""
 
+    payloads: dict[str, HandPayload] = field(default_factory=dict[str, HandPayload])
+    """The largest mass in any orientation."""
     verdicts: dict[str, HandVerdict] = field(default_factory=dict[str, HandVerdict])
     """What it held."""
     executions: dict[str, ExecutedHand] = field(default_factory=dict[str, ExecutedHand])
@@ -57,7 +60,7 @@ def reaches_to_json(  # noqa: PLR0913 - the parts of the file
         found: The results, one per grasp.
         complete: Whether every grasp that was asked for was looked at.
         grasps: The grasps that were asked for.
-        tried: What the hand did in simulation; None for nothing.
+        tried: What the hand carries and did in simulation; None for nothing.
     """
     planned = {grasp.id: contacts_sha256(grasp.contacts) for grasp in grasps}
     document: ReachesFile = {
@@ -106,6 +109,12 @@ def _record(hand: Hand, found: HandReach, planned: str, tried: HandTrials) -> Re
         "starts": found.starts,
         "pose": _pose(hand, found),
     }
+    if (carried := tried.payloads.get(found.grasp)) is not None:
+        record["payload"] = {
+            "lower_kg": carried.lower,
+            "upper_kg": carried.upper,
+            "weakest_gravity": _triple(carried.weakest),
+        }
     if found.grasp in tried.verdicts:
         record["simulated"] = _simulated(tried.verdicts[found.grasp])
     if found.grasp in tried.executions:

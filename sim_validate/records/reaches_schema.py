@@ -105,6 +105,17 @@ class ExecutedHandRecord(TypedDict):
     execution: HandExecutionRecord | None
 
 
+class HandPayloadRecord(TypedDict):
+    """Fields about the largest mass that a hand holds in any orientation, its links included."""
+
+    lower_kg: NotNegative
+    """Mass that is held in every orientation, with forces chosen anew for each."""
+    upper_kg: NotNegative
+    """Mass above which some orientation is not held."""
+    weakest_gravity: Triple
+    """Direction of gravity in which the hand lets go first, of unit length, object axes."""
+
+
 class ReachRecord(TypedDict):
     """Fields about one grasp."""
 
@@ -116,6 +127,8 @@ class ReachRecord(TypedDict):
     explanation: str
     starts: Count
     pose: PoseRecord | None
+    payload: NotRequired[HandPayloadRecord]
+    """What the hand carries; absent where motors or links are unknown, or too weak."""
     simulated: NotRequired[SimulatedHandRecord]
     """What the hand held in simulation; absent where no simulation was asked for."""
     executed: NotRequired[ExecutedHandRecord]

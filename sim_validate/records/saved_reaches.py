@@ -25,6 +25,7 @@ from sim_validate.records.reaches_json import SCHEMA
 from sim_validate.records.reaches_schema import (
     AskedRecord,
     ExecutedHandRecord,
+    HandPayloadRecord,
     HandRecord,
     PoseRecord,
     ReachesFile,
@@ -55,6 +56,8 @@ class SavedReaches:
     """Margin of closure with the contacts that are reached, by the ids of these grasps."""
     fingers: tuple[str, ...]
     """Names of the hand's fingers."""
+    payloads: Mapping[str, HandPayloadRecord]
+    """What the hand carries in any orientation, by the ids of the grasps."""
     simulated: Mapping[str, SimulatedHandRecord]
     """What the hand held in simulation, by the ids of the grasps in which it was simulated."""
     executed: Mapping[str, ExecutedHandRecord]
@@ -110,6 +113,7 @@ def _saved(record: ReachesFile) -> SavedReaches:
             for each in record["reaches"] if each["pose"] is not None
         },
         fingers=tuple(own["fingers"]),
+        payloads={each["id"]: each["payload"] for each in record["reaches"] if "payload" in each},
         simulated={
             each["id"]: each["simulated"] for each in record["reaches"] if "simulated" in each
         },

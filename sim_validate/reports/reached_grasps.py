@@ -34,6 +34,7 @@ MOTORS = "in simulation, each at 80 % of what contacts and motors resist by the 
 WEAKEST = "that contacts and motors resist; torques over the object's radius"
 LOSS = "multiple of a trial's load at which the object is lost, by the analysis"
 PAYLOAD = "that it is certified to carry slowly, in any direction, within the motors' torques"
+CARRIED = "that motors and contacts hold whichever way the hand is turned, forces chosen anew"
 WAY = "over 60 mm, with open fingers and nothing in the way"
 
 
@@ -154,6 +155,8 @@ def _facts(reaches: "SavedReaches", found: "HandReach") -> Iterable[tuple[str, s
     if found.reached:
         yield "Fingers open", _found(found.pregrasp), OPENING
         yield "Straight way in", _found(found.approach), WAY
+    if (carried := reaches.payloads.get(found.grasp)) is not None:
+        yield "Payload in any orientation", f"{number(carried['lower_kg'])} kg", CARRIED
     if (held := reaches.simulated.get(found.grasp)) is not None:
         count, lost = held["wrenches"], len(held["not_held"])
         yield "Held with its motors", f"{count - lost} of {count} wrenches", MOTORS

@@ -1,5 +1,9 @@
 """Functions about hands: a call of each, and what they must refuse."""
 
+from dataclasses import replace
+
+import numpy as np
+
 import grasp_core as gc
 import scenes
 from sim_validate.hands.hand_gate import cube, hinged_hand, stance
@@ -15,6 +19,7 @@ from tests.public_values.bad_values import (
     VALUE,
     WORD,
     array,
+    each_of,
     optional,
     unless,
 )
@@ -32,12 +37,31 @@ def standing():
     return {"hand": hinged_hand(), "body": cube(), "reach": stance(0.5), "friction": 0.5}
 
 
+def weighing():
+    """The hand with links of ten grams."""
+    hand = hinged_hand()
+    fingers = tuple(
+        replace(finger, links=tuple(
+            replace(link, mass_kg=0.01, center_of_mass=np.zeros(3)) for link in finger.links
+        ))
+        for finger in hand.fingers
+    )  # fmt: skip
+    return replace(hand, fingers=fingers)
+
+
 DOWN = optional(array([0.0, 0.0, -1.0])) | {"zero": [0.0, 0.0, 0.0]}
 
 
 CALLS = [
     Call("gc.hand_motors", lambda: {"hand": hinged_hand(), "reach": stance(0.5)}, {
         "hand": VALUE, "reach": VALUE, "down": DOWN, "any_orientation": SWITCH,
+    }),
+    Call("gc.hand_payload", lambda: {
+        "hand": weighing(), "body": cube(), "reach": stance(0.5), "friction": 0.5,
+        "max_push_n": 10.0,
+    }, {
+        "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": each_of(FRICTION, "zero"),
+        "max_push_n": POSITIVE, "gap": POSITIVE | {"one": 1.0, "too fine": 1e-5},
     }),
     Call("scenes.build_hand_scene", standing, {
         "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": FRICTION, "down": DOWN,

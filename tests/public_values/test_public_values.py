@@ -40,6 +40,7 @@ MADE_BY_FUNCTIONS = {
     "gc.FreeMass": "payload",
     "gc.Grip": "grip",
     "gc.Hand": "load_hand",
+    "gc.HandPayload": "hand_payload",
     "gc.HandReach": "reach_with",
     "gc.Payload": "payload",
     "gc.CertifiedRegions": "certify_regions and load_regions",

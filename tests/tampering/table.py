@@ -12,6 +12,8 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
+from grasp_core.execution.carried_mass import carried_mass
+from grasp_core.execution.carrying_hand import CarryingHand
 from grasp_core.families.free import Absence, place_free
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.regions.certify_regions import certify_regions
@@ -20,6 +22,7 @@ from tests.judges import random_contacts
 from tests.tampering import (
     best_grasps,
     exact_closure,
+    hand_payloads,
     on_planes,
     soft_contacts,
     squeezes,
@@ -255,6 +258,20 @@ def payload(seed):
     return gc.payload(*contacts, max_push_n=10.0, motors=hand, **springs)
 
 
+def hand_payload(seed):
+    rng = np.random.default_rng(seed)
+    body, friction, grasps = planned(seed)
+    grasp = grasps[seed // len(PLANNED) % len(grasps)]
+    joints = motors(rng, 4, 10.0)
+    pulls = rng.normal(size=(len(joints.limits), 3))
+    pulls *= (0.5 * joints.limits / np.linalg.norm(pulls, axis=1))[:, None]
+    hand = CarryingHand(
+        grasp.positions - body.center_of_mass, grasp.normals, np.full(4, friction), 10.0,
+        gc.Motors.of(joints.levers, joints.limits), pulls,
+    )  # fmt: skip
+    return carried_mass(hand)
+
+
 @cache
 def best(seed):
     name, friction = (("tetrahedron", 0.5), ("random-4-1", 0.5), ("tetrahedron", 0.8))[seed % 3]
@@ -304,6 +321,7 @@ TABLE = {
     "CutTree": Row(cut_tree, best_grasps.proof, 0.8),
     "BestGrasp": Row(best, best_grasps.best, 0.4),
     "Payload": Row(payload, lambda c, _: squeezes.payload(c), 0.4),
+    "HandPayload": Row(hand_payload, lambda c, _: hand_payloads.payload(c), 0.8),
     "proof file of regions": Row(
         proof_file, lambda c, rng: on_planes.regions(regions_of(vars(c)), rng), 0.4
     ),

@@ -1,9 +1,10 @@
 """Runs the command `reach`, which looks for poses in which a hand stands in grasps."""
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from grasp_core.execution.carrying_hand import HandPayload
 from grasp_core.files.text_files import write_text
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
@@ -12,6 +13,7 @@ from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
+from sim_validate.commands.hands.carried import COLUMN, carried, say_what_it_means
 from sim_validate.commands.hands.executed import executed, show_executed
 from sim_validate.commands.hands.hand import asked_hand
 from sim_validate.commands.hands.records import write_records
@@ -45,7 +47,7 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
     chosen = chosen_grasps(saved, friction=command.friction, seed=None, limit=command.limit)
     with alone_in(command.out):
         found, tried, text = _reach(command, hand, chosen, reporter)
-        _show(hand, found, reporter)
+        _show(hand, found, tried.payloads, reporter)
         if command.dexgraspbench is not None:
             write_records(command.dexgraspbench, hand, chosen.body, found, reporter)
         judged = Exit.GOOD
@@ -95,6 +97,7 @@ def _reach(
                 found.append(each)
                 good = sum(one.reached for one in found)
                 steps.update(len(found), len(jobs), f"({good} reached)")
+        tried.payloads.update(carried(hand, saved, found))
         simulated(command, hand, saved, found, reporter, tried.verdicts)
         executed(command, hand, saved, found, reporter, tried.executions)
     finally:
@@ -116,11 +119,20 @@ def _all_tried(command: hand_flags.Reach, found: Sequence[HandReach], tried: Han
     return held and (len(tried.executions) == reached or command.mass_kg is None)
 
 
-def _show(hand: Hand, found: Sequence[HandReach], reporter: Reporter) -> None:
+def _show(
+    hand: Hand, found: Sequence[HandReach], payloads: Mapping[str, HandPayload], reporter: Reporter
+) -> None:
     shown = found[:TABLE_ROWS]
     columns = ("grasp", "reached", "fingers", "starts", "opens", "straight way in")
-    reporter.table(f"grasps with the hand {hand.name}", columns, [_row(hand, e) for e in shown])
+    rows = [_row(hand, each) for each in shown]
+    if payloads:
+        columns = (*columns, COLUMN)
+        masses = (payloads.get(each.grasp) for each in shown)
+        cells = (ABSENT if mass is None else f"{mass.lower:.3g}" for mass in masses)
+        rows = [(*row, cell) for row, cell in zip(rows, cells, strict=True)]
+    reporter.table(f"grasps with the hand {hand.name}", columns, rows)
     say_cut(len(found), reporter)
+    say_what_it_means(payloads, reporter)
     counts = reaches_summary(found, complete=True)
     said = f"{counts['reached']} of {counts['grasps']} grasps were reached"
     if counts["collision"] + counts["limit"] + counts["not_found"]:

@@ -1,5 +1,6 @@
 """The command `reach`: its file, its exit codes, and what it refuses."""
 
+import dataclasses
 import json
 import shutil
 
@@ -15,6 +16,7 @@ from sim_validate.commands.hands import simulated
 from sim_validate.commands.hands.reach import say_where_to_look
 from sim_validate.files.stale_results import REACHES
 from sim_validate.hands.jobs import held_by_hands
+from sim_validate.hands.validate_hand import MOST_PUSH_N
 from sim_validate.main import main
 from sim_validate.records.reaches_schema import ReachesFile
 from sim_validate.records.saved_reaches import read_reaches
@@ -169,6 +171,52 @@ def test_a_simulated_hand_holds_and_its_grasps_are_ranked(grasps, tmp_path, caps
     assert '<option value="-hand">hand resists most</option>' in first
     for each in reached:
         assert f'data-hand="{each["simulated"]["weakest_n"]}"' in first
+
+
+def test_a_hand_whose_motors_and_links_are_known_says_what_it_carries(grasps, tmp_path, capsys):
+    shutil.copy(grasps, tmp_path / "grasps.json")
+    words = ["reach", str(tmp_path / "grasps.json"), "--hand", "leap", "--out", str(tmp_path)]
+    main([*words, "--jobs", "1"])
+    said = capsys.readouterr().out
+    assert "payload kg: the largest mass that the motors hold whichever way" in said
+    record = record_of(ReachesFile, (tmp_path / REACHES).read_text(), REACHES, schema=1)
+    reached = [each for each in record["reaches"] if each["reached"]]
+    assert reached, said
+    plan, hand = gc.load_grasps(grasps), gc.load_hand("leap")
+    saved, _ = read_reaches(tmp_path / REACHES)
+    for each in reached:
+        found = each["payload"]
+        assert 0.0 < found["lower_kg"] <= found["upper_kg"] <= 1.002 * found["lower_kg"]
+        assert f"{found['lower_kg']:.3g}" in said
+        load = np.append(9.80665 * np.array(found["weakest_gravity"]), np.zeros(3))
+        kept = saved.found[each["id"]]
+        closed = gc.force_closure(kept.contacts, friction=record["friction"])
+        reach = dataclasses.replace(kept, certificate=closed)
+        motors = gc.hand_motors(hand, reach, down=found["weakest_gravity"])
+        held = gc.max_resisted_wrench(
+            reach.contacts, None, record["friction"], load, max_normal_force=MOST_PUSH_N,
+            center=plan.body.center_of_mass, motors=motors,
+        )  # fmt: skip
+        assert held == pytest.approx(found["upper_kg"], rel=2e-3)  # twice the gap of the bounds
+    assert main(["report", str(tmp_path), "-q"]) == Exit.GOOD
+    page = (tmp_path / "report" / "grasps" / f"{reached[0]['id']}.html").read_text()
+    assert "Payload in any orientation" in page
+
+
+def test_a_hand_whose_links_have_no_masses_or_are_too_heavy_says_nothing_of_it(
+    grasps, tmp_path, capsys
+):
+    for words in (
+        ["allegro", "--torque-limit-n-m", "0.35"],
+        ["leap", "--torque-limit-n-m", "0.001"],
+    ):
+        out = tmp_path / words[0]
+        main(["reach", str(grasps), "--hand", *words, "--out", str(out), "--jobs", "1"])
+        assert "payload kg" not in capsys.readouterr().out
+        record = record_of(ReachesFile, (out / REACHES).read_text(), REACHES, schema=1)
+        reached = [each for each in record["reaches"] if each["reached"]]
+        assert reached
+        assert all("payload" not in each for each in reached)
 
 
 def test_what_was_tried_before_an_interrupt_is_kept(grasps, tmp_path, monkeypatch):

@@ -1,0 +1,71 @@
+"""Shows that the hull of points contains a ball about the origin.
+
+If triangles of the points have the origin on their inner side, and every edge belongs to two of
+them in opposite directions, then the cones over them cover all directions, and the ball whose
+radius is the least distance of their planes is inside the hull.                            (1)
+
+No hull is computed again to check this: sums, cross products and a look at the edges do.
+"""
+
+import importlib
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.fields import is_indices
+from grasp_core.solvers.ties import first_best, on_grid
+
+
+def nearest_facet(points: Array) -> tuple[Array, float, Indices]:
+    """Find the facet of the hull of points (n, 3) that is nearest to the origin, inside the hull.
+
+    Returns:
+        The facet's outward unit normal, (3,), its distance from the origin, and all triangles of
+        the hull, (t, 3).
+    """
+    spatial: Any = importlib.import_module("scipy.spatial")
+    hull = spatial.ConvexHull(points)
+    equations: Array = hull.equations
+    # equally near facets are taken in the order of their normals, the same on every machine
+    equations = equations[np.lexsort(on_grid(equations[:, :3]).T)]
+    nearest = equations[first_best(equations[:, 3])]
+    return nearest[:3], -float(nearest[3]), np.asarray(hull.simplices, dtype=np.int64)
+
+
+def outward(points: Array, triangles: Indices) -> Indices:
+    """Turn triangles, (t, 3), so that the origin is on their inner side."""
+    turned = np.linalg.det(points[triangles]) < 0.0
+    return np.where(turned[:, None], triangles[:, ::-1], triangles)
+
+
+def least_distance(corners: Array) -> float:
+    """Return the least distance of the origin from planes of triangles, (t, 3, 3).
+
+    The distance is negative where a triangle has the origin on its outer side.
+    """
+    a, b, c = np.moveaxis(corners, 1, 0)
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    if not (lengths > 0.0).all():
+        return -np.inf
+    return float((np.einsum("ti,ti->t", normals, a) / lengths).min())
+
+
+def ball_in(points: Array, triangles: Any) -> float:
+    """Return the radius of the ball that triangles of points (n, 3) show to be in the hull by (1).
+
+    The radius is minus infinity where the triangles, (t, 3), are not such ones.
+    """
+    if not (is_indices(triangles, None, 3) and len(triangles)):
+        return -np.inf
+    if triangles.min() < 0 or triangles.max() >= len(points) or not _is_closed(triangles):
+        return -np.inf
+    return least_distance(points[triangles])
+
+
+def _is_closed(triangles: Indices) -> bool:
+    """Return whether every edge belongs to two triangles, in opposite directions."""
+    edges = [tuple(edge) for t in triangles.tolist() for edge in zip(t, t[1:] + t[:1], strict=True)]
+    known = set(edges)
+    return len(known) == len(edges) and all((b, a) in known for a, b in edges)

@@ -1,0 +1,54 @@
+"""Triangles show a ball in a hull only if they are closed around the origin."""
+
+import numpy as np
+import pytest
+
+from grasp_core.execution.ball_in_hull import ball_in, nearest_facet, outward
+
+OCTAHEDRON = np.vstack([np.eye(3), -np.eye(3)])
+INSIDE = 1.0 / np.sqrt(3.0)
+"""Distance of the origin from the faces of an octahedron with corners at unit distance."""
+
+
+def faces():
+    _, _, triangles = nearest_facet(OCTAHEDRON)
+    return outward(OCTAHEDRON, triangles)
+
+
+def test_the_ball_in_an_octahedron_touches_its_faces():
+    normal, distance, triangles = nearest_facet(OCTAHEDRON)
+    assert distance == pytest.approx(INSIDE, rel=1e-12)
+    assert np.abs(normal) == pytest.approx(INSIDE, rel=1e-12)
+    assert len(triangles) == 8
+    assert ball_in(OCTAHEDRON, faces()) == pytest.approx(INSIDE, rel=1e-12)
+
+
+def test_the_ball_is_in_the_hull_of_random_points():
+    """All points of the sphere are on the inner side of each plane of the hull, by its corners."""
+    rng, tested = np.random.default_rng(0), 0
+    for _ in range(20):
+        points = rng.normal(size=(30, 3)) * [1.0, 2.0, 0.5]
+        _, distance, triangles = nearest_facet(points)
+        if distance <= 0.0:
+            continue
+        turned = outward(points, triangles)
+        assert ball_in(points, turned) == pytest.approx(distance, rel=1e-9)
+        normals = rng.normal(size=(1000, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        assert (points @ normals.T).max(axis=0).min() >= distance
+        tested += 1
+    assert tested >= 10
+
+
+def test_triangles_that_are_not_closed_around_the_origin_show_no_ball():
+    good = faces()
+    far = OCTAHEDRON + np.array([2.0, 0.0, 0.0])
+    twice = np.vstack([good, good])
+    flat = OCTAHEDRON * np.array([1.0, 1.0, 0.0])
+    for points, triangles in (
+        (OCTAHEDRON, good[1:]), (OCTAHEDRON, good[:, ::-1]), (OCTAHEDRON, twice),
+        (OCTAHEDRON, good + 1), (OCTAHEDRON, good - 1), (OCTAHEDRON, good[:0]), (far, good),
+        (flat, good), (OCTAHEDRON, None), (OCTAHEDRON, good.astype(float)),
+        (OCTAHEDRON, np.vstack([good[:1, ::-1], good[1:]])),
+    ):  # fmt: skip
+        assert not ball_in(points, triangles) > 0.0

@@ -1,0 +1,215 @@
+"""The mass that a hand holds in every orientation, its links included, against the definition."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.execution.carried_mass import GAP, carried_mass
+from grasp_core.execution.carrying_hand import CarryingHand
+from tests.grasp_core.execution.held import box, directions, opposed, planned
+from tests.grasp_core.execution.jointed import LEVER_M, hand_of, pushing
+
+G = 9.80665
+PROGRAM = 1e-6
+"""Accuracy of limits and bounds, relative to them: ten times that of conic programs."""
+TORQUE = 0.25
+
+
+def carrying(body, contacts, motors, weights, mu=0.5, push=10.0):
+    """The contacts with these motors and links."""
+    positions = np.array([contact.position for contact in contacts])
+    normals = np.array([contact.normal for contact in contacts])
+    friction = np.full(len(positions), mu)
+    return CarryingHand(
+        positions - body.center_of_mass, normals, friction, push, motors, np.array(weights)
+    )
+
+
+def held(hand, way):
+    """The largest mass under gravity along a unit vector, by the definition."""
+    turned = gc.Motors(hand.motors.levers, hand.motors.limits, hand.weights @ way)
+    return gc.max_resisted_wrench(
+        hand.arms, hand.normals, hand.friction, np.append(G * way, np.zeros(3)),
+        max_normal_force=hand.max_push_n, motors=turned,
+    )  # fmt: skip
+
+
+def hands(share=0.25):
+    """Grasps with hands at random, whose links ask for a share of the torques, the worst joint."""
+    rng = np.random.default_rng(3)
+    for name in ("box", "dodecahedron", "wedge"):
+        body, grasps = planned(name, 2)
+        for grasp in grasps:
+            motors = hand_of(rng, 4, 0.15, 0.0)
+            pulls = rng.uniform(0.0, share, size=(len(motors.limits), 1))
+            weights = pulls * motors.limits[:, None] * directions(len(motors.limits), rng)
+            yield carrying(body, grasp.contacts, motors, weights)
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.4, 0.9])
+@pytest.mark.parametrize("weight", [0.0, 0.05, 0.15])
+def test_opposed_fingers_whose_links_hang_alike_hold_what_the_closed_form_says(mu, weight):
+    """Under gravity along d each finger pushes with (c - w d_z) / l at most, and takes the part of
+    the load along the pushes and across as in the test of `payload`:
+    m g |d_yz| + 2 mu m g |d_x| <= 4 mu (c - w d_z) / l. Across, the worst is along z, where
+    both sides must take equal shares; over d_x and d_z the left side less the right is largest at
+    ((m g + 4 mu w / l)^2 + (2 mu m g)^2)^(1/2) = 4 mu c / l.
+    """
+    weights = np.tile([0.0, 0.0, weight], (4, 1))
+    hand = carrying(box(), opposed(), pushing(opposed(), TORQUE), weights, mu)
+    found = carried_mass(hand)
+    links, most = 4.0 * mu * weight / LEVER_M, 4.0 * mu * TORQUE / LEVER_M
+    square = 1.0 + 4.0 * mu**2
+    exact = (np.sqrt(links**2 + square * (most**2 - links**2)) - links) / (square * G)
+    assert found.lower <= exact * (1.0 + PROGRAM)
+    assert found.upper >= exact * (1.0 - PROGRAM)
+    assert found.upper <= found.lower * (1.0 + GAP) * (1.0 + PROGRAM)
+    assert found.verify()
+    lowered = 4.0 * mu * (TORQUE - weight) / LEVER_M / np.sqrt(square) / G
+    assert found.upper >= lowered * (1.0 - PROGRAM)
+
+
+def test_the_mass_is_held_in_many_orientations_and_no_more_in_the_weakest():
+    rng, tested = np.random.default_rng(0), 0
+    for hand in hands():
+        found = carried_mass(hand)
+        assert found.verify()
+        assert 0.0 < found.lower <= found.upper <= found.lower * (1.0 + GAP) * (1.0 + PROGRAM)
+        assert min(held(hand, way) for way in directions(40, rng)) >= found.lower * (1.0 - PROGRAM)
+        assert held(hand, found.weakest) <= found.upper * (1.0 + PROGRAM)
+        tested += 1
+    assert tested == 6
+
+
+def test_lowered_limits_promise_less_and_by_how_much_is_bounded():
+    """Forces under lowered limits hold in every orientation (see `Motors.in_any_orientation`)."""
+    tested = gained = 0
+    for hand in hands():
+        found = carried_mass(hand)
+        lowered = gc.Motors.in_any_orientation(hand.motors.levers, hand.motors.limits, hand.weights)
+        sure = carried_mass(dataclasses.replace(hand, motors=lowered, weights=0.0 * hand.weights))
+        taken = np.linalg.norm(hand.weights, axis=1)
+        most = float(((hand.motors.limits + taken) / lowered.limits).max())
+        assert sure.lower <= found.upper * (1.0 + PROGRAM)
+        assert found.lower <= most * sure.upper * (1.0 + PROGRAM)
+        tested += 1
+        gained += found.lower > 1.02 * sure.upper
+    assert tested == 6
+    assert gained >= 3
+
+
+@pytest.mark.parametrize("gap", [1e-3, 0.1])
+def test_links_without_weight_leave_the_mass_of_a_payload_with_forces_chosen_anew(gap):
+    tested = 0
+    for hand in hands():
+        plain = dataclasses.replace(hand, weights=0.0 * hand.weights)
+        found = carried_mass(plain, gap)
+        body = box()
+        contacts = [
+            gc.Contact(arm + body.center_of_mass, normal)
+            for arm, normal in zip(plain.arms, plain.normals, strict=True)
+        ]
+        free = gc.payload(body, contacts, 0.5, max_push_n=10.0, motors=plain.motors).free
+        assert found.lower <= free.upper * (1.0 + PROGRAM)
+        assert found.upper >= free.lower * (1.0 - PROGRAM)
+        assert found.upper <= found.lower * (1.0 + gap) * (1.0 + PROGRAM)
+        tested += 1
+    assert tested == 6
+
+
+def test_a_hand_without_joints_is_a_hand_without_motors():
+    motors = gc.Motors.of(np.zeros((0, 12)), 1.0)
+    for mu in (0.1, 0.9):
+        found = carried_mass(carrying(box(), opposed(), motors, np.zeros((0, 3)), mu))
+        exact = 4.0 * mu * 10.0 / G / np.sqrt(1.0 + 4.0 * mu**2)
+        assert found.lower <= exact * (1.0 + PROGRAM)
+        assert found.upper >= exact * (1.0 - PROGRAM)
+        assert found.verify()
+
+
+@pytest.mark.parametrize("mu", [0.0, 1e-9])
+def test_contacts_that_hold_nothing_carry_no_mass(mu):
+    weights = np.tile([0.0, 0.0, 0.1], (4, 1))
+    found = carried_mass(carrying(box(), opposed(), pushing(opposed(), TORQUE), weights, mu))
+    assert found.lower == 0.0
+    assert found.upper < 1e-6
+    assert len(found.gravities) == len(found.triangles) == 0
+    assert found.verify()
+
+
+def test_links_that_nearly_use_up_the_motors_leave_little_and_it_is_proved():
+    """The closed form for w = c (1 - e), whose mass is nearly 2 c e / w times that of no links."""
+    for left in (1e-2, 1e-4):
+        weight = TORQUE * (1.0 - left)
+        weights = np.tile([0.0, 0.0, weight], (4, 1))
+        found = carried_mass(carrying(box(), opposed(), pushing(opposed(), TORQUE), weights, 0.4))
+        links, most = 1.6 * weight / LEVER_M, 1.6 * TORQUE / LEVER_M
+        square = 1.0 + 4.0 * 0.4**2
+        exact = (most**2 - links**2) / (links + np.sqrt(links**2 + square * (most**2 - links**2)))
+        assert found.lower <= exact / G * (1.0 + PROGRAM / left)
+        assert found.upper >= exact / G * (1.0 - PROGRAM / left)
+        assert found.upper <= found.lower * (1.0 + GAP) * (1.0 + PROGRAM)
+        assert found.verify()
+
+
+def test_a_hand_that_is_turned_holds_as_much():
+    rng = np.random.default_rng(7)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    tested = 0
+    for hand in hands():
+        levers = hand.motors.levers.reshape(-1, 4, 3) @ turn.T
+        turned = dataclasses.replace(
+            hand, arms=hand.arms @ turn.T, normals=hand.normals @ turn.T,
+            weights=hand.weights @ turn.T,
+            motors=gc.Motors.of(levers.reshape(len(levers), 12), hand.motors.limits),
+        )  # fmt: skip
+        one, other = carried_mass(hand), carried_mass(turned)
+        assert one.lower <= other.upper * (1.0 + PROGRAM)
+        assert other.lower <= one.upper * (1.0 + PROGRAM)
+        tested += 1
+    assert tested == 6
+
+
+def test_false_claims_are_no_certificate():
+    hand = next(iter(hands()))
+    found = carried_mass(hand)
+    assert found.verify()
+    weaker = gc.Motors.of(hand.motors.levers, 0.99 * hand.motors.limits)
+    stronger = gc.Motors.of(hand.motors.levers, 1.01 * hand.motors.limits)
+    own = [
+        {"lower": found.lower * 1.001}, {"upper": found.upper * (1.0 - 1e-6)},
+        {"upper": found.lower * 0.999}, {"triangles": found.triangles[1:]},
+        {"triangles": found.triangles[:, ::-1]}, {"triangles": None}, {"triangles": ()},
+        {"triangles": found.triangles + 1}, {"gravities": 0.99 * found.gravities},
+        {"gravities": 1.01 * found.gravities}, {"gravities": found.gravities[1:]},
+        {"gravities": None}, {"forces": 1.001 * found.forces}, {"forces": found.forces[::-1]},
+        {"forces": None}, {"facet": 0.0 * found.facet}, {"facet": -found.facet}, {"facet": None},
+        {"motor_multipliers": 0.0 * found.motor_multipliers}, {"motor_multipliers": None},
+        {"lower": np.nan}, {"lower": -1.0}, {"upper": "a"}, {"upper": np.nan}, {"hand": None},
+    ]  # fmt: skip
+    about = [
+        {"motors": weaker}, {"motors": stronger}, {"motors": None}, {"weights": 0.9 * hand.weights},
+        {"weights": 1.1 * hand.weights}, {"weights": -hand.weights}, {"weights": None},
+        {"weights": 100.0 * hand.weights}, {"friction": 0.99 * hand.friction},
+        {"friction": 1.01 * hand.friction}, {"friction": None}, {"arms": 1.01 * hand.arms},
+        {"arms": None}, {"normals": -hand.normals}, {"normals": 2.0 * hand.normals},
+        {"normals": None}, {"max_push_n": np.nan}, {"max_push_n": None},
+        {"motors": gc.Motors.of(hand.motors.levers, hand.motors.limits, 1e-3)},
+    ]  # fmt: skip
+    for change in own:
+        assert dataclasses.replace(found, **change).verify() is False, change
+    for change in about:
+        other = dataclasses.replace(hand, **change)
+        assert dataclasses.replace(found, hand=other).verify() is False, change
+
+
+def test_a_mass_that_is_none_needs_no_forces_and_a_smaller_claim_is_one_too():
+    found = carried_mass(next(iter(hands())))
+    nothing = {"gravities": np.zeros((0, 3)), "forces": np.zeros((0, 4, 3)),
+               "triangles": np.zeros((0, 3), dtype=int)}  # fmt: skip
+    assert dataclasses.replace(found, lower=0.0, **nothing).verify()
+    assert not dataclasses.replace(found, **nothing).verify()
+    assert dataclasses.replace(found, upper=2.0 * found.upper).verify()
