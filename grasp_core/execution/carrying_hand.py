@@ -17,7 +17,7 @@ contains zero, with f = 0. The mass m is held under d if (m d, d) is in C, and h
 *A mass that is held.* Points v of S(m), each with its forces, whose hull contains the unit ball
 prove (3); `ball_in_hull` shows that by triangles.
 
-*A mass that is not.* For any twist y and multipliers u of the joints, (3) of `wrench_limits` bounds
+*A mass that is not.* For any twist y and multipliers u of the joints, (3) of `wrench_body` bounds
 y.(G f) + u.(L f + W v) - u.(W v) over C, so that
 
     (W'u - g m y_F).d  <=  h(y, u)    wherever m is held under d,                       (4)
@@ -43,7 +43,7 @@ from grasp_core.execution.ball_in_hull import ball_in
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.fields import are_frictions, are_units, is_a, is_array, is_indices, is_number
 from grasp_core.quality.motors import Motors
-from grasp_core.quality.wrench_limits import HELD, WrenchBody
+from grasp_core.quality.wrench_body import HELD, WrenchBody
 from grasp_core.short_text import summary
 
 ROUNDING = 1e-9

@@ -1,7 +1,7 @@
 """The weakest wrench: a search among all unit wrenches for one that contacts resist least.
 
 A wrench is resisted up to a limiting facet of the body of wrenches that the contacts can apply (see
-`wrench_limits`), with the twist y and the support h(y). The wrench -y / |y| meets that facet
+`wrench_body`), with the twist y and the support h(y). The wrench -y / |y| meets that facet
 squarely, so
 
     limit of -y / |y|  <=  h(y) / |y|:                                                  (1)
@@ -15,7 +15,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit
+from grasp_core.quality.wrench_body import WrenchBody, WrenchLimit
 from grasp_core.solvers.ties import first_best, smallest_first
 
 SETTLED = 1e-3

@@ -1,4 +1,4 @@
-"""Finds the largest resisted multiples of many wrenches, one after the other (see `wrench_limits`).
+"""Finds the largest resisted multiples of many wrenches, one after the other (see `wrench_body`).
 
 Solved by following the central path of program (1): in units of f_max, with d = -w and the cones
 s0^2 + s1^2 < (mu n)^2, 0 < n < 1 of each contact (n, s0, s1), Newton's method finds

@@ -7,7 +7,8 @@ from scipy.optimize import linprog
 import grasp_core as gc
 from grasp_core.closure.wrenches import grasp_map
 from grasp_core.quality.weakest_wrench import SETTLED, weakest_from
-from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches
+from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limits import axis_wrenches
 from tests.judges import random_contacts
 
 SIDES = 64

@@ -4,7 +4,8 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.wrenches import grasp_map, normal_and_tangential
 from grasp_core.quality.weakest_wrench import weakest_from
-from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, max_resisted_wrench
+from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limits import axis_wrenches, max_resisted_wrench
 from scenes.example_objects import example_object
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
 

@@ -6,8 +6,9 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import compiled
-from grasp_core.quality import wrench_limits
-from grasp_core.quality.wrench_limits import CLOSE, KERNEL, WrenchBody, many_limits
+from grasp_core.quality import wrench_body
+from grasp_core.quality.wrench_body import CLOSE, KERNEL, WrenchBody
+from grasp_core.quality.wrench_limits import many_limits
 from scenes.example_objects import example_object
 
 COUNT = 60
@@ -73,5 +74,5 @@ def test_what_is_wrong_is_solved_by_itself(monkeypatch):
                 kernel.limits(contacts, loads, *filled)
                 spoil(*filled)
 
-        monkeypatch.setattr(wrench_limits, "compiled", lambda _, other=Spoiled: other)
+        monkeypatch.setattr(wrench_body, "compiled", lambda _, other=Spoiled: other)
         np.testing.assert_allclose(many(*case), expected, rtol=11.0 * CLOSE)

@@ -19,7 +19,8 @@ from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.optimizing.better_contacts import pieces_under
 from grasp_core.planning.given_contacts import seat
 from grasp_core.quality import weakest_wrench
-from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches
+from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limits import axis_wrenches
 from grasp_core.records.contacts_json import ContactSet
 from grasp_core.regions.centers import larger_inside
 from grasp_core.regions.cover_search import search_cover
