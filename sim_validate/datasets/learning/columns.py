@@ -17,7 +17,8 @@ KINDS = (
 )  # fmt: skip
 CLOSURE = (
     Column("span_angle_rad", "float", "half-angle below which cones positively span", "rad"),
-    Column("min_weight", "float", "min-weight metric of pyramids with eight edges", "1"),
+    Column("min_weight", "float",
+           "min-weight metric of pyramids with eight edges; null if no weights balance", "1"),
     Column("hull_volume_n6", "float", "volume of the hull of the pyramids' edges", "N6"),
     Column("smallest_singular_value", "float", "least singular value of the grasp map", "1"),
     Column("witness_forces_n", "float", "balanced forces on the object, normal parts sum to one",

@@ -4,6 +4,7 @@ Each figure is a cell of a grasp's row, or null where it does not exist for the 
 four have no span angle, contacts that are not in force closure no payload.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -59,9 +60,10 @@ class Figures:
         }
         for name, way in ways.items():
             try:
-                cells[name] = way()
+                value = way()
             except GraspError:  # too few contacts span too little
-                cells[name] = None
+                value = None
+            cells[name] = value if value is not None and math.isfinite(value) else None
         return cells
 
     def of_grasp(self, body: Polyhedron, grasp: Grasp, friction: float) -> Cells:

@@ -14,6 +14,8 @@ from sim_validate.datasets.verifying.rows_by_object import ObjectRows, Row
 
 ROUNDING = 1e-6
 """Share of a ratio or a distance that processors may round differently."""
+NEAR_ZERO = 1e-7
+"""Difference of critical frictions that counts as none: those near zero are found to millionths."""
 BAND = 1e-3
 """Share by which a ratio may leave its band: frictions and masses are rounded to four digits."""
 LABELS = {"grasp": PLANNED, GIVEN: GIVEN}
@@ -66,7 +68,8 @@ def _ratio_faults(row: Row) -> Iterator[str]:
     wanted = row["friction"] / critical if 0.0 < critical < np.inf else None
     known = row["friction_ratio"]
     if (known is None) != (wanted is None) or (
-        wanted is not None and not np.isclose(known, wanted, rtol=ROUNDING * 10.0, atol=0.0)
+        wanted is not None
+        and not np.isclose(row["friction"] / known, critical, rtol=10.0 * ROUNDING, atol=NEAR_ZERO)
     ):
         yield f"friction_ratio is {known}, but from the contacts it is {wanted}"
     if row["kind"] in RATIOS:

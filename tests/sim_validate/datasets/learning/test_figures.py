@@ -8,6 +8,8 @@ from grasp_core.closure.contact_arrays import stacked
 from grasp_core.objects.symmetries import orbit_sizes
 from grasp_core.planning.reach import segment_distances
 from scenes.example_objects import example_object
+from sim_validate.datasets.learning.figures import Figures
+from sim_validate.datasets.learning.settings import Learning
 from sim_validate.datasets.verifying.verify import verify
 from tests.sim_validate.datasets.forging import forged
 from tests.sim_validate.datasets.learned import BODIES, rows_of
@@ -36,6 +38,18 @@ def test_closure_figures_are_those_of_the_contacts(grasps):
         assert row["hull_volume_n6"] == gc.hull_volume(contacts, friction=friction, **about)
         assert row["smallest_singular_value"] == gc.smallest_singular_value(contacts, **about)
         assert row["span_angle_rad"] == gc.span_angle(stacked(contacts)[1])
+
+
+def test_what_no_weights_balance_has_no_min_weight():
+    """Tables hold no infinite numbers, so that a row and its check must agree on null."""
+    body = example_object("box")
+    top = body.vertices[:, 2].max()
+    places = [(0.01 * x, 0.01 * y, top) for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
+    contacts = [gc.Contact(np.array(place), np.array([0.0, 0.0, -1.0])) for place in places]
+    assert gc.min_weight(contacts, friction=0.5) == -np.inf
+    cells = Figures(Learning(figures=("closure",)), None).of_contacts(body, contacts, 0.5)
+    assert cells["min_weight"] is None
+    assert cells["smallest_singular_value"] is not None
 
 
 def test_witness_forces_balance_within_the_cones(grasps):
