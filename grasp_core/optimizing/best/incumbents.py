@@ -1,7 +1,8 @@
 """Finds good contacts to begin with: random ones that many twists weigh well, moved uphill.
 
-The quality of contacts is at most their largest support in each of many twists. Random contacts are
-ordered by the least of these bounds, and the first of different sets of faces climb.
+The quality of contacts is at most what each of many twists allows: their largest support over the
+twist's demand. Random contacts are ordered by the least of these bounds, and the first of different
+sets of faces climb.
 """
 
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.optimizing.best.grounds import Grounds
 from grasp_core.optimizing.best.search import Found, Searching
+from grasp_core.quality.resisted_loads import THIN
 from grasp_core.solvers.ties import surpassing
 from grasp_core.values import FINGERS
 
@@ -43,8 +45,12 @@ def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Foun
         at[place] = rng.dirichlet(np.ones(len(polygon))) @ polygon
     supports = _supports(grounds, searching.friction, on, at, twists)
     sets = np.sort(rng.integers(POINTS, size=(SETS, FINGERS)), axis=1)
+    measure, demands = searching.measure, searching.measure.demands(twists)
     bounds = np.concatenate(
-        [supports[sets[k : k + AT_ONCE]].max(axis=1).min(axis=1) for k in range(0, SETS, AT_ONCE)]
+        [
+            measure.multiples(supports[sets[k : k + AT_ONCE]].max(axis=1), demands).min(axis=1)
+            for k in range(0, SETS, AT_ONCE)
+        ]
     )
     tried: set[tuple[int, ...]] = set()
     best: Found | None = None
@@ -66,7 +72,8 @@ def climbed(searching: Searching, on: Sequence[int] | Indices, at: Array) -> Fou
     """Move contacts uphill on their pieces."""
     pieces = tuple(piece_at(searching.grounds, int(p)) for p in on)
     limits = tuple(piece.b for piece in pieces)
-    faces = ContactFaces(pieces, limits, searching.friction)
+    scale = THIN if searching.measure.name == "weight" else 1.0
+    faces = ContactFaces(pieces, limits, searching.friction, scale)
     here = searching.measured(np.array(on), at)
     if here.quality.lower <= 0.0:
         return here
