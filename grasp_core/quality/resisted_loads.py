@@ -21,6 +21,7 @@ The least m_j is a lower bound, as forces that add up to zero complete the hull,
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -133,13 +134,13 @@ def resisted_loads(wrenches: WrenchSet, measure: Measure, gap: float = GAP) -> R
         return ResistedLoads(
             min(-1.0, closed.lower), upper, measure, wrenches, direction, None, None
         )
-    each = [_resisted(wrenches, load) for load in measure.loads]
-    lower = min(multiple for multiple, _, _ in each)
-    direction, upper = _least(wrenches, measure, [twist for _, _, twist in each])
+    each = task_limits(wrenches, measure)
+    lower = min(limit.multiple for limit in each)
+    direction, upper = _least(wrenches, measure, [limit.twist for limit in each])
     rest, _ = nearest_wrench(wrenches)
     # less than the largest multiple of a load is a mixture with forces that add up to zero
-    shares = [lower / multiple for multiple, _, _ in each]
-    forces = [s * f + (1.0 - s) * rest for s, (_, f, _) in zip(shares, each, strict=True)]
+    shares = [lower / limit.multiple for limit in each]
+    forces = [s * limit.forces + (1.0 - s) * rest for s, limit in zip(shares, each, strict=True)]
     return ResistedLoads(
         min(lower, upper), upper, measure, wrenches, direction, None, np.array([*forces, rest])
     )
@@ -163,8 +164,26 @@ def _units(rows: Array) -> Array:
     return rows / np.linalg.norm(rows, axis=1)[:, None]
 
 
-def _resisted(wrenches: WrenchSet, load: Array) -> tuple[float, Array, Array]:
-    """Return the largest multiple of a load, local forces that resist it, and a limiting twist."""
+class TaskLimit(NamedTuple):
+    """How large a multiple of one load contacts in force closure resist."""
+
+    multiple: float
+    forces: Array
+    """Local forces that resist the multiple, (3k,)."""
+    twist: Array
+    """Twist with demand one that limits the multiple, (6,)."""
+
+
+def task_limits(wrenches: WrenchSet, measure: Measure) -> list[TaskLimit]:
+    """Find the largest multiple of each load of a task that contacts in force closure resist.
+
+    Raises:
+        SolverError: A program's answer failed its check.
+    """
+    return [_limit(wrenches, load) for load in measure.loads]
+
+
+def _limit(wrenches: WrenchSet, load: Array) -> TaskLimit:
     G, mu = wrenches.G, wrenches.friction
     k, n, size = len(mu), G.shape[1], float(np.linalg.norm(load))
     A = np.zeros((WRENCH + 1 + k + n, n + 1))
@@ -181,4 +200,4 @@ def _resisted(wrenches: WrenchSet, load: Array) -> tuple[float, Array, Array]:
     if not multiple > 0.0:
         raise SolverError("a load of a task has no resisted multiple although contacts are closed")
     # the multipliers have z.load = |load|, so that their demand is positive the other way
-    return multiple, answer.x[:-1], -answer.z[:WRENCH]
+    return TaskLimit(multiple, answer.x[:-1], -answer.z[:WRENCH] / size)

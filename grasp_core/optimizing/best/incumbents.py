@@ -15,6 +15,7 @@ from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.optimizing.best.grounds import Grounds
 from grasp_core.optimizing.best.search import Found, Searching
+from grasp_core.optimizing.best.task_ascent import climbed_for_task
 from grasp_core.quality.resisted_loads import THIN
 from grasp_core.solvers.ties import surpassing
 from grasp_core.values import FINGERS
@@ -77,7 +78,10 @@ def climbed(searching: Searching, on: Sequence[int] | Indices, at: Array) -> Fou
     here = searching.measured(np.array(on), at)
     if here.quality.lower <= 0.0:
         return here
-    moved, _ = faces.climbed(at)
+    if searching.measure.name == "task":
+        moved = climbed_for_task(faces, searching.measure, at)
+    else:
+        moved, _ = faces.climbed(at)
     there = searching.measured(np.array(on), moved)
     inside = all(
         float((piece.E @ y - piece.b).max()) <= 0.0 for piece, y in zip(pieces, moved, strict=True)

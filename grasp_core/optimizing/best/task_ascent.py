@@ -1,0 +1,74 @@
+"""Moves contacts on four convex faces uphill towards larger resisted multiples of a task's loads.
+
+Solved, locally: maximise over positions x_i on the faces the least of the largest multiples m_j of
+loads w_j that contact forces with normal parts of sum one resist.
+
+Derivation. The program for m_j has forces F_i and a twist (v, omega) as its answer, which asks for
+one of w_j, see `resisted_loads`. When contacts move by d_i and take the forces along, the wrench
+changes by (0, sum_i d_i x F_i), and the optimum by its product with the twist,
+
+    m_j changes by  sum_i d_i . (F_i x omega).                                              (1)
+
+Steps are those of `ascent`: linear programs with (1) in a trust region.
+"""
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.closure.wrenches import contact_frames
+from grasp_core.optimizing.ascent import (
+    FIRST_REACH,
+    GOOD,
+    GROWTH,
+    LEAST_REACH,
+    MOST_STEPS,
+    POOR,
+    SHRINKAGE,
+    WORTHWHILE,
+    ContactFaces,
+)
+from grasp_core.quality.ferrari_canny import wrench_set_quality
+from grasp_core.quality.measures import Measure
+from grasp_core.quality.resisted_loads import CLOSED_GAP, task_limits
+from grasp_core.solvers.ties import surpassing
+
+
+def climbed_for_task(faces: ContactFaces, measure: Measure, y: Array) -> Array:
+    """Move contacts in force closure uphill to a local optimum, and return where they are.
+
+    Args:
+        faces: The faces.
+        measure: The task.
+        y: Plane coordinates of the contacts, (k, 2).
+    """
+    reach, found = FIRST_REACH, _planes(faces, measure, y)
+    for _ in range(MOST_STEPS):
+        if found is None or reach < LEAST_REACH:
+            break
+        lower = float(found[0].min())
+        step, predicted = faces.step(y, lower, found, reach)
+        if predicted <= WORTHWHILE * lower:
+            break
+        trial = _planes(faces, measure, y + step)
+        there = 0.0 if trial is None else float(trial[0].min())
+        if there > surpassing(lower):
+            y, found = y + step, trial
+        gained = (there - lower) / predicted
+        reach *= GROWTH if gained > GOOD else SHRINKAGE if gained < POOR else 1.0
+    return y
+
+
+def _planes(faces: ContactFaces, measure: Measure, y: Array) -> tuple[Array, Array] | None:
+    """Return the multiple of each load, (m,), and its slopes (1), (m, 2k); None without closure."""
+    friction = np.full(len(y), faces.friction)
+    wrenches = WrenchSet.at(faces.positions(y), faces.normals, friction).on_grid()
+    if wrench_set_quality(wrenches, CLOSED_GAP).lower <= 0.0:
+        return None
+    limits = task_limits(wrenches, measure)
+    local = np.array([limit.forces for limit in limits]).reshape(len(limits), -1, 3)
+    forces = np.einsum("kij,nkj->nki", contact_frames(faces.normals), local)
+    turned = np.cross(forces, np.array([limit.twist for limit in limits])[:, None, 3:])
+    planes = np.array([piece.frame for piece in faces.pieces])
+    slopes = np.einsum("nki,kij->nkj", turned, planes).reshape(len(limits), -1)
+    return np.array([limit.multiple for limit in limits]), slopes
