@@ -207,14 +207,14 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
 
 
 def measured(
-    body: Polyhedron, grasp: Grasp, friction: float, measure: Measure
+    body: Polyhedron, grasp: Grasp, friction: float, measure: Measure, gap: float = EXACT_GAP
 ) -> FerrariCanny | ResistedLoads:
     """Bound what a grasp of an object resists of the loads of a measure, with proofs."""
     about = {"center": body.center_of_mass, "torque_scale": body.radius}
     if measure.is_usual:
-        return ferrari_canny(grasp, friction=friction, gap=EXACT_GAP, **about)
+        return ferrari_canny(grasp, friction=friction, gap=gap, **about)
     wrenches = WrenchSet.of(grasp, None, friction, **about)
-    return resisted_loads(wrenches, measure, EXACT_GAP)
+    return resisted_loads(wrenches, measure, gap)
 
 
 @contextmanager
