@@ -68,8 +68,6 @@ class ContactFaces:
     """Offsets of the edges, for each piece: contact i lies where E_i y <= limits[i] in its
     plane."""
     friction: float
-    torque_scale: float = 1.0
-    """Length by which torques are divided, in units of the object's size."""
 
     @property
     def normals(self) -> Array:
@@ -81,13 +79,13 @@ class ContactFaces:
         return np.array([piece.point(at) for piece, at in zip(self.pieces, y, strict=True)])
 
     def quality(self, y: Array, gap: float = SEARCH_GAP) -> FerrariCanny:
-        """Compute the `l1` quality of contacts, with torques over the torque scale.
+        """Compute the `l1` quality of contacts, with torques in units of the object's size.
 
         Wrenches are rounded to a grid, because a polytope that grows where it is weakest often has
         to choose between several equally near planes.
         """
         friction = np.full(len(y), self.friction)
-        wrenches = WrenchSet.at(self.positions(y) / self.torque_scale, self.normals, friction)
+        wrenches = WrenchSet.at(self.positions(y), self.normals, friction)
         return wrench_set_quality(wrenches.on_grid(), gap)
 
     def climbed(self, y: Array) -> tuple[Array, FerrariCanny]:
@@ -153,7 +151,7 @@ class ContactFaces:
         local = polytope.forces.reshape(len(polytope.forces), -1, 3)
         forces = np.einsum("kij,nkj->nki", frames, local)
         carried = np.einsum("mc,mcki->mki", shares[sound], forces[corners[sound]])
-        turned = np.cross(carried, normals[sound, None, 3:] / self.torque_scale)
+        turned = np.cross(carried, normals[sound, None, 3:])
         planes = np.array([piece.frame for piece in self.pieces])
         slopes = np.einsum("mki,kij->mkj", turned, planes).reshape(int(sound.sum()), -1)
         return b[sound], slopes

@@ -15,8 +15,7 @@ from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.optimizing.best.grounds import Grounds
 from grasp_core.optimizing.best.search import Found, Searching
-from grasp_core.optimizing.best.task_ascent import climbed_for_task
-from grasp_core.quality.resisted_loads import THIN
+from grasp_core.optimizing.best.task_ascent import climbed_for_task, climbs_for_weight
 from grasp_core.solvers.ties import surpassing
 from grasp_core.values import FINGERS
 
@@ -73,20 +72,30 @@ def climbed(searching: Searching, on: Sequence[int] | Indices, at: Array) -> Fou
     """Move contacts uphill on their pieces."""
     pieces = tuple(piece_at(searching.grounds, int(p)) for p in on)
     limits = tuple(piece.b for piece in pieces)
-    scale = THIN if searching.measure.name == "weight" else 1.0
-    faces = ContactFaces(pieces, limits, searching.friction, scale)
-    here = searching.measured(np.array(on), at)
-    if here.quality.lower <= 0.0:
-        return here
-    if searching.measure.name == "task":
-        moved = climbed_for_task(faces, searching.measure, at)
+    faces = ContactFaces(pieces, limits, searching.friction)
+
+    def measured(y: Array) -> Found:
+        return searching.measured(np.array(on), y)
+
+    best = measured(at)
+    if best.quality.lower <= 0.0:
+        return best
+    measure = searching.measure
+    if measure.name == "weight":
+        every = climbs_for_weight(faces, at, lambda y: measured(y).quality)
+    elif measure.name == "task":
+        every = [climbed_for_task(faces, measure, at)]
     else:
-        moved, _ = faces.climbed(at)
-    there = searching.measured(np.array(on), moved)
-    inside = all(
-        float((piece.E @ y - piece.b).max()) <= 0.0 for piece, y in zip(pieces, moved, strict=True)
-    )
-    return there if inside and there.quality.lower > here.quality.lower else here
+        every = [faces.climbed(at)[0]]
+    for moved in every:
+        there = measured(moved)
+        inside = all(
+            float((piece.E @ y - piece.b).max()) <= 0.0
+            for piece, y in zip(pieces, moved, strict=True)
+        )
+        if inside and there.quality.lower > best.quality.lower:
+            best = there
+    return best
 
 
 def piece_at(grounds: Grounds, place: int) -> FacePiece:

@@ -10,7 +10,12 @@ changes by (0, sum_i d_i x F_i), and the optimum by its product with the twist,
     m_j changes by  sum_i d_i . (F_i x omega).                                              (1)
 
 Steps are those of `ascent`: linear programs with (1) in a trust region.
+
+The weight is a task with forces in all directions. Contacts climb for some of them, again and again
+with those directions as well that they held least.
 """
+
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -30,8 +35,57 @@ from grasp_core.optimizing.ascent import (
 )
 from grasp_core.quality.ferrari_canny import wrench_set_quality
 from grasp_core.quality.measures import Measure
-from grasp_core.quality.resisted_loads import CLOSED_GAP, task_limits
+from grasp_core.quality.resisted_loads import CLOSED_GAP, THIN, ResistedLoads, task_limits
 from grasp_core.solvers.ties import surpassing
+
+SPREAD, ROUNDS = 48, 4
+"""Directions of the weight for which contacts climb first, and how often they climb."""
+WEAK, APART, MOST_WEAK = 1.05, 0.97, 16
+"""Directions that are added are held up to this much better than the weakest, with cosines below
+this between them, and are so many at most."""
+
+
+def climbs_for_weight(
+    faces: ContactFaces, y: Array, measured: Callable[[Array], ResistedLoads]
+) -> Iterator[Array]:
+    """Yield where contacts in force closure come to by climbing for the weight, (k, 2) each.
+
+    Args:
+        faces: The faces.
+        y: Plane coordinates of the contacts, (k, 2).
+        measured: Measures contacts for the weight.
+    """
+    forces = _spread()
+    for _ in range(ROUNDS):
+        loads = np.hstack([forces, np.zeros_like(forces)])
+        y = climbed_for_task(faces, Measure("task", loads), y)
+        yield y
+        forces = np.vstack([forces, _weakest(measured(y))])
+
+
+def _spread() -> Array:
+    """Return directions along a spiral from pole to pole, all about as far apart, (n, 3)."""
+    place = np.arange(SPREAD) + 0.5
+    z, turn = 1.0 - 2.0 * place / SPREAD, np.pi * (1.0 + np.sqrt(5.0)) * place
+    across = np.sqrt(1.0 - z * z)
+    return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
+
+
+def _weakest(found: ResistedLoads) -> Array:
+    """Return directions of the weight that contacts hold least, far from each other, (n, 3)."""
+    if found.ball is None or found.ball.polytope is None:
+        return np.zeros((0, 3))
+    twists = found.ball.polytope.normals / np.repeat([1.0, THIN], 3)
+    supports, demands = found.wrenches.supports(twists), found.measure.demands(twists)
+    held = found.measure.multiples(supports, demands)
+    near = np.argsort(held, kind="stable")
+    near = near[held[near] <= WEAK * float(held.min())]
+    ways = -twists[near, :3] / demands[near, None]
+    kept: list[Array] = []
+    while len(ways) and len(kept) < MOST_WEAK:
+        kept.append(ways[0])
+        ways = ways[ways @ ways[0] < APART]
+    return np.array(kept)
 
 
 def climbed_for_task(faces: ContactFaces, measure: Measure, y: Array) -> Array:
