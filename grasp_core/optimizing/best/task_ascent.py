@@ -30,7 +30,6 @@ from grasp_core.optimizing.ascent import (
     MOST_STEPS,
     POOR,
     SHRINKAGE,
-    WORTHWHILE,
     ContactFaces,
 )
 from grasp_core.quality.ferrari_canny import wrench_set_quality
@@ -38,8 +37,11 @@ from grasp_core.quality.measures import Measure
 from grasp_core.quality.resisted_loads import CLOSED_GAP, THIN, ResistedLoads, task_limits
 from grasp_core.solvers.ties import surpassing
 
-SPREAD, ROUNDS = 48, 4
-"""Directions of the weight for which contacts climb first, and how often they climb."""
+SMALL_GAIN = 1e-4
+"""Predicted relative gain below which a climb ends."""
+SPREAD, ROUNDS, GAIN = 48, 4, 1e-3
+"""Directions of the weight for which contacts climb first, how often they climb, and the relative
+gain that is worth another time."""
 WEAK, APART, MOST_WEAK = 1.05, 0.97, 16
 """Directions that are added are held up to this much better than the weakest, with cosines below
 this between them, and are so many at most."""
@@ -55,12 +57,16 @@ def climbs_for_weight(
         y: Plane coordinates of the contacts, (k, 2).
         measured: Measures contacts for the weight.
     """
-    forces = _spread()
+    forces, best = _spread(), 0.0
     for _ in range(ROUNDS):
         loads = np.hstack([forces, np.zeros_like(forces)])
         y = climbed_for_task(faces, Measure("task", loads), y)
         yield y
-        forces = np.vstack([forces, _weakest(measured(y))])
+        found = measured(y)
+        if found.lower <= (1.0 + GAIN) * best:
+            return
+        best = found.lower
+        forces = np.vstack([forces, _weakest(found)])
 
 
 def _spread() -> Array:
@@ -102,7 +108,7 @@ def climbed_for_task(faces: ContactFaces, measure: Measure, y: Array) -> Array:
             break
         lower = float(found[0].min())
         step, predicted = faces.step(y, lower, found, reach)
-        if predicted <= WORTHWHILE * lower:
+        if predicted <= SMALL_GAIN * lower:
             break
         trial = _planes(faces, measure, y + step)
         there = 0.0 if trial is None else float(trial[0].min())
