@@ -167,16 +167,16 @@ def test_a_regular_tetrahedron_holds_a_weight_known_by_its_normals():
 def test_fractions_confirm_a_small_proof(measure, tmp_path, monkeypatch):
     """Exact arithmetic that shares no code with the package, on a proof without symmetries."""
     monkeypatch.setattr(searching, "exact_maps", lambda *_: np.eye(3)[None])
-    body = example_object("tetrahedron")
     if measure == "weight":
-        found = gc.best_grasp(body, FRICTION, gap=0.066, measure="weight")
+        found, least = best("box", "weight", gap=0.2), 5
     else:
         axes = np.vstack([np.eye(6), -np.eye(6)]) * np.repeat([1.0, 0.05], 3)
+        body, least = example_object("tetrahedron"), 100
         found = gc.best_grasp(body, FRICTION, gap=0.3, measure="task", wrenches=axes)
     path = write_proof(tmp_path / "proof.npz", found.proof)
     with np.load(path) as archive:
         arrays = dict(archive)
-    assert len(arrays["deeds"]) > 10
+    assert len(arrays["deeds"]) >= least
     assert replays(arrays)
     assert not replays(arrays | {"threshold": 0.5 * arrays["threshold"]})
     assert not replays(arrays | {"deeds": arrays["deeds"][:-1], "asked": arrays["asked"][:-1]})
