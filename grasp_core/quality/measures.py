@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array, frozen, frozen_copy
 from grasp_core.by_value import ByValue
@@ -100,7 +100,7 @@ class Measure(ByValue):
             return len(self.loads) == 0
         sizes = np.linalg.norm(self.loads, axis=1)
         return 0 < len(sizes) <= MOST_LOADS and bool(
-            SMALLEST <= sizes.min() and sizes.max() <= LARGEST
+            sizes.min() >= SMALLEST and sizes.max() <= LARGEST
         )
 
     @property
@@ -114,7 +114,7 @@ class Measure(ByValue):
         return float(np.linalg.norm(self.loads, axis=1).max()) if self.name == "task" else 1.0
 
     def demands(self, twists: Array) -> Array:
-        """Compute how much of the loads each twist (n, 6), at unit length, asks for, (n,) by (1)."""
+        """Compute the demands (1) of twists at unit length, (n, 6): how much they ask for, (n,)."""
         if self.name == "weight":
             return np.asarray(np.linalg.norm(twists[:, :3], axis=1), dtype=np.float64)
         if self.name == "task":
@@ -130,7 +130,7 @@ class Measure(ByValue):
             allowed = np.where(demands > 0.0, supports / demands, np.inf)
         return np.where(supports < 0.0, supports / np.maximum(demands, SMALL_DEMAND), allowed)
 
-    def keeps(self, maps: Array, slack: float) -> Array:
+    def keeps(self, maps: Array, slack: float) -> NDArray[np.bool_]:
         """Return which orthogonal matrices (g, 3, 3) map the loads to themselves, (g,).
 
         Args:
@@ -138,14 +138,14 @@ class Measure(ByValue):
             slack: Largest distance between a mapped load and another, over the longest one.
         """
         if self.name != "task":
-            return np.ones(len(maps), dtype=bool)
+            return np.ones(len(maps), dtype=np.bool_)
         # a reflection turns torques the other way round
         signs = np.sign(np.linalg.det(maps))[:, None, None]
         forces, torques = self.loads[:, :3], self.loads[:, 3:]
         turned = (forces @ maps.transpose(0, 2, 1), signs * (torques @ maps.transpose(0, 2, 1)))
         images = np.concatenate(turned, axis=2)
         apart = np.linalg.norm(images[:, :, None] - self.loads, axis=3).min(axis=2)
-        return np.asarray(apart.max(axis=1) <= slack * self.size)
+        return np.asarray(apart.max(axis=1) <= slack * self.size, dtype=np.bool_)
 
 
 FERRARI_CANNY = Measure("ferrari-canny")

@@ -11,8 +11,8 @@ thousandth of the object's radius r. The ball that it proves,
     { (f, tau) : |f|^2 + |tau / (r / 1000)|^2 <= m^2 },                                     (1)
 
 holds all forces up to m, so that m is a lower bound for the weight. The twist (v, omega) that
-limits this ball has h(y) = m' |(v, omega r / 1000)|, m' the upper bound of its radius, and so bounds
-the weight by m' (1 + 5e-7 |omega r|^2 / |v|^2) at most: the two bounds are close.
+limits this ball has h(y) = m' |(v, omega r / 1000)|, m' the upper bound of its radius, and so
+bounds the weight by m' (1 + 5e-7 |omega r|^2 / |v|^2) at most: the two bounds are close.
 
 *From below, task.* For each load w_j, forces with normal parts of sum one and the wrench -m_j w_j,
 m_j as large as possible, come from a cone program; its multipliers are the twist that limits m_j.
@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices
 from grasp_core.by_value import ByValue
 from grasp_core.closure.wrench_sets import WrenchSet, nearest_wrench
 from grasp_core.closure.wrenches import WRENCH
@@ -90,7 +90,7 @@ class ResistedLoads(ByValue):
         if self.measure.name == "weight":
             return (
                 self.forces is None
-                and is_a(self.ball, FerrariCanny)
+                and isinstance(self.ball, FerrariCanny)
                 and self.ball.lower >= self.lower
                 and self.ball.wrenches == thin(self.wrenches)
                 and self.ball.verify()
@@ -106,7 +106,7 @@ class ResistedLoads(ByValue):
 
 
 def thin(wrenches: WrenchSet) -> WrenchSet:
-    """Return the same contacts' wrenches with torques over a thousandth of the length, as in (1)."""
+    """Return the same wrenches with torques over a thousandth of the length, as in (1)."""
     return replace(wrenches, G=np.vstack([wrenches.G[:3], wrenches.G[3:] / THIN]))
 
 
@@ -190,7 +190,7 @@ def _limit(wrenches: WrenchSet, load: Array) -> TaskLimit:
     A[:WRENCH, :-1], A[:WRENCH, -1] = G, load / size
     A[WRENCH, :n:3] = 1.0
     A[WRENCH + 1 + np.arange(k), np.arange(0, n, 3)] = -1.0
-    cones = WRENCH + 1 + k + np.arange(n)
+    cones: Indices = np.arange(WRENCH + 1 + k, len(A))
     A[cones, np.arange(n)] = -1.0
     A[cones[::3], np.arange(0, n, 3)] = -mu
     q, b = np.append(np.zeros(n), -1.0), np.zeros(len(A))

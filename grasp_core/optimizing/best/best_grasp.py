@@ -210,10 +210,10 @@ def measured(
     body: Polyhedron, grasp: Grasp, friction: float, measure: Measure, gap: float = EXACT_GAP
 ) -> FerrariCanny | ResistedLoads:
     """Bound what a grasp of an object resists of the loads of a measure, with proofs."""
-    about = {"center": body.center_of_mass, "torque_scale": body.radius}
+    center, scale = body.center_of_mass, body.radius
     if measure.is_usual:
-        return ferrari_canny(grasp, friction=friction, gap=gap, **about)
-    wrenches = WrenchSet.of(grasp, None, friction, **about)
+        return ferrari_canny(grasp, friction=friction, center=center, torque_scale=scale, gap=gap)
+    wrenches = WrenchSet.of(grasp, None, friction, center=center, torque_scale=scale)
     return resisted_loads(wrenches, measure, gap)
 
 

@@ -82,7 +82,7 @@ def climbed(searching: Searching, on: Sequence[int] | Indices, at: Array) -> Fou
         return best
     measure = searching.measure
     if measure.name == "weight":
-        every = climbs_for_weight(faces, at, lambda y: measured(y).quality)
+        every = climbs_for_weight(faces, at)
     elif measure.name == "task":
         every = [climbed_for_task(faces, measure, at)]
     else:

@@ -1,7 +1,7 @@
 """Writes and reads the proof of a best grasp's bound as an npz file, which needs no pickles.
 
-The arrays are those of `CutTree` and of its `Grounds`, by name, and three more: `format` is the text
-"graspproof cut tree", `bound` is what the proof shows, for readers that do not compute it, and
+The arrays are those of `CutTree` and of its `Grounds`, by name, and three more: `format` is the
+text "graspproof cut tree", `bound` is what the proof shows, for readers that do not compute it, and
 `schema` is 1 for the Ferrari-Canny quality. For other measures it is 2, and two arrays say which
 loads count: `measure`, a text, and `loads`, those of a task.
 """

@@ -64,7 +64,7 @@ def replay(  # noqa: C901, PLR0913, PLR0917 - the arrays of a tree
             if cuts[top - 1] > most_cuts:
                 return False
             if 0 <= deed < BY_PIECES and 0 <= at < len(twists):
-                y, t = twists[at], answers[at]
+                y, t = twists[at], float(answers[at])
                 added = _answered(planes, corners, counts, fresh, top - 1, deed, y, t)
             elif BY_PIECES <= deed < BY_PIECES + FINGERS and 0 <= at < len(lines):
                 added = _sorted(corners, counts, fresh, top - 1, deed - BY_PIECES, lines[at, 0])

@@ -19,7 +19,8 @@ and products shows. Two maps are applied at most, so that contacts are moved to 
 others that the proof is about, with normals as near: their quality differs by less than
 1e-7 (1 + mu). Loads of a task are mapped to within `EXACT` of the longest load L, so that answers
 a(y) = t d(y), t L <= 8 (1 + mu), of unit twists are off by less than 2e-8 (1 + mu); those of the
-moved contacts are off by 5e-8 (1 + mu). Half-planes (1) are moved outwards by `WIDENED` for the same reason.
+moved contacts are off by 5e-8 (1 + mu). Half-planes (1) are moved outwards by `WIDENED` for the
+same reason.
 """
 
 import numpy as np
@@ -55,8 +56,7 @@ def exact_maps(body: Polyhedron, grounds: Grounds, measure: Measure = FERRARI_CA
 
 
 def fitting(maps: Array, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> bool:
-    """Return whether maps are orthogonal, form a group, and map pieces to pieces, loads to loads.
-    """
+    """Return whether maps are orthogonal, form a group, and keep the pieces and the loads."""
     if len(maps) > MOST_MAPS or np.abs(maps[0] - np.eye(3)).max() > 0.0:
         return False
     square = maps @ maps.transpose(0, 2, 1) - np.eye(3)

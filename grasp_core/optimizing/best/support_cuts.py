@@ -47,9 +47,9 @@ room for rounding. Here less is an answer,
 for twists with |y| <= 1 + 1e-12, and contacts that reach t answer all questions with the room that
 the induction needs: the bound is t itself. The product t d(y) is rounded as well, once for each
 twist, as its error does not move points. With L the longest load, t d(y) <= t L, and the products
-and sums of six numbers in it are off by less than 1e-15 t L. A wrench of forces with normal parts of
-sum one is shorter than 8 (1 + mu), with coordinates up to two, so that only t L <= 8 (1 + mu) need
-be considered, and a(y) is off by less than 1e-14 (1 + mu), a hundred-thousandth of the room.
+and sums of six numbers in it are off by less than 1e-15 t L. A wrench of forces with normal parts
+of sum one is shorter than 8 (1 + mu), with coordinates up to two, so that only t L <= 8 (1 + mu)
+need be considered, and a(y) is off by less than 1e-14 (1 + mu), a hundred-thousandth of the room.
 
 Symmetries. See `same_places`: contacts can be moved by a symmetry, at the cost of its error. It
 takes the place of rounding in (3) and (4): `INEXACT` is added to `ROUNDING`.

@@ -15,7 +15,7 @@ The weight is a task with forces in all directions. Contacts climb for some of t
 with those directions as well that they held least.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -29,12 +29,19 @@ from grasp_core.optimizing.ascent import (
     LEAST_REACH,
     MOST_STEPS,
     POOR,
+    SEARCH_GAP,
     SHRINKAGE,
     ContactFaces,
 )
 from grasp_core.quality.ferrari_canny import wrench_set_quality
 from grasp_core.quality.measures import Measure
-from grasp_core.quality.resisted_loads import CLOSED_GAP, THIN, ResistedLoads, task_limits
+from grasp_core.quality.resisted_loads import (
+    CLOSED_GAP,
+    THIN,
+    ResistedLoads,
+    resisted_loads,
+    task_limits,
+)
 from grasp_core.solvers.ties import surpassing
 
 SMALL_GAIN = 1e-4
@@ -47,22 +54,19 @@ WEAK, APART, MOST_WEAK = 1.05, 0.97, 16
 this between them, and are so many at most."""
 
 
-def climbs_for_weight(
-    faces: ContactFaces, y: Array, measured: Callable[[Array], ResistedLoads]
-) -> Iterator[Array]:
+def climbs_for_weight(faces: ContactFaces, y: Array) -> Iterator[Array]:
     """Yield where contacts in force closure come to by climbing for the weight, (k, 2) each.
 
     Args:
         faces: The faces.
         y: Plane coordinates of the contacts, (k, 2).
-        measured: Measures contacts for the weight.
     """
     forces, best = _spread(), 0.0
     for _ in range(ROUNDS):
         loads = np.hstack([forces, np.zeros_like(forces)])
         y = climbed_for_task(faces, Measure("task", loads), y)
         yield y
-        found = measured(y)
+        found = resisted_loads(_wrenches(faces, y), Measure("weight"), SEARCH_GAP)
         if found.lower <= (1.0 + GAIN) * best:
             return
         best = found.lower
@@ -119,10 +123,14 @@ def climbed_for_task(faces: ContactFaces, measure: Measure, y: Array) -> Array:
     return y
 
 
+def _wrenches(faces: ContactFaces, y: Array) -> WrenchSet:
+    friction = np.full(len(y), faces.friction)
+    return WrenchSet.at(faces.positions(y), faces.normals, friction).on_grid()
+
+
 def _planes(faces: ContactFaces, measure: Measure, y: Array) -> tuple[Array, Array] | None:
     """Return the multiple of each load, (m,), and its slopes (1), (m, 2k); None without closure."""
-    friction = np.full(len(y), faces.friction)
-    wrenches = WrenchSet.at(faces.positions(y), faces.normals, friction).on_grid()
+    wrenches = _wrenches(faces, y)
     if wrench_set_quality(wrenches, CLOSED_GAP).lower <= 0.0:
         return None
     limits = task_limits(wrenches, measure)

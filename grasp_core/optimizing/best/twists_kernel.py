@@ -95,15 +95,20 @@ def demanded(demand: Demand, y: Array, hardest: Array) -> float:
             for j in range(3):
                 hardest[j] = y[j] / long
         return long
+    return _most_of(demand.loads, y, hardest)
+
+
+@loop("numpy")
+def _most_of(loads: Array, y: Array, hardest: Array) -> float:
     most = 0.0
-    for k in range(len(demand.loads)):
+    for k in range(len(loads)):
         found = 0.0
         for j in range(TWIST):
-            found -= demand.loads[k, j] * y[j]
+            found -= loads[k, j] * y[j]
         if found > most:
             most = found
             for j in range(TWIST):
-                hardest[j] = -demand.loads[k, j]
+                hardest[j] = -loads[k, j]
     return most
 
 

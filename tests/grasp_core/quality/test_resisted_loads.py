@@ -39,8 +39,8 @@ def some_task(rng, count=4):
 def test_contacts_on_a_sphere_hold_nearly_the_ball_in_the_hull_of_their_normals(
     places, ball, friction
 ):
-    """Forces along normals need no torque: their hull is resisted. Against the nearest of its planes
-    no contact pushes more than the ball's radius, and friction adds less than itself."""
+    """Forces along normals need no torque: their hull is resisted. Against the nearest of its
+    planes no contact pushes more than the ball's radius, and friction adds less than itself."""
     found = resisted_loads(arranged(places, friction), WEIGHT, 1e-5)
     assert found.verify()
     assert found.upper >= ball

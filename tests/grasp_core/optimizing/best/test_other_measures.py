@@ -22,7 +22,8 @@ from tests.grasp_core.optimizing.best.independent_replay import replays
 
 FRICTION = 0.5
 LIFT = np.array(
-    [[0.0, 0.0, -3.0, 0.0, 0.0, 0.0], [1.0, 0.0, -3.0, 0.0, 0.02, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.1]]
+    [[0.0, 0.0, -3.0, 0.0, 0.0, 0.0], [1.0, 0.0, -3.0, 0.0, 0.02, 0.0],
+     [0.0, 0.0, 0.0, 0.0, 0.0, 0.1]]
 )  # fmt: skip
 """A task: an object of three newtons that is lifted, lifted and pushed, and unscrewed."""
 CASES = {
