@@ -91,9 +91,9 @@ class ResistedLoads(ByValue):
             return (
                 self.forces is None
                 and isinstance(self.ball, FerrariCanny)
+                and self.ball.verify()
                 and self.ball.lower >= self.lower
                 and self.ball.wrenches == thin(self.wrenches)
-                and self.ball.verify()
             )
         width, count = self.wrenches.G.shape[1], len(self.measure.loads)
         if self.ball is not None or not is_array(self.forces, count + 1, width):

@@ -46,9 +46,8 @@ from grasp_core.solvers.ties import surpassing
 
 SMALL_GAIN = 1e-4
 """Predicted relative gain below which a climb ends."""
-SPREAD, ROUNDS, GAIN = 48, 4, 1e-3
-"""Directions of the weight for which contacts climb first, how often they climb, and the relative
-gain that is worth another time."""
+SPREAD, ROUNDS = 48, 4
+"""Directions of the weight for which contacts climb first, and how often they climb."""
 WEAK, APART, MOST_WEAK = 1.05, 0.97, 16
 """Directions that are added are held up to this much better than the weakest, with cosines below
 this between them, and are so many at most."""
@@ -61,15 +60,12 @@ def climbs_for_weight(faces: ContactFaces, y: Array) -> Iterator[Array]:
         faces: The faces.
         y: Plane coordinates of the contacts, (k, 2).
     """
-    forces, best = _spread(), 0.0
+    forces = _spread()
     for _ in range(ROUNDS):
         loads = np.hstack([forces, np.zeros_like(forces)])
         y = climbed_for_task(faces, Measure("task", loads), y)
         yield y
         found = resisted_loads(_wrenches(faces, y), Measure("weight"), SEARCH_GAP)
-        if found.lower <= (1.0 + GAIN) * best:
-            return
-        best = found.lower
         forces = np.vstack([forces, _weakest(found)])
 
 
