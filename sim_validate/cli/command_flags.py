@@ -8,7 +8,6 @@ from typing import Annotated, Literal, get_args
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from grasp_core.checked import MOST_COUNT
-from grasp_core.quality.measures import MeasureName
 from sim_validate.cli.baseline_flags import Baseline
 from sim_validate.cli.dataset_flags import Dataset
 from sim_validate.cli.execution_flags import UPRIGHT, Execute, Executing, Mass, Tips, Trials
@@ -81,7 +80,7 @@ class Plan:
     """With --best: share of the proved bound that the quality may be below it."""
     time_limit_s: Positive | None = None
     """With --best: time after which the search ends with the gap reached [s]."""
-    measure: MeasureName = "ferrari-canny"
+    measure: Literal["ferrari-canny", "weight", "task"] = "ferrari-canny"
     """With --best: what is largest. The Ferrari-Canny quality; the weight that is held in every
     orientation; or the multiple of a task's --wrenches that is resisted."""
     wrenches: Path | None = None

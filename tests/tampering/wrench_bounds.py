@@ -70,7 +70,7 @@ def resisted(q, rng):
     def allowed(y):
         return h(y) / d(y) if d(y) > 1e-9 else np.inf if h(y) >= -1e-7 else -1.0
 
-    starts = [q.direction, *rng.normal(size=(4, 6)), *-q.measure.loads[:2]]
+    starts = [q.direction, *rng.normal(size=(2, 6)), *-q.measure.loads[:1]]
     least = min(min(minimize(allowed, y, method="Nelder-Mead").fun, allowed(y)) for y in starts)
     return q.lower <= least * (1.0 + 1e-6)
 
