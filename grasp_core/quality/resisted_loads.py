@@ -17,7 +17,11 @@ bounds the weight by m' (1 + 5e-7 |omega r|^2 / |v|^2) at most: the two bounds a
 *From below, task.* For each load w_j, forces with normal parts of sum one and the wrench -m_j w_j,
 m_j as large as possible, come from a cone program; its multipliers are the twist that limits m_j.
 The least m_j is a lower bound, as forces that add up to zero complete the hull, see (1) of
-`measures`.
+`measures`. Contacts that are not in force closure may have no such forces. For them
+
+    maximise m_j - `STEEP` |wrench + m_j w_j|                                               (2)
+
+always has an answer; its multipliers are a twist of length up to `STEEP` that bounds m_j.
 """
 
 from dataclasses import dataclass, replace
@@ -40,6 +44,8 @@ THIN = 1e-3
 HELD = 1e-7
 """How far the forces of a task may be from balance, and from cones, relative to the longest wrench:
 the accuracy of conic programs."""
+STEEP = 1e3
+"""Cost of wrenches that are not balanced, over the load's length."""
 CLOSED_GAP = 0.5
 """Gap that suffices to see whether contacts are in force closure."""
 
@@ -130,7 +136,8 @@ def resisted_loads(wrenches: WrenchSet, measure: Measure, gap: float = GAP) -> R
         )
     closed = wrench_set_quality(wrenches, CLOSED_GAP)
     if closed.lower <= 0.0:
-        direction, upper = _least(wrenches, measure, [closed.direction, *-_units(measure.loads)])
+        limiting = [_limiting_twist(wrenches, load) for load in measure.loads]
+        direction, upper = _least(wrenches, measure, [closed.direction, *limiting])
         return ResistedLoads(
             min(-1.0, closed.lower), upper, measure, wrenches, direction, None, None
         )
@@ -201,3 +208,22 @@ def _limit(wrenches: WrenchSet, load: Array) -> TaskLimit:
         raise SolverError("a load of a task has no resisted multiple although contacts are closed")
     # the multipliers have z.load = |load|, so that their demand is positive the other way
     return TaskLimit(multiple, answer.x[:-1], -answer.z[:WRENCH] / size)
+
+
+def _limiting_twist(wrenches: WrenchSet, load: Array) -> Array:
+    """Return a twist that bounds the resisted multiple of a load, by the program (2), (6,)."""
+    G, mu = wrenches.G, wrenches.friction
+    k, n = len(mu), G.shape[1]
+    A = np.zeros((1 + k + 1 + WRENCH + n, n + 2))
+    A[0, :n:3] = 1.0
+    A[1 + np.arange(k), np.arange(0, n, 3)] = -1.0
+    # rows: distance >= |wrench + m load|, friction cones
+    rest = slice(2 + k, 2 + k + WRENCH)
+    A[1 + k, -1] = -1.0
+    A[rest, :n], A[rest, n] = -G, -load / np.linalg.norm(load)
+    cones: Indices = np.arange(2 + k + WRENCH, len(A))
+    A[cones, np.arange(n)] = -1.0
+    A[cones[::3], np.arange(0, n, 3)] = -mu
+    q, b = np.concatenate([np.zeros(n), [-1.0, STEEP]]), np.zeros(len(A))
+    b[0] = 1.0
+    return minimize(ConicProgram(q, A, b, 1, k, (1 + WRENCH, *(3,) * k))).z[rest]

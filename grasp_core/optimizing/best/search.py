@@ -42,6 +42,9 @@ BUDGET = 2000
 """Nodes after which a thread looks whether it should stop: some tenths of a second."""
 FIRST_ROOM = 4096
 """Nodes for which a part's tree has room at first; it is doubled when it is full."""
+MUCH = 1.1
+"""Ratio of qualities from which on contacts are a better start for other thresholds, where the
+measure is not the usual one and the first contacts may be poor."""
 EXACT_GAP = 1e-5
 """Gap between the bounds of the quality of contacts that may be better."""
 
@@ -244,6 +247,8 @@ class Searching:
         found = self.measured(work.on, work.middle)
         if found.quality.lower > known:
             part.found.append(found)
+            if not self.measure.is_usual and found.quality.lower > MUCH * known:
+                return False
         if found.quality.upper >= threshold:
             return False
         self.learn(found.quality.direction[None], part.pool, int(part.tree.sizes[0]))
