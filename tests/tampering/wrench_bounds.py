@@ -68,7 +68,7 @@ def resisted(q, rng):
         return True
 
     def allowed(y):
-        return h(y) / d(y) if d(y) > 1e-9 else np.inf if h(y) >= -1e-7 else -1.0
+        return h(y) / d(y) if d(y) > 1e-9 else 1e6 if h(y) >= -1e-7 else -1.0
 
     starts = [q.direction, *rng.normal(size=(2, 6)), *-q.measure.loads[:1]]
     least = min(min(minimize(allowed, y, method="Nelder-Mead").fun, allowed(y)) for y in starts)
