@@ -94,7 +94,8 @@ class ContactFaces:
         for _ in range(MOST_STEPS):
             if found.polytope is None or reach < LEAST_REACH:
                 break
-            step, predicted = self._step(y, found, found.polytope, reach)
+            planes = self.nearest_planes(found, found.polytope)
+            step, predicted = self.step(y, found.lower, planes, reach)
             if predicted <= WORTHWHILE * found.lower:
                 break
             trial = self.quality(y + step)
@@ -104,14 +105,21 @@ class ContactFaces:
             reach *= GROWTH if gained > GOOD else SHRINKAGE if gained < POOR else 1.0
         return y, found
 
-    def _step(
-        self, y: Array, found: FerrariCanny, polytope: InnerPolytope, reach: float
+    def step(
+        self, y: Array, lower: float, planes: tuple[Array, Array], reach: float
     ) -> tuple[Array, float]:
-        """Find the best move within the trust region, and the gain that it predicts."""
-        distances, slopes = self.nearest_planes(found, polytope)
+        """Find the best move within the trust region, and the gain that it predicts.
+
+        Args:
+            y: Plane coordinates of the contacts, (k, 2).
+            lower: The least of the planes' distances.
+            planes: Distances (m,), and how they change with the contacts, (m, 2k).
+            reach: Size of the trust region.
+        """
+        distances, slopes = planes
         n = y.size
         rows = [np.hstack([-slopes, np.ones((len(slopes), 1))])]
-        room = [distances - found.lower]
+        room = [distances - lower]
         for i, (piece, limit) in enumerate(zip(self.pieces, self.limits, strict=True)):
             inside = np.zeros((len(limit), n + 1))
             inside[:, 2 * i : 2 * i + 2] = piece.E

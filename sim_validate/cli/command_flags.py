@@ -72,14 +72,19 @@ class Plan:
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
     planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
     best: bool = False
-    """Also search for the grasp of the largest Ferrari-Canny quality on any faces, and prove how
-    much better any other can be. It comes first; best.json and best-proof.npz hold the proof. Its
+    """Also search for the grasp of the largest --measure on any faces, and prove how much better
+    any other can be. It comes first; best.json and best-proof.npz hold the proof. Its
     contacts stay --edge-clearance-m from edges, or half the radius of the largest disc in a face
     where that is less; a twentieth of the object's radius if not given."""
     gap: Gap = 0.05
     """With --best: share of the proved bound that the quality may be below it."""
     time_limit_s: Positive | None = None
     """With --best: time after which the search ends with the gap reached [s]."""
+    measure: Literal["ferrari-canny", "weight", "task"] = "ferrari-canny"
+    """With --best: what is largest. The Ferrari-Canny quality; the weight that is held in every
+    orientation; or the multiple of a task's --wrenches that is resisted."""
+    wrenches: Path | None = None
+    """With --measure task: JSON file of the task's wrenches (see docs/files.md)."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)

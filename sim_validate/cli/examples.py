@@ -9,6 +9,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "plan": (
         "plan wedge --limit 10 --out plan",
         "plan wedge --limit 10 --best --gap 0.05 --time-limit-s 120 --out plan",
+        "plan wedge --limit 10 --best --measure weight --out plan",
         "plan part.stl --unit mm --finger-radius-m 0.006 --approach-m 0.05 --out plan",
     ),
     "validate": (

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from grasp_core.arrays import Array
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planner import plan
@@ -24,6 +25,7 @@ from grasp_core.values import FaceQuadruple, Grasp
 from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.cli.flag_bounds import FlagsError
 from sim_validate.commands.asked.objects import asked_finger, object_to_plan
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import remove_results
@@ -31,6 +33,7 @@ from sim_validate.parallel.compiling import compiled_beside
 
 if TYPE_CHECKING:
     from grasp_core.optimizing.best.best_grasp import BestGrasp
+    from sim_validate.commands.best.best_json import Rated
     from sim_validate.parallel.certifying import Found
 
 CARRIED = {"payload": "payload kg", "first-slip": "first slip"}
@@ -104,22 +107,24 @@ def with_regions(
 
 def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
     """Plan grasps, write them to a file, and show the best of them."""
+    wrenches = _task(command)
     body = object_to_plan(command.object, command.planning, reporter)
     with alone_in(command.out):
         found = plan_object(body, command.planning, command.jobs, reporter)
-        best = _searched(body, command, reporter)
+        best = _searched(body, command, wrenches, reporter)
         if command.out:
             remove_results(command.out)
         found = with_regions(body, found, command.planning, command.out, command.jobs, reporter)
-        planned, found = found.grasps, _with_best(found, best)
+        planned, compared, found = found.grasps, list["Rated"](), _with_best(found, best)
         text = plan_to_json(body, found)
         if command.out:
             path = write_text(command.out / "grasps.json", text)
             reporter.say(f"wrote {path}")
         if best is not None:
-            from sim_validate.commands.best.search import write_best
+            from sim_validate.commands.best.search import rated, write_best
 
-            write_best(body, best, planned, command.out, reporter)
+            compared = rated(body, best, planned)
+            write_best(body, best, compared, command.out, reporter)
         elif reporter.json_only:
             print(text, end="")  # noqa: T201 - the document itself
     say_counts(body, found, reporter)
@@ -135,18 +140,37 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
         return Exit.GOOD
     from sim_validate.commands.best.search import show_best
 
-    return show_best(best, planned, reporter)
+    return show_best(best, compared, reporter)
+
+
+def _task(command: command_flags.Plan) -> Array | None:
+    """Return the wrenches of a task, (m, 6), if it is to be done well.
+
+    Raises:
+        InputError: Flags do not fit each other, or the file of wrenches is refused.
+    """
+    if not command.best and (command.measure != "ferrari-canny" or command.wrenches):
+        raise FlagsError(
+            "--measure and --wrenches say which grasp is best: give --best too, or leave them out"
+        )
+    if (command.measure == "task") != (command.wrenches is not None):
+        raise FlagsError("--measure task and --wrenches FILE go together: give both, or neither")
+    if command.wrenches is None:
+        return None
+    from sim_validate.records.wrenches import wrenches_from_file
+
+    return np.array([each.wrench for each in wrenches_from_file(command.wrenches)])
 
 
 def _searched(
-    body: Polyhedron, command: command_flags.Plan, reporter: Reporter
+    body: Polyhedron, command: command_flags.Plan, wrenches: Array | None, reporter: Reporter
 ) -> "BestGrasp | None":
     """Return the best grasp if it is asked for."""
     if not command.best:
         return None
     from sim_validate.commands.best.search import search_best
 
-    return search_best(body, command, reporter)
+    return search_best(body, command, wrenches, reporter)
 
 
 def _with_best(found: Plan, best: "BestGrasp | None") -> Plan:

@@ -131,6 +131,7 @@ CALLS = [
         "gap": POSITIVE | {"one": 1.0},
         "time_limit_s": optional(NOT_NEGATIVE),
         "measure": WORD,
+        "wrenches": optional(array([WRENCH])) | {"without a task": [WRENCH]},
         "clearance": optional(NOT_NEGATIVE) | {"larger than the object": 1.0},
         "seed": SEED,
         "jobs": AT_LEAST_ONE,

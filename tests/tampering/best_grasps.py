@@ -3,6 +3,8 @@
 import numpy as np
 
 import grasp_core as gc
+from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.quality.resisted_loads import resisted_loads
 from tests.tampering import wrench_bounds
 
 SETS, MEASURED = 400, 12
@@ -29,13 +31,23 @@ def proof(found, rng):
     u = y[:, :3] + np.cross(y[:, 3:], x[:, :, None])
     along = np.einsum("sfnj,sfj->sfn", u, normals)
     across = np.linalg.norm(u - along[..., None] * normals[:, :, None], axis=3)
-    upper = (along + found.friction * across).max(axis=1).min(axis=1)
+    demands = np.array([wrench_bounds.demand(found.measure, each) for each in y])
+    supports = (along + found.friction * across).max(axis=1)
+    upper = (supports / np.maximum(demands, 1e-9)).min(axis=1)
     for row in np.argsort(-upper)[:MEASURED]:
-        here = gc.ferrari_canny(x[row], normals[row], found.friction, torque_scale=1.0, gap=0.05)
-        if here.lower > found.bound:
+        if measured(found, x[row], normals[row]).lower > found.bound:
             return False
     return True
 
 
+def measured(found, x, normals):
+    if found.measure.name == "ferrari-canny":
+        return gc.ferrari_canny(x, normals, found.friction, torque_scale=1.0, gap=0.05)
+    wrenches = WrenchSet.at(x, normals, np.full(len(x), found.friction))
+    return resisted_loads(wrenches, found.measure, 0.05)
+
+
 def best(found, rng):
-    return proof(found.proof, rng) and wrench_bounds.quality(found.quality, rng)
+    usual = found.proof.measure.name == "ferrari-canny"
+    true = wrench_bounds.quality if usual else wrench_bounds.resisted
+    return proof(found.proof, rng) and true(found.quality, rng)

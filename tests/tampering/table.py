@@ -12,10 +12,13 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
+from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.execution.carried_mass import carried_mass
 from grasp_core.execution.carrying_hand import CarryingHand
 from grasp_core.families.free import Absence, place_free
 from grasp_core.objects.face_pieces import unit_pieces
+from grasp_core.quality.measures import Measure
+from grasp_core.quality.resisted_loads import resisted_loads
 from grasp_core.regions.certify_regions import certify_regions
 from sim_validate.records.regions import SHAPES, proof_arrays, regions_of
 from tests.judges import random_contacts
@@ -114,6 +117,16 @@ def quality(seed):
         x, n, mu, center=x.mean(axis=0), torque_scale=size, norm=rng.choice(["l1", "linf"]).item(),
         gap=0.1,
     )  # fmt: skip
+
+
+def resisted(seed):
+    """The weight, or a task, on contacts that are not closed where chance will have it."""
+    rng = np.random.default_rng(seed)
+    x, n, mu = placed(rng)
+    size = float(np.ptp(x, axis=0).max())
+    wrenches = WrenchSet.of(x, n, mu, center=x.mean(axis=0), torque_scale=size)
+    task = Measure("task", rng.normal(size=(3, 6)))
+    return resisted_loads(wrenches, Measure("weight") if seed % 2 else task, 0.1)
 
 
 def soft_quality(seed):
@@ -282,6 +295,19 @@ def cut_tree(seed):
     return best(seed).proof
 
 
+@cache
+def best_for_loads(seed):
+    body = scenes.example_object("tetrahedron")
+    if seed % 2:
+        return gc.best_grasp(body, 0.5, gap=0.06, measure="weight")
+    axes = np.vstack([np.eye(6), -np.eye(6)]) * np.repeat([1.0, 0.05], 3)
+    return gc.best_grasp(body, 0.5, gap=0.3, measure="task", wrenches=axes)
+
+
+def cut_tree_for_loads(seed):
+    return best_for_loads(seed).proof
+
+
 ProofFile = dataclasses.make_dataclass(
     "ProofFile", SHAPES, frozen=True, eq=False,
     namespace={"verify": lambda self: regions_of(vars(self)).verify()},
@@ -320,6 +346,9 @@ TABLE = {
     "BestSqueeze": Row(best_squeeze, lambda c, _: squeezes.squeeze(c), 0.8),
     "CutTree": Row(cut_tree, best_grasps.proof, 0.8),
     "BestGrasp": Row(best, best_grasps.best, 0.4),
+    "a cut tree for other loads": Row(cut_tree_for_loads, best_grasps.proof, 0.4),
+    "a best grasp for a task": Row(lambda _: best_for_loads(0), best_grasps.best, 0.4),
+    "ResistedLoads": Row(resisted, wrench_bounds.resisted),
     "Payload": Row(payload, lambda c, _: squeezes.payload(c), 0.4),
     "HandPayload": Row(hand_payload, lambda c, _: hand_payloads.payload(c), 0.8),
     "proof file of regions": Row(

@@ -26,6 +26,57 @@ def support(G, mu, norm, y):
 def quality(q, rng):
     """Bounds of the least support over unit directions, sought by descent from many starts."""
     w = q.wrenches
+    if not are_contacts(w):
+        return False
+    size = longest(w)
+    h = lambda y: support(w.G, w.friction, w.norm, y / np.linalg.norm(y))  # noqa: E731
+    if abs(np.linalg.norm(q.direction) - 1.0) > 1e-9 or h(q.direction) > q.upper + 1e-11 * size:
+        return False
+    if not q.lower <= q.upper or (q.polytope is None) == (q.forces is None):
+        return False
+    starts = [q.direction, *rng.normal(size=(4, 6))]
+    least = min(min(minimize(h, y, method="Nelder-Mead").fun, h(y)) for y in starts)
+    return q.lower <= least + 1e-9 * size and _allowed(q)
+
+
+def longest(w):
+    return np.linalg.norm(w.G, axis=0).max() * np.sqrt(1.0 + w.friction.max() ** 2)
+
+
+def demand(measure, y):
+    """How much of the loads of a measure a twist asks for."""
+    if measure.name == "weight":
+        return np.linalg.norm(y[:3])
+    if measure.name == "task":
+        return max(0.0, *(-load @ y for load in measure.loads))
+    return np.linalg.norm(y)
+
+
+def resisted(q, rng):
+    """Bounds of the least support over demand, sought by descent from many starts."""
+    w = q.wrenches
+    if not (are_contacts(w) and w.norm == "l1" and q.measure.name in ("weight", "task")):
+        return False
+    h = lambda y: support(w.G, w.friction, "l1", y / np.linalg.norm(y))  # noqa: E731
+    d = lambda y: demand(q.measure, y / np.linalg.norm(y))  # noqa: E731
+    slack = 1e-11 * longest(w)
+    if abs(np.linalg.norm(q.direction) - 1.0) > 1e-9 or not q.lower <= q.upper:
+        return False
+    if h(q.direction) > q.upper * d(q.direction) + slack:
+        return False
+    if q.lower < 0.0:  # claims nothing
+        return True
+
+    def allowed(y):
+        return h(y) / d(y) if d(y) > 1e-9 else 1e6 if h(y) >= -1e-7 else -1.0
+
+    starts = [q.direction, *rng.normal(size=(2, 6)), *-q.measure.loads[:1]]
+    least = min(min(minimize(allowed, y, method="Nelder-Mead").fun, allowed(y)) for y in starts)
+    return q.lower <= least * (1.0 + 1e-6)
+
+
+def are_contacts(w):
+    """Whether a wrench set is that of some contacts."""
     k = len(w.friction)
     known = w.G.shape in ((6, 3 * k), (6, 4 * k)) and w.norm in ("l1", "linf")
     if not known or (w.friction < 0.0).any():
@@ -40,15 +91,7 @@ def quality(q, rng):
         skew = np.abs(S + S.T).max() <= 1e-8 * (1 + abs(S).max())
         if not skew or np.abs(R.T @ R - np.eye(3)).max() > 1e-8:
             return False
-    size = np.linalg.norm(w.G, axis=0).max() * np.sqrt(1.0 + w.friction.max() ** 2)
-    h = lambda y: support(w.G, w.friction, w.norm, y / np.linalg.norm(y))  # noqa: E731
-    if abs(np.linalg.norm(q.direction) - 1.0) > 1e-9 or h(q.direction) > q.upper + 1e-11 * size:
-        return False
-    if not q.lower <= q.upper or (q.polytope is None) == (q.forces is None):
-        return False
-    starts = [q.direction, *rng.normal(size=(4, 6))]
-    least = min(min(minimize(h, y, method="Nelder-Mead").fun, h(y)) for y in starts)
-    return q.lower <= least + 1e-9 * size and _allowed(q)
+    return True
 
 
 def _allowed(q):

@@ -8,7 +8,15 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 from grasp_core.optimizing.best.cuts_kernel import MOST_CORNERS, area, cut, extent
-from grasp_core.optimizing.best.nodes_kernel import ALL, ASK, FINGERS, Search, copy, note
+from grasp_core.optimizing.best.nodes_kernel import (
+    ALL,
+    ASK,
+    FINGERS,
+    Search,
+    answer_to,
+    copy,
+    note,
+)
 
 TRIALS = 6
 """Twists whose cuts are measured before one of them is asked."""
@@ -43,9 +51,7 @@ def look_again(search: Search, node: int) -> None:
 @loop("numpy")
 def look(search: Search, node: int, i: int, first: int, last: int) -> None:
     """Fill in how far finger i reaches under some twists, and how much of it is left by each."""
-    pieces, stack, pool, work, t = (
-        search.pieces, search.stack, search.pool, search.work, search.t,
-    )  # fmt: skip
+    pieces, stack, pool, work = search.pieces, search.stack, search.pool, search.work
     mu, ends = pieces.friction, np.empty(2, np.int64)
     reach, left = work.reach[i], work.left[i]
     low, high = work.low, work.high
@@ -67,7 +73,8 @@ def look(search: Search, node: int, i: int, first: int, last: int) -> None:
         weight = _weight(corners, count, ends)
         whole += weight
         for k in range(first, last):
-            share = min(max((high[k] - t) / (high[k] - low[k] + 1e-12), 0.0), 1.0)
+            above = high[k] - answer_to(search, k)
+            share = min(max(above / (high[k] - low[k] + 1e-12), 0.0), 1.0)
             left[k] += weight * share * share * (3.0 - 2.0 * share)
             reach[k] = max(reach[k], high[k])
     for k in range(first, last):
@@ -110,9 +117,9 @@ def choose(search: Search, node: int) -> tuple[int, float]:
 def _estimated(search: Search, node: int, k: int) -> float:
     """Return about what `_measured` does, without cutting."""
     cost, twin, stays, answers = 0.0, False, False, 0
-    fresh, work = search.stack.fresh[node], search.work
+    fresh, work, t = search.stack.fresh[node], search.work, answer_to(search, k)
     for i in range(FINGERS):
-        if work.reach[i, k] < search.t or (fresh[i] and twin):
+        if work.reach[i, k] < t or (fresh[i] and twin):
             continue
         twin = twin or fresh[i] > 0
         stays = stays or work.left[i, k] > MOST_LEFT
@@ -127,11 +134,11 @@ def _measured(search: Search, node: int, k: int) -> tuple[float, int]:
 
     The cost is the sum of the roots of the shares that are left: a half on either side costs 1.41.
     """
-    pieces, stack, work = search.pieces, search.stack, search.work
+    pieces, stack, work, t = search.pieces, search.stack, search.work, answer_to(search, k)
     cost, answers, twin, stays = 0.0, 0, False, False
     rest, ends = np.empty((MOST_CORNERS, 2)), np.empty(2, np.int64)
     for i in range(FINGERS):
-        if work.reach[i, k] < search.t or (stack.fresh[node, i] and twin):
+        if work.reach[i, k] < t or (stack.fresh[node, i] and twin):
             continue
         twin = twin or stack.fresh[node, i] > 0
         answers += 1
@@ -140,7 +147,7 @@ def _measured(search: Search, node: int, k: int) -> tuple[float, int]:
             count = stack.counts[node, i, p]
             if count > 0:
                 at = search.pool.asked[p, :, k]
-                kept = cut(stack.corners[node, i, p], count, at, pieces.friction, search.t, rest)
+                kept = cut(stack.corners[node, i, p], count, at, pieces.friction, t, rest)
                 left += _weight(rest, kept, ends)
         stays = stays or left > MOST_LEFT * work.whole[i]
         cost += np.sqrt(left / work.whole[i])
@@ -152,8 +159,9 @@ def ask(search: Search, node: int, k: int, now: int) -> None:
     """Replace the node by one for each finger that may answer, cut to where it does."""
     stack, pool, tree, work = search.stack, search.pool, search.tree, search.work
     answering, twin, deed, total = np.zeros(FINGERS, np.int64), False, ASK, 0
+    t = answer_to(search, k)
     for i in range(FINGERS):
-        if work.reach[i, k] < search.t or (stack.fresh[node, i] and twin):
+        if work.reach[i, k] < t or (stack.fresh[node, i] and twin):
             continue
         twin = twin or stack.fresh[node, i] > 0
         answering[total] = i
@@ -181,11 +189,12 @@ def ask(search: Search, node: int, k: int, now: int) -> None:
 def _cut_to(search: Search, place: int, i: int, k: int) -> None:
     """Cut the polygons of a finger to where it answers a twist."""
     pieces, stack, rest = search.pieces, search.stack, np.empty((MOST_CORNERS, 2))
+    t = answer_to(search, k)
     stack.fresh[place, i] = 0
     for p in range(len(pieces.normals)):
         count = stack.counts[place, i, p]
         if count > 0:
             at = search.pool.asked[p, :, k]
-            kept = cut(stack.corners[place, i, p], count, at, pieces.friction, search.t, rest)
+            kept = cut(stack.corners[place, i, p], count, at, pieces.friction, t, rest)
             stack.counts[place, i, p] = kept
             stack.corners[place, i, p, :kept] = rest[:kept]

@@ -17,10 +17,12 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
-from grasp_core.checked import coefficient, function, number, one_of, seed_of, whole
+from grasp_core.checked import coefficient, function, number, seed_of, whole
+from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
 from grasp_core.families.constructions import point_region, regions_of
@@ -33,14 +35,12 @@ from grasp_core.optimizing.best.grounds import grounds_of
 from grasp_core.optimizing.best.incumbents import begin, climbed, piece_at
 from grasp_core.optimizing.best.same_places import exact_maps, first_nodes
 from grasp_core.optimizing.best.search import EXACT_GAP, Found, Searching, Steps, Stop
-from grasp_core.optimizing.best.support_cuts import (
-    CutTree,
-    proved_bound,
-    searched_threshold,
-)
+from grasp_core.optimizing.best.support_cuts import CutTree, Slack
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
 from grasp_core.planning.certify import Candidate, certify, named, to_grasp
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
+from grasp_core.quality.measures import Measure, MeasureName
+from grasp_core.quality.resisted_loads import ResistedLoads, resisted_loads
 from grasp_core.values import ForceCone, Grasp
 
 Ended: TypeAlias = Literal["gap", "time", "interrupt", "undivided"]
@@ -69,9 +69,9 @@ class GapAt:
     seconds: float
     """Time since it began [s]."""
     quality: float
-    """Quality of the best grasp known then [N]."""
+    """Quality of the best grasp known then [N], or the multiple of a task's loads."""
     bound: float
-    """What no quality exceeds [N]."""
+    """What no quality exceeds [N], or no multiple."""
     nodes: int
     """How many nodes had been visited."""
 
@@ -86,8 +86,9 @@ class BestGrasp(ByValue):
     """The best grasp found, with a proved bound of the quality of all others."""
 
     grasp: Grasp
-    quality: FerrariCanny
-    """Bounds of the grasp's quality (`l1`), with torques over the object's radius."""
+    quality: FerrariCanny | ResistedLoads
+    """Bounds of the grasp's quality (`l1`), with torques over the object's radius; or of the
+    largest multiple of the loads of another measure that its contacts resist."""
     clearance: float
     """Distance that contacts keep from the edges of faces [m], or half the radius of the largest
     disc in a face where that is less."""
@@ -98,8 +99,16 @@ class BestGrasp(ByValue):
 
     @property
     def bound(self) -> float:
-        """Return the quality [N] that no four contacts on the faces exceed, clear of the edges."""
+        """Return the quality [N] that no four contacts on the faces exceed, clear of the edges.
+
+        For a task it is a multiple of its wrenches, for normal forces of sum one newton.
+        """
         return self.proof.bound
+
+    @property
+    def measure(self) -> MeasureName:
+        """Return the name of the measure that is maximised."""
+        return self.proof.measure.name
 
     @property
     def gap(self) -> float:
@@ -114,14 +123,21 @@ class BestGrasp(ByValue):
         `grounds_of`.
         """
         return (
-            is_a(self.quality, FerrariCanny)
-            and is_a(self.proof, CutTree)
+            is_a(self.proof, CutTree)
+            and self._has_its_measure()
             and is_number(self.clearance, least=0.0)
             and self.quality.verify()
             and self.proof.verify()
             and self.quality.lower <= self.bound
             and are_contacts_of(self.grasp, self.quality.wrenches, self.proof)
         )
+
+    def _has_its_measure(self) -> bool:
+        """Return whether the quality is about the loads of the proof."""
+        if isinstance(self.quality, ResistedLoads):
+            return self.quality.measure == self.proof.measure
+        usual = is_a(self.proof.measure, Measure) and self.proof.measure.is_usual
+        return is_a(self.quality, FerrariCanny) and usual
 
 
 def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
@@ -130,7 +146,8 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
     *,
     gap: float = 0.05,
     time_limit_s: float | None = None,
-    measure: Literal["ferrari-canny"] = "ferrari-canny",
+    measure: MeasureName = "ferrari-canny",
+    wrenches: ArrayLike | None = None,
     clearance: float | None = None,
     seed: int = 0,
     jobs: int = 1,
@@ -147,8 +164,12 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
         gap: Share of the bound that the quality may be below it.
         time_limit_s: Time after which the search stops with the gap reached [s]; it may take some
             seconds more.
-        measure: What is maximised: the Ferrari-Canny quality `l1`, with torques about the centre of
-            mass over the object's radius.
+        measure: What is maximised, with normal forces that sum to one newton: the Ferrari-Canny
+            quality `l1`, with torques about the centre of mass over the object's radius; the
+            `weight` that is held in every orientation [N]; or the multiple of all wrenches of a
+            `task` that is resisted.
+        wrenches: The external (force, torque) of a task, torque about the centre of mass, (m, 6)
+            [N, N m], m up to 100; None for other measures.
         clearance: How far contacts stay from the edges of faces [m], or half the radius of the
             largest disc in a face where that is less; a twentieth of the object's radius if None.
         seed: Seed of the random contacts and twists to begin with.
@@ -171,7 +192,7 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
         )
     friction, seed = coefficient(friction), seed_of(seed)
     number(gap, "gap", least=SMALLEST_GAP, most=LARGEST_GAP)
-    one_of(measure, ("ferrari-canny",), "measure")
+    loads = Measure.of(measure, wrenches, body.radius)
     whole(jobs, "jobs", least=1, most=MOST_JOBS)
     if progress is not None:
         function(progress, "progress")
@@ -181,8 +202,19 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
         clearance = FINGER_RADIUS * body.radius
     number(clearance, "clearance", least=0.0, most=body.radius, where=", the object's radius in m")
     with _stopping(time_limit_s) as stop:
-        levels = _Levels(body, friction, clearance, seed, jobs, stop, progress)
+        levels = _Levels(body, friction, loads, clearance, seed, jobs, stop, progress)
         return levels.result(levels.closed_to(gap))
+
+
+def measured(
+    body: Polyhedron, grasp: Grasp, friction: float, measure: Measure, gap: float = EXACT_GAP
+) -> FerrariCanny | ResistedLoads:
+    """Bound what a grasp of an object resists of the loads of a measure, with proofs."""
+    center, scale = body.center_of_mass, body.radius
+    if measure.is_usual:
+        return ferrari_canny(grasp, friction=friction, center=center, torque_scale=scale, gap=gap)
+    wrenches = WrenchSet.of(grasp, None, friction, center=center, torque_scale=scale)
+    return resisted_loads(wrenches, measure, gap)
 
 
 @contextmanager
@@ -204,8 +236,8 @@ class _Levels:
     """The levels of a search, with the best contacts and the best bound so far."""
 
     def __init__(  # noqa: PLR0913, PLR0917 - each is a quantity of its own
-        self, body: Polyhedron, friction: float, clearance: float, seed: int, jobs: int, stop: Stop,
-        progress: Callable[[GapAt], None] | None,
+        self, body: Polyhedron, friction: float, measure: Measure, clearance: float, seed: int,
+        jobs: int, stop: Stop, progress: Callable[[GapAt], None] | None,
     ) -> None:  # fmt: skip
         self.body, self.friction, self.clearance, self.progress = (
             body, friction, clearance, progress,
@@ -213,9 +245,12 @@ class _Levels:
         self.started = time.perf_counter()
         self.rng = np.random.default_rng([seed])
         self.grounds = grounds_of(body, clearance)
-        self.maps = exact_maps(body, self.grounds)
+        self.measure = measure
+        self.maps = exact_maps(body, self.grounds, measure)
         self.nodes = first_nodes(self.grounds, self.maps)
-        self.searching = Searching(self.grounds, friction, jobs, stop)
+        self.slack = Slack(friction, len(self.maps), measure.is_usual)
+        spare = self.slack.searched_below
+        self.searching = Searching(self.grounds, friction, jobs, stop, measure, spare)
         self.history: list[GapAt] = []
         twists = self._twists()
         self.steps, self.threshold = self._one_twist(twists)
@@ -230,7 +265,7 @@ class _Levels:
 
     @property
     def bound(self) -> float:
-        return proved_bound(self.threshold, self.friction, len(self.maps))
+        return self.slack.bound(self.threshold)
 
     def closed_to(self, gap: float) -> Ended:
         """Refute threshold after threshold, until the gap is reached or the search is stopped."""
@@ -248,12 +283,12 @@ class _Levels:
 
     def _refuted(self, bound: float) -> bool:
         """Lower the bound, or find better contacts; return whether one of them came about."""
-        threshold = searched_threshold(bound, self.friction, len(self.maps))
+        threshold = self.slack.searched(bound)
         known = self.best.quality.lower
         steps, better = self.searching.refute(self.nodes, threshold, known, lambda _: None)
         if steps is not None:
             self.steps = steps
-            self.threshold = bound - proved_bound(0.0, self.friction, len(self.maps))
+            self.threshold = self.slack.threshold(bound)
         for found in better:
             if found.quality.lower > self.best.quality.lower:
                 self.best = found
@@ -271,17 +306,20 @@ class _Levels:
             self.progress(now)
 
     def _twists(self) -> Array:
-        """Return twists in which all faces have little support, and let the search know them."""
+        """Return twists in which all faces resist little, and let the search know them."""
         descend = compiled(DESCENTS).descend
         points = [self.grounds.places(p, at) for p, at in enumerate(self.grounds.polygons())]
         on = np.repeat(np.arange(len(points)), [len(each) for each in points])
         corners, pieces = np.vstack(points), self.searching.pieces
         found = self.rng.normal(size=(TWISTS, 6))
+        # a task's loads themselves, the other way, ask for most
+        found = np.vstack([-self.measure.loads, found])
         found /= np.linalg.norm(found, axis=1, keepdims=True)
-        lowered = found[: TWISTS // 4].copy()
+        low = len(self.measure.loads) + TWISTS // 4
+        lowered = found[:low].copy()
         for y in lowered:
-            descend(pieces, corners, on, len(on), y, FIRST_STEPS)
-        found = np.vstack([lowered, found[TWISTS // 4 :]])
+            descend(pieces, self.searching.demand, corners, on, len(on), y, FIRST_STEPS)
+        found = np.vstack([lowered, found[low:]])
         self.searching.learn(found)
         return np.array(self.searching.pool.twists[: len(found)])
 
@@ -295,26 +333,23 @@ class _Levels:
                 slopes(pieces, p, y, at)
                 highest = max(support(at, a, b, self.friction) for a, b in polygon)
                 reached[k] = max(reached[k], highest)
-        best = int(reached.argmin())
-        spare = searched_threshold(0.0, self.friction, len(self.maps))
+        thresholds = self.slack.refuted(reached, self.measure.demands(twists))
+        best = int(thresholds.argmin())
         count = len(self.nodes[0])
         steps = Steps(
             np.zeros(count, np.int64), np.zeros(count, np.int64), twists[best : best + 1],
             np.empty((0, 3)),
         )  # fmt: skip
-        return steps, float(reached[best]) - spare
+        return steps, float(thresholds[best])
 
     def result(self, ended: Ended) -> BestGrasp:
         """Return the best contacts as a grasp, with the proof."""
         proof = CutTree(
             self.grounds, self.friction, self.maps, self.threshold, self.steps.deeds,
-            self.steps.asked, self.steps.twists, self.steps.lines,
+            self.steps.asked, self.steps.twists, self.steps.lines, self.measure,
         )  # fmt: skip
         grasp = self._grasp(self.best)
-        quality = ferrari_canny(
-            grasp, friction=self.friction, center=self.body.center_of_mass,
-            torque_scale=self.body.radius, gap=EXACT_GAP,
-        )  # fmt: skip
+        quality = measured(self.body, grasp, self.friction, self.measure)
         return BestGrasp(grasp, quality, self.clearance, proof, ended, tuple(self.history))
 
     def _grasp(self, best: Found) -> Grasp:

@@ -1,7 +1,8 @@
 """Finds good contacts to begin with: random ones that many twists weigh well, moved uphill.
 
-The quality of contacts is at most their largest support in each of many twists. Random contacts are
-ordered by the least of these bounds, and the first of different sets of faces climb.
+The quality of contacts is at most what each of many twists allows: their largest support over the
+twist's demand. Random contacts are ordered by the least of these bounds, and the first of different
+sets of faces climb.
 """
 
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.optimizing.best.grounds import Grounds
 from grasp_core.optimizing.best.search import Found, Searching
+from grasp_core.optimizing.best.task_ascent import climbed_for_task, climbs_for_weight
 from grasp_core.solvers.ties import surpassing
 from grasp_core.values import FINGERS
 
@@ -23,6 +25,9 @@ SETS = 40_000
 """Random sets of four of them."""
 CLIMBED = 6
 """Sets of different faces that climb."""
+LATER = 500
+"""Sets not in force closure that are passed over for others on the same faces: twists of other
+measures than the usual one say less of closure."""
 AT_ONCE = 4000
 
 
@@ -43,10 +48,14 @@ def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Foun
         at[place] = rng.dirichlet(np.ones(len(polygon))) @ polygon
     supports = _supports(grounds, searching.friction, on, at, twists)
     sets = np.sort(rng.integers(POINTS, size=(SETS, FINGERS)), axis=1)
+    measure, demands = searching.measure, searching.measure.demands(twists)
     bounds = np.concatenate(
-        [supports[sets[k : k + AT_ONCE]].max(axis=1).min(axis=1) for k in range(0, SETS, AT_ONCE)]
+        [
+            measure.multiples(supports[sets[k : k + AT_ONCE]].max(axis=1), demands).min(axis=1)
+            for k in range(0, SETS, AT_ONCE)
+        ]
     )
-    tried: set[tuple[int, ...]] = set()
+    tried, closed_later = set[tuple[int, ...]](), 0 if measure.is_usual else LATER
     best: Found | None = None
     for k in np.argsort(-bounds, kind="stable"):
         chosen = sets[k]
@@ -55,6 +64,11 @@ def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Foun
             continue
         tried.add(key)
         found = climbed(searching, on[chosen], at[chosen])
+        if found.quality.lower <= 0.0 and closed_later > 0:
+            # others on the same faces may be in force closure
+            tried.discard(key)
+            closed_later -= 1
+            continue
         if best is None or found.quality.lower > surpassing(best.quality.lower):
             best = found
         if len(tried) == CLIMBED:
@@ -67,15 +81,29 @@ def climbed(searching: Searching, on: Sequence[int] | Indices, at: Array) -> Fou
     pieces = tuple(piece_at(searching.grounds, int(p)) for p in on)
     limits = tuple(piece.b for piece in pieces)
     faces = ContactFaces(pieces, limits, searching.friction)
-    here = searching.measured(np.array(on), at)
-    if here.quality.lower <= 0.0:
-        return here
-    moved, _ = faces.climbed(at)
-    there = searching.measured(np.array(on), moved)
-    inside = all(
-        float((piece.E @ y - piece.b).max()) <= 0.0 for piece, y in zip(pieces, moved, strict=True)
-    )
-    return there if inside and there.quality.lower > here.quality.lower else here
+
+    def measured(y: Array) -> Found:
+        return searching.measured(np.array(on), y)
+
+    best = measured(at)
+    if best.quality.lower <= 0.0:
+        return best
+    measure = searching.measure
+    if measure.name == "weight":
+        every = climbs_for_weight(faces, at)
+    elif measure.name == "task":
+        every = [climbed_for_task(faces, measure, at)]
+    else:
+        every = [faces.climbed(at)[0]]
+    for moved in every:
+        there = measured(moved)
+        inside = all(
+            float((piece.E @ y - piece.b).max()) <= 0.0
+            for piece, y in zip(pieces, moved, strict=True)
+        )
+        if inside and there.quality.lower > best.quality.lower:
+            best = there
+    return best
 
 
 def piece_at(grounds: Grounds, place: int) -> FacePiece:

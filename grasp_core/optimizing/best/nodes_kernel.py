@@ -7,7 +7,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 from grasp_core.optimizing.best.cuts_kernel import MOST_CORNERS, Pieces, clip, extent
-from grasp_core.optimizing.best.twists_kernel import Pool
+from grasp_core.optimizing.best.twists_kernel import Demand, Pool
 
 FINGERS = 4
 ASK, BY_PIECES, BY_LINE, SPLICE = 0, 16, 32, 64
@@ -81,7 +81,16 @@ class Search(NamedTuple):
     tree: Tree
     work: Work
     t: float
-    """The quality that no contacts are to reach."""
+    """The multiple of the loads that no contacts are to resist."""
+    demand: Demand
+    spare: float
+    """How far below t times a twist's demand a support still counts as an answer."""
+
+
+@loop("numpy")
+def answer_to(search: Search, k: int) -> float:
+    """Return the support from which on a contact answers a twist of the pool."""
+    return search.t * search.pool.demands[k] - search.spare
 
 
 @loop("numpy")

@@ -1,7 +1,7 @@
 """Replays a tree of cuts, divisions and refutations, compiled; it shares no code with the search.
 
 Solved: the check that `support_cuts` derives. Supports are computed in space, from the definition,
-and edges are followed by halving.
+and edges are followed by halving. From which support on a contact answers a twist is given.
 """
 
 from typing import NamedTuple
@@ -33,10 +33,13 @@ class Planes(NamedTuple):
 
 @loop("numpy", beside=True)
 def replay(  # noqa: C901, PLR0913, PLR0917 - the arrays of a tree
-    planes: Planes, first: Array, first_counts: Indices, first_fresh: Indices, t: float,
-    deeds: Indices, asked: Indices, twists: Array, lines: Array, most_cuts: int,
+    planes: Planes, first: Array, first_counts: Indices, first_fresh: Indices,
+    deeds: Indices, asked: Indices, twists: Array, answers: Array, lines: Array, most_cuts: int,
 ) -> bool:  # fmt: skip
-    """Return whether the deeds refute, from each first node on, that contacts reach t."""
+    """Return whether the deeds refute, from each first node on, that contacts answer all twists.
+
+    An answer to the twist k is a support of at least answers[k].
+    """
     pieces, place = len(planes.normals), 0
     deep = 16
     corners = np.zeros((deep, FINGERS, pieces, ROOM, 2))
@@ -61,7 +64,8 @@ def replay(  # noqa: C901, PLR0913, PLR0917 - the arrays of a tree
             if cuts[top - 1] > most_cuts:
                 return False
             if 0 <= deed < BY_PIECES and 0 <= at < len(twists):
-                added = _answered(planes, corners, counts, fresh, top - 1, deed, twists[at], t)
+                y, t = twists[at], float(answers[at])
+                added = _answered(planes, corners, counts, fresh, top - 1, deed, y, t)
             elif BY_PIECES <= deed < BY_PIECES + FINGERS and 0 <= at < len(lines):
                 added = _sorted(corners, counts, fresh, top - 1, deed - BY_PIECES, lines[at, 0])
             elif BY_LINE <= deed < LAST and 0 <= at < len(lines):

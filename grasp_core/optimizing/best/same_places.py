@@ -2,7 +2,8 @@
 
 Solved: first nodes of a search that hold at least one image of every four contacts.
 
-Derivation. A symmetry that maps every piece of the faces to a piece keeps the quality of contacts.
+Derivation. A symmetry that maps every piece of the faces to a piece, and the loads that count to
+such loads, keeps the quality of contacts. All keep wrenches of unit length, and the weight.
 Let pieces that symmetries map to each other form an orbit, with its first piece for all. Of the
 orbits on which contacts are, take the first, k. A symmetry moves a contact of this orbit to the
 orbit's first piece r_k; call it finger 0. The others are on pieces of the orbits from k on. The
@@ -16,7 +17,10 @@ which is a half-plane for each h.
 Each map is exact up to `EXACT`, in pieces, normals and products of maps, which a check of all maps
 and products shows. Two maps are applied at most, so that contacts are moved to within 1e-8 of
 others that the proof is about, with normals as near: their quality differs by less than
-1e-7 (1 + mu). Half-planes (1) are moved outwards by `WIDENED` for the same reason.
+1e-7 (1 + mu). Loads of a task are mapped to within `EXACT` of the longest load L, so that answers
+a(y) = t d(y), t L <= 8 (1 + mu), of unit twists are off by less than 2e-8 (1 + mu); those of the
+moved contacts are off by 5e-8 (1 + mu). Half-planes (1) are moved outwards by `WIDENED` for the
+same reason.
 """
 
 import numpy as np
@@ -26,6 +30,7 @@ from grasp_core.compiled import compiled
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.symmetries import symmetries
 from grasp_core.optimizing.best.grounds import ROOM, Grounds
+from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS
 
 EXACT = 1e-9
@@ -37,24 +42,27 @@ ASIDE = (0.37, 0.11)
 KERNEL = "grasp_core.optimizing.best.cuts_kernel"
 
 
-def exact_maps(body: Polyhedron, grounds: Grounds) -> Array:
-    """Return the symmetries of an object that map pieces to pieces exactly enough, (g, 3, 3).
+def exact_maps(body: Polyhedron, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> Array:
+    """Return the symmetries of an object that map pieces and loads exactly enough, (g, 3, 3).
 
     Only the identity is returned if they do not form a group.
     """
     alone = np.eye(3)[None]
     found = symmetries(body)
     every = np.concatenate([alone, found.rotations[1:], found.reflections])
+    every = every[measure.keeps(every, EXACT)]
     kept = np.array([each for each in every if _images(each[None], grounds)[0].min() >= 0])
-    return kept if len(kept) <= MOST_MAPS and fitting(kept, grounds) else alone
+    return kept if len(kept) <= MOST_MAPS and fitting(kept, grounds, measure) else alone
 
 
-def fitting(maps: Array, grounds: Grounds) -> bool:
-    """Return whether maps are orthogonal, form a group, and map pieces to pieces."""
+def fitting(maps: Array, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> bool:
+    """Return whether maps are orthogonal, form a group, and keep the pieces and the loads."""
     if len(maps) > MOST_MAPS or np.abs(maps[0] - np.eye(3)).max() > 0.0:
         return False
     square = maps @ maps.transpose(0, 2, 1) - np.eye(3)
     if np.abs(square).max() > EXACT or (_images(maps, grounds) < 0).any():
+        return False
+    if not measure.keeps(maps, EXACT).all():
         return False
     products = np.einsum("aij,bjk->abik", maps, maps)
     return all(

@@ -21,6 +21,8 @@ from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
 from grasp_core.optimizing.best.grounds import ROOM, Grounds
 from grasp_core.quality.ferrari_canny import FerrariCanny, wrench_set_quality
+from grasp_core.quality.measures import FERRARI_CANNY, Measure
+from grasp_core.quality.resisted_loads import ResistedLoads, resisted_loads
 from grasp_core.values import FINGERS
 
 KERNEL = "grasp_core.optimizing.best.search_kernel"
@@ -40,6 +42,9 @@ BUDGET = 2000
 """Nodes after which a thread looks whether it should stop: some tenths of a second."""
 FIRST_ROOM = 4096
 """Nodes for which a part's tree has room at first; it is doubled when it is full."""
+MUCH = 1.1
+"""Ratio of qualities from which on contacts are a better start for other thresholds, where the
+measure is not the usual one and the first contacts may be poor."""
 EXACT_GAP = 1e-5
 """Gap between the bounds of the quality of contacts that may be better."""
 
@@ -52,7 +57,7 @@ class Found:
     """The piece of each contact, (4,)."""
     at: Array
     """Plane coordinates, (4, 2)."""
-    quality: FerrariCanny
+    quality: FerrariCanny | ResistedLoads
 
     def __post_init__(self) -> None:
         self.at.setflags(write=False)
@@ -81,12 +86,15 @@ class Steps:
 
 @dataclass(slots=True, eq=False)
 class Searching:
-    """What levels of a search share: pieces, twists, and whether to stop."""
+    """What levels of a search share: pieces, loads, twists, and whether to stop."""
 
     grounds: Grounds
     friction: float
     jobs: int
     stop: "Stop"
+    measure: Measure = FERRARI_CANNY
+    spare: float = 0.0
+    """How far below threshold times demand a support still counts as an answer."""
     pool: Any = None
     nodes: int = 0
     """How many nodes were visited in all levels."""
@@ -103,11 +111,19 @@ class Searching:
             float(self.friction),
         )  # fmt: skip
 
+    @property
+    def demand(self) -> Any:
+        """Return the loads as the kernels take them."""
+        kernel = compiled(TWISTS)
+        kinds = {"ferrari-canny": kernel.USUAL, "weight": kernel.WEIGHT, "task": kernel.TASK}
+        return kernel.Demand(int(kinds[self.measure.name]), np.array(self.measure.loads))
+
     def empty_pool(self) -> Any:
         """Return a pool without twists."""
         pieces = len(self.grounds.counts)
         return compiled(TWISTS).Pool(
-            np.zeros((POOL, 6)), np.zeros((pieces, 6, POOL)), np.zeros(POOL, np.int64),
+            np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((pieces, 6, POOL)),
+            np.zeros(POOL, np.int64),
             np.full(POOL, -1), np.zeros(1, np.int64),
         )  # fmt: skip
 
@@ -115,7 +131,7 @@ class Searching:
         """Add twists, (n, 6), to a pool, the common one by default."""
         pool = self.pool if pool is None else pool
         for y in twists:
-            compiled(TWISTS).learn(pool, self.pieces, np.array(y), now)
+            compiled(TWISTS).learn(pool, self.pieces, self.demand, np.array(y), now)
 
     def refute(
         self, nodes: tuple[Array, Indices, Indices], threshold: float, known: float,
@@ -209,9 +225,11 @@ class Searching:
     def _runs(self, part: Part, threshold: float, known: float, depth: int) -> Iterator[int]:
         """Run the kernel until a part is done, and yield why it pauses for the caller."""
         kernel, nodes, pieces = compiled(KERNEL), compiled(NODES), self.pieces
-        work = _room()
+        work, demand = _room(), self.demand
         while not self.stop():
-            search = nodes.Search(pieces, part.stack, part.pool, part.tree, work, threshold)
+            search = nodes.Search(
+                pieces, part.stack, part.pool, part.tree, work, threshold, demand, self.spare
+            )
             why = kernel.run(search, BUDGET, depth)
             if why == kernel.DONE:
                 part.finished = True
@@ -229,6 +247,8 @@ class Searching:
         found = self.measured(work.on, work.middle)
         if found.quality.lower > known:
             part.found.append(found)
+            if not self.measure.is_usual and found.quality.lower > MUCH * known:
+                return False
         if found.quality.upper >= threshold:
             return False
         self.learn(found.quality.direction[None], part.pool, int(part.tree.sizes[0]))
@@ -238,7 +258,10 @@ class Searching:
         """Bound the quality of contacts on pieces, (4,), at plane coordinates, (4, 2)."""
         points = np.array([self.grounds.places(p, y[None])[0] for p, y in zip(on, at, strict=True)])
         wrenches = WrenchSet.at(points, self.grounds.normals[on], np.full(FINGERS, self.friction))
-        quality = wrench_set_quality(wrenches, EXACT_GAP)
+        if self.measure.is_usual:
+            quality = wrench_set_quality(wrenches, EXACT_GAP)
+        else:
+            quality = resisted_loads(wrenches, self.measure, EXACT_GAP)
         return Found(tuple(int(p) for p in on), np.array(at), quality)
 
     def _hand_on(self, wave: Sequence[Part]) -> None:

@@ -19,7 +19,7 @@ from grasp_core.optimizing.best.nodes_kernel import (
     is_full,
     note,
 )
-from grasp_core.optimizing.best.twists_kernel import descend, learn
+from grasp_core.optimizing.best.twists_kernel import descend, learn, multiple
 
 DONE, PAUSED, FULL, PART, FOUND, LOST = 0, 1, 2, 3, 4, 5
 """Why a run ends: nothing left, budget of nodes spent, no room in the tree, a node that is to be a
@@ -95,13 +95,14 @@ def _is_single(search: Search, node: int) -> bool:
 
 @loop("numpy")
 def _lowered(search: Search, node: int, now: int) -> tuple[bool, bool]:
-    """Lower the support of all corners of a node; return whether that gave a twist, and refutes."""
+    """Lower what all corners of a node resist; return whether that gave a twist, and refutes."""
     work, stack, pieces = search.work, search.stack, search.pieces
     least, first = np.inf, 0
     for k in range(search.pool.size[0]):
         found = work.reach[0, k]
         for i in range(1, FINGERS):
             found = max(found, work.reach[i, k])
+        found = multiple(found, search.pool.demands[k])
         if found < least:
             least, first = found, k
     room = FINGERS * MOST_CORNERS
@@ -117,7 +118,7 @@ def _lowered(search: Search, node: int, now: int) -> tuple[bool, bool]:
             on[m] = p
             m += 1
     y = search.pool.twists[first].copy()
-    found = descend(pieces, points, on, m, y, STEPS)
+    found = descend(pieces, search.demand, points, on, m, y, STEPS)
     if found < least:
         _learn(search, node, y, now)
     return found < least, min(found, least) < search.t
@@ -125,7 +126,7 @@ def _lowered(search: Search, node: int, now: int) -> tuple[bool, bool]:
 
 @loop("numpy")
 def _middle_lowered(search: Search, node: int, now: int) -> tuple[float, bool]:
-    """Lower the support of contacts in a node's middle; return it, and whether it gave a twist."""
+    """Lower what contacts in a node's middle resist; return it, and whether it gave a twist."""
     pieces, pool, work = search.pieces, search.pool, search.work
     near, nearest = np.inf, 0
     points, on = np.empty((FINGERS, 3)), work.on
@@ -138,10 +139,11 @@ def _middle_lowered(search: Search, node: int, now: int) -> tuple[float, bool]:
             one, two = at[3, k] - at[5, k] * b, at[4, k] + at[5, k] * a
             s = at[0, k] + at[1, k] * a + at[2, k] * b
             found = max(found, s + pieces.friction * np.sqrt(one * one + two * two))
+        found = multiple(found, pool.demands[k])
         if found < near:
             near, nearest = found, k
     y = pool.twists[nearest].copy()
-    found = descend(pieces, points, on, FINGERS, y, CLOSE_STEPS)
+    found = descend(pieces, search.demand, points, on, FINGERS, y, CLOSE_STEPS)
     if found < near:
         _learn(search, node, y, now)
     return min(found, near), found < near
@@ -149,7 +151,7 @@ def _middle_lowered(search: Search, node: int, now: int) -> tuple[float, bool]:
 
 @loop("numpy")
 def _learn(search: Search, node: int, y: Array, now: int) -> None:
-    place = learn(search.pool, search.pieces, y, now)
+    place = learn(search.pool, search.pieces, search.demand, y, now)
     for i in range(FINGERS):
         look(search, node, i, place, place + 1)
 

@@ -1,23 +1,26 @@
 """Proves that no four contacts on given faces reach a quality, by asking who answers each twist.
 
-Solved: given a threshold t, a proof that the Ferrari-Canny quality (`l1`, exact circular cones,
-torques over the object's radius, as `ferrari_canny` measures it) of any four contacts on the pieces
-of faces is below t. Several contacts may be on one piece.
+Solved: given a threshold t, a proof that a measure of any four contacts on the pieces of faces is
+below t: the Ferrari-Canny quality (`l1`, exact circular cones, torques over the object's radius, as
+`ferrari_canny` measures it), or the largest resisted multiple of other loads (see `measures`).
+Several contacts may be on one piece.
 
-Derivation. A contact at x answers the twist y = (v, w), |y| >= 1, with the support of its cone,
+Derivation. A contact at x answers the twist y = (v, w) with the support of its cone,
 
     s(y, x) = n.u + mu |u - (n.u) n|,   u = v + w x x,                                  (1)
 
-and the quality of contacts x_1 ... x_4 is the least over unit twists of max_i s(y, x_i). So if they
-reach t, then for every y some contact has s(y, x_i) >= t. Let finger i be known to be in the union
-of convex polygons K_ip, one for each piece p.
+and contacts x_1 ... x_4 reach the measure t if and only if for every y some contact has
+s(y, x_i) >= t d(y), with the demand d of the loads, (1) of `measures`: the support of the hull of
+the contacts' cones is the largest of theirs. Let a(y) = t d(y) be what an *answer* is. For the
+Ferrari-Canny quality d(y) = |y|, and a(y) = t is asked of twists with |y| >= 1. Let finger i be
+known to be in the union of convex polygons K_ip, one for each piece p.
 
-* *Ask.* A finger whose polygons have s < t at all corners cannot answer y, as s is convex in x. One
+* *Ask.* A finger whose polygons have s < a at all corners cannot answer y, as s is convex in x. One
   of the others does. For each of them there is a child in which its polygons are cut to where it
   answers. No finger left: no child, the node is refuted.
-* *Cut.* {x in K : s >= t} lies in the hull of the corners that reach t and of a point on each edge
-  between such a corner and one that does not, at which s < t still: what is cut off beyond a chord
-  between two such points is the hull of points with s < t.                            (2)
+* *Cut.* {x in K : s >= a} lies in the hull of the corners that reach a and of a point on each edge
+  between such a corner and one that does not, at which s < a still: what is cut off beyond a chord
+  between two such points is the hull of points with s < a.                            (2)
 * *Divide.* A finger is on one side of a line or on the other, or on one of two sets of pieces.
 * *Fresh fingers.* Contacts can be numbered as one likes. While some fingers have had no part in
   anything, their polygons are equal, and one child is enough for an answer from any of them.
@@ -28,15 +31,28 @@ which follow from them.
 Rounding. The proof is replayed in doubles. With coordinates and twists of size one or two, a corner
 is off the line or edge it should be on by less than 2e-15, a support computed is off by less than
 2e-15 (1 + mu), and s changes by at most (1 + mu) per unit of distance. By induction over the nodes
-above, a point that answers all questions with s >= t + (1 + mu) d e, after d cuts of error
-e < 2e-15, is within d e of the polygons of its node: its nearest point in the polygon before a cut
-has s >= t still, so that (2) leaves it in. With at most `MOST_CUTS` cuts above any node,
+above, a point that answers all questions with s >= a + (1 + mu) k e, after k cuts of error
+e < 2e-15, is within k e of the polygons of its node: its nearest point in the polygon before a cut
+has s >= a still, so that (2) leaves it in. With at most `MOST_CUTS` cuts above any node,
 
     quality < t + (1 + mu) * ROUNDING                                                     (3)
 
 has room for more than ten times this. Twists of length 1 - 1e-12 are taken for units.
 
-Symmetries. See `same_places`: contacts can be moved by a symmetry, at the cost of its error.
+Other measures. Twists may ask for little or nothing, d(y) = 0, so that a larger t does not make
+room for rounding. Here less is an answer,
+
+    a(y) = t d(y) - (1 + mu) * ROUNDING,                                                  (4)
+
+for twists with |y| <= 1 + 1e-12, and contacts that reach t answer all questions with the room that
+the induction needs: the bound is t itself. The product t d(y) is rounded as well, once for each
+twist, as its error does not move points. With L the longest load, t d(y) <= t L, and the products
+and sums of six numbers in it are off by less than 1e-15 t L. A wrench of forces with normal parts
+of sum one is shorter than 8 (1 + mu), with coordinates up to two, so that only t L <= 8 (1 + mu)
+need be considered, and a(y) is off by less than 1e-14 (1 + mu), a hundred-thousandth of the room.
+
+Symmetries. See `same_places`: contacts can be moved by a symmetry, at the cost of its error. It
+takes the place of rounding in (3) and (4): `INEXACT` is added to `ROUNDING`.
 """
 
 from dataclasses import dataclass
@@ -49,6 +65,7 @@ from grasp_core.compiled import compiled
 from grasp_core.fields import is_a, is_array, is_indices, is_number
 from grasp_core.optimizing.best.grounds import Grounds
 from grasp_core.optimizing.best.same_places import first_nodes, fitting
+from grasp_core.quality.measures import FERRARI_CANNY, Measure
 
 ROUNDING = 1e-9
 """How far rounding can lift a quality above the threshold, over 1 + mu."""
@@ -61,25 +78,64 @@ INEXACT = 1e-7
 """How far errors of symmetries can lift a quality, over 1 + mu."""
 TWIST_SLACK = 1e-12
 LONGEST_TWIST = 2.0
+LONGEST_WRENCH = 8.0
+"""More than the length of any wrench of forces with normal parts of sum one, over 1 + mu."""
 KERNEL = "grasp_core.optimizing.best.replay_kernel"
 
 
-def proved_bound(threshold: float, friction: float, maps: int) -> float:
-    """Return what no quality exceeds if a tree refutes the threshold, by (3).
+@dataclass(frozen=True, slots=True)
+class Slack:
+    """What proofs leave for rounding, and searches for a replay with other roundings."""
 
-    Args:
-        threshold: The quality whose reaching is refuted.
-        friction: Coulomb coefficient.
-        maps: How many symmetries are used, the identity included.
-    """
-    lost = ROUNDING + (INEXACT if maps > 1 else 0.0)
-    return threshold + (1.0 + friction) * lost
+    friction: float
+    maps: int
+    """How many symmetries are used, the identity included."""
+    usual: bool
+    """Whether the measure is the Ferrari-Canny quality."""
 
+    @property
+    def _lost(self) -> float:
+        lost = ROUNDING + (INEXACT if self.maps > 1 else 0.0)
+        return (1.0 + self.friction) * lost
 
-def searched_threshold(bound: float, friction: float, maps: int) -> float:
-    """Return the quality to refute by search, so that a bound is proved in the end."""
-    spare = proved_bound(0.0, friction, maps) + (1.0 + friction) * SEARCHED_BELOW
-    return bound - spare
+    @property
+    def _below(self) -> float:
+        return (1.0 + self.friction) * SEARCHED_BELOW
+
+    def bound(self, threshold: float) -> float:
+        """Return what no quality exceeds if a tree refutes a threshold, by (3) or (4)."""
+        return threshold + self._lost if self.usual else threshold
+
+    def threshold(self, bound: float) -> float:
+        """Return the threshold that proves a bound."""
+        return bound - self._lost if self.usual else bound
+
+    def searched(self, bound: float) -> float:
+        """Return the threshold to refute by search, so that a bound is proved in the end."""
+        return bound - (self._lost + self._below) if self.usual else bound
+
+    @property
+    def answers_below(self) -> float:
+        """Return how far below threshold times demand supports are answers in a proof, by (4)."""
+        return 0.0 if self.usual else self._lost
+
+    @property
+    def searched_below(self) -> float:
+        """Return how far below it they are answers in a search."""
+        return 0.0 if self.usual else self._lost + self._below
+
+    def refuted(self, reached: Array, demands: Array) -> Array:
+        """Return the least thresholds that twists refute alone, as searches do.
+
+        Args:
+            reached: Largest supports that contacts have in the twists, (n,).
+            demands: Demands of the twists, (n,); none is refuted where that is zero.
+        """
+        spare = self._lost + self._below
+        if self.usual:
+            return reached + spare
+        with np.errstate(divide="ignore"):
+            return np.where(demands > 0.0, (np.maximum(reached, 0.0) + spare) / demands, np.inf)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -105,6 +161,8 @@ class CutTree(ByValue):
     lines: Array
     """Rows (a, b, c): first a x + b y <= c in the piece's plane, then >=; for pieces (k, 0, 0),
     first those below k, then the others, (l, 3)."""
+    measure: Measure = FERRARI_CANNY
+    """The loads whose largest resisted multiple is bounded."""
 
     def __post_init__(self) -> None:
         for name, shape in (("maps", (None, 3, 3)), ("twists", (None, 6)), ("lines", (None, 3))):
@@ -115,7 +173,11 @@ class CutTree(ByValue):
     @property
     def bound(self) -> float:
         """Return the quality that no contacts exceed."""
-        return proved_bound(self.threshold, self.friction, len(self.maps))
+        return self._slack.bound(self.threshold)
+
+    @property
+    def _slack(self) -> Slack:
+        return Slack(self.friction, len(self.maps), self.measure.is_usual)
 
     def verify(self) -> bool:
         """Replay the proof without the search, from the pieces, in plain arithmetic."""
@@ -123,13 +185,15 @@ class CutTree(ByValue):
             return self._is_sound() and bool(self._replayed())
 
     def _is_sound(self) -> bool:
-        """Return whether all numbers are of sizes for which (3) is derived."""
+        """Return whether all numbers are of sizes for which (3) and (4) are derived."""
         count = len(self.deeds) if is_indices(self.deeds, None) else 0
         if not (
             is_a(self.grounds, Grounds)
             and self.grounds.sound()
             and is_number(self.friction, least=0.0, most=1e3)
-            and is_number(self.threshold, least=1e-6, most=1e3)
+            and is_a(self.measure, Measure)
+            and self.measure.sound()
+            and self._has_fitting_threshold()
             and count
             and is_indices(self.asked, count)
             and is_array(self.twists, None, 6)
@@ -140,15 +204,25 @@ class CutTree(ByValue):
             return False
         lengths = np.linalg.norm(self.twists, axis=1)
         fits = lengths.min(initial=1.0) >= 1.0 - TWIST_SLACK
-        fits = fits and lengths.max(initial=1.0) <= LONGEST_TWIST
-        return bool(fits) and (len(self.maps) == 1 or fitting(self.maps, self.grounds))
+        longest = LONGEST_TWIST if self.measure.is_usual else 1.0 + TWIST_SLACK
+        fits = fits and lengths.max(initial=1.0) <= longest
+        alone = len(self.maps) == 1
+        return bool(fits) and (alone or fitting(self.maps, self.grounds, self.measure))
+
+    def _has_fitting_threshold(self) -> bool:
+        if self.measure.is_usual:
+            return is_number(self.threshold, least=1e-6, most=1e3)
+        longest = LONGEST_WRENCH * (1.0 + self.friction) / self.measure.size
+        return is_number(self.threshold, least=1e-6 / self.measure.size, most=longest)
 
     def _replayed(self) -> bool:
         kernel = compiled(KERNEL)
         corners, counts, fresh = first_nodes(self.grounds, self.maps)
         grounds = self.grounds
+        # (4), or the threshold itself
+        answers = self.threshold * self.measure.demands(self.twists) - self._slack.answers_below
         return kernel.replay(
             kernel.Planes(grounds.normals, grounds.origins, grounds.frames, self.friction),
-            corners, counts, fresh, self.threshold, self.deeds.astype(np.int64),
-            self.asked.astype(np.int64), np.array(self.twists), np.array(self.lines), MOST_CUTS,
+            corners, counts, fresh, self.deeds.astype(np.int64), self.asked.astype(np.int64),
+            np.array(self.twists), answers, np.array(self.lines), MOST_CUTS,
         )  # fmt: skip

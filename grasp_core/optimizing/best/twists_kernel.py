@@ -1,4 +1,8 @@
-"""Keeps twists that have divided or refuted much, and finds new ones by descent, compiled."""
+"""Keeps twists that have divided or refuted much, and finds new ones by descent, compiled.
+
+Twists are weighed by the multiple of the loads that they allow: support over demand, (1) of
+`measures`.
+"""
 
 from typing import NamedTuple
 
@@ -15,6 +19,20 @@ SETTLING = 5
 """Steps without progress after which a descent aims less far."""
 FIRST_AIM, LAST_AIM = 0.2, 0.004
 """Share of the value that a step aims below the best one, at first and before a descent ends."""
+USUAL, WEIGHT, TASK = 0, 1, 2
+"""Kinds of demands."""
+SMALL_DEMAND = 1e-2
+"""Demand below which descents take this one, and twists with negative support are compared by it.
+"""
+
+
+class Demand(NamedTuple):
+    """The loads whose largest resisted multiple is sought."""
+
+    kind: int
+    """Whose length is at most one (`USUAL` for wrenches, `WEIGHT` for forces), or of a `TASK`."""
+    loads: Array
+    """Loads of a task, (m, 6)."""
 
 
 class Pool(NamedTuple):
@@ -22,6 +40,8 @@ class Pool(NamedTuple):
 
     twists: Array
     """Twists at least one long, with torques over the object's radius, (c, 6)."""
+    demands: Array
+    """How much of the loads each asks for, (c,)."""
     asked: Array
     """The `slopes` of each piece under each twist, (p, 6, c)."""
     used: Indices
@@ -33,7 +53,7 @@ class Pool(NamedTuple):
 
 
 @loop("numpy")
-def learn(pool: Pool, pieces: Pieces, y: Array, now: int) -> int:
+def learn(pool: Pool, pieces: Pieces, demand: Demand, y: Array, now: int) -> int:
     """Put a twist into the pool, in place of the one unused for longest if that is full."""
     place = pool.size[0]
     if place < len(pool.used):
@@ -49,6 +69,7 @@ def learn(pool: Pool, pieces: Pieces, y: Array, now: int) -> int:
     length = np.sqrt(length)
     for j in range(TWIST):
         pool.twists[place, j] = y[j] / length * OVER
+    pool.demands[place] = demanded(demand, pool.twists[place], np.empty(TWIST))
     at = np.empty(SLOPES)
     for p in range(len(pieces.normals)):
         slopes(pieces, p, pool.twists[place], at)
@@ -56,6 +77,50 @@ def learn(pool: Pool, pieces: Pieces, y: Array, now: int) -> int:
             pool.asked[p, j, place] = at[j]
     pool.used[place], pool.names[place] = now, -1
     return place
+
+
+@loop("numpy")
+def demanded(demand: Demand, y: Array, hardest: Array) -> float:
+    """Return how much of the loads a unit twist asks for, and fill in minus the load that does.
+
+    For the usual measure that is one; its load, along the twist, is left out, as descents move
+    across it.
+    """
+    hardest[:] = 0.0
+    if demand.kind == USUAL:
+        return 1.0
+    if demand.kind == WEIGHT:
+        long = np.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
+        if long > 0.0:
+            for j in range(3):
+                hardest[j] = y[j] / long
+        return long
+    return _most_of(demand.loads, y, hardest)
+
+
+@loop("numpy")
+def _most_of(loads: Array, y: Array, hardest: Array) -> float:
+    most = 0.0
+    for k in range(len(loads)):
+        found = 0.0
+        for j in range(TWIST):
+            found -= loads[k, j] * y[j]
+        if found > most:
+            most = found
+            for j in range(TWIST):
+                hardest[j] = -loads[k, j]
+    return most
+
+
+@loop("numpy")
+def multiple(support: float, asked: float) -> float:
+    """Return the multiple of the loads that a twist allows; a negative one if it allows none.
+
+    It is below a positive number t if and only if the support is below t times what is asked for.
+    """
+    if support < 0.0:
+        return support / max(asked, SMALL_DEMAND)
+    return support / asked if asked > 0.0 else np.inf
 
 
 @loop("numpy")
@@ -104,18 +169,18 @@ def _velocity(x: Array, y: Array) -> tuple[float, float, float]:
 
 
 @loop("numpy")
-def descend(  # noqa: C901 - loops that are written out
-    pieces: Pieces, points: Array, on: Indices, m: int, y: Array, steps: int
+def descend(  # noqa: C901, PLR0913, PLR0917 - loops that are written out
+    pieces: Pieces, demand: Demand, points: Array, on: Indices, m: int, y: Array, steps: int
 ) -> float:
-    """Move a unit twist to where the largest support of contacts is smaller; return the smallest.
+    """Move a unit twist to where contacts resist less; return the least multiple that one allows.
 
-    Each step follows the wrench that attains the support, as far as would lower it to an aim if it
-    stayed the largest.
+    Each step follows the wrench that attains the support, less the load that asks for most, as far
+    as would lower the multiple to an aim if these stayed the largest.
     """
-    at, best, slope = y.copy(), np.inf, np.empty(TWIST)
+    at, best, slope, hardest = y.copy(), np.inf, np.empty(TWIST), np.empty(TWIST)
     aim, idle = FIRST_AIM, 0
     for _ in range(steps):
-        found = highest(pieces, points, on, m, at, slope)
+        found = _steepest(pieces, demand, points, on, m, at, slope, hardest)
         if found < best:
             idle = 0 if found < best - 0.25 * aim * abs(best) else idle + 1
             best = found
@@ -127,7 +192,7 @@ def descend(  # noqa: C901 - loops that are written out
             at[:] = y
             if aim < LAST_AIM:
                 break
-            found = highest(pieces, points, on, m, at, slope)
+            found = _steepest(pieces, demand, points, on, m, at, slope, hardest)
         along, square = 0.0, 0.0
         for j in range(TWIST):
             along += slope[j] * at[j]
@@ -144,4 +209,29 @@ def descend(  # noqa: C901 - loops that are written out
         length = np.sqrt(length)
         for j in range(TWIST):
             at[j] /= length
-    return best
+    if demand.kind == USUAL:
+        return best
+    found = highest(pieces, points, on, m, y, slope)
+    return multiple(found, demanded(demand, y, hardest))
+
+
+@loop("numpy")
+def _steepest(  # noqa: PLR0913, PLR0917 - what a descent works with
+    pieces: Pieces, demand: Demand, points: Array, on: Indices, m: int, y: Array, slope: Array,
+    hardest: Array,
+) -> float:  # fmt: skip
+    """Return the multiple that a twist allows, as if it asked for a little at least, and its slope.
+
+    The slope, (6,), is that of the support over the demand: (w - multiple * load) / demand.
+    """
+    found = highest(pieces, points, on, m, y, slope)
+    if demand.kind == USUAL:
+        return found
+    asked = demanded(demand, y, hardest)
+    if asked < SMALL_DEMAND:
+        asked = SMALL_DEMAND
+        hardest[:] = 0.0
+    found /= asked
+    for j in range(TWIST):
+        slope[j] = (slope[j] - found * hardest[j]) / asked
+    return found

@@ -4,17 +4,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from grasp_core.arrays import Array
 from grasp_core.files.json_text import text_of
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.best_grasp import BestGrasp, GapAt, best_grasp
+from grasp_core.optimizing.best.best_grasp import BestGrasp, GapAt, best_grasp, measured
 from grasp_core.optimizing.best.proof_file import write_proof
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.best.best_json import best_to_document
+from sim_validate.commands.best.best_json import Rated, best_to_document
 
 FILE, PROOF = "best.json", "best-proof.npz"
 STEPS = 100
@@ -25,12 +26,24 @@ WHY = {
     "undivided": "what is left of the faces is too small to be divided further",
 }
 """Why a search ended, in words."""
+ROUGH = 1e-3
+"""Gap between the bounds of what planned grasps hold."""
+UNITS = {
+    "ferrari-canny": ("quality", " N"), "weight": ("weight", " N"), "task": ("multiple", ""),
+}  # fmt: skip
+"""What each measure gives, and its unit, for normal forces that sum to one newton."""
 
 
 def search_best(
-    body: Polyhedron, command: command_flags.Plan, reporter: Reporter
+    body: Polyhedron, command: command_flags.Plan, wrenches: Array | None, reporter: Reporter
 ) -> BestGrasp:  # fmt: skip
     """Search for the best grasp, and show how the gap closes.
+
+    Args:
+        body: The object.
+        command: The flags.
+        wrenches: Those of a task, (m, 6) [N, N m]; None for other measures.
+        reporter: Shows the progress.
 
     Raises:
         InputError: A setting is refused, or there is no grasp.
@@ -40,14 +53,26 @@ def search_best(
 
         def tell(now: GapAt) -> None:
             closed = round(STEPS * (1.0 - max(now.gap - command.gap, 0.0)))
-            note = f"(quality {now.quality:.4f}, bound {now.bound:.4f}, gap {100 * now.gap:.1f} %)"
+            word = UNITS[command.measure][0]
+            note = f"({word} {now.quality:.4f}, bound {now.bound:.4f}, gap {100 * now.gap:.1f} %)"
             steps.update(closed, STEPS, note)
 
         return best_grasp(
             body, planning.friction, gap=command.gap, time_limit_s=command.time_limit_s,
             clearance=planning.edge_clearance_m or None, seed=planning.seed, jobs=command.jobs,
-            progress=tell,
+            measure=command.measure, wrenches=wrenches, progress=tell,
         )  # fmt: skip
+
+
+def rated(body: Polyhedron, best: BestGrasp, planned: Sequence[Grasp]) -> list[Rated]:
+    """Return planned grasps with bounds of the measure of the best one."""
+    measure, friction = best.proof.measure, best.proof.friction
+    if measure.is_usual:
+        return [Rated(grasp, grasp.ferrari_canny) for grasp in planned]
+    found = [measured(body, grasp, friction, measure, ROUGH) for grasp in planned]
+    return [
+        Rated(grasp, (each.lower, each.upper)) for grasp, each in zip(planned, found, strict=True)
+    ]
 
 
 def with_best(found: Plan, best: BestGrasp) -> Plan:
@@ -56,7 +81,7 @@ def with_best(found: Plan, best: BestGrasp) -> Plan:
 
 
 def write_best(
-    body: Polyhedron, best: BestGrasp, planned: Sequence[Grasp], folder: Path | None,
+    body: Polyhedron, best: BestGrasp, planned: Sequence[Rated], folder: Path | None,
     reporter: Reporter,
 ) -> None:  # fmt: skip
     """Write the search's result and its proof to a folder, and to standard output with --json."""
@@ -68,22 +93,26 @@ def write_best(
     reporter.document(document)
 
 
-def show_best(best: BestGrasp, planned: Sequence[Grasp], reporter: Reporter) -> int:
+def show_best(best: BestGrasp, planned: Sequence[Rated], reporter: Reporter) -> int:
     """Show the best grasp, the bound, and how much of the possible each planned grasp reaches."""
     last = best.history[-1]
+    word, unit = UNITS[best.measure]
     reporter.say(
-        f"best grasp {best.grasp.id}: quality {best.quality.lower:.4f} N; no four contacts "
-        f"{1e3 * best.clearance:.3g} mm from edges exceed {best.bound:.4f} N (gap "
+        f"best grasp {best.grasp.id}: {word} {best.quality.lower:.4f}{unit}; no four contacts "
+        f"{1e3 * best.clearance:.3g} mm from edges exceed {best.bound:.4f}{unit} (gap "
         f"{100.0 * best.gap:.2f} %); {WHY[best.ended]}, after {last.nodes} nodes"
     )
+    first = (best.quality.lower, best.quality.upper)
+    if best.proof.measure.is_usual:
+        first = best.grasp.ferrari_canny
     rows = [
-        (grasp.id, grasp.family, f"{grasp.ferrari_canny[0]:.4f}",
-         f"{100.0 * grasp.ferrari_canny[0] / best.bound:.1f}")
-        for grasp in (best.grasp, *planned)[:TABLE_ROWS]
+        (each.grasp.id, each.grasp.family, f"{each.quality[0]:.4f}",
+         f"{100.0 * each.quality[0] / best.bound:.1f}")
+        for each in (Rated(best.grasp, first), *planned)[:TABLE_ROWS]
     ]  # fmt: skip
     reporter.table(
         "the possible, and what grasps reach of it",
-        ("grasp", "family", "quality N", "of the bound %"), rows,
+        ("grasp", "family", f"{word}{unit}", "of the bound %"), rows,
     )  # fmt: skip
     if best.ended == "interrupt":
         return Exit.INTERRUPTED

@@ -5,9 +5,12 @@ comparison is exact. Symmetries are left out: only proofs with the identity alon
 """
 
 from fractions import Fraction
+from math import isqrt
 
 FINE = 36
 """Binary digits of the place of a point on an edge."""
+ROOT = 10**20
+"""Roots are rounded down to a part of this."""
 
 
 def replays(arrays):  # noqa: C901, PLR0912 - all rules in one place
@@ -16,7 +19,9 @@ def replays(arrays):  # noqa: C901, PLR0912 - all rules in one place
         (exact(arrays["normals"][p]), exact(arrays["origins"][p]), exact(arrays["frames"][p].T))
         for p in range(len(arrays["counts"]))
     ]
-    mu, t = Fraction(float(arrays["friction"])), Fraction(float(arrays["threshold"]))
+    mu, threshold = Fraction(float(arrays["friction"])), Fraction(float(arrays["threshold"]))
+    measure = str(arrays["measure"]) if "measure" in arrays else "ferrari-canny"
+    loads = exact(arrays["loads"]) if measure == "task" else []
     assert len(arrays["maps"]) == 1
     polygons = {
         p: [tuple(exact(corner)) for corner in arrays["corners"][p][:count]]
@@ -31,8 +36,9 @@ def replays(arrays):  # noqa: C901, PLR0912 - all rules in one place
         places, fresh = waiting.pop()
         if deed < 16:
             y = exact(arrays["twists"][asked])
-            if sum(a * a for a in y) < 1 - Fraction(1, 10**12):
+            if measure == "ferrari-canny" and sum(a * a for a in y) < 1 - Fraction(1, 10**12):
                 return False
+            t = threshold * demand(measure, loads, y)
             named = [i for i in range(4) if deed >> i & 1]
             twin = any(fresh[i] for i in named)
             for i in range(4):
@@ -56,6 +62,16 @@ def replays(arrays):  # noqa: C901, PLR0912 - all rules in one place
                 half = {p: clipped(q, side * a, side * b, side * c) for p, q in places[i].items()}
                 waiting.append(child(places, fresh, i, {p: q for p, q in half.items() if q}))
     return not waiting
+
+
+def demand(measure, loads, y):
+    """How much of the loads a twist asks for, or a little less."""
+    if measure == "weight":
+        square = sum(a * a for a in y[:3])
+        return Fraction(isqrt(square.numerator * ROOT**2 // square.denominator), ROOT)
+    if measure == "task":
+        return max(0, *(-dot(load, y) for load in loads))
+    return 1
 
 
 def exact(numbers):

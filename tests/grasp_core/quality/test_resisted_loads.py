@@ -1,0 +1,148 @@
+"""What contacts resist of the weight and of tasks, against sampling, closed forms and programs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.quality.ferrari_canny import wrench_set_quality
+from grasp_core.quality.measures import Measure
+from grasp_core.quality.resisted_loads import resisted_loads
+from scenes.example_objects import example_object
+
+WEIGHT = Measure("weight")
+OCTAHEDRON = np.vstack([np.eye(3), -np.eye(3)])
+TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+
+
+def arranged(places, friction):
+    """Contacts at unit distance that push towards the middle."""
+    return WrenchSet.at(places, -places, np.full(len(places), friction))
+
+
+def planned(name, friction=0.5, count=3):
+    body = example_object(name)
+    return [
+        WrenchSet.of(grasp, None, friction, center=body.center_of_mass, torque_scale=body.radius)
+        for grasp in gc.plan(body, friction, limit=count).grasps
+    ]
+
+
+def some_task(rng, count=4):
+    return Measure("task", rng.normal(size=(count, 6)) * rng.uniform(0.1, 10.0))
+
+
+@pytest.mark.parametrize(("places", "ball"), [(OCTAHEDRON, 3**-0.5), (TETRAHEDRON, 1.0 / 3.0)])
+@pytest.mark.parametrize("friction", [0.02, 0.1])
+def test_contacts_on_a_sphere_hold_nearly_the_ball_in_the_hull_of_their_normals(
+    places, ball, friction
+):
+    """Forces along normals need no torque: their hull is resisted. Against the nearest of its
+    planes no contact pushes more than the ball's radius, and friction adds less than itself."""
+    found = resisted_loads(arranged(places, friction), WEIGHT, 1e-5)
+    assert found.verify()
+    assert found.upper >= ball
+    assert ball * (1.0 - 1e-4) <= found.lower <= ball + friction
+
+
+@pytest.mark.parametrize("name", ["tetrahedron", "box", "wedge"])
+def test_the_weight_lies_between_the_quality_and_every_twist(name):
+    rng, tried = np.random.default_rng(0), 0
+    y = rng.normal(size=(20_000, 6))
+    y /= np.linalg.norm(y, axis=1)[:, None]
+    for wrenches in planned(name):
+        found = resisted_loads(wrenches, WEIGHT)
+        assert found.verify()
+        assert (1.0 - 2e-4) * found.upper <= found.lower <= found.upper
+        allowed = wrenches.supports(y) / np.linalg.norm(y[:, :3], axis=1)
+        assert found.lower <= allowed.min()
+        quality = wrench_set_quality(wrenches)
+        assert quality.lower <= found.upper
+        tried += 1
+    assert tried >= 3
+
+
+def test_the_weight_is_at_most_what_a_program_says_for_each_direction():
+    """A task of some directions of gravity is resisted in a larger multiple than all of them."""
+    rng = np.random.default_rng(1)
+    ways = rng.normal(size=(40, 3))
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    some = Measure("task", np.hstack([ways, 0.0 * ways]))
+    for wrenches in planned("box") + planned("tetrahedron"):
+        every = resisted_loads(wrenches, WEIGHT)
+        few = resisted_loads(wrenches, some)
+        assert every.lower <= few.upper
+        # directions are some 20 degrees apart
+        assert few.lower <= 1.4 * every.upper
+
+
+@pytest.mark.parametrize("name", ["tetrahedron", "box"])
+def test_a_task_is_bounded_by_twists_and_attained_by_forces(name):
+    rng = np.random.default_rng(2)
+    y = rng.normal(size=(20_000, 6))
+    for wrenches in planned(name):
+        task = some_task(rng)
+        found = resisted_loads(wrenches, task)
+        assert found.verify()
+        assert found.upper - found.lower <= 1e-6 * found.upper
+        asked = np.maximum(-(y @ task.loads.T).min(axis=1), 0.0)
+        positive = asked > 0.0
+        assert found.lower <= (wrenches.supports(y[positive]) / asked[positive]).min() * (1 + 1e-9)
+        # minus the multiple of each load is a wrench of forces in the cones, of sum one
+        made = found.forces @ wrenches.G.T
+        assert np.abs(made[:-1] + found.lower * task.loads).max() <= 1e-7
+        assert np.abs(made[-1]).max() <= 1e-7
+        assert np.abs(found.forces.reshape(len(made), -1, 3)[:, :, 0].sum(axis=1) - 1).max() <= 1e-7
+
+
+def test_multiples_scale_with_loads_and_a_larger_task_is_not_easier():
+    rng = np.random.default_rng(3)
+    wrenches, task = planned("tetrahedron")[0], some_task(rng)
+    found = resisted_loads(wrenches, task)
+    half = resisted_loads(wrenches, Measure("task", 0.5 * task.loads))
+    more = resisted_loads(wrenches, Measure("task", np.vstack([task.loads, some_task(rng).loads])))
+    assert half.lower == pytest.approx(2.0 * found.lower, rel=1e-6)
+    assert more.lower <= found.upper
+
+
+def test_contacts_that_are_not_closed_resist_nothing():
+    places = np.array([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0], [0.6, 0.8, 0.0]])
+    wrenches = arranged(places, 0.1)
+    for measure in (WEIGHT, some_task(np.random.default_rng(4))):
+        found = resisted_loads(wrenches, measure)
+        assert found.lower < 0.0 <= found.upper
+        assert found.upper == 0.0
+        assert found.verify()
+
+
+@pytest.mark.parametrize("measure", [WEIGHT, some_task(np.random.default_rng(5))])
+def test_changed_bounds_are_refused(measure):
+    found = resisted_loads(planned("tetrahedron")[0], measure)
+    assert not replace(found, lower=1.001 * found.upper, upper=1.002 * found.upper).verify()
+    assert not replace(found, lower=0.9 * found.lower, upper=0.99 * found.lower).verify()
+    assert not replace(found, measure=Measure("ferrari-canny")).verify()
+    assert not replace(found, direction=2.0 * found.direction).verify()
+    assert not replace(found, wrenches=planned("box")[0]).verify()
+    if measure is WEIGHT:
+        assert not replace(found, ball=None).verify()
+        weaker = replace(found.ball, wrenches=found.wrenches)
+        assert not replace(found, ball=weaker).verify()
+    else:
+        assert not replace(found, forces=1.01 * found.forces).verify()
+        assert not replace(found, forces=found.forces[:-1]).verify()
+
+
+def test_symmetries_of_loads_turn_torques_with_the_hand():
+    """A reflection across a plane keeps a torque about its normal and turns one in it round."""
+    mirror = np.diag([1.0, 1.0, -1.0])
+    turn = np.diag([-1.0, -1.0, 1.0])
+    maps = np.array([np.eye(3), mirror, turn])
+    about = np.eye(6)[5:]
+    across = np.eye(6)[3:4]
+    assert Measure("task", about).keeps(maps, 1e-9).tolist() == [True, True, True]
+    assert Measure("task", across).keeps(maps, 1e-9).tolist() == [True, False, False]
+    both = np.vstack([across, -across])
+    assert Measure("task", both).keeps(maps, 1e-9).tolist() == [True, True, True]
+    assert WEIGHT.keeps(maps, 1e-9).all()
