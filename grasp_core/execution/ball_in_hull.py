@@ -16,6 +16,10 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.fields import is_indices
 from grasp_core.solvers.ties import first_best, on_grid
 
+UNITS_LOST = 16.0
+"""Rounding units by which the volume of a triangle's cone may be off, relative to the product of
+its sides and its distance: differences, products and sums lose about one each."""
+
 
 def nearest_facet(points: Array) -> tuple[Array, float, Indices]:
     """Find the facet of the hull of points (n, 3) that is nearest to the origin, inside the hull.
@@ -42,14 +46,19 @@ def outward(points: Array, triangles: Indices) -> Indices:
 def least_distance(corners: Array) -> float:
     """Return the least distance of the origin from planes of triangles, (t, 3, 3).
 
-    The distance is negative where a triangle has the origin on its outer side.
+    The distance is negative where a triangle has the origin on its outer side, and lower by what
+    rounding may add, which is much for corners that are nearly in line.
     """
     a, b, c = np.moveaxis(corners, 1, 0)
     normals = np.cross(b - a, c - a)
     lengths = np.linalg.norm(normals, axis=1)
     if not (lengths > 0.0).all():
         return -np.inf
-    return float((np.einsum("ti,ti->t", normals, a) / lengths).min())
+    far = np.linalg.norm(corners, axis=2).max(axis=1)
+    # a cross product is off by some rounding units of the product of its factors
+    sides = np.linalg.norm(b - a, axis=1) * np.linalg.norm(c - a, axis=1)
+    lost = UNITS_LOST * np.finfo(np.float64).eps * far * sides
+    return float(((np.einsum("ti,ti->t", normals, a) - lost) / lengths).min())
 
 
 def ball_in(points: Array, triangles: Any) -> float:

@@ -30,7 +30,7 @@ which fails above the larger root of a quadratic in m. It has one: |W'u| <= sum_
 less than h where each motor can carry its links, |W_j| < c_j.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -95,9 +95,10 @@ class HandPayload(ByValue):
         with np.errstate(all="ignore"):
             if not (is_a(self.hand, CarryingHand) and self.hand.sound() and self._has_numbers()):
                 return False
-            none = ROUNDING * self.hand.max_push_n / GRAVITY_M_PER_S2
-            most = self.hand.most(self.facet, self.motor_multipliers)
-            return most <= self.upper * (1.0 + ROUNDING) + none and self._holds()
+            hand = replace(self.hand)  # without what it has kept
+            none = ROUNDING * hand.max_push_n / GRAVITY_M_PER_S2
+            most = hand.most(self.facet, self.motor_multipliers)
+            return most <= self.upper * (1.0 + ROUNDING) + none and self._holds(hand)
 
     def _has_numbers(self) -> bool:
         n = len(self.gravities) if is_array(self.gravities, None, 3) else 0
@@ -111,12 +112,12 @@ class HandPayload(ByValue):
             and is_array(self.motor_multipliers, len(self.hand.motors.limits))
         )
 
-    def _holds(self) -> bool:
+    def _holds(self, hand: "CarryingHand") -> bool:
         """Return whether the lower mass is held wherever gravity points, by (3)."""
         if self.lower == 0.0:
             return True
         covered = ball_in(self.gravities, self.triangles) >= 1.0 - ROUNDING
-        return covered and self.hand.holds(self.lower, self.gravities, self.forces)
+        return covered and hand.holds(self.lower, self.gravities, self.forces)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,7 +172,13 @@ class CarryingHand(ByValue):
     def most(self, facet: Array, multipliers: Array) -> float:
         """Return the mass above which (5) fails [kg]; infinite if there is none."""
         a, b, h = self.bound(facet, multipliers)
-        square, along, left = float(a @ a), float(a @ b), max(h * h - float(b @ b), 0.0)
+        # facets of any length mean the same; squares of very short ones would vanish
+        size = max(float(np.linalg.norm(a)), float(np.linalg.norm(b)), abs(h))
+        if size == 0.0:
+            return np.inf
+        a, b, h = a / size, b / size, h / size
+        turn = float(np.linalg.norm(b))
+        square, along, left = float(a @ a), float(a @ b), max((h - turn) * (h + turn), 0.0)
         root = float(np.sqrt(along * along + square * left))
         if square == 0.0:
             return np.inf

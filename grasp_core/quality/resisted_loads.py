@@ -88,8 +88,9 @@ class ResistedLoads(ByValue):
             if not (sound and ordered and are_units(self.direction, WRENCH, slack=CHECK_SLACK)):
                 return False
             demand = float(self.measure.demands(self.direction[None])[0])
-            slack = CHECK_SLACK * self.wrenches.size
-            bounded = self.wrenches.support(self.direction)[0] <= self.upper * demand + slack
+            # half of what the bound was raised by, so that two ways to round agree
+            support = self.wrenches.support(self.direction)[0] + 0.5 * _rounding(self.wrenches)
+            bounded = self.upper >= 0.0 and support <= self.upper * demand
             return bounded and (self.lower < 0.0 or self._proves_lower())
 
     def _proves_lower(self) -> bool:
@@ -160,11 +161,17 @@ def _least(wrenches: WrenchSet, measure: Measure, twists: list[Array]) -> tuple[
     """
     axes = np.eye(WRENCH)[:3]
     every = _units(np.array([*twists, *axes, *-axes]))
-    supports = wrenches.supports(every)
+    # a twist that asks for next to nothing bounds nothing: rounding in its support counts in full
+    supports = wrenches.supports(every) + _rounding(wrenches)
     allowed = measure.multiples(supports, measure.demands(every))
     place = int(allowed.argmin())
     # a twist with negative support shows that nothing is resisted, whatever its demand
     return every[place], max(float(allowed[place]), 0.0)
+
+
+def _rounding(wrenches: WrenchSet) -> float:
+    """Return by how much supports of unit twists may be rounded."""
+    return CHECK_SLACK * wrenches.size
 
 
 def _units(rows: Array) -> Array:

@@ -173,6 +173,26 @@ def test_a_hand_that_is_turned_holds_as_much():
     assert tested == 6
 
 
+def test_a_facet_of_any_length_means_the_same_or_nothing():
+    hand = next(iter(hands()))
+    found = carried_mass(hand)
+    for length in (1e-140, 1e-90, 1e-20, 1.0, 1e20):
+        facet, multipliers = length * found.facet, length * found.motor_multipliers
+        assert hand.most(facet, multipliers) == pytest.approx(found.upper, rel=1e-9)
+        shorter = dataclasses.replace(
+            found, facet=facet, motor_multipliers=multipliers, lower=0.0, upper=0.99 * found.upper
+        )
+        assert shorter.verify() is False
+
+
+def test_a_hand_is_checked_without_what_it_has_kept():
+    hand = next(iter(hands()))
+    found = carried_mass(hand)
+    slippery = dataclasses.replace(hand, friction=0.01 * hand.friction)
+    vars(slippery)["body"] = hand.body
+    assert dataclasses.replace(found, hand=slippery).verify() is False
+
+
 def test_false_claims_are_no_certificate():
     hand = next(iter(hands()))
     found = carried_mass(hand)
