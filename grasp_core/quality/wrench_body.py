@@ -57,6 +57,9 @@ normal force: the accuracy of conic programs."""
 FACET_SLACK = 1e-9
 """Slack of the upper bound, relative to it, and of the facet's power, relative to the lengths of
 its factors."""
+MOST_OFF = 1e-6
+"""Largest error of the facet's power, whatever the lengths of its factors: rounding takes less even
+from facets that are a thousand million times as long as their wrench asks for."""
 LAST_DIGITS = 1e-12
 """Slack of an upper bound near zero, relative to the largest that the facet's length allows."""
 
@@ -318,7 +321,7 @@ class WrenchBody:
         farthest = self.bounded.size * float(np.linalg.norm(twist))
         slack = LAST_DIGITS * self.max_normal_force * farthest
         bounded = bound <= found.upper * (1.0 + FACET_SLACK) + slack
-        return bounded and abs(power + 1.0) <= FACET_SLACK * lengths
+        return bounded and abs(power + 1.0) <= min(FACET_SLACK * lengths, MOST_OFF)
 
     def limits(self, wrenches: Array, inside: Array) -> Array:
         """Find the largest multiple of each wrench that is resisted, (n,) (see `many_limits`)."""

@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -124,3 +126,17 @@ def test_a_zero_wrench_and_a_bad_force_are_refused():
         max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, np.zeros(6), max_normal_force=1.0)
     with pytest.raises(gc.InputError, match="max_normal_force must be a number from 1e-09"):
         max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, np.ones(6), max_normal_force=0.0)
+
+
+def test_a_long_facet_that_does_no_work_bounds_nothing():
+    """Two opposite fingers resist a pull at friction, but not the turn about their line."""
+    points, normals = np.array([[1.0, 0, 0], [-1.0, 0, 0]]), np.array([[-1.0, 0, 0], [1.0, 0, 0]])
+    pull = np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
+    (found,) = gc.wrench_limits(points, normals, 0.5, pull, max_normal_force=1.0)
+    assert found.limit == pytest.approx(1.0, rel=1e-6)
+    assert found.verify(points, normals, 0.5, max_normal_force=1.0)
+    about_line = np.array([0.0, 0.0, 0.0, 1e9, 0.0, 0.0])
+    false = dataclasses.replace(
+        found, limit=0.0, upper=0.0, forces=0.0 * found.forces, facet=about_line
+    )
+    assert not false.verify(points, normals, 0.5, max_normal_force=1.0)
