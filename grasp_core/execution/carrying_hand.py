@@ -17,8 +17,11 @@ contains zero, with f = 0. The mass m is held under d if (m d, d) is in C, and h
 *A mass that is held.* Points v of S(m), each with its forces, whose hull contains the unit ball
 prove (3); `ball_in_hull` shows that by triangles.
 
-*A mass that is not.* For any twist y and multipliers u of the joints, (3) of `wrench_body` bounds
-y.(G f) + u.(L f + W v) - u.(W v) over C, so that
+*A mass that is not.* For any twist y and multipliers u of the joints,
+
+    y.(G f) = (G'y - L'u).f + u.(L f + W v) - u.(W v),
+
+and (3) of `wrench_body` bounds the sum of the first two by h(y, u). With G f = -m g v for forces:
 
     (W'u - g m y_F).d  <=  h(y, u)    wherever m is held under d,                       (4)
 
@@ -26,7 +29,7 @@ where y_F is the force part of y, and h takes no gravity. All directions are hel
 
     |W'u - g m y_F|  <=  h(y, u),                                                       (5)
 
-which fails above the larger root of a quadratic in m. It has one: |W'u| <= sum_j |u_j| |W_j| is
+which fails, if y_F is not zero, above the larger root of a quadratic in m. It has one: |W'u| <= sum_j |u_j| |W_j| is
 less than h where each motor can carry its links, |W_j| < c_j.
 """
 
