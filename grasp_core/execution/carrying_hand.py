@@ -29,8 +29,8 @@ where y_F is the force part of y, and h takes no gravity. All directions are hel
 
     |W'u - g m y_F|  <=  h(y, u),                                                       (5)
 
-which fails, if y_F is not zero, above the larger root of a quadratic in m. It has one: |W'u| <= sum_j |u_j| |W_j| is
-less than h where each motor can carry its links, |W_j| < c_j.
+which fails, if y_F is not zero, above the larger root of a quadratic in m. It has one: |W'u| <=
+sum_j |u_j| |W_j| is less than h where each motor can carry its links, |W_j| < c_j.
 """
 
 from dataclasses import dataclass, replace
