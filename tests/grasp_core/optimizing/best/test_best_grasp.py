@@ -16,6 +16,7 @@ from grasp_core.optimizing.best.same_places import exact_maps
 from grasp_core.optimizing.best.search import Searching, Stop
 from scenes.example_objects import example_object
 from tests.grasp_core.optimizing.best.independent_replay import replays
+from tests.grasp_core.optimizing.best.supports_of_contacts import supports
 
 FRICTION = 0.5
 CASES = {"tetrahedron": 0.1, "box": 0.2, "random-4-1": 0.4, "prism": 0.3}
@@ -41,16 +42,6 @@ def random_contacts(found, rng, count):
         for row in on
     ]
     return on, np.array(at)
-
-
-def supports(found, on, at, twists):
-    """The support of each contact in each twist by the definition, (count, 4, n)."""
-    grounds = found.proof.grounds
-    x = grounds.origins[on] + np.einsum("...ij,...j->...i", grounds.frames[on], at)
-    u = twists[:, :3] + np.cross(twists[:, 3:], x[..., None, :])
-    along = np.einsum("...nj,...j->...n", u, grounds.normals[on])
-    across = np.sqrt(np.maximum((u * u).sum(axis=-1) - along**2, 0.0))
-    return along + found.proof.friction * across
 
 
 def test_the_gap_is_reached_and_the_proof_replays(searched):

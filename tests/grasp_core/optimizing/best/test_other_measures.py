@@ -20,6 +20,7 @@ from grasp_core.quality.measures import Measure
 from grasp_core.quality.resisted_loads import ResistedLoads, resisted_loads
 from scenes.example_objects import example_object
 from tests.grasp_core.optimizing.best.independent_replay import replays
+from tests.grasp_core.optimizing.best.supports_of_contacts import supports
 
 FRICTION = 0.5
 LIFT = np.array(
@@ -55,16 +56,6 @@ def measured(found, on, at):
     x = np.array([grounds.places(p, y[None])[0] for p, y in zip(on, at, strict=True)])
     wrenches = WrenchSet.at(x, grounds.normals[on], np.full(4, FRICTION))
     return resisted_loads(wrenches, found.proof.measure, 0.02)
-
-
-def supports(found, on, at, twists):
-    """The support of each contact in each twist by the definition, (count, 4, n)."""
-    grounds = found.proof.grounds
-    x = grounds.origins[on] + np.einsum("...ij,...j->...i", grounds.frames[on], at)
-    u = twists[:, :3] + np.cross(twists[:, 3:], x[..., None, :])
-    along = np.einsum("...nj,...j->...n", u, grounds.normals[on])
-    across = np.sqrt(np.maximum((u * u).sum(axis=-1) - along**2, 0.0))
-    return along + FRICTION * across
 
 
 def demands(found, twists):
