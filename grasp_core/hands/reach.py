@@ -1,10 +1,11 @@
 """Answers whether a hand can stand in a grasp: a pose with its proof, or what was in the way.
 
-A pose that is returned is checked: joints are within their ranges, exact distances of all shapes
-are no less than the clearance that was asked for, fingertips touch within 10 um, and the contacts
-that are reached are proved to be in force closure. No pose means that none was found from the
-starts that were tried, never that there is none. What is proved instead is that a hand with three
-fingers has no contacts to stand at, where no three of the grasp's contacts are in force closure.
+A pose that is returned is checked: joints are within their ranges, fingertips touch within 10 um,
+exact distances of all else are no less than the clearance that was asked for (a link whose tip
+touches must only not overlap the object), and the contacts that are reached are proved to be in
+force closure. No pose means that none was found from the starts that were tried, never that there
+is none. What is proved instead is that a hand with three fingers has no contacts to stand at, where
+no three of the grasp's contacts are in force closure.
 """
 
 from collections import Counter

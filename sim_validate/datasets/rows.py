@@ -214,7 +214,9 @@ class GraspRows:
     @property
     def _figures(self) -> Figures | None:
         config = self.unit.config
-        return None if config.learning is None else Figures(config.learning, config.execution)
+        if config.learning is None:
+            return None
+        return Figures(config.learning, config.execution, config.seed)
 
     def add_symmetries(self, grasps: Sequence[Grasp]) -> None:
         """Add to the rows of planned grasps which are the same by symmetry of the object."""

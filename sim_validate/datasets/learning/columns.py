@@ -64,6 +64,20 @@ POINTS = (
     Column("cloud_points_m", "float", "points drawn on the surface", "m", (SIZED, 3)),
     Column("cloud_normals", "float", "unit normals into the object at these", "1", (SIZED, 3)),
 )
+HAND = (
+    Column("hand_reached", "bool", "whether a pose of the hand was found; null if not closed"),
+    Column("hand_reason", "text", "why no pose was found; empty where one was"),
+    Column("hand_fingers", "int", "number of the hand's finger at each contact", shape=(4,)),
+    Column("hand_joints_rad", "float", "joint angles, finger by finger from the palm", "rad",
+           (SIZED,)),
+    Column("T_object_palm_m", "float", "pose of the palm in the object's frame", "m", (4, 4)),
+    Column("hand_points_m", "float", "contacts of the fingertips", "m", (4, 3)),
+    Column("hand_normals", "float", "inward unit normals at these", "1", (4, 3)),
+    Column("hand_open_joints_rad", "float", "joint angles with open fingers; null if none found",
+           "rad", (SIZED,)),
+    Column("hand_approach", "float", "direction of the palm's straight way in; null if none", "1",
+           (3,)),
+)  # fmt: skip
 RESTS = (
     Column("object_id", "text", "object that rests on a table"),
     Column("rest", "int", "number of the resting pose, the likeliest first, from 0"),
@@ -82,6 +96,7 @@ GROUPS: Mapping[str, Group] = {
     "payload": {"grasps": PAYLOAD},
     "margins": {"grasps": MARGINS, "executions": TRIAL_MARGINS},
     "least_squeeze": {"grasps": LEAST_SQUEEZE},
+    "hand": {"grasps": HAND},
     "shape": {"objects": SHAPE},
     "units": {"objects": UNITS},
     "points": {"objects": POINTS},

@@ -24,6 +24,7 @@ from grasp_core.quality.metrics import hull_volume, min_weight, smallest_singula
 from grasp_core.values import FINGERS, Contact, Grasp
 from scenes.fingertips import fitting_radius
 from sim_validate.datasets.execution_rows import for_fingers
+from sim_validate.datasets.learning.hand_poses import hand_cells, hand_named
 from sim_validate.datasets.learning.settings import Learning
 from sim_validate.execution.asked import AskedExecution
 from sim_validate.execution.execute import tip_radius
@@ -39,6 +40,8 @@ class Figures:
 
     asked: Learning
     execution: AskedExecution | None
+    seed: int = 0
+    """Seed of the postures from which a hand looks for its pose."""
 
     def of_contacts(self, body: Polyhedron, contacts: Sequence[Contact], friction: float) -> Cells:
         """Return the figures that any contacts have, closed or not."""
@@ -76,6 +79,8 @@ class Figures:
             cells |= _payload(body, grasp, friction, push_n)
         if "approach" in asked:
             cells |= approach_cells(body, grasp)
+        if self.asked.hand:
+            cells |= hand_cells(hand_named(self.asked.hand), body, grasp, friction, self.seed)
         return cells
 
     def of_executed(

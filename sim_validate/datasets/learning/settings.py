@@ -9,6 +9,7 @@ from grasp_core.checked import one_of, positive, whole
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import settings_of
 from grasp_core.files.strict_json import shown
+from grasp_core.hands.named_hands import hand_names, load_hand
 from grasp_core.objects.polyhedron import UNITS_M
 
 TABLE = "learning"
@@ -69,6 +70,8 @@ class Learning:
     """Class of an object's shape, by its name or its file's; others get one by their geometry."""
     synthetic: int = CONTROLS
     """Largest number of synthetic negative controls of each grasp, drawn from all that exist."""
+    hand: str = ""
+    """Built-in hand whose pose is looked for in each grasp in force closure; empty for none."""
 
     def __post_init__(self) -> None:
         for name in OF_GRASPS:
@@ -76,6 +79,7 @@ class Learning:
         whole(self.synthetic, "synthetic", most=CONTROLS)
         whole(self.points, "points", most=MOST_POINTS)
         one_of(self.split_by, SPLITS_BY, "split_by")
+        one_of(self.hand, ("", *hand_names()), "hand")
         for unit in self.units.values():
             one_of(unit, tuple(UNITS_M), "units")
         for scale in self.scales.values():
@@ -94,7 +98,10 @@ class Learning:
         chosen += ["margins"] if executed else []
         chosen += ["units"] if self.has_units else []
         chosen += ["rests"] if self.rests else []
-        return {**dict.fromkeys(chosen, 1), **({"points": self.points} if self.points else {})}
+        sized = {"points": self.points} if self.points else {}
+        if self.hand:
+            sized["hand"] = len(load_hand(self.hand).joints)
+        return {**dict.fromkeys(chosen, 1), **sized}
 
     @property
     def has_units(self) -> bool:

@@ -14,7 +14,9 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.learning.figures import Figures
+from sim_validate.datasets.learning.hand_poses import hand_named
 from sim_validate.datasets.meshes import stored_body
+from sim_validate.datasets.verifying.hand_poses import hand_pose_faults
 from sim_validate.datasets.verifying.rows_by_object import ObjectRows, Row
 
 SAME = 1e-6
@@ -35,7 +37,7 @@ def figure_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> Iter
     """
     if config.learning is None:
         return
-    figures = Figures(config.learning, config.execution)
+    figures, asked = Figures(config.learning, config.execution), config.learning.hand
     trials: dict[str, list[Row]] = {}
     for row in rows.get("executions", ()):
         trials.setdefault(row["grasp_id"], []).append(row)
@@ -49,6 +51,7 @@ def figure_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> Iter
                 *_symmetry_faults(row, names),
                 *_approach_faults(row, body),
                 *_margin_faults(row, trials.get(row["grasp_id"], [])),
+                *(hand_pose_faults(row, hand_named(asked), body) if asked else ()),
             ]
             yield from (f"grasps: {row['grasp_id']}: {fault}" for fault in found)
 

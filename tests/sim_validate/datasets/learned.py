@@ -17,7 +17,7 @@ LEARNED = DatasetConfig(
         friction_below=1, friction_near=2, friction_above=1, moved_out=2, mass_near=1, synthetic=1,
         figures=("closure", "symmetry", "approach", "payload", "least_squeeze"), seeds=(7,),
         rests=True, points=64, split_by="object", scales={"tetrahedron": 0.5},
-        classes={"wedge": "ramp"},
+        classes={"wedge": "ramp"}, hand="leap",
     ),
 )  # fmt: skip
 

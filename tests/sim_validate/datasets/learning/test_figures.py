@@ -5,6 +5,8 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.contact_arrays import stacked
+from grasp_core.geometry.nearest_points import nearest_on_triangles
+from grasp_core.hands.kinematics import places
 from grasp_core.objects.symmetries import orbit_sizes
 from grasp_core.planning.reach import segment_distances
 from scenes.example_objects import example_object
@@ -135,6 +137,28 @@ def test_the_least_squeeze_is_no_stronger_than_the_best_one_needs(grasps):
             assert row["least_push_n"] <= 10.0 * (1.0 + 1e-3)
 
 
+def test_a_hand_stands_where_its_joints_say(grasps):
+    """The fingertips of the stated angles lie on the object, at contacts in force closure."""
+    hand = gc.load_hand("leap")
+    assert {row["hand_reached"] for row in grasps if row["force_closed"]} == {True, False}
+    assert {row["hand_reached"] for row in grasps if not row["force_closed"]} == {None}
+    reached = [row for row in grasps if row["hand_reached"]]
+    assert len({row["grasp_id"][:16] for row in reached}) == len(BODIES)
+    for row in reached:
+        body = BODIES[row["object_id"]]
+        found = places(hand, row["hand_joints_rad"], np.array(row["T_object_palm_m"]))
+        tips = found.tips[0, row["hand_fingers"]]
+        radii = [[hand.fingers[finger].tip.radius] for finger in row["hand_fingers"]]
+        points, normals = np.array(row["hand_points_m"]), np.array(row["hand_normals"])
+        assert tips + radii * normals == pytest.approx(points, abs=1e-5)
+        corners = body.vertices[body.triangles]
+        for point in points:
+            away = nearest_on_triangles(corners, point) - point
+            assert np.linalg.norm(away, axis=1).min() <= 1e-5
+        assert gc.force_closure(points, normals, row["friction"]).closed
+        assert sorted(row["hand_fingers"]) == [0, 1, 2, 3]
+
+
 @pytest.mark.parametrize(
     ("cells", "message"),
     [
@@ -146,6 +170,10 @@ def test_the_least_squeeze_is_no_stronger_than_the_best_one_needs(grasps):
         ({"payload_kg": 9.0}, "payload_kg is 9.0, but load_multiple times"),
         ({"predicted_loss": 9.0}, "predicted_loss is 9.0, but not by"),
         ({"least_push_n": 0.01}, "least_push_n is 0.01, but the squeeze is not proved"),
+        ({"hand_joints_rad": [9.0] * 16}, "not within the ranges of the joints"),
+        ({"hand_joints_rad": [0.3] * 16}, "do not touch the object at hand_points_m"),
+        ({"T_object_palm_m": np.eye(4).tolist()}, "overlaps the object or itself"),
+        ({"hand_points_m": [[0.0] * 3] * 4}, "hand_points_m are not proved to be in force closure"),
     ],
 )
 def test_forged_figures_are_named(spoiled, cells, message):
