@@ -53,6 +53,7 @@ ACTIONS: dict[type[Any], str] = {
     dataset_flags.Merge: "datasets.looks:merge_datasets",
     dataset_flags.Stats: "datasets.looks:count_dataset",
     dataset_flags.SampleRows: "datasets.looks:sample_dataset",
+    dataset_flags.Depth: "datasets.looks:draw_depths",
     baseline_flags.Record: "baseline:record_baseline",
     baseline_flags.Check: "baseline:check_baseline",
     command_flags.Inspect: "objects:inspect_object",

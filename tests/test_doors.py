@@ -151,6 +151,7 @@ def test_every_command_has_its_function():
     flags = dataset_flags
     actions = {flags.Build, flags.Import, flags.Verify, flags.Export}
     actions |= {dataset_flags.Merge, dataset_flags.Stats, dataset_flags.SampleRows}
+    actions |= {dataset_flags.Depth}
     actions |= {baseline_flags.Record, baseline_flags.Check}
     named = set(get_args(Command)) - {flags.Dataset, baseline_flags.Baseline} | actions
     assert set(ACTIONS) == named

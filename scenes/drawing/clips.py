@@ -12,7 +12,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -125,11 +125,24 @@ def _written(path: Path, **job_parts: Any) -> Path:
         job, out = Path(folder) / "job.npz", Path(folder) / f"clip{path.suffix.lower()}"
         colours = [rgb(colour) for colour in FINGERS]
         np.savez(job, size=SIZE, rate=RATE, colours=colours, **job_parts)
-        said = ""
-        for graphics in _graphics():
-            said = _drawn(job, out, graphics)
-            if not said:
-                return write_parts(path, [out.read_bytes()])
+        drawn_by_first([(job, out)])
+        return write_parts(path, [out.read_bytes()])
+
+
+def drawn_by_first(pairs: Sequence[tuple[Path, Path]]) -> None:
+    """Draw pictures in another process, with the first graphics library that works.
+
+    Args:
+        pairs: For each picture the file that says what to draw, and the file to write.
+
+    Raises:
+        GraphicsError: No graphics library draws here; the message quotes it.
+    """
+    said = ""
+    for graphics in _graphics():
+        said = _drawn(pairs, graphics)
+        if not said:
+            return
     raise GraphicsError(f"MuJoCo cannot draw on this machine: {said}; {remedy()}")
 
 
@@ -194,10 +207,11 @@ def _graphics() -> Iterator[str]:
         yield ""
 
 
-def _drawn(job: Path, out: Path, graphics: str) -> str:
-    """Draw a clip in another process; return what went wrong, or an empty text."""
-    trouble = _run_frames(graphics, [str(job), str(out)])
-    return trouble or ("" if out.is_file() else f"{graphics}: nothing was drawn")
+def _drawn(pairs: Sequence[tuple[Path, Path]], graphics: str) -> str:
+    """Draw pictures in another process; return what went wrong, or an empty text."""
+    trouble = _run_frames(graphics, [str(path) for pair in pairs for path in pair])
+    whole = all(out.is_file() for _, out in pairs)
+    return trouble or ("" if whole else f"{graphics}: nothing was drawn")
 
 
 def _run_frames(graphics: str, arguments: list[str]) -> str:

@@ -84,6 +84,9 @@ class Build:
     settings but --out (see docs/datasets.md)."""
     out: Path
     """Folder of the dataset."""
+    stats: Path | None = None
+    """Folder for a page that shows what the dataset holds, with charts, as `dataset stats` writes
+    it; if not given, none is written."""
     planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
     learned: OmitArgPrefixes[Learned] = field(default_factory=Learned)
     settings: OmitArgPrefixes[Settings] = field(default_factory=Settings)
@@ -180,6 +183,31 @@ class SampleRows:
 
 
 @dataclass(frozen=True, slots=True)
+class Depth:
+    """Draw depth images of the objects, with the poses of the cameras; this needs graphics."""
+
+    dataset: Positional[Path]
+    """Folder of the dataset."""
+    out: Path
+    """Folder to write to; it must be empty or not exist."""
+    views: Annotated[int, at_least(1, up_to=1000)] = 8
+    """Number of images of each object."""
+    on_table: bool = False
+    """Have the object lie on a table and look from above it; if not given, look from all around."""
+    width: Annotated[int, at_least(1, up_to=4096)] = 128
+    """Columns of an image [pixels]."""
+    height: Annotated[int, at_least(1, up_to=4096)] = 128
+    """Rows of an image [pixels]."""
+    field_deg: Annotated[float, FINITE, at_least(1.0, up_to=120.0)] = 40.0
+    """Angle between the upper and the lower border of an image [deg]."""
+    seed: Seed = 0
+    """Seed of the places of cameras, and of the poses on the table."""
+    split: SplitName | None = None
+    """Draw only objects of this split; if not given, all objects."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
+@dataclass(frozen=True, slots=True)
 class Dataset:
     """Build a dataset of grasps of many objects; check, merge, show or export datasets."""
 
@@ -191,6 +219,7 @@ class Dataset:
         | Annotated[Merge, subcommand("merge", prefix_name=False)]
         | Annotated[Stats, subcommand("stats", prefix_name=False)]
         | Annotated[SampleRows, subcommand("sample", prefix_name=False)]
+        | Annotated[Depth, subcommand("depth", prefix_name=False)]
     ]
 
     @property

@@ -11,6 +11,7 @@ from grasp_core.planning.request import METHODS
 from sim_validate.cli import dataset_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands.datasets.looks import refuse_own, write_page
 from sim_validate.datasets.building.build import build
 from sim_validate.datasets.building.driver import Engine
 from sim_validate.datasets.building.worker import Limits
@@ -19,7 +20,7 @@ from sim_validate.datasets.describing.card import CARD
 from sim_validate.datasets.exports.formats import export
 from sim_validate.datasets.learning.settings import Learning
 from sim_validate.datasets.manifest import read_manifest
-from sim_validate.datasets.open_dataset import splits_in_words
+from sim_validate.datasets.open_dataset import select, splits_in_words
 from sim_validate.datasets.verifying.redo import Sample
 from sim_validate.datasets.verifying.verify import verify
 from sim_validate.parallel.clusters import dask_workers, ray_workers
@@ -32,7 +33,12 @@ MEGABYTE = 2**20
 
 def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
     """Make a dataset, or resume a build that was interrupted."""
-    return _build(_asked(command), command.out, command.work, reporter)
+    if command.stats is not None:
+        refuse_own(command.stats, command.out)
+    ended = _build(_asked(command), command.out, command.work, reporter)
+    if command.stats is not None:
+        write_page(command.stats, select(command.out), reporter)
+    return ended
 
 
 def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:

@@ -29,7 +29,8 @@ from sim_validate.datasets.parquet import Columns, pyarrow, read_columns, schema
 from sim_validate.files.writing import write_arrays, write_bytes, write_lines
 
 PARTS = {3: tuple("xyz"), 4: tuple("0123"), 6: ("fx", "fy", "fz", "tx", "ty", "tz")}
-"""Names of the components of a cell, by their number: of a point, four fingers, or a wrench."""
+"""Names of the components of a cell, by their number: of a point, four fingers, or a wrench. Others
+are counted from 0."""
 FORMULA = "^[=+\\-@\uff1d\uff0b\uff0d\uff20'\\pC\\pZ]"
 """Pattern of cells that a spreadsheet may calculate, also where signs are in full width or behind
 space, and of cells that begin with the apostrophe that marks text."""
@@ -138,11 +139,16 @@ def _flat(table: Any, of_table: Sequence[Column]) -> Any:
             columns[column.name] = compute.if_else(risky, marked, text)
             continue
         for places in product(*(range(size) for size in column.shape)):
-            words = (PARTS[size][i] for i, size in zip(places, column.shape, strict=True))
+            words = map(_part, places, column.shape)
             columns["_".join((column.name, *words))] = reduce(
                 compute.list_element, places, table[column.name]
             )
     return pyarrow().table(columns)
+
+
+def _part(place: int, size: int) -> str:
+    """Return the name of one component of several."""
+    return PARTS[size][place] if size in PARTS else str(place)
 
 
 def _plain_columns(chosen: Selection, name: Name) -> Columns:

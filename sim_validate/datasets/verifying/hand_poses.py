@@ -35,13 +35,13 @@ def hand_pose_faults(row: Row, hand: Hand, body: Polyhedron) -> Iterator[str]:
     ranges = hand.ranges
     if (joints < ranges[:, 0] - TURNED).any() or (joints > ranges[:, 1] + TURNED).any():
         yield "hand_joints_rad are not within the ranges of the joints"
-    fingers = np.array(row["hand_fingers"])
+    fingers: list[int] = row["hand_fingers"]
     points, normals = np.array(row["hand_points_m"]), np.array(row["hand_normals"])
     radii = np.array([hand.fingers[finger].tip.radius for finger in fingers])
     tips = places(hand, joints, pose).tips[0, fingers]
     if np.linalg.norm(tips + radii[:, None] * normals - points, axis=1).max() > TOUCHES_M:
         yield "the fingertips of hand_joints_rad do not touch the object at hand_points_m"
-    found = clearances(hand, body, joints, pose, fingers)
+    found = clearances(hand, body, joints, pose, np.array(fingers))
     if found.itself < CLEAR_M or min(found.object, found.tips) < -TOUCHES_M:
         yield "the hand of hand_joints_rad overlaps the object or itself"
     if not _closed(points, normals, row["friction"]):

@@ -1,0 +1,1 @@
+"""What does a depth camera see of an object?"""
