@@ -110,7 +110,7 @@ def _seen(row: dict[str, Any], body: Polyhedron, asked: AskedDepths) -> _Seen:
     shares = np.array([rest["likelihood"] for rest in resting])
     chosen = rng.choice(len(resting), size=asked.views, p=shares / shares.sum())
     poses = np.array([resting[number]["T_table_object_m"] for number in chosen], dtype=np.float64)
-    tables = np.linalg.inv(poses)
+    tables = np.asarray(np.linalg.inv(poses), dtype=np.float64)
     cameras = above(body.center_of_mass, distance, tables[:, :3, 2], rng)
     return _Seen(row, Views(body, cameras, asked.lens, tables), chosen)
 
