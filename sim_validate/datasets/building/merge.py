@@ -6,19 +6,18 @@ friction, the rows of the first count. Memory holds one object of each dataset a
 
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from hashlib import sha256
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_text
+from sim_validate.datasets.building.merged_parts import Part, Row, merged_config, part_of
 from sim_validate.datasets.building.write_tables import CONFIG, DATA, EXTRAS, QUARANTINE
 from sim_validate.datasets.columns import OF_OBJECTS, Name, Tables
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.describing.card import CARD, card_text
-from sim_validate.datasets.learning.settings import BY_NAME
 from sim_validate.datasets.learning.splitting import assigned
 from sim_validate.datasets.manifest import (
     SCHEMA,
@@ -27,38 +26,16 @@ from sim_validate.datasets.manifest import (
     listed,
     write_manifest,
 )
-from sim_validate.datasets.open_dataset import Selection, select
 from sim_validate.datasets.parquet import arrow_table
 from sim_validate.datasets.quarantine import LeftOut, left_out_text, read_left_out
 from sim_validate.datasets.rows import id_beginning
 from sim_validate.datasets.table_files import TableFiles
-from sim_validate.datasets.units import shared_settings
 from sim_validate.files.folder_lock import alone_in
 
 MIXED = "several"
 """What a merged manifest says of versions that differ between the datasets."""
 ABSENT = "no merged dataset has this object at this friction"
 """Reason for which an object has no rows at a friction that other objects have."""
-Row = Mapping[str, Any]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Part:
-    """One dataset that is merged."""
-
-    chosen: Selection
-    config: DatasetConfig
-    objects: Mapping[str, Row]
-    """Rows of its objects, by their names."""
-    gone: frozenset[tuple[str, float]]
-    """Hashes of mesh files, with the frictions at which they have no rows."""
-
-    def has(self, object_id: str, friction: float) -> bool:
-        """Return whether the dataset has an object at a friction."""
-        row = self.objects.get(object_id)
-        if row is None or friction not in self.config.frictions:
-            return False
-        return (row["source_sha256"], friction) not in self.gone
 
 
 def merge(folders: Sequence[Path], out: Path) -> Manifest:
@@ -77,82 +54,12 @@ def merge(folders: Sequence[Path], out: Path) -> Manifest:
     """
     if len(folders) < 2:  # noqa: PLR2004 - of one there is nothing to merge
         raise InputError("datasets: expected at least two folders of datasets to merge")
-    parts = [_part(folder) for folder in folders]
-    config = _merged_config(parts)
+    parts = [part_of(folder) for folder in folders]
+    config = merged_config(parts)
     with alone_in(out):
         if there := sorted(out.iterdir()):
             raise InputError(f"{there[0]}: this folder is not empty; give an empty or new --out")
         return _written(parts, config, out)
-
-
-def _part(folder: Path) -> Part:
-    chosen = select(folder)
-    for name in chosen.tables:
-        chosen.paths(name)  # raises if a file is not what was written
-    # points and the like stay in their files until their object's turn
-    kept = ("source_name", "source_sha256", "object_id", "split", "shape_class")
-    objects = {
-        row["object_id"]: {name: row[name] for name in kept if name in row}
-        for row in chosen.rows("objects")
-    }
-    gone = {(each.source_sha256, each.friction) for each in read_left_out(folder / QUARANTINE)}
-    return Part(chosen, chosen.config(), objects, frozenset(gone))
-
-
-def _merged_config(parts: Sequence[Part]) -> DatasetConfig:
-    """Return the settings of the merged dataset.
-
-    Raises:
-        InputError: The datasets differ in more than objects, frictions and credits.
-    """
-    first = parts[0]
-    for part in parts:
-        if part.config.contacts:
-            raise InputError(
-                f"{part.chosen.folder}: this dataset judges given contacts, whose names are only "
-                "its own; merge datasets of planned grasps"
-            )
-        differs = [
-            name for name, value in _settings(part.config).items()
-            if value != _settings(first.config).get(name)
-        ]  # fmt: skip
-        if differs or part.chosen.manifest.groups != first.chosen.manifest.groups:
-            raise InputError(
-                f"{part.chosen.folder}: this dataset was made with another {differs or 'learning'} "
-                f"than {first.chosen.folder}; only objects, frictions and credits may differ"
-            )
-    configs = [part.config for part in parts]
-    learning = first.config.learning
-    if learning is not None:
-        every = [each.learning for each in configs if each.learning is not None]
-        learning = replace(learning, **{name: _union(every, name) for name in BY_NAME})
-    return replace(
-        first.config,
-        objects=tuple(dict.fromkeys(name for each in configs for name in each.objects)),
-        frictions=tuple(sorted({friction for each in configs for friction in each.frictions})),
-        learning=learning,
-    )
-
-
-def _settings(config: DatasetConfig) -> dict[str, object]:
-    """Return the settings that must be the same, with none about single objects."""
-    if config.learning is not None:
-        alone = {name: dict[str, Any]() for name in BY_NAME}
-        config = replace(config, learning=replace(config.learning, **alone))
-    found = shared_settings(config)
-    return {**found, "execution": found.get("execution"), "learning": found.get("learning")}
-
-
-def _union(every: Iterable[Any], table: str) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for each in every:
-        for name, value in getattr(each, table).items():
-            if found.setdefault(name, value) != value:
-                raise InputError(
-                    f"learning.{table}: two datasets have different values for {name}; their "
-                    "objects need different names to be merged"
-                )
-    return found
 
 
 def _written(parts: Sequence[Part], config: DatasetConfig, out: Path) -> Manifest:
