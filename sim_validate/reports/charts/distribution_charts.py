@@ -23,6 +23,8 @@ ALIKE = 1e-6
 """Share of the largest value below which differences do not make an axis of their own."""
 BAR, LEFT, LETTERS = 22.0, 150.0, 22
 """Height of a bar's row, place where bars begin [pixels], and most letters of its name."""
+KEY, SWATCH = 110.0, 12.0
+"""Width of an entry of the key, and the side of its square [pixels]."""
 SHADES = {"survived": GOOD, "lost": BAD, "not known": NEUTRAL}
 """Colours of outcomes."""
 
@@ -47,7 +49,7 @@ def histogram(name: str, unit: str, values: Array) -> Sheet:
 
 
 def shares(name: str, counts: Mapping[str, Mapping[str, int]]) -> Sheet:
-    """Draw a bar for each word, divided by outcome.
+    """Draw a bar for each word, divided by outcome, with a key where there are several.
 
     Args:
         name: What the words are of.
@@ -69,4 +71,13 @@ def shares(name: str, counts: Mapping[str, Mapping[str, int]]) -> Sheet:
         text = " / ".join(str(outcomes[each]) for each in SHADES if each in outcomes)
         total = text or str(sum(outcomes.values()))
         marks.append(Words(start + 4.0, top + 0.5 * BAR, total, "start", SMALL))
-    return Sheet(WIDTH, 36.0 + BAR * len(counts), f"shares of {name}", tuple(marks))
+    bottom = 36.0 + BAR * len(counts)
+    known = [each for each in SHADES if any(each in outcomes for outcomes in counts.values())]
+    for column, outcome in enumerate(known):
+        left = 8.0 + KEY * column
+        corners = np.array([(0.0, 4.0), (SWATCH, 4.0), (SWATCH, 4.0 + SWATCH), (0.0, 4.0 + SWATCH)])
+        marks.append(Area((corners + np.array([left, bottom]),), SHADES[outcome], 0.8))
+        middle = bottom + 4.0 + 0.5 * SWATCH
+        marks.append(Words(left + SWATCH + 6.0, middle, outcome, "start", SMALL))
+    height = bottom + (BAR if known else 0.0)
+    return Sheet(WIDTH, height, f"shares of {name}", tuple(marks))

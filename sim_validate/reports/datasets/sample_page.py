@@ -14,9 +14,11 @@ from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated, seat
 from grasp_core.values import FINGERS, Contact, ContactRegion, ForceCone, Grasp, Witness, four
+from scenes.drawing.drawings import drawing_of
 from scenes.drawing.flat.svg import svg_of
 from scenes.drawing.pages import number
-from scenes.drawing.pictures import grasp_sheet
+from scenes.drawing.pictures import SIDE, number_places, sheet_of
+from scenes.drawing.views import best_view
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.open_dataset import Selection
 from sim_validate.reports.pages import page, style
@@ -27,6 +29,8 @@ SHOWN = (
     "ferrari_canny_lower_n", "held", "outcome", "survived", "predicted_loss", "mass_kg",
 )  # fmt: skip
 """Columns of grasps that the page shows where the dataset has them."""
+OF_FORCES = ("line of force", "ruled surface")
+"""Roles of shapes that need the forces of a grasp, which tables do not hold."""
 DIGITS = 4
 Row = Mapping[str, Any]
 
@@ -96,7 +100,14 @@ def picture_of(body: Polyhedron, row: Row) -> str:
     points, normals = row["contact_points_m"], row["contact_normals"]
     try:
         seated = seat(body, points, normals)
-        return svg_of(grasp_sheet(seated.body, _drawable(seated, row), row["friction"]))
+        grasp = _drawable(seated, row)
+        shapes = drawing_of(seated.body, grasp, row["friction"])
+        shown = [shape for shape in shapes if shape.role not in OF_FORCES]
+        sheet = sheet_of(
+            shown, seated.body, best_view(seated.body, grasp), row["grasp_id"],
+            numbers=number_places(seated.body, grasp), side=SIDE,
+        )  # fmt: skip
+        return svg_of(sheet)
     except GraspError:  # such as a finger that pulls
         return ""
 

@@ -108,4 +108,6 @@ def test_a_build_writes_the_page_of_its_statistics(learned, tmp_path, capsys):
     assert "index.html in a browser" in capsys.readouterr().out
     counts = json.loads((tmp_path / "stats" / "stats.json").read_text())
     assert counts["rows"]["grasps"] == len(rows_of(learned, "grasps"))
-    assert "survival by kind" in (tmp_path / "stats" / "index.html").read_text()
+    page = (tmp_path / "stats" / "index.html").read_text()
+    assert "survival by kind" in page
+    assert all(f">{outcome}</text>" in page for outcome in ("survived", "lost", "not known"))
