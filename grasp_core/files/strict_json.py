@@ -27,12 +27,13 @@ KINDS: Mapping[str, Collection[str]] = {
     "executions.json": {"executions"},
     "manifest.json": {"units_sha256", "files"},
     "grasps.json": {"object", "grasps"},
+    "best.json": {"clearance_m", "ended"},
     "wrench file": {"wrenches"},
     "contacts file": {"contacts"},
 }
 """The JSON files of graspproof, and for each the keys that tell it from the files listed after it.
 """
-BESIDE = ("verdicts.json", "regions.json", "executions.json")
+BESIDE = ("verdicts.json", "regions.json", "executions.json", "best.json")
 """Files that are kept in the same folder as the grasps.json that they belong to."""
 
 

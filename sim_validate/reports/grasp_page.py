@@ -21,6 +21,7 @@ from sim_validate.reports.agreement import (
     let_go,
     wrench_size,
 )
+from sim_validate.reports.best_possible import possible_facts
 from sim_validate.reports.drawn_grasps import Drawn, certified, largest_push
 from sim_validate.reports.executed_grasps import (
     execute_command,
@@ -166,6 +167,7 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[Fac
     lower, upper = map(number, grasp.ferrari_canny)
     between = lower if lower == upper else f"{lower} to {upper}"
     yield "Ferrari-Canny quality", f"{between} N{at_plan}", QUALITY
+    yield from possible_facts(run.possible, grasp.id)
     yield "Normals span up to", f"{number(math.degrees(grasp.span_angle))}°", SPAN
     for place, focus in enumerate(grasp.focus_points):
         name = "Point between the lines of pair" if grasp.family == "regulus" else "Focus"

@@ -18,6 +18,7 @@ from sim_validate.reports.agreement import (
     quadrants_in,
     wrench_size,
 )
+from sim_validate.reports.best_possible import described_possible
 from sim_validate.reports.charts.fidelity_charts import fidelity_panels
 from sim_validate.reports.charts.survival_charts import survival_sentence, survival_sheet
 from sim_validate.reports.executed_grasps import (
@@ -113,6 +114,11 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         controls=_controls(verdicts),
         executions=_executions(all_executions(runs)),
         judged=[row for run in runs for row in _judged(run)],
+        possible=[
+            {"object": run.saved.body.name, **found}
+            for run in runs
+            if (found := described_possible(run.possible)) is not None
+        ],
     )
 
 
@@ -170,6 +176,7 @@ def _card(shown: Shown) -> dict[str, Any]:
         "tone": tone,
         "radius_mm": round(MILLI * grasp.radius, 6),
         "quality": grasp.ferrari_canny[0],
+        "share": None if shown.run.possible is None else shown.run.possible.share(grasp.id),
         "critical_friction": grasp.critical_friction,
         "executed": execution_row(executed) if shown.run.executions else None,
         "reached": said_of_reach(shown.run.reaches, grasp) if shown.run.reaches else None,

@@ -11,7 +11,7 @@ from grasp_core.files.complaints import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.execution.jobs import ExecutedGrasp
-from sim_validate.files.stale_results import JUDGEMENTS, REACHES
+from sim_validate.files.stale_results import BEST, JUDGEMENTS, REACHES
 from sim_validate.protocols.judgements_schema import JudgementsFile
 from sim_validate.records.executions_json import EXECUTIONS, Executions, load_executions
 from sim_validate.records.grasps import read_grasps
@@ -21,6 +21,7 @@ from sim_validate.records.regions_schema import RegionsFile
 from sim_validate.records.verdicts_schema import SCHEMA as VERDICTS_SCHEMA
 from sim_validate.records.verdicts_schema import VerdictsFile
 from sim_validate.reports.agreement import BAD, Record, said_of
+from sim_validate.reports.best_possible import Possible, read_possible
 from sim_validate.simulation.hold_verdict import Outcome
 
 if TYPE_CHECKING:
@@ -52,6 +53,8 @@ class RunFolder:
     """Where a hand stands in the grasps; None if the file does not exist."""
     judgements: Record | None = None
     """What published tests say of the grasps; None if the file does not exist."""
+    possible: Possible | None = None
+    """The best grasp and the bound on all others; None if the file does not exist."""
     left_out: int = 0
     """Number of grasps in the files that `saved` leaves out."""
 
@@ -135,7 +138,20 @@ def _run(path: Path) -> RunFolder:
         executions=_executions(path / EXECUTIONS, saved),
         reaches=reaches_beside(path / GRASPS, saved),
         judgements=_read(path / JUDGEMENTS, JudgementsFile, saved),
+        possible=_possible(path / BEST[0], saved),
     )
+
+
+def _possible(path: Path, saved: SavedGrasps) -> Possible | None:
+    """Read the best grasp and the bound on all others; return None if the file does not exist."""
+    if not path.is_file():
+        return None
+    try:
+        found = read_possible(path)
+    except InputError as error:
+        raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
+    _check_object(path, found.object_sha256, saved)
+    return found
 
 
 def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":

@@ -9,9 +9,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.best_grasp import BestGrasp
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
-
-USUAL, OTHER = 1, 2
-"""Schema for the Ferrari-Canny quality, and for other measures."""
+from sim_validate.records.best_schema import OTHER, USUAL
 
 
 @dataclass(frozen=True, slots=True)

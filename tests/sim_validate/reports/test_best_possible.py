@@ -1,0 +1,78 @@
+"""Reports say how much of the possible each grasp reaches, and refuse files that say something
+else."""
+
+import json
+import re
+
+import pytest
+
+from sim_validate.main import main
+from sim_validate.reports.best_possible import possible_facts, read_possible
+from sim_validate.reports.report import write_report
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("best") / "plan"
+    words = ["plan", "tetrahedron", "--limit", "3", "--best", "--gap", "0.4", "--jobs", "1"]
+    assert main([*words, "--out", str(out), "-q"]) == 0
+    return out
+
+
+def test_each_page_says_the_share_that_its_grasp_reaches_of_the_bound(folder):
+    best = json.loads((folder / "best.json").read_text())
+    write_report(folder, jobs=1, every_copy=True)
+    shares = {each["id"]: each["share_of_bound"] for each in best["planned"]}
+    shares[best["grasp"]["id"]] = best["quality_n"][0] / best["bound_n"]
+    assert len(shares) == 4
+    for name, share in shares.items():
+        text = (folder / "report" / "grasps" / f"{name}.html").read_text()
+        assert "Share of the possible" in text
+        assert f"{100.0 * share:.1f} %" in text
+    index = (folder / "report" / "index.html").read_text()
+    section = index.split('<section id="possible">')[1].split("</section>")[0]
+    rows = re.findall(r'<th scope="row">([^<]+)</th><td>[^<]+</td><td>([\d.]+)</td>', section)
+    assert rows[0][0] == best["grasp"]["id"]
+    assert {name: float(value) for name, value in rows} == pytest.approx(
+        {name: 100.0 * share for name, share in shares.items()}, abs=0.051
+    )
+    assert f"{best['clearance_m'] * 1e3:.3g} mm from edges" in section
+    assert len(re.findall(r'data-share="', index)) == len(shares)
+
+
+def test_without_a_search_pages_say_nothing_of_the_possible(tmp_path):
+    assert main(["plan", "tetrahedron", "--limit", "1", "--out", str(tmp_path), "-q"]) == 0
+    write_report(tmp_path, jobs=1)
+    assert "possible" not in (tmp_path / "report" / "index.html").read_text()
+
+
+def test_other_measures_are_named(tmp_path):
+    words = ["plan", "tetrahedron", "--limit", "1", "--best", "--gap", "0.4", "--jobs", "1"]
+    assert main([*words, "--measure", "weight", "--out", str(tmp_path), "-q"]) == 0
+    found = read_possible(tmp_path / "best.json")
+    assert found.measure == "weight"
+    ((name, value, meaning),) = possible_facts(found, found.best)
+    assert name == "Share of the possible"
+    assert float(value.split()[0]) >= 60.0
+    assert meaning.startswith("weight held in every orientation")
+    assert list(possible_facts(found, "no-such-grasp")) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"bound_n": -1.0}, "bound_n"),
+        ({"schema": 3}, "schema"),
+        ({"planned": [{"id": "x"}]}, "quality_n"),
+        ({"object": {"name": "x", "content_sha256": "y"}}, "object"),
+    ],
+)
+def test_files_that_are_not_about_this_are_refused(folder, tmp_path, change, message, capsys):
+    for name in ("grasps.json", "best.json"):
+        (tmp_path / name).write_text((folder / name).read_text())
+    record = json.loads((tmp_path / "best.json").read_text())
+    (tmp_path / "best.json").write_text(json.dumps({**record, **change}))
+    assert main(["report", str(tmp_path), "-q"]) == 4
+    said = capsys.readouterr().err
+    assert "best.json" in said
+    assert message in said
