@@ -30,14 +30,13 @@ FRICTIONS = (0.3, 0.5)
 PROFILED = 3
 """One object out of so many."""
 KINDS = {
-    "metrics": [("certify.py", "_quality"), ("certify.py", "_critical")],
     "planning": [("planner.py", "plan")],
     "stepping": [("simulate.py", "run")],
     "rest of validation": [("validation.py", "validate")],
     "writing": [("datasets.py", "written")],
 }
 """Each kind less what it holds of the others."""
-INSIDE = {"planning": ("metrics",), "rest of validation": ("stepping",)}
+INSIDE = {"rest of validation": ("stepping",)}
 
 
 def main():
