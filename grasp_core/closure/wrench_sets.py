@@ -224,15 +224,21 @@ class WrenchSet(ByValue):
         rows = forces.reshape(-1, width * k)
         return rows if self.norm == "linf" else rows[:-1]
 
-    def holds(self, forces: Array, slack: float) -> bool:
-        """Return whether local forces, one a row, are within cones and bounds, up to a slack."""
+    def holds(self, forces: Array, slack: float | Array) -> bool:
+        """Return whether local forces, one a row, are within cones and bounds.
+
+        Args:
+            forces: The forces, (n, 3k), or (n, 4k) with torsion.
+            slack: By how much they may miss each of them, one for all rows or one each, (n,).
+        """
         each = forces.reshape(len(forces), -1, self.width)
         pushes, slides = each[:, :, 0], _across(each)
         if self.norm == "l1":
             bounded = np.abs(pushes.sum(axis=1) - 1.0) <= slack
         else:
             bounded = pushes.max(axis=1) <= 1.0 + slack
-        in_cones = (slides <= self.friction * pushes + slack).all(axis=1)
+        rooms = np.reshape(slack, (-1, 1))
+        in_cones = (slides <= self.friction * pushes + rooms).all(axis=1)
         return bool((bounded & in_cones & (pushes.min(axis=1) >= -slack)).all())
 
 
