@@ -299,10 +299,10 @@ def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
     b = np.append(1.0, np.zeros(len(A) - 1))
     answer = minimize(ConicProgram(q, A, b, 1, k, (m + 1, *(width,) * k)))
     facing = answer.z[k + 2 : k + m + 2]
-    return _into_cones(answer.x[:n], wrenches.friction), facing
+    return into_cones(answer.x[:n], wrenches.friction), facing
 
 
-def _into_cones(forces: Array, friction: Array) -> Array:
+def into_cones(forces: Array, friction: Array) -> Array:
     """Move forces into the cones and scale them so that normal parts sum to one exactly."""
     each = forces.reshape(len(friction), -1).copy()
     each[:, 0] = np.maximum(each[:, 0], 0.0)
