@@ -39,7 +39,7 @@ def is_number(value: Any, *, least: float = -LARGEST_ENTRY, most: float = LARGES
 
 
 def is_array(value: Any, *shape: int | None) -> TypeGuard[Array]:
-    """Return whether a value is a float64 array of finite numbers; None is an axis of any length."""
+    """Return whether a value is a float64 array of finite numbers; None is any length."""
     if not _fits(value, np.float64, shape):
         return False
     return bool((np.abs(cast("Array", value)) <= LARGEST_ENTRY).all())

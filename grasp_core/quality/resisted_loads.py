@@ -168,6 +168,14 @@ def resisted_loads(wrenches: WrenchSet, measure: Measure, gap: float = GAP) -> R
     return ResistedLoads(lower, upper, measure, wrenches, direction, closed, forces)
 
 
+def measured_set(
+    wrenches: WrenchSet, measure: Measure, gap: float = GAP
+) -> FerrariCanny | ResistedLoads:
+    """Bound any measure of contacts, also the usual one (see `resisted_loads`)."""
+    usual = measure.is_usual
+    return wrench_set_quality(wrenches, gap) if usual else resisted_loads(wrenches, measure, gap)
+
+
 def _without_rests(wrenches: WrenchSet, loads: Array, forces: Array, ball: FerrariCanny) -> Array:
     """Return the multiples of loads (m, 6) that forces (m, 3k) and a ball show by (2), (m,).
 

@@ -175,7 +175,7 @@ class WrenchBody:
         return bool((left <= slack).all()) and self.bounded.holds(shares, slack)
 
     def is_strong_enough(self, torques: Array, slack: float | Array) -> bool:
-        """Return whether motors have torques, (n, joints) [N m], up to a slack over their limits."""
+        """Return whether motors have torques, (n, joints) [N m], to a slack over their limits."""
         return bool((np.abs(torques) / self.motors.limits <= 1.0 + slack).all())
 
     @property

@@ -39,7 +39,7 @@ WIDENED = 1e-8
 MOST_MAPS = 128
 ASIDE = (0.37, 0.11)
 """Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
-KERNEL = "grasp_core.optimizing.best.cuts_kernel"
+KERNEL = "grasp_core.optimizing.best.searching.cuts_kernel"
 
 
 def exact_maps(body: Polyhedron, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> Array:

@@ -10,12 +10,15 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
-from grasp_core.optimizing.best import best_grasp as searching
+from grasp_core.optimizing.best import levels as searching
 from grasp_core.optimizing.best.grounds import grounds_of
 from grasp_core.optimizing.best.proof_file import read_proof, write_proof
 from grasp_core.optimizing.best.same_places import exact_maps
-from grasp_core.optimizing.best.search import DEEP, Searching, Stop
+from grasp_core.optimizing.best.searching.parts import DEEP
+from grasp_core.optimizing.best.searching.search import Searching
+from grasp_core.optimizing.best.searching.stop import Stop
 from grasp_core.optimizing.best.support_cuts import ROUNDING, CutTree
+from grasp_core.optimizing.best.task_ascent import _weakest
 from grasp_core.quality.measures import Measure
 from grasp_core.quality.resisted_loads import ResistedLoads, resisted_loads
 from scenes.example_objects import example_object
@@ -274,7 +277,7 @@ def test_compiled_demands_are_those_of_the_definition(measure):
         assert asked == pytest.approx(max(hardest @ y, 0.0), abs=1e-13)
 
 
-TWISTS = "grasp_core.optimizing.best.twists_kernel"
+TWISTS = "grasp_core.optimizing.best.searching.twists_kernel"
 
 
 def test_the_proof_is_the_same_on_any_number_of_threads():
@@ -299,3 +302,19 @@ def test_the_proof_is_the_same_on_any_number_of_threads():
 def test_what_does_not_fit_is_refused(changed, told):
     with pytest.raises(gc.InputError, match=told):
         gc.best_grasp(example_object("tetrahedron"), FRICTION, **changed)
+
+
+def test_weak_directions_are_ordered_without_last_digits():
+    """Facets that hold as much as each other come in one order, however long their normals are."""
+    places = np.vstack([np.eye(3), -np.eye(3)])
+    wrenches = WrenchSet.at(places, -places, np.full(6, 0.3))
+    found = resisted_loads(wrenches, Measure("weight"), 1e-3)
+    polytope, rng = found.ball.polytope, np.random.default_rng(0)
+    first = _weakest(found)
+    assert len(first) > 1
+    for _ in range(8):
+        lengths = rng.uniform(0.5, 2.0, size=(len(polytope.normals), 1))
+        other = replace(polytope, normals=lengths * polytope.normals)
+        again = _weakest(replace(found, ball=replace(found.ball, polytope=other)))
+        assert again.shape == first.shape
+        assert np.abs(again - first).max() <= 1e-9

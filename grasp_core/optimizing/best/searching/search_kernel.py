@@ -8,9 +8,9 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
-from grasp_core.optimizing.best.asking_kernel import ask, choose, look, look_again
-from grasp_core.optimizing.best.cuts_kernel import MOST_CORNERS, Pieces
-from grasp_core.optimizing.best.nodes_kernel import (
+from grasp_core.optimizing.best.searching.asking_kernel import ask, choose, look, look_again
+from grasp_core.optimizing.best.searching.cuts_kernel import MOST_CORNERS, Pieces
+from grasp_core.optimizing.best.searching.nodes_kernel import (
     ALL,
     FINGERS,
     SPLICE,
@@ -19,7 +19,7 @@ from grasp_core.optimizing.best.nodes_kernel import (
     is_full,
     note,
 )
-from grasp_core.optimizing.best.twists_kernel import descend, learn, multiple
+from grasp_core.optimizing.best.searching.twists_kernel import descend, learn, multiple
 
 DONE, PAUSED, FULL, PART, FOUND, LOST = 0, 1, 2, 3, 4, 5
 """Why a run ends: nothing left, budget of nodes spent, no room in the tree, a node that is to be a
