@@ -54,7 +54,7 @@ def _fits(value: Any, kind: type, shape: tuple[int | None, ...]) -> bool:
     """Return whether a value is a plain array of a type of entries and a shape."""
     if type(value) is not np.ndarray:
         return False
-    array = cast("NDArray[Any]", value)
+    array: NDArray[Any] = value
     return (
         array.dtype == kind
         and array.ndim == len(shape)

@@ -6,7 +6,7 @@ The program and its dual are in `wrench_body`, and what proves their answers in 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.checked import LARGEST, SMALLEST
@@ -136,7 +136,9 @@ def many_limits(  # noqa: PLR0913 - all that limits depend on
     return limits
 
 
-def _compiled_limits(body: WrenchBody, loads: Array, inside: Array) -> tuple[Array, Array]:
+def _compiled_limits(
+    body: WrenchBody, loads: Array, inside: Array
+) -> tuple[Array, NDArray[np.bool_]]:
     """Find limits of unit loads (n, 6) on hard contacts without motors, by the compiled code.
 
     Returns:
@@ -151,7 +153,7 @@ def _compiled_limits(body: WrenchBody, loads: Array, inside: Array) -> tuple[Arr
     kernel = compiled(KERNEL)
     kernel.limits(kernel.Contacts(body.G, mu, start), loads, found, forces, facets)
     upper = body.bounded.supports(facets) / -np.einsum("ij,ij->i", facets, loads)
-    close = np.abs(upper - found) <= CLOSE * np.abs(upper)
+    close: NDArray[np.bool_] = np.abs(upper - found) <= CLOSE * np.abs(upper)
     close &= np.abs(forces @ body.G.T + found[:, None] * loads).max(axis=1) <= CLOSE * upper
     normal, *across = forces.reshape(len(loads), -1, 3).transpose(2, 0, 1)
     close &= (np.hypot(*across) <= mu * normal).all(axis=1) & (normal <= 1.0).all(axis=1)

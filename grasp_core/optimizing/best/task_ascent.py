@@ -48,9 +48,9 @@ SMALL_GAIN = 1e-4
 """Predicted relative gain below which a climb ends: the smallest gap that may be asked for, as each
 step takes a program for every load."""
 SPREAD, ROUNDS = 48, 4
-"""Directions of the weight for which contacts climb first, and how often they climb. None is farther
-than 23 degrees from one of these, so that what is held of it is at most 8 % less than is seen; the
-directions that are added make up for that."""
+"""Directions of the weight for which contacts climb first, and how often they climb. Every
+direction is within 23 degrees of one of these, so that it is held at most 8 % less than they are;
+the directions that are added make up for that."""
 WEAK, APART, MOST_WEAK = 1.05, 0.97, 16
 """Directions that are added are held up to this much better than the weakest: others are not the
 least after a small step. Cosines between them are below this: 14 degrees, half of what is between

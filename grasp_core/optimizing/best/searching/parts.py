@@ -28,7 +28,7 @@ FIRST_ROOM = 4096
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """Contacts whose quality is known."""
+    """Contacts whose quality, or multiple of a task's loads, is known."""
 
     pieces: tuple[int, ...]
     """The piece of each contact, (4,)."""

@@ -1,4 +1,4 @@
-"""Searches for a tree of cuts that refutes a quality, on all cores, the same tree on any number.
+"""Searches for a tree of cuts that refutes a threshold, on all cores, the same tree on any number.
 
 A level of the search refutes one threshold. Its tree is begun by one thread up to a depth; each
 node left there is a part of its own, searched with its own twists. Parts are searched in waves of a
@@ -54,7 +54,7 @@ MUCH = 1.1
 """Ratio of qualities from which on contacts are a better start for other thresholds, where the
 measure is not the usual one and the first contacts may be poor."""
 EXACT_GAP = 1e-5
-"""Gap between the bounds of the quality of contacts that may be better: a tenth of the smallest gap
+"""Gap between the bounds of the measure of contacts that may be better: a tenth of the smallest gap
 that a search may be asked for."""
 
 
@@ -119,8 +119,8 @@ class Searching:
 
         Args:
             nodes: What `first_nodes` returns.
-            threshold: The quality.
-            known: A quality that is attained.
+            threshold: The quality, or the multiple of the loads.
+            known: One that is attained.
             progress: Called with the share of the parts that are done.
 
         Returns:
@@ -217,7 +217,7 @@ class Searching:
         return True
 
     def measured(self, on: Indices, at: Array) -> Found:
-        """Bound the quality of contacts on pieces, (4,), at plane coordinates, (4, 2)."""
+        """Bound the measure of contacts on pieces, (4,), at plane coordinates, (4, 2)."""
         points = np.array([self.grounds.places(p, y[None])[0] for p, y in zip(on, at, strict=True)])
         wrenches = WrenchSet.at(points, self.grounds.normals[on], np.full(FINGERS, self.friction))
         quality = measured_set(wrenches, self.measure, EXACT_GAP)
