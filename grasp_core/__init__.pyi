@@ -42,8 +42,8 @@ from grasp_core.objects.face import PatchLimits as PatchLimits
 from grasp_core.objects.polyhedron import Polyhedron as Polyhedron
 from grasp_core.objects.polyhedron import from_trimesh as from_trimesh
 from grasp_core.objects.polyhedron import load_polyhedron as load_polyhedron
-from grasp_core.optimizing.best.best_grasp import BestGrasp as BestGrasp
 from grasp_core.optimizing.best.best_grasp import best_grasp as best_grasp
+from grasp_core.optimizing.best.result import BestGrasp as BestGrasp
 from grasp_core.optimizing.better_contacts import Improvement as Improvement
 from grasp_core.optimizing.better_contacts import optimize_contacts as optimize_contacts
 from grasp_core.optimizing.ceiling import QualityCeiling as QualityCeiling
@@ -59,7 +59,7 @@ from grasp_core.quality.metrics import min_weight as min_weight
 from grasp_core.quality.metrics import min_weights as min_weights
 from grasp_core.quality.metrics import smallest_singular_value as smallest_singular_value
 from grasp_core.quality.motors import Motors as Motors
-from grasp_core.quality.wrench_body import WrenchLimit as WrenchLimit
+from grasp_core.quality.wrench_limit import WrenchLimit as WrenchLimit
 from grasp_core.quality.wrench_limits import max_resisted_wrench as max_resisted_wrench
 from grasp_core.quality.wrench_limits import wrench_limits as wrench_limits
 from grasp_core.records.grasps_files import load_grasps as load_grasps

@@ -1,6 +1,11 @@
 """Checks fields of a certificate, and answers True or False where others would raise errors.
 
 A certificate may come from anywhere, so its `verify` answers False to a bad field, never an error.
+
+Checks compute with a certificate's arrays as they are. So real ones must be float64, and whole ones
+int64, as this package makes them: narrower types wrap or overflow in the sums of a check, unsigned
+ones in its differences, and subclasses of arrays may hide entries. To check arrays of other types,
+convert them first, `array.astype(np.float64)`.
 """
 
 from numbers import Real
@@ -9,7 +14,7 @@ from typing import Any, TypeGuard, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import LARGEST_ENTRY, REAL, UNIT_SLACK, Array
+from grasp_core.arrays import LARGEST_ENTRY, UNIT_SLACK, Array, Indices
 from grasp_core.checked import LARGEST_FRICTION
 
 
@@ -34,20 +39,27 @@ def is_number(value: Any, *, least: float = -LARGEST_ENTRY, most: float = LARGES
 
 
 def is_array(value: Any, *shape: int | None) -> TypeGuard[Array]:
-    """Return whether a value is an array of finite reals of a shape; None leaves an axis free."""
-    if not isinstance(value, np.ndarray):
+    """Return whether a value is a float64 array of finite numbers; None is any length."""
+    if not _fits(value, np.float64, shape):
         return False
-    array = cast("NDArray[Any]", value)
-    fits = len(array.shape) == len(shape) and all(
-        want is None or want == got for want, got in zip(shape, array.shape, strict=True)
+    return bool((np.abs(cast("Array", value)) <= LARGEST_ENTRY).all())
+
+
+def is_indices(value: Any, *shape: int | None) -> TypeGuard[Indices]:
+    """Return whether a value is an int64 array of a shape; None is any length."""
+    return _fits(value, np.int64, shape)
+
+
+def _fits(value: Any, kind: type, shape: tuple[int | None, ...]) -> bool:
+    """Return whether a value is a plain array of a type of entries and a shape."""
+    if type(value) is not np.ndarray:
+        return False
+    array: NDArray[Any] = value
+    return (
+        array.dtype == kind
+        and array.ndim == len(shape)
+        and all(want in (None, got) for want, got in zip(shape, array.shape, strict=True))
     )
-    numbers = fits and array.dtype.kind in REAL
-    return numbers and bool((np.abs(array) <= LARGEST_ENTRY).all())
-
-
-def is_indices(value: Any, *shape: int | None) -> bool:
-    """Return whether a value is an array of whole numbers of a shape."""
-    return is_array(value, *shape) and value.dtype.kind in "iu"
 
 
 def are_units(value: Any, *shape: int | None, slack: float = UNIT_SLACK) -> bool:

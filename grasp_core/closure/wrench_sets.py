@@ -224,15 +224,21 @@ class WrenchSet(ByValue):
         rows = forces.reshape(-1, width * k)
         return rows if self.norm == "linf" else rows[:-1]
 
-    def holds(self, forces: Array, slack: float) -> bool:
-        """Return whether local forces, one a row, are within cones and bounds, up to a slack."""
+    def holds(self, forces: Array, slack: float | Array) -> bool:
+        """Return whether local forces, one a row, are within cones and bounds.
+
+        Args:
+            forces: The forces, (n, 3k), or (n, 4k) with torsion.
+            slack: By how much they may miss each of them, one for all rows or one each, (n,).
+        """
         each = forces.reshape(len(forces), -1, self.width)
         pushes, slides = each[:, :, 0], _across(each)
         if self.norm == "l1":
             bounded = np.abs(pushes.sum(axis=1) - 1.0) <= slack
         else:
             bounded = pushes.max(axis=1) <= 1.0 + slack
-        in_cones = (slides <= self.friction * pushes + slack).all(axis=1)
+        rooms = np.reshape(slack, (-1, 1))
+        in_cones = (slides <= self.friction * pushes + rooms).all(axis=1)
         return bool((bounded & in_cones & (pushes.min(axis=1) >= -slack)).all())
 
 
@@ -293,10 +299,10 @@ def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
     b = np.append(1.0, np.zeros(len(A) - 1))
     answer = minimize(ConicProgram(q, A, b, 1, k, (m + 1, *(width,) * k)))
     facing = answer.z[k + 2 : k + m + 2]
-    return _into_cones(answer.x[:n], wrenches.friction), facing
+    return into_cones(answer.x[:n], wrenches.friction), facing
 
 
-def _into_cones(forces: Array, friction: Array) -> Array:
+def into_cones(forces: Array, friction: Array) -> Array:
     """Move forces into the cones and scale them so that normal parts sum to one exactly."""
     each = forces.reshape(len(friction), -1).copy()
     each[:, 0] = np.maximum(each[:, 0], 0.0)

@@ -31,26 +31,53 @@ where y_F is the force part of y, and h takes no gravity. All directions are hel
 
 which fails, if y_F is not zero, above the larger root of a quadratic in m. It has one: |W'u| <=
 sum_j |u_j| |W_j| is less than h where each motor can carry its links, |W_j| < c_j.
+
+*How hard fingers can push.* A push that motors do not allow counts nowhere, so that f_max may be
+taken as small as they make it. For a sum p.f of pushes, any multipliers q of the joints, and |v| up
+to one,
+
+    p.f = (p - L'q).f + q.(L f)  <=  f_max sum_i max(0, s_i(p - L'q)) + sum_j |q_j| (c_j + |W_j|).
+                                                                                        (6)
+
+This is asked of each push, and of the sum of all, each with the q whose L'q is nearest to p: zero
+is left of p where motors feel such pushes. The largest push is rounded up, to less than twice as
+much, so that last digits do not decide. All slacks are then relative to forces that there can be.
+
+*Rounding of (5).* A product of sums with n terms is off by less than n rounding units of the sum of
+its terms' sizes. h is raised by more than these, `LOST` times such a sum.
+
+*What forces prove.* They meet (1) to within `HELD` of the largest contact force, and in any case to
+within `MOST_LEFT` of the weight and of the motors' limits.
 """
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, cross
+from grasp_core.arrays import SHIFT, Array, Indices, cross
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST
-from grasp_core.closure.wrenches import WRENCH
+from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.closure.wrenches import WRENCH, contact_frames, in_frames
 from grasp_core.execution.ball_in_hull import ball_in
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.fields import are_frictions, are_units, is_a, is_array, is_indices, is_number
 from grasp_core.quality.motors import Motors
-from grasp_core.quality.wrench_body import HELD, WrenchBody
+from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limit import HELD
 from grasp_core.short_text import summary
 
 ROUNDING = 1e-9
-"""Slack of the unit ball and of bounds, relative to them or to the largest push."""
+"""Slack of the unit ball and of the upper bound, relative to them: a thousand times what sums and
+square roots lose of either."""
+MOST_LEFT = 1e-4
+"""What forces may lack of (1) at most, over the weight and the motors' limits: a tenth of the usual
+gap between the bounds."""
+LOST = 64.0 * float(np.finfo(np.float64).eps)
+"""Rounding of products in (5) and (6): sums in them have six components of a wrench, three of each
+contact or one of each joint, a few tens in all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -62,12 +89,13 @@ class HandPayload(ByValue):
     """
 
     lower: float
-    """Mass that is held in every orientation [kg]."""
+    """Mass that is held in every orientation [kg]; zero where none is shown to be, without corners
+    of a hull then."""
     upper: float
     """Mass above which some orientation is not held [kg]."""
     gravities: Array
     """Corners of a hull that contains the unit ball, (n, 3): gravity in units of its own size.
-    Under each of them the lower mass and the links are held; none where the lower bound is zero."""
+    Under each of them the lower mass and the links are held."""
     forces: Array
     """Contact forces on the object that hold them there, (n, k, 3) [N]."""
     triangles: Indices
@@ -82,7 +110,7 @@ class HandPayload(ByValue):
     @property
     def weakest(self) -> Array:
         """Direction of gravity, of unit length, in which the hand lets go first, (3,)."""
-        a, b, _ = self.hand.bound(self.facet, self.motor_multipliers)
+        a, b = self.hand.sides(self.facet, self.motor_multipliers)
         way = self.upper * a + b
         return way / (float(np.linalg.norm(way)) or 1.0)
 
@@ -92,16 +120,23 @@ class HandPayload(ByValue):
     def verify(self) -> bool:
         """Re-check every field in plain arithmetic; False if they are no certificate.
 
+        The upper bound is exact but for rounding, 1e-9 of it. Forces hold the lower mass to within
+        1e-7 of the largest of them, the accuracy of conic programs: balance, friction cones and
+        torques are met to that, whatever the largest push, and to 1e-4 of the weight and of the
+        motors' limits where forces are more than a thousand times the weight.
+
         Whether the contacts are those of an object can only be checked with it, and whether joints
         and links are those of a hand only with the hand.
+
+        Returns:
+            Whether both bounds are proved.
         """
         with np.errstate(all="ignore"):
             if not (is_a(self.hand, CarryingHand) and self.hand.sound() and self._has_numbers()):
                 return False
             hand = replace(self.hand)  # without what it has kept
-            none = ROUNDING * hand.max_push_n / GRAVITY_M_PER_S2
             most = hand.most(self.facet, self.motor_multipliers)
-            return most <= self.upper * (1.0 + ROUNDING) + none and self._holds(hand)
+            return most <= self.upper * (1.0 + ROUNDING) and self._holds(hand)
 
     def _has_numbers(self) -> bool:
         n = len(self.gravities) if is_array(self.gravities, None, 3) else 0
@@ -117,8 +152,8 @@ class HandPayload(ByValue):
 
     def _holds(self, hand: "CarryingHand") -> bool:
         """Return whether the lower mass is held wherever gravity points, by (3)."""
-        if self.lower == 0.0:
-            return True
+        if self.lower == 0.0:  # claims nothing, by nothing
+            return not (len(self.gravities) or len(self.triangles))
         covered = ball_in(self.gravities, self.triangles) >= 1.0 - ROUNDING
         return covered and hand.holds(self.lower, self.gravities, self.forces)
 
@@ -145,9 +180,28 @@ class CarryingHand(ByValue):
     of gravity, (joints, 3) [N m]."""
 
     @cached_property
+    def push_n(self) -> float:
+        """The largest normal force of a fingertip that counts [N], by (6)."""
+        k = len(self.friction)
+        levers = in_frames(self.motors.levers, contact_frames(self.normals))
+        sums = np.zeros((k + 1, 3 * k))
+        sums[np.arange(k), 3 * np.arange(k)] = 1.0
+        sums[k, ::3] = 1.0
+        multipliers = np.linalg.lstsq(levers.T, sums.T, rcond=None)[0].T
+        left, sizes = sums - multipliers @ levers, sums + np.abs(multipliers) @ np.abs(levers)
+        cones = WrenchSet(np.zeros((WRENCH, 3 * k)), self.friction, "linf")
+        felt = np.array([cones.reach(row)[0] for row in left])
+        felt += LOST * (1.0 + float(self.friction.max())) * sizes.sum(axis=1)
+        strengths = self.motors.limits + np.linalg.norm(self.weights, axis=1)
+        allowed = self.max_push_n * felt + np.abs(multipliers) @ strengths
+        most = float(np.minimum(allowed[:k], allowed[k]).max())
+        # the next power of two, shifted as grids are, so that round numbers are far from its steps
+        return min(self.max_push_n, 2.0 ** (math.ceil(math.log2(most) - SHIFT) + SHIFT))
+
+    @cached_property
     def body(self) -> WrenchBody:
         """The wrenches that the contacts resist where links have no weight."""
-        return WrenchBody(self.arms, self.normals, self.friction, self.max_push_n, self.motors)
+        return WrenchBody(self.arms, self.normals, self.friction, self.push_n, self.motors)
 
     def sound(self) -> bool:
         """Return whether the fields are those of contacts, and of motors that carry their links."""
@@ -167,14 +221,21 @@ class CarryingHand(ByValue):
             and bool((np.linalg.norm(self.weights, axis=1) < self.motors.limits).all())
         )
 
-    def bound(self, facet: Array, multipliers: Array) -> tuple[Array, Array, float]:
-        """Return the vectors a and b and the number h of (5), |m a + b| <= h."""
-        h = self.body.support(facet, multipliers)
-        return -GRAVITY_M_PER_S2 * facet[:3], self.weights.T @ multipliers, h
+    def sides(self, facet: Array, multipliers: Array) -> tuple[Array, Array]:
+        """Return the vectors a and b of (5), |m a + b| <= h."""
+        return -GRAVITY_M_PER_S2 * facet[:3], self.weights.T @ multipliers
 
-    def most(self, facet: Array, multipliers: Array) -> float:
-        """Return the mass above which (5) fails [kg]; infinite if there is none."""
-        a, b, h = self.bound(facet, multipliers)
+    def most(self, facet: Array, multipliers: Array, rounding: float = 1.0) -> float:
+        """Return the mass above which (5) fails [kg]; infinite if there is none.
+
+        Args:
+            facet: Twist y, (6,).
+            multipliers: Multipliers u of the joints, (joints,).
+            rounding: How often h is raised by what rounding may take of it: certificates are made
+                with more than they are checked with, so that two ways to round agree.
+        """
+        a, b = self.sides(facet, multipliers)
+        h = self.body.support(facet, multipliers) + rounding * self._lost(facet, multipliers)
         # facets of any length mean the same; squares of very short ones would vanish
         size = max(float(np.linalg.norm(a)), float(np.linalg.norm(b)), abs(h))
         if size == 0.0:
@@ -188,17 +249,28 @@ class CarryingHand(ByValue):
         # the form without a difference of near numbers
         return left / (along + root) if along > 0.0 else (root - along) / square
 
+    def _lost(self, facet: Array, multipliers: Array) -> float:
+        """Return how much of h may be lost to rounding."""
+        body, sizes = self.body, np.abs(multipliers)
+        twist = np.abs(facet * body.scale)
+        twist[:3] += np.linalg.norm(facet[3:]) * np.linalg.norm(body.middle)
+        terms = float((twist @ np.abs(body.G) + sizes @ np.abs(body.levers)).sum())
+        pushed = body.max_normal_force * (1.0 + float(self.friction.max())) * terms
+        return LOST * (pushed + float(sizes @ self.motors.limits))
+
     def holds(self, mass: float, gravities: Array, forces: Array) -> bool:
         """Return whether forces (n, k, 3) hold a mass and the links under gravities (n, 3)."""
         body = self.body
         local = np.einsum("kij,nki->nkj", body.frames, forces) / body.max_normal_force
-        shares = local.reshape(len(forces), -1)
         weights = GRAVITY_M_PER_S2 * mass * gravities / body.max_normal_force
         loads = np.hstack([weights, -cross(body.middle, weights)]) / body.scale
-        slack = HELD * body.bounded.size
-        # (1), to the accuracy that forces of wrench limits have
-        balanced = np.linalg.norm(shares @ body.G.T + loads, axis=1) <= slack
+        largest = np.linalg.norm(local, axis=2).max(axis=1)
+        slack = np.minimum(
+            HELD * body.bounded.size * largest, MOST_LEFT * np.linalg.norm(weights, axis=1)
+        )
         torques = forces.reshape(len(forces), -1) @ body.motors.levers.T
         torques += gravities @ self.weights.T
-        strong = np.abs(torques) <= body.motors.limits * (1.0 + HELD * body.strongest)
-        return bool(balanced.all() and strong.all()) and body.bounded.holds(shares, slack)
+        spare = np.minimum(HELD * np.maximum(1.0, body.strongest * largest), MOST_LEFT)
+        return body.holds(local.reshape(len(local), -1), loads, slack) and body.is_strong_enough(
+            torques, spare[:, None]
+        )

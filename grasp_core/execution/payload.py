@@ -48,7 +48,8 @@ from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.fields import is_a, is_indices, is_number, is_tuple_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors, motors_for
-from grasp_core.quality.wrench_body import WrenchBody, WrenchLimit
+from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limit import WrenchLimit, attains, bounds, limit_of
 from grasp_core.short_text import summary
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
@@ -129,8 +130,8 @@ class Payload(ByValue):
             ray.has_numbers(body.count, len(body.levers))
             and not ray.wrench[3:].any()
             and abs(np.linalg.norm(ray.wrench) / GRAVITY_M_PER_S2 - 1.0) <= ROUNDING
-            and body.attains(ray)
-            and body.bounds(ray)
+            and attains(body, ray)
+            and bounds(body, ray)
             for ray in self.free.rays
         )
 
@@ -226,7 +227,7 @@ def _nothing_held(rays: list[WrenchLimit]) -> FreeMass:
 def _ray(body: WrenchBody, direction: Array) -> WrenchLimit:
     weight = np.zeros(WRENCH)
     weight[:3] = GRAVITY_M_PER_S2 * direction / np.linalg.norm(direction)
-    return body.limit(weight)
+    return limit_of(body, weight)
 
 
 def _ends(rays: Iterable[WrenchLimit]) -> Array:

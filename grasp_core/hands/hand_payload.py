@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import frozen, frozen_copy
-from grasp_core.checked import LARGEST, number, positive
+from grasp_core.checked import LARGEST, positive
 from grasp_core.closure.contact_arrays import contact_frictions
 from grasp_core.execution.carried_mass import GAP, carried_mass
 from grasp_core.execution.carrying_hand import CarryingHand, HandPayload
@@ -13,9 +13,6 @@ from grasp_core.hands.hand_motors import turned_motors
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-
-FINEST_GAP = 1e-4
-"""Smallest gap that may be asked for: below it, more rays follow than are kept."""
 
 
 def hand_payload(
@@ -40,6 +37,9 @@ def hand_payload(
         max_push_n: Largest normal force of a finger, beside what its motors allow [N].
         gap: Wanted (upper - lower) / lower, from 1e-4.
 
+    Returns:
+        Both bounds of the mass, with their proofs (see `HandPayload.verify`).
+
     Raises:
         InputError: The hand is another one or not in a pose, a joint has no torque limit, a link
             no mass, a motor cannot carry the links in some orientation, or a number is out of
@@ -47,7 +47,6 @@ def hand_payload(
         SolverError: A program's answer failed its check.
     """
     check_body(body)
-    number(gap, "gap", least=FINEST_GAP, below=1.0)
     most = positive(max_push_n, "max_push_n")
     motors, weights, contacts = turned_motors(hand, reach)
     count = len(contacts)

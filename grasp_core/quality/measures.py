@@ -35,6 +35,8 @@ MeasureName: TypeAlias = Literal["ferrari-canny", "weight", "task"]
 """Which loads count: wrenches of unit length, the weight in every orientation, or a user's loads.
 """
 MOST_LOADS = 100
+"""Most loads of a task: each takes a cone program wherever contacts are measured, and a search
+measures thousands of contacts."""
 SMALL_DEMAND = 1e-2
 """Demand of a unit twist below which a twist with negative support is compared as if it had this
 one: it refutes every multiple, and none better than others do."""
@@ -66,6 +68,9 @@ class Measure(ByValue):
                 [N, N m]; None for other measures.
             radius: The object's radius [m].
 
+        Returns:
+            The measure, with torques over the radius.
+
         Raises:
             InputError: There is no such measure, or the wrenches do not fit it.
         """
@@ -83,13 +88,20 @@ class Measure(ByValue):
                 "array of shape (m, 6), forces in N and torques in N m"
             )
         loads = frozen(wrenches, (None, WRENCH), "wrenches") / np.repeat([1.0, radius], 3)
-        found = cls("task", loads)
-        if not found.sound():
+        if not 0 < len(loads) <= MOST_LOADS:
             raise InputError(
-                f"wrenches: expected 1 to {MOST_LOADS} wrenches, none of them zero or huge, got "
-                f"{len(loads)}; leave out those that ask for nothing"
+                f"wrenches: expected 1 to {MOST_LOADS} wrenches, got {len(loads)}; leave out those "
+                "that are mixtures of others"
             )
-        return found
+        sizes = np.linalg.norm(loads, axis=1)
+        wrong = np.flatnonzero((sizes < SMALLEST) | (sizes > LARGEST))
+        if wrong.size:
+            raise InputError(
+                f"wrenches: row {int(wrong[0])} must be from {SMALLEST:g} to {LARGEST:g} N long, "
+                f"torques over the object's radius, got {float(sizes[wrong[0]]):.6g}; leave out "
+                "wrenches that ask for nothing, and give others in N and N m"
+            )
+        return cls("task", loads)
 
     def sound(self) -> bool:
         """Return whether this is a measure, of any origin."""

@@ -16,10 +16,18 @@ bounds the weight by m' (1 + 5e-7 |omega r|^2 / |v|^2) at most: the two bounds a
 
 *From below, task.* For each load w_j, forces with normal parts of sum one and the wrench -m_j w_j,
 m_j as large as possible, come from a cone program; its multipliers are the twist that limits m_j.
-The least m_j is a lower bound, as forces that add up to zero complete the hull, see (1) of
-`measures`. Contacts that are not in force closure may have no such forces. For them
+Programs are not exact. Moved into their cones, the forces have a wrench -m_j w_j + r_j, with a
+small rest r_j across w_j. Contacts in force closure resist a ball of wrenches with a radius q > 0
+as well. The ball has the wrench -q r_j / |r_j|, which takes away the rest in a mixture:
 
-    maximise m_j - `STEEP` |wrench + m_j w_j|                                               (2)
+    -m w_j  is in W  for  m = m_j / (1 + |r_j| / q),                                        (2)
+
+with nothing left of the program's inaccuracy. The least of these is a lower bound, as the ball
+holds zero, see (1) of `measures`.
+
+Contacts that are not in force closure may have no such forces. For them
+
+    maximise m_j - `STEEP` |wrench + m_j w_j|                                               (3)
 
 always has an answer; its multipliers are a twist of length up to `STEEP` that bounds m_j.
 """
@@ -31,23 +39,29 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.by_value import ByValue
-from grasp_core.closure.wrench_sets import WrenchSet, nearest_wrench
+from grasp_core.closure.wrench_sets import WrenchSet, into_cones
 from grasp_core.closure.wrenches import WRENCH
 from grasp_core.errors import SolverError
 from grasp_core.fields import are_units, is_a, is_array, is_number
 from grasp_core.quality.ferrari_canny import CHECK_SLACK, GAP, FerrariCanny, wrench_set_quality
 from grasp_core.quality.measures import Measure
 from grasp_core.solvers.conic import ConicProgram, minimize
+from grasp_core.solvers.ties import first_best
 
 THIN = 1e-3
-"""Length of (1) over the object's radius."""
-HELD = 1e-7
-"""How far the forces of a task may be from balance, and from cones, relative to the longest wrench:
-the accuracy of conic programs."""
+"""Length of (1) over the object's radius: what (1) then gives away, 5e-7 for twists that turn and
+move alike, is less than the gap between a ball's bounds, and rounding is far from it still."""
 STEEP = 1e3
-"""Cost of wrenches that are not balanced, over the load's length."""
+"""Cost of wrenches that are not balanced, over the load's length: a thousandth of a load counts as
+none, and programs know twists as long as this to a few digits."""
 CLOSED_GAP = 0.5
-"""Gap that suffices to see whether contacts are in force closure."""
+"""Gap that suffices to see whether contacts are in force closure, and for a ball that takes rests:
+any ball does, and half of the largest one is found with the first simplices."""
+SAME_BOUND = 1e-7
+"""Share by which bounds of twists may differ and count as one: the accuracy of the conic programs
+that they come from."""
+NONE_SHOWN = -1.0
+"""Lower bound where no multiple is shown to be resisted, not even zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -55,8 +69,8 @@ class ResistedLoads(ByValue):
     """Bounds of the largest multiple of a set of loads that contacts resist, with their proofs."""
 
     lower: float
-    """Multiple that is resisted, if not negative; contacts that are not in force closure have a
-    negative one."""
+    """Multiple that is resisted; -1 where none is shown to be, not even zero, as for contacts that
+    are not in force closure. There is no ball then, and there are no forces."""
     upper: float
     """Multiple beyond which not all loads are resisted."""
     measure: Measure
@@ -66,14 +80,18 @@ class ResistedLoads(ByValue):
     direction: Array
     """Unit twist, (6,), with torques over the object's radius, that allows at most `upper`."""
     ball: FerrariCanny | None
-    """Proof of (1), for the weight."""
+    """Proof of the ball (1) for the weight, or of the one in (2) for a task."""
     forces: Array | None
-    """Local forces, (m + 1, 3k), that resist `lower` times each load of a task, and none."""
+    """Local forces, (m, 3k), for each load of a task: they resist at least `lower` times the load,
+    but for rests that the ball takes by (2)."""
 
     def verify(self) -> bool:
         """Check both bounds again in plain arithmetic, without any solver.
 
-        They hold to within 1e-12 of the longest wrench for the weight, and 1e-7 for a task.
+        They hold to within 1e-12 of the longest wrench.
+
+        Returns:
+            Whether both are proved; only the upper one where the lower one is -1.
         """
         with np.errstate(all="ignore"):
             sound = (
@@ -91,25 +109,24 @@ class ResistedLoads(ByValue):
             # half of what the bound was raised by, so that two ways to round agree
             support = self.wrenches.support(self.direction)[0] + 0.5 * _rounding(self.wrenches)
             bounded = self.upper >= 0.0 and support <= self.upper * demand
-            return bounded and (self.lower < 0.0 or self._proves_lower())
+            return bounded and self._proves_lower()
 
     def _proves_lower(self) -> bool:
-        if self.measure.name == "weight":
-            return (
-                self.forces is None
-                and isinstance(self.ball, FerrariCanny)
-                and self.ball.verify()
-                and self.ball.lower >= self.lower
-                and self.ball.wrenches == thin(self.wrenches)
-            )
-        width, count = self.wrenches.G.shape[1], len(self.measure.loads)
-        if self.ball is not None or not is_array(self.forces, count + 1, width):
+        if self.lower == NONE_SHOWN:
+            return self.ball is None and self.forces is None
+        if self.lower < 0.0 or not (isinstance(self.ball, FerrariCanny) and self.ball.verify()):
             return False
-        slack = HELD * self.wrenches.size
-        left = self.forces @ self.wrenches.G.T
-        left[:-1] += self.lower * self.measure.loads
-        balanced = float(np.linalg.norm(left, axis=1).max()) <= slack
-        return balanced and self.wrenches.holds(self.forces, HELD)
+        if self.measure.name == "weight":
+            of_weight = self.ball.wrenches == thin(self.wrenches)
+            return self.forces is None and of_weight and self.ball.lower >= self.lower
+        loads, width = self.measure.loads, self.wrenches.G.shape[1]
+        if not (self.ball.wrenches == self.wrenches and is_array(self.forces, len(loads), width)):
+            return False
+        slack = _rounding(self.wrenches)
+        sizes = np.linalg.norm(loads, axis=1)
+        shown = sizes * _without_rests(self.wrenches, loads, self.forces, self.ball)
+        resisted = bool((shown >= self.lower * sizes - slack).all())
+        return resisted and self.wrenches.holds(self.forces, CHECK_SLACK)
 
 
 def thin(wrenches: WrenchSet) -> WrenchSet:
@@ -125,46 +142,67 @@ def resisted_loads(wrenches: WrenchSet, measure: Measure, gap: float = GAP) -> R
         measure: The loads, other than those of the Ferrari-Canny quality.
         gap: Wanted relative gap between the bounds, for the weight.
 
+    Returns:
+        Both bounds with their proofs.
+
     Raises:
         SolverError: A program's answer failed its check.
     """
     if measure.name == "weight":
         ball = wrench_set_quality(thin(wrenches), gap)
-        direction = ball.direction / np.repeat([1.0, THIN], 3)
-        direction, upper = _least(wrenches, measure, [direction])
-        return ResistedLoads(
-            min(ball.lower, upper), upper, measure, wrenches, direction, ball, None
-        )
+        direction, upper = _least(wrenches, measure, [ball.direction / np.repeat([1.0, THIN], 3)])
+        if ball.lower <= 0.0:
+            return ResistedLoads(NONE_SHOWN, upper, measure, wrenches, direction, None, None)
+        lower = min(ball.lower, upper)
+        return ResistedLoads(lower, upper, measure, wrenches, direction, ball, None)
     closed = wrench_set_quality(wrenches, CLOSED_GAP)
-    if closed.lower <= 0.0:
+    if closed.lower <= _rounding(wrenches):
         limiting = [_limiting_twist(wrenches, load) for load in measure.loads]
         direction, upper = _least(wrenches, measure, [closed.direction, *limiting])
-        return ResistedLoads(
-            min(-1.0, closed.lower), upper, measure, wrenches, direction, None, None
-        )
+        return ResistedLoads(NONE_SHOWN, upper, measure, wrenches, direction, None, None)
     each = task_limits(wrenches, measure)
-    lower = min(limit.multiple for limit in each)
     direction, upper = _least(wrenches, measure, [limit.twist for limit in each])
-    rest, _ = nearest_wrench(wrenches)
-    # less than the largest multiple of a load is a mixture with forces that add up to zero
-    shares = [lower / limit.multiple for limit in each]
-    forces = [s * limit.forces + (1.0 - s) * rest for s, limit in zip(shares, each, strict=True)]
-    return ResistedLoads(
-        min(lower, upper), upper, measure, wrenches, direction, None, np.array([*forces, rest])
-    )
+    forces = np.array([into_cones(limit.forces, wrenches.friction) for limit in each])
+    shown = _without_rests(wrenches, measure.loads, forces, closed)
+    lower = min(float(shown.min()), upper)
+    return ResistedLoads(lower, upper, measure, wrenches, direction, closed, forces)
+
+
+def measured_set(
+    wrenches: WrenchSet, measure: Measure, gap: float = GAP
+) -> FerrariCanny | ResistedLoads:
+    """Bound any measure of contacts, also the usual one (see `resisted_loads`)."""
+    usual = measure.is_usual
+    return wrench_set_quality(wrenches, gap) if usual else resisted_loads(wrenches, measure, gap)
+
+
+def _without_rests(wrenches: WrenchSet, loads: Array, forces: Array, ball: FerrariCanny) -> Array:
+    """Return the multiples of loads (m, 6) that forces (m, 3k) and a ball show by (2), (m,).
+
+    They are minus infinity where the ball is not above rounding.
+    """
+    radius = ball.lower - _rounding(wrenches)
+    if not radius > 0.0:
+        return np.full(len(loads), -np.inf)
+    sizes = np.linalg.norm(loads, axis=1)
+    units, made = loads / sizes[:, None], forces @ wrenches.G.T
+    along = -np.einsum("mi,mi->m", made, units)
+    rests = np.linalg.norm(made + along[:, None] * units, axis=1)
+    return along / (1.0 + rests / radius) / sizes
 
 
 def _least(wrenches: WrenchSet, measure: Measure, twists: list[Array]) -> tuple[Array, float]:
     """Return the twist, at unit length, that allows the least multiple, and the multiple.
 
-    Forces along the axes are tried as well, so that it is finite.
+    Forces along the axes are tried as well, so that it is finite. Of twists whose multiples are
+    equal but for the accuracy of programs the first counts, the same on every machine.
     """
     axes = np.eye(WRENCH)[:3]
     every = _units(np.array([*twists, *axes, *-axes]))
     # a twist that asks for next to nothing bounds nothing: rounding in its support counts in full
     supports = wrenches.supports(every) + _rounding(wrenches)
     allowed = measure.multiples(supports, measure.demands(every))
-    place = int(allowed.argmin())
+    place = first_best(-allowed, SAME_BOUND * abs(float(allowed.min())))
     # a twist with negative support shows that nothing is resisted, whatever its demand
     return every[place], max(float(allowed[place]), 0.0)
 
@@ -218,7 +256,7 @@ def _limit(wrenches: WrenchSet, load: Array) -> TaskLimit:
 
 
 def _limiting_twist(wrenches: WrenchSet, load: Array) -> Array:
-    """Return a twist that bounds the resisted multiple of a load, by the program (2), (6,)."""
+    """Return a twist that bounds the resisted multiple of a load, by the program (3), (6,)."""
     G, mu = wrenches.G, wrenches.friction
     k, n = len(mu), G.shape[1]
     A = np.zeros((1 + k + 1 + WRENCH + n, n + 2))

@@ -15,7 +15,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.quality.wrench_body import WrenchBody, WrenchLimit
+from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limit import WrenchLimit, limit_of
 from grasp_core.solvers.ties import first_best, smallest_first
 
 SETTLED = 1e-3
@@ -50,7 +51,7 @@ def _descend(body: WrenchBody, start: WrenchLimit, scale: Array) -> WrenchLimit:
     for _ in range(MAX_STEPS):
         # (1): the wrench that the limiting facet points at, by the scaled product of wrenches
         facing = -best.facet * scale**2
-        found = body.limit(_unit(facing, scale))
+        found = limit_of(body, _unit(facing, scale))
         if found.limit > best.limit * (1.0 - SETTLED):
             break
         best = found

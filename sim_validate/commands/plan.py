@@ -32,7 +32,7 @@ from sim_validate.files.stale_results import remove_results
 from sim_validate.parallel.compiling import compiled_beside
 
 if TYPE_CHECKING:
-    from grasp_core.optimizing.best.best_grasp import BestGrasp
+    from grasp_core.optimizing.best.result import BestGrasp
     from sim_validate.commands.best.best_json import Rated
     from sim_validate.parallel.certifying import Found
 

@@ -16,7 +16,7 @@ from grasp_core.by_value import ByValue
 from grasp_core.checked import SMALLEST
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
-from grasp_core.quality.wrench_body import WrenchLimit
+from grasp_core.quality.wrench_limit import WrenchLimit, limit_of
 from grasp_core.values import Contact
 from sim_validate.simulation.loads import PlannedLoad, resisted_by
 from sim_validate.simulation.setup import Setup
@@ -64,7 +64,7 @@ class HandCase:
     def limit(self, wrench: Array) -> WrenchLimit:
         """Find the largest multiple of a wrench that the hand resists."""
         body = resisted_by(self.body, self.contacts, self.friction, self.setup, self.motors)
-        return body.limit(wrench)
+        return limit_of(body, wrench)
 
 
 def hand_controls(

@@ -27,6 +27,7 @@ from grasp_core.errors import UnfaithfulError
 from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.wrench_limit import limit_of
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
 from scenes.hands.hand_mjcf import HandScene, build_hand_scene, limited
@@ -138,7 +139,9 @@ def _limits(
     bench = Bench(scene)
     rig = squeezed(bench, setup, scene.layout.squeeze_forces, friction)
     resisted = resisted_by(body, reach.contacts or (), friction, setup, scene.layout.motors)
-    loads = [Load(size * wrench, resisted.limit(wrench).forces) for wrench, size in exact.values()]
+    loads = [
+        Load(size * wrench, limit_of(resisted, wrench).forces) for wrench, size in exact.values()
+    ]
     found = ramped_limits(rig, loads)
     return tuple(
         Check(f"limit of motors {name}, over the exact one", math.nan if at is None else at.share,

@@ -12,7 +12,8 @@ from grasp_core.closure.wrenches import normal_and_tangential
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.weakest_wrench import weakest_from
-from grasp_core.quality.wrench_body import WrenchBody, WrenchLimit
+from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limit import WrenchLimit, limit_of
 from grasp_core.quality.wrench_limits import axis_wrenches
 from grasp_core.values import Contact
 from sim_validate.simulation.schedules import Load
@@ -93,7 +94,9 @@ def loads_as_they_are(  # noqa: PLR0913 - all that loads are planned from
     """
     resisted = resisted_by(body, contacts, friction, setup, motors)
     need = _Need.of(body, contacts, setup)
-    return tuple(_load(name, resisted.limit(wrench), 1.0, idle, need) for name, wrench in wrenches)
+    return tuple(
+        _load(name, limit_of(resisted, wrench), 1.0, idle, need) for name, wrench in wrenches
+    )
 
 
 def resisted_by(
@@ -116,13 +119,13 @@ def _relative(
     resisted: WrenchBody, torque_scale: float, agenda: Agenda
 ) -> list[tuple[str, WrenchLimit]]:
     """Name the wrenches that are applied at a share of their limit, and compute each limit."""
-    axes = [resisted.limit(wrench) for wrench in axis_wrenches(torque_scale)]
+    axes = [limit_of(resisted, wrench) for wrench in axis_wrenches(torque_scale)]
     weakest = weakest_from(resisted, axes, torque_scale)
     rng = np.random.default_rng(agenda.seed)
     scale = np.array([1.0] * 3 + [torque_scale] * 3)
     drawn = rng.normal(size=(agenda.random_wrenches, 6))
     units = scale * drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
-    others = [(RANDOM.format(place), resisted.limit(unit)) for place, unit in enumerate(units)]
+    others = [(RANDOM.format(place), limit_of(resisted, unit)) for place, unit in enumerate(units)]
     return [*zip(AXIS_NAMES, axes, strict=True), (WEAKEST, weakest), *others]
 
 

@@ -23,6 +23,7 @@ import scenes
 from grasp_core.closure.contact_arrays import contact_frictions
 from grasp_core.closure.soft.contacts import contact_torsions
 from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limit import limit_of
 from scenes.physics import PhysicsSettings
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.records.verdicts_json import verdicts_to_json
@@ -105,7 +106,7 @@ def limiting_loads(case, setup, count, seed):
     )  # fmt: skip
     scale = np.array([1.0] * 3 + [body.radius] * 3)
     drawn = np.random.default_rng(seed).normal(size=(count, 6)) * scale
-    limits = [resisted.limit(wrench) for wrench in drawn]
+    limits = [limit_of(resisted, wrench) for wrench in drawn]
     return [Load(limit.limit * limit.wrench, limit.forces) for limit in limits]
 
 

@@ -8,6 +8,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.closure.contact_arrays import contact_frictions
 from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limit import limit_of
 from scenes.mjcf import build_scene
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.schedules import Load
@@ -41,7 +42,7 @@ def limiting_loads(body, grasp, friction, count, seed=0):
     )
     scale = np.array([1.0] * 3 + [body.radius] * 3)
     drawn = np.random.default_rng(seed).normal(size=(count, 6)) * scale
-    found = [resisted.limit(wrench) for wrench in drawn]
+    found = [limit_of(resisted, wrench) for wrench in drawn]
     return [Load(limit.limit * limit.wrench, limit.forces) for limit in found]
 
 

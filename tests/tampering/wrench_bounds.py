@@ -72,7 +72,7 @@ def resisted(q, rng):
 
     starts = [q.direction, *rng.normal(size=(2, 6)), *-q.measure.loads[:1]]
     least = min(min(minimize(allowed, y, method="Nelder-Mead").fun, allowed(y)) for y in starts)
-    return q.lower <= least * (1.0 + 1e-6)
+    return q.lower <= least + slack * (1.0 + abs(least))
 
 
 def are_contacts(w):

@@ -14,7 +14,8 @@ from grasp_core.geometry.polygons import edge_rows
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.optimizing.best.grounds import Grounds
-from grasp_core.optimizing.best.search import Found, Searching
+from grasp_core.optimizing.best.searching.parts import Found
+from grasp_core.optimizing.best.searching.search import Searching
 from grasp_core.optimizing.best.task_ascent import climbed_for_task, climbs_for_weight
 from grasp_core.solvers.ties import surpassing
 from grasp_core.values import FINGERS

@@ -3,7 +3,7 @@
 Solved: first nodes of a search that hold at least one image of every four contacts.
 
 Derivation. A symmetry that maps every piece of the faces to a piece, and the loads that count to
-such loads, keeps the quality of contacts. All keep wrenches of unit length, and the weight.
+such loads, keeps the measure of contacts. All keep wrenches of unit length, and the weight.
 Let pieces that symmetries map to each other form an orbit, with its first piece for all. Of the
 orbits on which contacts are, take the first, k. A symmetry moves a contact of this orbit to the
 orbit's first piece r_k; call it finger 0. The others are on pieces of the orbits from k on. The
@@ -16,7 +16,7 @@ which is a half-plane for each h.
 
 Each map is exact up to `EXACT`, in pieces, normals and products of maps, which a check of all maps
 and products shows. Two maps are applied at most, so that contacts are moved to within 1e-8 of
-others that the proof is about, with normals as near: their quality differs by less than
+others that the proof is about, with normals as near: their measure differs by less than
 1e-7 (1 + mu). Loads of a task are mapped to within `EXACT` of the longest load L, so that answers
 a(y) = t d(y), t L <= 8 (1 + mu), of unit twists are off by less than 2e-8 (1 + mu); those of the
 moved contacts are off by 5e-8 (1 + mu). Half-planes (1) are moved outwards by `WIDENED` for the
@@ -39,7 +39,7 @@ WIDENED = 1e-8
 MOST_MAPS = 128
 ASIDE = (0.37, 0.11)
 """Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
-KERNEL = "grasp_core.optimizing.best.cuts_kernel"
+KERNEL = "grasp_core.optimizing.best.searching.cuts_kernel"
 
 
 def exact_maps(body: Polyhedron, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> Array:

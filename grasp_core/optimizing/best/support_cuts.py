@@ -1,4 +1,4 @@
-"""Proves that no four contacts on given faces reach a quality, by asking who answers each twist.
+"""Proves that no four contacts on given faces reach a threshold, by asking who answers each twist.
 
 Solved: given a threshold t, a proof that a measure of any four contacts on the pieces of faces is
 below t: the Ferrari-Canny quality (`l1`, exact circular cones, torques over the object's radius, as
@@ -35,7 +35,7 @@ above, a point that answers all questions with s >= a + (1 + mu) k e, after k cu
 e < 2e-15, is within k e of the polygons of its node: its nearest point in the polygon before a cut
 has s >= a still, so that (2) leaves it in. With at most `MOST_CUTS` cuts above any node,
 
-    quality < t + (1 + mu) * ROUNDING                                                     (3)
+    measure < t + (1 + mu) * ROUNDING                                                     (3)
 
 has room for more than ten times this. Twists of length 1 - 1e-12 are taken for units.
 
@@ -56,11 +56,13 @@ takes the place of rounding in (3) and (4): `INEXACT` is added to `ROUNDING`.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices
 from grasp_core.by_value import ByValue
+from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.compiled import compiled
 from grasp_core.fields import is_a, is_array, is_indices, is_number
 from grasp_core.optimizing.best.grounds import Grounds
@@ -68,79 +70,55 @@ from grasp_core.optimizing.best.same_places import first_nodes, fitting
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 
 ROUNDING = 1e-9
-"""How far rounding can lift a quality above the threshold, over 1 + mu."""
+"""How far rounding can lift a measure above the threshold, over 1 + mu: the derivation needs less
+than a tenth of it."""
 MOST_CUTS = 10_000
-"""Largest number of cuts above a node."""
+"""Largest number of cuts above a node: hundreds are usual, and (3) is derived for no more."""
 SEARCHED_BELOW = 1e-9
 """How far below its threshold a proof is searched for, over 1 + mu, so that replaying it, with
 other roundings, meets no case that is just decided the other way."""
 INEXACT = 1e-7
-"""How far errors of symmetries can lift a quality, over 1 + mu."""
+"""How far errors of symmetries can lift a measure, over 1 + mu (see `same_places`)."""
 TWIST_SLACK = 1e-12
+"""How far unit twists may be from length one: their lengths are rounded by less than 1e-15, and a
+wrench is shorter than 8 (1 + mu), so that a support is off by a hundredth of `ROUNDING` at most."""
 LONGEST_TWIST = 2.0
+"""Longest twist for the Ferrari-Canny quality, the size for which rounding is bounded."""
+LEAST_THRESHOLD, MOST_THRESHOLD = 1e-6, 1e3
+"""Thresholds that are proved, times the longest load: a thousand times what rounding takes, and
+more than normal forces of sum one reach on contacts with coordinates up to two, at any friction
+below a hundred."""
 LONGEST_WRENCH = 8.0
 """More than the length of any wrench of forces with normal parts of sum one, over 1 + mu."""
 KERNEL = "grasp_core.optimizing.best.replay_kernel"
 
 
-@dataclass(frozen=True, slots=True)
-class Slack:
-    """What proofs leave for rounding, and searches for a replay with other roundings."""
+class Slack(NamedTuple):
+    """What a proof leaves for rounding and for errors of symmetries."""
 
-    friction: float
-    maps: int
-    """How many symmetries are used, the identity included."""
-    usual: bool
-    """Whether the measure is the Ferrari-Canny quality."""
+    raised: float
+    """How far its bound is above the threshold that it refutes, by (3)."""
+    lowered: float
+    """How far below threshold times demand supports are answers, by (4)."""
 
-    @property
-    def _lost(self) -> float:
-        lost = ROUNDING + (INEXACT if self.maps > 1 else 0.0)
-        return (1.0 + self.friction) * lost
-
-    @property
-    def _below(self) -> float:
-        return (1.0 + self.friction) * SEARCHED_BELOW
-
-    def bound(self, threshold: float) -> float:
-        """Return what no quality exceeds if a tree refutes a threshold, by (3) or (4)."""
-        return threshold + self._lost if self.usual else threshold
-
-    def threshold(self, bound: float) -> float:
-        """Return the threshold that proves a bound."""
-        return bound - self._lost if self.usual else bound
-
-    def searched(self, bound: float) -> float:
-        """Return the threshold to refute by search, so that a bound is proved in the end."""
-        return bound - (self._lost + self._below) if self.usual else bound
-
-    @property
-    def answers_below(self) -> float:
-        """Return how far below threshold times demand supports are answers in a proof, by (4)."""
-        return 0.0 if self.usual else self._lost
-
-    @property
-    def searched_below(self) -> float:
-        """Return how far below it they are answers in a search."""
-        return 0.0 if self.usual else self._lost + self._below
-
-    def refuted(self, reached: Array, demands: Array) -> Array:
-        """Return the least thresholds that twists refute alone, as searches do.
+    @classmethod
+    def of(cls, friction: float, maps: int, measure: Measure, more: float = 0.0) -> "Slack":
+        """Return the slack of proofs about a measure.
 
         Args:
-            reached: Largest supports that contacts have in the twists, (n,).
-            demands: Demands of the twists, (n,); none is refuted where that is zero.
+            friction: Coulomb coefficient.
+            maps: How many symmetries are used, the identity included.
+            measure: The loads; only the Ferrari-Canny quality raises the bound.
+            more: What is left in addition, over 1 + mu.
         """
-        spare = self._lost + self._below
-        if self.usual:
-            return reached + spare
-        with np.errstate(divide="ignore"):
-            return np.where(demands > 0.0, (np.maximum(reached, 0.0) + spare) / demands, np.inf)
+        lost = ROUNDING + (INEXACT if maps > 1 else 0.0)
+        slack = (1.0 + friction) * lost + (1.0 + friction) * more
+        return cls(slack, 0.0) if measure.is_usual else cls(0.0, slack)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CutTree(ByValue):
-    """A proof that contacts on the pieces of faces have a quality below a bound."""
+    """A proof that a measure of contacts on the pieces of faces is below a bound."""
 
     grounds: Grounds
     """Where contacts may be, at unit size."""
@@ -149,7 +127,7 @@ class CutTree(ByValue):
     """Symmetries that are used, matrices about the centre of mass, the identity first, (g, 3, 3).
     """
     threshold: float
-    """The quality that the tree refutes."""
+    """The multiple of the loads, or the Ferrari-Canny quality [N], that the tree refutes."""
     deeds: Indices
     """What is done at each node, parents before their children, the whole subtree of a child before
     the next child, (n,): the sum of 2**i over fingers i that may answer; 16 + i if finger i is on
@@ -172,12 +150,12 @@ class CutTree(ByValue):
 
     @property
     def bound(self) -> float:
-        """Return the quality that no contacts exceed."""
-        return self._slack.bound(self.threshold)
+        """Return the multiple, or the quality [N], that no contacts exceed."""
+        return self.threshold + self._slack.raised
 
     @property
     def _slack(self) -> Slack:
-        return Slack(self.friction, len(self.maps), self.measure.is_usual)
+        return Slack.of(self.friction, len(self.maps), self.measure)
 
     def verify(self) -> bool:
         """Replay the proof without the search, from the pieces, in plain arithmetic."""
@@ -190,7 +168,7 @@ class CutTree(ByValue):
         if not (
             is_a(self.grounds, Grounds)
             and self.grounds.sound()
-            and is_number(self.friction, least=0.0, most=1e3)
+            and is_number(self.friction, least=0.0, most=LARGEST_FRICTION)
             and is_a(self.measure, Measure)
             and self.measure.sound()
             and self._has_fitting_threshold()
@@ -211,16 +189,17 @@ class CutTree(ByValue):
 
     def _has_fitting_threshold(self) -> bool:
         if self.measure.is_usual:
-            return is_number(self.threshold, least=1e-6, most=1e3)
-        longest = LONGEST_WRENCH * (1.0 + self.friction) / self.measure.size
-        return is_number(self.threshold, least=1e-6 / self.measure.size, most=longest)
+            return is_number(self.threshold, least=LEAST_THRESHOLD, most=MOST_THRESHOLD)
+        size = self.measure.size
+        most = LONGEST_WRENCH * (1.0 + self.friction) / size
+        return is_number(self.threshold, least=LEAST_THRESHOLD / size, most=most)
 
     def _replayed(self) -> bool:
         kernel = compiled(KERNEL)
         corners, counts, fresh = first_nodes(self.grounds, self.maps)
         grounds = self.grounds
         # (4), or the threshold itself
-        answers = self.threshold * self.measure.demands(self.twists) - self._slack.answers_below
+        answers = self.threshold * self.measure.demands(self.twists) - self._slack.lowered
         return kernel.replay(
             kernel.Planes(grounds.normals, grounds.origins, grounds.frames, self.friction),
             corners, counts, fresh, self.deeds.astype(np.int64), self.asked.astype(np.int64),

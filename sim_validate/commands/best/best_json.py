@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.best_grasp import BestGrasp
+from grasp_core.optimizing.best.result import BestGrasp
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from sim_validate.records.best_schema import OTHER, USUAL

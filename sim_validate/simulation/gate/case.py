@@ -9,6 +9,7 @@ from grasp_core.arrays import Array
 from grasp_core.closure.contact_arrays import contact_frictions
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limit import limit_of
 from grasp_core.quality.wrench_limits import axis_wrenches
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
@@ -80,5 +81,5 @@ def tetrahedron(case: Case) -> tuple[Rig, list[Load]]:
     arms = np.array([contact.position for contact in contacts]) - body.center_of_mass
     frictions = contact_frictions(case.friction, len(contacts))
     resisted = WrenchBody(arms, body.normals, frictions, largest)
-    found = [resisted.limit(wrench) for wrench in axis_wrenches(body.radius)]
+    found = [limit_of(resisted, wrench) for wrench in axis_wrenches(body.radius)]
     return rig, [Load(limit.limit * limit.wrench, limit.forces) for limit in found]

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.execution import carried_mass as carried_mass_module
+from grasp_core.execution.ball_in_hull import ball_in
 from grasp_core.execution.carried_mass import GAP, carried_mass
-from grasp_core.execution.carrying_hand import CarryingHand
+from grasp_core.execution.carrying_hand import CarryingHand, HandPayload
 from tests.grasp_core.execution.held import box, directions, opposed, planned
-from tests.grasp_core.execution.jointed import LEVER_M, hand_of, pushing
+from tests.grasp_core.execution.jointed import LEVER_M, hand_of, jaws, lifting, pushing
 
 G = 9.80665
 PROGRAM = 1e-6
@@ -233,3 +235,116 @@ def test_a_mass_that_is_none_needs_no_forces_and_a_smaller_claim_is_one_too():
     assert dataclasses.replace(found, lower=0.0, **nothing).verify()
     assert not dataclasses.replace(found, **nothing).verify()
     assert dataclasses.replace(found, upper=2.0 * found.upper).verify()
+
+
+PUSHES = [1e2, 1e5, 1e7, 1e9]
+
+
+@pytest.mark.parametrize("push", PUSHES)
+def test_a_hand_that_is_held_back_by_motors_holds_as_much_whatever_its_largest_push(push):
+    """The same closed form as above; slacks are relative to forces that there are."""
+    weights = np.tile([0.0, 0.0, 0.05], (4, 1))
+    hand = carrying(box(), opposed(), pushing(opposed(), TORQUE), weights, 0.4, push)
+    links, most = 1.6 * 0.05 / LEVER_M, 1.6 * TORQUE / LEVER_M
+    square = 1.0 + 4.0 * 0.4**2
+    exact = (np.sqrt(links**2 + square * (most**2 - links**2)) - links) / (square * G)
+    found = carried_mass(hand)
+    assert exact * (1.0 - GAP - PROGRAM) <= found.lower <= exact * (1.0 + PROGRAM)
+    assert exact * (1.0 - PROGRAM) <= found.upper <= found.lower * (1.0 + GAP) * (1.0 + PROGRAM)
+    assert found.verify()
+    for change in (
+        {"upper": found.upper * (1.0 - 1e-6)}, {"forces": (1.0 + 1e-5) * found.forces},
+        {"gravities": (1.0 + 1e-5) * found.gravities}, {"lower": (1.0 + 1e-5) * found.lower},
+    ):  # fmt: skip
+        assert dataclasses.replace(found, **change).verify() is False, change
+
+
+def test_fingers_that_motors_do_not_hold_back_hold_what_is_held_with_less():
+    """Motors that feel forces along z only: pushes of a kilonewton hold all that they can."""
+    weights = np.tile([0.0, 0.0, 0.05], (4, 1))
+    motors, tested = lifting(4, TORQUE), 0
+    enough = carried_mass(carrying(box(), opposed(), motors, weights, 0.4, 1e3))
+    for push in (1e5, 1e7, 1e8):
+        found = carried_mass(carrying(box(), opposed(), motors, weights, 0.4, push))
+        assert found.verify()
+        assert found.lower == pytest.approx(enough.lower, rel=GAP)
+        assert found.upper == pytest.approx(enough.upper, rel=GAP)
+        tested += found.hand.push_n == push
+    assert tested == 3
+
+
+@pytest.mark.parametrize("push", [10.0, 1e5, 1e9])
+def test_no_weight_is_held_by_what_large_forces_may_miss(push):
+    """Fingers without friction squeeze, and carry the weight with a millionth of that, across."""
+    none = gc.Motors.of(np.zeros((0, 12)), 1.0)
+    hand = carrying(box(), opposed(), none, np.zeros((0, 3)), 0.0, push)
+    corners = np.sqrt(3.0) * np.vstack([np.eye(3), -np.eye(3)])
+    triangles = np.array([[x, y, z] for x in (0, 3) for y in (1, 4) for z in (2, 5)])
+    odd = [sum(corner >= 3 for corner in each) % 2 == 1 for each in triangles]
+    triangles[odd] = triangles[odd][:, ::-1]
+    mass = 1e-8 * push / G
+    squeeze = 0.5 * push * hand.normals
+    carried = np.broadcast_to(-0.25 * G * mass * corners[:, None], (6, 4, 3))
+    facet = carried_mass(hand).facet
+    claim = HandPayload(mass, push, corners, squeeze + carried, triangles, facet, np.zeros(0), hand)
+    assert ball_in(corners, triangles) >= 1.0 - 1e-12
+    assert claim.verify() is False
+
+
+def test_no_finger_pushes_harder_than_counts():
+    """Forces at random, as large as the torques in some orientation allow."""
+    rng, tested = np.random.default_rng(11), 0
+    for hand in hands():
+        free = dataclasses.replace(hand, max_push_n=1e6)
+        forces = rng.normal(size=(4000, 4, 3))
+        forces[:1000] += 3.0 * hand.normals
+        normal = np.einsum("nki,ki->nk", forces, hand.normals)
+        across = forces - normal[..., None] * hand.normals
+        sizes = np.linalg.norm(across, axis=2)
+        held = np.minimum(sizes, 0.5 * np.abs(normal)) / sizes
+        forces = np.abs(normal)[..., None] * hand.normals + held[..., None] * across
+        torques = np.abs(forces.reshape(-1, 12) @ hand.motors.levers.T)
+        room = hand.motors.limits + np.linalg.norm(hand.weights, axis=1)
+        forces /= (torques / room).max(axis=1)[:, None, None]
+        pushes = np.einsum("nki,ki->nk", forces, hand.normals)
+        assert pushes.max() <= free.push_n < 1e4
+        assert hand.push_n <= hand.max_push_n
+        tested += pushes.max() >= 0.05 * free.push_n
+    assert tested >= 4
+
+
+def test_pushes_that_motors_feel_are_bounded_by_them_to_a_factor_of_two():
+    """Behind each finger a joint, or one behind each side: pushes of (c + w) / l in all."""
+    weights = np.tile([0.0, 0.0, 0.05], (4, 1))
+    most = (TORQUE + 0.05) / LEVER_M
+    alone = carrying(box(), opposed(), pushing(opposed(), TORQUE), weights, push=1e6)
+    sides = carrying(box(), opposed(), jaws(opposed(), TORQUE), weights[:2], push=1e6)
+    assert most <= alone.push_n <= 2.0 * most
+    assert most <= sides.push_n <= 4.0 * most
+    assert dataclasses.replace(alone, max_push_n=0.5).push_n == 0.5
+
+
+def test_where_no_mass_is_claimed_there_are_no_forces():
+    found = carried_mass(next(iter(hands())))
+    for forces in (found.forces, 100.0 * found.forces):
+        assert dataclasses.replace(found, lower=0.0, forces=forces).verify() is False
+
+
+@pytest.mark.parametrize("gap", [0.0, -1.0, 1e-5, 1.0, np.nan])
+def test_gaps_that_are_never_reached_are_refused(gap):
+    with pytest.raises(gc.InputError, match="gap must be"):
+        carried_mass(next(iter(hands())), gap)
+
+
+def test_a_search_out_of_rays_ends_after_a_few_steps_with_a_smaller_mass(monkeypatch):
+    hand = next(iter(hands()))
+    fine, hulls = carried_mass(hand), []
+    monkeypatch.setattr(carried_mass_module, "RAYS", 6)
+    facet = carried_mass_module.nearest_facet
+    monkeypatch.setattr(
+        carried_mass_module, "nearest_facet", lambda ends: hulls.append(1) or facet(ends)
+    )
+    found = carried_mass(hand, 1e-4)
+    assert found.verify()
+    assert 0.1 * fine.lower < found.lower < 0.99 * fine.lower
+    assert 6 < len(hulls) < 30

@@ -8,6 +8,7 @@ import grasp_core as gc
 from grasp_core.closure.wrenches import contact_frames, grasp_map
 from grasp_core.cones.pyramids import PYRAMID_SIDES
 from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limit import limit_of
 from grasp_core.quality.wrench_limits import axis_wrenches
 from scenes.example_objects import example_object
 from tests.judges import random_contacts
@@ -28,7 +29,7 @@ def cases(per_object=4):
                 grasp.positions - body.center_of_mass, grasp.normals, np.full(4, 0.5), LIMITS[1]
             )
             for wrench in axis_wrenches(body.radius):
-                yield body, grasp, 0.8 * resisted.limit(wrench).limit * wrench
+                yield body, grasp, 0.8 * limit_of(resisted, wrench).limit * wrench
 
 
 def imbalance(grasp, forces, wrench, center):

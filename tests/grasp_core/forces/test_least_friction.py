@@ -8,6 +8,7 @@ from grasp_core.forces.contact_forces import (
     least_friction_forces,
 )
 from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limit import limit_of
 from tests.grasp_core.forces.loads import LIMITS, SLACK, balanced_wrenches, cases
 from tests.judges import random_contacts
 
@@ -23,7 +24,7 @@ def test_least_friction_is_near_the_true_minimum():
         lower, upper = 0.0, 0.5
         for _ in range(20):
             middle = 0.5 * (lower + upper)
-            limit = WrenchBody(arms, grasp.normals, np.full(4, middle), LIMITS[1]).limit(wrench)
+            limit = limit_of(WrenchBody(arms, grasp.normals, np.full(4, middle), LIMITS[1]), wrench)
             lower, upper = (lower, middle) if limit.limit >= 1.0 else (middle, upper)
         _, needed = least_friction_forces(
             grasp.positions, grasp.normals, 0.5, wrench,
@@ -46,7 +47,7 @@ def test_least_friction_uses_the_least_share_of_frictions_that_differ():
         lower, upper = 0.0, 1.0
         for _ in range(20):
             middle = 0.5 * (lower + upper)
-            limit = WrenchBody(positions, normals, middle * friction, 10.0).limit(load)
+            limit = limit_of(WrenchBody(positions, normals, middle * friction, 10.0), load)
             lower, upper = (lower, middle) if limit.limit >= 1.0 else (middle, upper)
         forces = contact_forces(
             positions, normals, friction, load, objective="least_friction", normal_force=(0.0, 10.0)

@@ -8,6 +8,7 @@ from scipy.spatial import ConvexHull
 import grasp_core as gc
 from grasp_core.quality import ferrari_canny as module
 from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limit import limit_of
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
 
 TETRA = TETRA_CENTERS, TETRA_NORMALS, 0.5
@@ -124,7 +125,7 @@ def test_bounded_forces_resist_the_weakest_wrench_exactly_so_far():
         found = gc.ferrari_canny(positions, normals, 0.7, torque_scale=1.0, norm="linf")
         if found.lower > 0.0:
             body = WrenchBody(positions, normals, np.full(4, 0.7), 1.0)
-            limit = body.limit(-found.direction).limit
+            limit = limit_of(body, -found.direction).limit
             assert found.lower * (1 - 1e-9) <= limit <= found.upper * (1 + 1e-6)
             tested += 1
 

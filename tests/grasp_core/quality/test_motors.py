@@ -8,6 +8,7 @@ import grasp_core as gc
 from grasp_core.closure.wrenches import grasp_map
 from grasp_core.quality.weakest_wrench import SETTLED, weakest_from
 from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limit import limit_of
 from grasp_core.quality.wrench_limits import axis_wrenches
 from tests.judges import random_contacts
 
@@ -230,17 +231,17 @@ def test_the_search_for_the_weakest_wrench_knows_motors():
         motors = hand_of(rng, 4)
         body = WrenchBody(positions, normals, np.full(4, 0.6), 3.0, motors)
         free = WrenchBody(positions, normals, np.full(4, 0.6), 3.0)
-        limits = [body.limit(wrench) for wrench in axis_wrenches(1.0)]
+        limits = [limit_of(body, wrench) for wrench in axis_wrenches(1.0)]
         found = weakest_from(body, limits, 1.0)
         given = {"max_normal_force": 3.0, "motors": motors}
         assert found.verify(positions, normals, 0.6, **given)
         assert np.linalg.norm(found.wrench) == pytest.approx(1.0)
         assert found.limit <= min(each.limit for each in limits)
-        facing = body.limit(-found.facet / np.linalg.norm(found.facet))
+        facing = limit_of(body, -found.facet / np.linalg.norm(found.facet))
         assert found.limit * (1.0 - SETTLED) <= facing.limit <= found.limit * (1.0 + 1e-6)
         wrenches = rng.normal(size=(250, 6))
         wrenches /= np.linalg.norm(wrenches, axis=1, keepdims=True)
-        assert found.limit <= min(body.limit(wrench).limit for wrench in wrenches)
-        lowered += found.limit < 0.9 * free.limit(found.wrench).limit
+        assert found.limit <= min(limit_of(body, wrench).limit for wrench in wrenches)
+        lowered += found.limit < 0.9 * limit_of(free, found.wrench).limit
         tested += 1
     assert lowered >= 1

@@ -90,11 +90,22 @@ def test_a_task_is_bounded_by_twists_and_attained_by_forces(name):
         asked = np.maximum(-(y @ task.loads.T).min(axis=1), 0.0)
         positive = asked > 0.0
         assert found.lower <= (wrenches.supports(y[positive]) / asked[positive]).min() * (1 + 1e-9)
-        # minus the multiple of each load is a wrench of forces in the cones, of sum one
+        # minus a multiple of each load is a wrench of forces in the cones, of sum one
         made = found.forces @ wrenches.G.T
-        assert np.abs(made[:-1] + found.lower * task.loads).max() <= 1e-7
-        assert np.abs(made[-1]).max() <= 1e-7
-        assert np.abs(found.forces.reshape(len(made), -1, 3)[:, :, 0].sum(axis=1) - 1).max() <= 1e-7
+        sizes = np.linalg.norm(task.loads, axis=1)
+        along = -(made * task.loads).sum(axis=1) / sizes**2
+        rests = np.linalg.norm(made + along[:, None] * task.loads, axis=1)
+        assert rests.max() <= 1e-7
+        assert along.min() >= found.lower >= along.min() * (1.0 - 1e-6)
+        each = found.forces.reshape(len(made), -1, 3)
+        across = np.linalg.norm(each[:, :, 1:], axis=2)
+        assert (across <= 0.5 * each[:, :, 0] * (1.0 + 1e-12)).all()
+        assert np.abs(each[:, :, 0].sum(axis=1) - 1).max() <= 1e-12
+        # the quality is the ball that takes the rests
+        quality = wrench_set_quality(wrenches)
+        assert 0.0 < found.ball.lower <= quality.upper
+        shown = along / (1.0 + rests / found.ball.lower)
+        assert found.lower <= shown.min() * (1.0 + 1e-12)
 
 
 def test_multiples_scale_with_loads_and_a_larger_task_is_not_easier():
@@ -115,6 +126,51 @@ def test_contacts_that_are_not_closed_resist_nothing():
         assert found.lower < 0.0 <= found.upper
         assert found.upper == 0.0
         assert found.verify()
+        # a negative bound claims nothing, and nothing beside it is left unchecked
+        closed = resisted_loads(planned("tetrahedron")[0], measure)
+        assert not replace(found, ball=closed.ball or wrench_set_quality(wrenches)).verify()
+        assert not replace(found, forces=np.zeros((4, 12))).verify()
+        assert not replace(closed, lower=-0.5).verify()
+        assert not replace(closed, lower=found.lower).verify()
+        assert not replace(found, lower=2.0 * found.lower).verify()
+
+
+def test_what_a_program_misses_is_paid_for_in_full():
+    """Forces that miss a load by a little prove as much less, by the ball that is left for it."""
+    rng = np.random.default_rng(6)
+    wrenches, task = planned("tetrahedron")[0], some_task(rng)
+    found = resisted_loads(wrenches, task)
+    each = found.forces.reshape(len(task.loads), -1, 3)
+    for miss in (1e-10, 1e-8, 1e-6, 1e-3):
+        pushes = each[:, :, 0] + miss * rng.uniform(size=each.shape[:2])
+        off = np.concatenate([pushes[:, :, None], (1.0 - 2.0 * miss) * each[:, :, 1:]], axis=2)
+        off = (off / pushes.sum(axis=1)[:, None, None]).reshape(len(each), -1)
+        assert not replace(found, forces=off).verify()
+        less = found.lower * (1.0 - 10.0 * miss / found.ball.lower)
+        assert replace(found, lower=max(less, 0.0), forces=off).verify()
+    assert not replace(found, lower=found.lower * (1.0 + 1e-9), upper=2.0 * found.upper).verify()
+
+
+def test_equal_loads_are_limited_by_the_first_of_them():
+    """Loads along the axes of an octahedron that differ in their last digits only."""
+    axes, wrenches = np.eye(6)[:3], arranged(OCTAHEDRON, 0.3)
+    for off in (1e-10, -1e-10, 1e-13):
+        for order in ([0, 1, 2], [2, 0, 1]):
+            loads = (1.0 + off * np.arange(3)[:, None]) * axes[order]
+            found = resisted_loads(wrenches, Measure("task", loads))
+            assert (-axes @ found.direction).argmax() == order[0]
+            assert found.upper == pytest.approx(1.0, abs=1e-8)
+            assert found.verify()
+
+
+def test_a_wrench_that_is_zero_or_huge_is_named():
+    good = np.eye(6)
+    for bad, told in ((0.0, "row 3 must be .* got 0"), (1e12, "row 3 must be .* got 1e")):
+        rows = np.vstack([good[:3], bad * good[0], bad * good[1]])
+        with pytest.raises(gc.InputError, match=told):
+            Measure.of("task", rows, 1.0)
+    with pytest.raises(gc.InputError, match="1 to 100 wrenches, got 101"):
+        Measure.of("task", np.tile(good[0], (101, 1)), 1.0)
 
 
 @pytest.mark.parametrize("measure", [WEIGHT, some_task(np.random.default_rng(5))])
@@ -131,6 +187,8 @@ def test_changed_bounds_are_refused(measure):
         assert not replace(found, ball=weaker).verify()
     else:
         assert not replace(found, forces=1.01 * found.forces).verify()
+        assert not replace(found, ball=None).verify()
+        assert not replace(found, ball=wrench_set_quality(planned("box")[0])).verify()
         assert not replace(found, forces=found.forces[:-1]).verify()
 
 

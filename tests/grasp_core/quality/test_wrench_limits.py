@@ -5,8 +5,10 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.wrenches import grasp_map, normal_and_tangential
+from grasp_core.quality import wrench_body
 from grasp_core.quality.weakest_wrench import weakest_from
 from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limit import limit_of
 from grasp_core.quality.wrench_limits import axis_wrenches, max_resisted_wrench
 from scenes.example_objects import example_object
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
@@ -36,7 +38,7 @@ def test_limits_are_attained_by_forces_and_bounded_by_their_facets():
         positions, normals = random_contacts(rng)
         body = WrenchBody(positions, normals, np.full(4, 0.4), 3.0)
         wrench = rng.normal(size=6)
-        found = body.limit(wrench)
+        found = limit_of(body, wrench)
         along, across = normal_and_tangential(found.forces, normals)
         assert (across <= 0.4 * along + 1e-6).all()
         assert along.max() <= 3.0 + 1e-6
@@ -66,11 +68,12 @@ def test_the_weakest_wrench_is_weaker_than_axes_and_random_wrenches():
                 grasp.positions - body.center_of_mass, grasp.normals, np.full(4, 0.5), 10.0
             )
             axes = axis_wrenches(body.radius)
-            weakest = weakest_from(resisted, map(resisted.limit, axes), body.radius)
+            first = [limit_of(resisted, axis) for axis in axes]
+            weakest = weakest_from(resisted, first, body.radius)
             assert np.linalg.norm(weakest.wrench / scale) == pytest.approx(1.0)
             others = rng.normal(size=(30, 6))
             others = others / np.linalg.norm(others, axis=1, keepdims=True) * scale
-            limits = [resisted.limit(w).limit for w in (*axes, *others)]
+            limits = [limit_of(resisted, w).limit for w in (*axes, *others)]
             assert weakest.limit <= min(limits) * (1 + 1e-6)
             tested += 1
     assert tested == 12
@@ -140,3 +143,19 @@ def test_a_long_facet_that_does_no_work_bounds_nothing():
         found, limit=0.0, upper=0.0, forces=0.0 * found.forces, facet=about_line
     )
     assert not false.verify(points, normals, 0.5, max_normal_force=1.0)
+
+
+@pytest.mark.parametrize("share", [0.0, -1.0])
+def test_multipliers_without_power_bound_nothing(monkeypatch, share):
+    """They are an error, not a facet at infinity or on the other side."""
+
+    def powerless(program):
+        answer = minimize(program)
+        return dataclasses.replace(answer, z=share * answer.z)
+
+    minimize = wrench_body.minimize
+    monkeypatch.setattr(wrench_body, "minimize", powerless)
+    positions, normals = np.vstack([np.eye(3), -np.eye(3)]), np.vstack([-np.eye(3), np.eye(3)])
+    body = WrenchBody(positions, normals, np.full(6, 0.4), 3.0)
+    with pytest.raises(gc.SolverError, match="power"):
+        limit_of(body, np.eye(6)[0])

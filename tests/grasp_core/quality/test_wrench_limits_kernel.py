@@ -6,9 +6,8 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import compiled
-from grasp_core.quality import wrench_body
-from grasp_core.quality.wrench_body import CLOSE, KERNEL, WrenchBody
-from grasp_core.quality.wrench_limits import many_limits
+from grasp_core.quality import wrench_limits
+from grasp_core.quality.wrench_limits import CLOSE, KERNEL, many_limits
 from scenes.example_objects import example_object
 
 COUNT = 60
@@ -45,10 +44,8 @@ def test_limits_are_those_of_the_conic_program(name, friction, monkeypatch):
         grasp, None, friction, wrenches, max_normal_force=7.0, center=body.center_of_mass
     )
     alone = []
-    limit = WrenchBody.limit
-    monkeypatch.setattr(
-        WrenchBody, "limit", lambda self, wrench: alone.append(1) or limit(self, wrench)
-    )
+    limit = wrench_limits.limit_of
+    monkeypatch.setattr(wrench_limits, "limit_of", lambda *given: alone.append(1) or limit(*given))
     found = many(*case)
     np.testing.assert_allclose(found, [each.limit for each in expected], rtol=11.0 * CLOSE)
     if friction == 0.5:
@@ -74,5 +71,5 @@ def test_what_is_wrong_is_solved_by_itself(monkeypatch):
                 kernel.limits(contacts, loads, *filled)
                 spoil(*filled)
 
-        monkeypatch.setattr(wrench_body, "compiled", lambda _, other=Spoiled: other)
+        monkeypatch.setattr(wrench_limits, "compiled", lambda _, other=Spoiled: other)
         np.testing.assert_allclose(many(*case), expected, rtol=11.0 * CLOSE)

@@ -20,6 +20,7 @@ from grasp_core.optimizing.better_contacts import pieces_under
 from grasp_core.planning.given_contacts import seat
 from grasp_core.quality import weakest_wrench
 from grasp_core.quality.wrench_body import WrenchBody
+from grasp_core.quality.wrench_limit import limit_of
 from grasp_core.quality.wrench_limits import axis_wrenches
 from grasp_core.records.contacts_json import ContactSet
 from grasp_core.regions.centers import larger_inside
@@ -221,7 +222,7 @@ def test_the_weakest_wrench_is_sought_from_the_first_of_equally_weak_ones(monkey
         grasp.positions - body.center_of_mass, grasp.normals, np.full(4, 0.5), 20.0
     )
     monkeypatch.setattr(weakest_wrench, "_descend", lambda _body, start, _scale: start)
-    limits = [resisted.limit(wrench) for wrench in axis_wrenches(body.radius)]
+    limits = [limit_of(resisted, wrench) for wrench in axis_wrenches(body.radius)]
     rng, least = np.random.default_rng(6), min(found.limit for found in limits)
     equal = [found for found in limits if found.limit <= least * (1.0 + 1e-7)]
     assert len(equal) >= 3

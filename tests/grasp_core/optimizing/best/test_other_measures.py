@@ -10,12 +10,15 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
-from grasp_core.optimizing.best import best_grasp as searching
+from grasp_core.optimizing.best import levels as searching
 from grasp_core.optimizing.best.grounds import grounds_of
 from grasp_core.optimizing.best.proof_file import read_proof, write_proof
 from grasp_core.optimizing.best.same_places import exact_maps
-from grasp_core.optimizing.best.search import DEEP, Searching, Stop
+from grasp_core.optimizing.best.searching.parts import DEEP
+from grasp_core.optimizing.best.searching.search import Searching
+from grasp_core.optimizing.best.searching.stop import Stop
 from grasp_core.optimizing.best.support_cuts import ROUNDING, CutTree
+from grasp_core.optimizing.best.task_ascent import _weakest
 from grasp_core.quality.measures import Measure
 from grasp_core.quality.resisted_loads import ResistedLoads, resisted_loads
 from scenes.example_objects import example_object
@@ -274,7 +277,7 @@ def test_compiled_demands_are_those_of_the_definition(measure):
         assert asked == pytest.approx(max(hardest @ y, 0.0), abs=1e-13)
 
 
-TWISTS = "grasp_core.optimizing.best.twists_kernel"
+TWISTS = "grasp_core.optimizing.best.searching.twists_kernel"
 
 
 def test_the_proof_is_the_same_on_any_number_of_threads():
@@ -299,3 +302,17 @@ def test_the_proof_is_the_same_on_any_number_of_threads():
 def test_what_does_not_fit_is_refused(changed, told):
     with pytest.raises(gc.InputError, match=told):
         gc.best_grasp(example_object("tetrahedron"), FRICTION, **changed)
+
+
+def test_weak_directions_are_ordered_without_last_digits():
+    """The eight facets of an octahedron hold as much as each other, however long normals are."""
+    places = np.vstack([np.eye(3), -np.eye(3)])
+    wrenches = WrenchSet.at(places, -places, np.full(6, 0.3))
+    found = resisted_loads(wrenches, Measure("weight"), 1e-3)
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    facing, rng = np.hstack([signs, np.zeros((8, 3))]), np.random.default_rng(0)
+    for _ in range(8):
+        normals = rng.uniform(0.5, 2.0, size=(8, 1)) * facing
+        polytope = replace(found.ball.polytope, normals=normals)
+        again = _weakest(replace(found, ball=replace(found.ball, polytope=polytope)))
+        assert np.abs(again + signs / np.sqrt(3.0)).max() <= 1e-12

@@ -1,4 +1,4 @@
-"""Refutes that contacts in given polygons reach a quality, by asking who answers, compiled.
+"""Refutes that contacts in given polygons reach a threshold, by asking who answers, compiled.
 
 Solved: the search of `support_cuts`, depth first, from one node to the end of its subtree or to the
 next moment at which the caller must decide something.
@@ -8,9 +8,9 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
-from grasp_core.optimizing.best.asking_kernel import ask, choose, look, look_again
-from grasp_core.optimizing.best.cuts_kernel import MOST_CORNERS, Pieces
-from grasp_core.optimizing.best.nodes_kernel import (
+from grasp_core.optimizing.best.searching.asking_kernel import ask, choose, look, look_again
+from grasp_core.optimizing.best.searching.cuts_kernel import MOST_CORNERS, Pieces
+from grasp_core.optimizing.best.searching.nodes_kernel import (
     ALL,
     FINGERS,
     SPLICE,
@@ -19,11 +19,11 @@ from grasp_core.optimizing.best.nodes_kernel import (
     is_full,
     note,
 )
-from grasp_core.optimizing.best.twists_kernel import descend, learn, multiple
+from grasp_core.optimizing.best.searching.twists_kernel import descend, learn, multiple
 
 DONE, PAUSED, FULL, PART, FOUND, LOST = 0, 1, 2, 3, 4, 5
 """Why a run ends: nothing left, budget of nodes spent, no room in the tree, a node that is to be a
-part of its own, contacts that may reach the quality, a node too small to be divided."""
+part of its own, contacts that may reach the threshold, a node too small to be divided."""
 ASKED_ABOVE = 1.3
 """Cost of a question up to which it is asked rather than dividing a polygon, which costs 1.41."""
 STEPS, CLOSE_STEPS = 40, 120
@@ -57,7 +57,7 @@ def run(search: Search, budget: int, part_depth: int) -> int:
 
 @loop("numpy")
 def _visit(search: Search, node: int, now: int) -> bool:
-    """Replace a node by its children; False if its middle may reach the quality, or it is tiny.
+    """Replace a node by its children; False if its middle may reach the threshold, or it is tiny.
 
     Where it is tiny, the first of `work.on` is negative.
     """

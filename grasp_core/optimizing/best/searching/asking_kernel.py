@@ -7,8 +7,8 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
-from grasp_core.optimizing.best.cuts_kernel import MOST_CORNERS, area, cut, extent
-from grasp_core.optimizing.best.nodes_kernel import (
+from grasp_core.optimizing.best.searching.cuts_kernel import MOST_CORNERS, area, cut, extent
+from grasp_core.optimizing.best.searching.nodes_kernel import (
     ALL,
     ASK,
     FINGERS,

@@ -1,4 +1,4 @@
-"""Searches for a tree of cuts that refutes a quality, on all cores, the same tree on any number.
+"""Searches for a tree of cuts that refutes a threshold, on all cores, the same tree on any number.
 
 A level of the search refutes one threshold. Its tree is begun by one thread up to a depth; each
 node left there is a part of its own, searched with its own twists. Parts are searched in waves of a
@@ -8,10 +8,9 @@ tree that refutes one threshold must visit all of its nodes in any order, and th
 means here the loosest threshold first (see `best_grasp`).
 """
 
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,69 +18,44 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
-from grasp_core.optimizing.best.grounds import ROOM, Grounds
-from grasp_core.quality.ferrari_canny import FerrariCanny, wrench_set_quality
+from grasp_core.optimizing.best.grounds import Grounds
+from grasp_core.optimizing.best.searching.parts import (
+    NODES,
+    POOL,
+    Found,
+    Part,
+    Steps,
+    copied,
+    enlarge,
+    joined,
+    part_from,
+    room,
+)
+from grasp_core.optimizing.best.searching.stop import Stop
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
-from grasp_core.quality.resisted_loads import ResistedLoads, resisted_loads
+from grasp_core.quality.resisted_loads import measured_set
 from grasp_core.values import FINGERS
 
-KERNEL = "grasp_core.optimizing.best.search_kernel"
-NODES = "grasp_core.optimizing.best.nodes_kernel"
-CUTS, TWISTS = "grasp_core.optimizing.best.cuts_kernel", "grasp_core.optimizing.best.twists_kernel"
-POOL = 512
-"""Twists that a search keeps."""
-DEEP = 320
-"""Nodes that may wait in one part."""
+KERNEL = "grasp_core.optimizing.best.searching.search_kernel"
+CUTS = "grasp_core.optimizing.best.searching.cuts_kernel"
+TWISTS = "grasp_core.optimizing.best.searching.twists_kernel"
 PART_DEPTH = 7
-"""Nodes with several children above a node that becomes a part of its own."""
+"""Nodes with several children above a node that becomes a part of its own: a full tree has at least
+128 such parts, four waves of them."""
 WAVE = 32
-"""Parts that are searched from the same twists."""
+"""Parts that are searched from the same twists: more threads would find nothing to do, and twists
+that a part finds are of no use to the others of its wave."""
 KEPT = 384
-"""Twists that a wave hands on at most."""
+"""Twists that a wave hands on at most: three quarters of a pool, so that as many of the old ones
+stay."""
 BUDGET = 2000
 """Nodes after which a thread looks whether it should stop: some tenths of a second."""
-FIRST_ROOM = 4096
-"""Nodes for which a part's tree has room at first; it is doubled when it is full."""
 MUCH = 1.1
 """Ratio of qualities from which on contacts are a better start for other thresholds, where the
 measure is not the usual one and the first contacts may be poor."""
 EXACT_GAP = 1e-5
-"""Gap between the bounds of the quality of contacts that may be better."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """Contacts whose quality is known."""
-
-    pieces: tuple[int, ...]
-    """The piece of each contact, (4,)."""
-    at: Array
-    """Plane coordinates, (4, 2)."""
-    quality: FerrariCanny | ResistedLoads
-
-    def __post_init__(self) -> None:
-        self.at.setflags(write=False)
-
-
-@dataclass(slots=True, eq=False)
-class Part:
-    """A subtree and the state of its search."""
-
-    stack: Any
-    tree: Any
-    pool: Any
-    found: list[Found] = field(default_factory=list[Found])
-    finished: bool = False
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Steps:
-    """The nodes of a tree as `CutTree` lists them."""
-
-    deeds: Indices
-    asked: Indices
-    twists: Array
-    lines: Array
+"""Gap between the bounds of the measure of contacts that may be better: a tenth of the smallest gap
+that a search may be asked for."""
 
 
 @dataclass(slots=True, eq=False)
@@ -91,7 +65,7 @@ class Searching:
     grounds: Grounds
     friction: float
     jobs: int
-    stop: "Stop"
+    stop: Stop
     measure: Measure = FERRARI_CANNY
     spare: float = 0.0
     """How far below threshold times demand a support still counts as an answer."""
@@ -101,6 +75,11 @@ class Searching:
 
     def __post_init__(self) -> None:
         self.pool = self.empty_pool()
+
+    @property
+    def count(self) -> int:
+        """Return the number of pieces."""
+        return len(self.grounds.counts)
 
     @property
     def pieces(self) -> Any:
@@ -120,9 +99,8 @@ class Searching:
 
     def empty_pool(self) -> Any:
         """Return a pool without twists."""
-        pieces = len(self.grounds.counts)
         return compiled(TWISTS).Pool(
-            np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((pieces, 6, POOL)),
+            np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((self.count, 6, POOL)),
             np.zeros(POOL, np.int64),
             np.full(POOL, -1), np.zeros(1, np.int64),
         )  # fmt: skip
@@ -141,16 +119,16 @@ class Searching:
 
         Args:
             nodes: What `first_nodes` returns.
-            threshold: The quality.
-            known: A quality that is attained.
+            threshold: The quality, or the multiple of the loads.
+            known: One that is attained.
             progress: Called with the share of the parts that are done.
 
         Returns:
             The tree, or None if it was stopped or contacts reach the threshold; contacts found that
             are better than known.
         """
-        trunk = self._part(nodes)
-        trunk.pool = _copied(self.pool)
+        trunk = part_from(nodes, self.count)
+        trunk.pool = copied(self.pool)
         parts: list[Part] = []
         better: list[Found] = []
         for part in self._begun(trunk, threshold, known):
@@ -163,7 +141,7 @@ class Searching:
             for start in range(0, len(parts), WAVE):
                 wave = parts[start : start + WAVE]
                 for part in wave:
-                    part.pool = _copied(self.pool)
+                    part.pool = copied(self.pool)
                 self._together(threads, wave, threshold, known)
                 self._hand_on(wave)
                 self.nodes += sum(int(part.tree.sizes[0]) for part in wave)
@@ -171,7 +149,7 @@ class Searching:
                 if not all(part.finished for part in wave):
                     return None, better
                 progress(min(1.0, (start + WAVE) / len(parts)))
-        return _joined(trunk, parts), better
+        return joined(trunk, parts), better
 
     def _together(
         self, threads: ThreadPoolExecutor, wave: Sequence[Part], threshold: float, known: float
@@ -184,23 +162,6 @@ class Searching:
             self.stop.now()
             raise
 
-    def _part(self, first: tuple[Array, Indices, Indices]) -> Part:
-        nodes, pieces = compiled(NODES), len(self.grounds.counts)
-        corners, counts, fresh = first
-        deep = max(DEEP, len(corners) + FINGERS + 1)
-        stack = nodes.Stack(
-            np.zeros((deep, FINGERS, pieces, ROOM, 2)),
-            np.zeros((deep, FINGERS, pieces), np.int64),
-            np.zeros((deep, FINGERS), np.int64), np.zeros(deep, np.int64), np.zeros(1, np.int64),
-        )  # fmt: skip
-        n = len(corners)
-        # the last one is searched first
-        stack.corners[:n], stack.counts[:n], stack.fresh[:n] = (
-            corners[::-1], counts[::-1], fresh[::-1],
-        )  # fmt: skip
-        stack.top[0] = n
-        return Part(stack, _empty_tree(FIRST_ROOM), None)
-
     def _begun(self, trunk: Part, threshold: float, known: float) -> Iterator[Part]:
         """Search the beginning of a tree, and yield a part for each node that is left."""
         kernel = compiled(KERNEL)
@@ -208,12 +169,13 @@ class Searching:
             if why == kernel.PART:
                 node = int(trunk.stack.top[0]) - 1
                 stack = trunk.stack
-                yield self._part(
+                yield part_from(
                     (
                         stack.corners[node : node + 1].copy(),
                         stack.counts[node : node + 1].copy(),
                         stack.fresh[node : node + 1].copy(),
-                    )
+                    ),
+                    self.count,
                 )
                 stack.top[0] = node
 
@@ -225,7 +187,7 @@ class Searching:
     def _runs(self, part: Part, threshold: float, known: float, depth: int) -> Iterator[int]:
         """Run the kernel until a part is done, and yield why it pauses for the caller."""
         kernel, nodes, pieces = compiled(KERNEL), compiled(NODES), self.pieces
-        work, demand = _room(), self.demand
+        work, demand = room(), self.demand
         while not self.stop():
             search = nodes.Search(
                 pieces, part.stack, part.pool, part.tree, work, threshold, demand, self.spare
@@ -237,7 +199,7 @@ class Searching:
             if why == kernel.LOST:
                 return
             if why == kernel.FULL:
-                _enlarge(part)
+                enlarge(part)
             elif why == kernel.FOUND and not self._is_refuted(part, work, threshold, known):
                 return
             yield why
@@ -255,13 +217,10 @@ class Searching:
         return True
 
     def measured(self, on: Indices, at: Array) -> Found:
-        """Bound the quality of contacts on pieces, (4,), at plane coordinates, (4, 2)."""
+        """Bound the measure of contacts on pieces, (4,), at plane coordinates, (4, 2)."""
         points = np.array([self.grounds.places(p, y[None])[0] for p, y in zip(on, at, strict=True)])
         wrenches = WrenchSet.at(points, self.grounds.normals[on], np.full(FINGERS, self.friction))
-        if self.measure.is_usual:
-            quality = wrench_set_quality(wrenches, EXACT_GAP)
-        else:
-            quality = resisted_loads(wrenches, self.measure, EXACT_GAP)
+        quality = measured_set(wrenches, self.measure, EXACT_GAP)
         return Found(tuple(int(p) for p in on), np.array(at), quality)
 
     def _hand_on(self, wave: Sequence[Part]) -> None:
@@ -274,88 +233,3 @@ class Searching:
             fresh = [y for y in part.pool.twists[newest] if y.tobytes() not in old]
             self.learn(np.array(fresh).reshape(-1, 6), now=part.tree.sizes[0])
             part.pool = None
-
-
-def _copied(pool: Any) -> Any:
-    copies = type(pool)(*(array.copy() for array in pool))
-    copies.names[:] = -1
-    copies.used[:] = 0
-    return copies
-
-
-def _empty_tree(room: int) -> Any:
-    return compiled(NODES).Tree(
-        np.zeros(room, np.int64), np.zeros(room, np.int64), np.zeros((room, 6)),
-        np.zeros((room, 3)), np.zeros(3, np.int64),
-    )  # fmt: skip
-
-
-def _larger(tree: Any) -> Any:
-    new = _empty_tree(2 * len(tree.deeds))
-    for old, room in zip(tree[:4], new[:4], strict=True):
-        room[: len(old)] = old
-    new.sizes[:] = tree.sizes
-    return new
-
-
-def _enlarge(part: Part) -> None:
-    """Make room in a part's tree, and in its stack where that is full."""
-    if int(part.stack.top[0]) + FINGERS >= len(part.stack.depths):
-        part.stack = _doubled(part.stack)
-    part.tree = _larger(part.tree)
-
-
-def _doubled(stack: Any) -> Any:
-    return type(stack)(
-        *(np.concatenate([array, np.zeros_like(array)]) for array in stack[:4]), stack.top
-    )
-
-
-def _room() -> Any:
-    return compiled(NODES).Work(
-        np.zeros((FINGERS, POOL)), np.zeros((FINGERS, POOL)), np.zeros(POOL), np.zeros(POOL),
-        np.zeros(FINGERS), np.zeros((FINGERS, 2)), np.zeros(FINGERS, np.int64),
-        np.full(1, -1),
-    )  # fmt: skip
-
-
-def _joined(trunk: Part, parts: Sequence[Part]) -> Steps:
-    """Put the trees of parts into their places in the trunk's tree."""
-    nodes = compiled(NODES)
-    trees = [trunk.tree, *(part.tree for part in parts)]
-    sizes = np.array([tree.sizes for tree in trees], dtype=np.int64)
-    starts = np.cumsum(sizes, axis=0) - sizes
-    each: list[tuple[Indices, Indices]] = []
-    for tree, (n, _, _), (_, twists, lines) in zip(trees, sizes, starts, strict=True):
-        deeds: Indices = tree.deeds[:n]
-        shifts = np.where(deeds < int(nodes.BY_PIECES), int(twists), int(lines))
-        asked: Indices = np.asarray(tree.asked[:n], dtype=np.int64) + shifts
-        each.append((deeds, asked))
-    deeds, asked = each[0]
-    rows: list[tuple[Indices, Indices]] = []
-    start = 0
-    for hole, part in zip(np.flatnonzero(deeds == nodes.SPLICE).tolist(), each[1:], strict=True):
-        rows += [(deeds[start:hole], asked[start:hole]), part]
-        start = hole + 1
-    rows.append((deeds[start:], asked[start:]))
-    return Steps(
-        np.concatenate([one for one, _ in rows]),
-        np.concatenate([two for _, two in rows]),
-        np.concatenate([tree.twists[:m] for tree, m in zip(trees, sizes[:, 1], strict=True)]),
-        np.concatenate([tree.lines[:m] for tree, m in zip(trees, sizes[:, 2], strict=True)]),
-    )
-
-
-class Stop:
-    """Tells threads to stop, after a time or when asked."""
-
-    def __init__(self) -> None:
-        self._event = threading.Event()
-
-    def __call__(self) -> bool:
-        """Return whether to stop."""
-        return self._event.is_set()
-
-    def now(self) -> None:
-        """Stop."""
-        self._event.set()

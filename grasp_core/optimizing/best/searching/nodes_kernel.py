@@ -6,8 +6,8 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
-from grasp_core.optimizing.best.cuts_kernel import MOST_CORNERS, Pieces, clip, extent
-from grasp_core.optimizing.best.twists_kernel import Demand, Pool
+from grasp_core.optimizing.best.searching.cuts_kernel import MOST_CORNERS, Pieces, clip, extent
+from grasp_core.optimizing.best.searching.twists_kernel import Demand, Pool
 
 FINGERS = 4
 ASK, BY_PIECES, BY_LINE, SPLICE = 0, 16, 32, 64

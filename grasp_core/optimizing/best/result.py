@@ -1,0 +1,107 @@
+"""The best grasp found on an object, with the proof of its gap, and how the search came there."""
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from grasp_core.by_value import ByValue
+from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.fields import is_a, is_number
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.optimizing.best.contacts_of_proof import are_contacts_of
+from grasp_core.optimizing.best.searching.search import EXACT_GAP
+from grasp_core.optimizing.best.support_cuts import CutTree
+from grasp_core.quality.ferrari_canny import FerrariCanny
+from grasp_core.quality.measures import Measure, MeasureName
+from grasp_core.quality.resisted_loads import ResistedLoads, measured_set
+from grasp_core.values import Grasp
+
+Ended: TypeAlias = Literal["gap", "time", "interrupt", "undivided"]
+"""Why a search ended: the gap is reached, time is up, it was interrupted, or polygons became too
+small to be divided."""
+
+
+@dataclass(frozen=True, slots=True)
+class GapAt:
+    """How far a search had come at one moment."""
+
+    seconds: float
+    """Time since it began [s]."""
+    quality: float
+    """Quality of the best grasp known then [N], or the multiple of a task's loads."""
+    bound: float
+    """What no quality exceeds [N], or no multiple."""
+    nodes: int
+    """How many nodes had been visited."""
+
+    @property
+    def gap(self) -> float:
+        """Return the share of the bound that is not reached."""
+        return 1.0 - self.quality / self.bound
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class BestGrasp(ByValue):
+    """The best grasp found, with a proved bound of the quality of all others."""
+
+    grasp: Grasp
+    quality: FerrariCanny | ResistedLoads
+    """Bounds of the grasp's quality (`l1`), with torques over the object's radius; or of the
+    largest multiple of the loads of another measure that its contacts resist."""
+    clearance: float
+    """Distance that contacts keep from the edges of faces [m], or half the radius of the largest
+    disc in a face where that is less."""
+    proof: CutTree
+    ended: Ended
+    history: tuple[GapAt, ...]
+    """How the gap closed; the times do not count when values are compared."""
+
+    @property
+    def bound(self) -> float:
+        """Return the quality [N] that no four contacts on the faces exceed, clear of the edges.
+
+        For a task it is a multiple of its wrenches, for normal forces of sum one newton.
+        """
+        return self.proof.bound
+
+    @property
+    def measure(self) -> MeasureName:
+        """Return the name of the measure that is maximised."""
+        return self.proof.measure.name
+
+    @property
+    def gap(self) -> float:
+        """Return the share of the bound that the grasp's quality does not reach."""
+        return 1.0 - self.quality.lower / self.bound
+
+    def verify(self) -> bool:
+        """Check the grasp's quality and replay the proof of the bound, without any search.
+
+        The contacts must be those of the quality, and lie on polygons of the proof. Whether these
+        are those of an object's faces, this far from edges, can only be checked with the object, by
+        `grounds_of`.
+        """
+        return (
+            is_a(self.proof, CutTree)
+            and self._has_its_measure()
+            and is_number(self.clearance, least=0.0)
+            and self.quality.verify()
+            and self.proof.verify()
+            and self.quality.lower <= self.bound
+            and are_contacts_of(self.grasp, self.quality.wrenches, self.proof)
+        )
+
+    def _has_its_measure(self) -> bool:
+        """Return whether the quality is about the loads of the proof."""
+        if isinstance(self.quality, ResistedLoads):
+            return self.quality.measure == self.proof.measure
+        usual = is_a(self.proof.measure, Measure) and self.proof.measure.is_usual
+        return is_a(self.quality, FerrariCanny) and usual
+
+
+def measured(
+    body: Polyhedron, grasp: Grasp, friction: float, measure: Measure, gap: float = EXACT_GAP
+) -> FerrariCanny | ResistedLoads:
+    """Bound what a grasp of an object resists of the loads of a measure, with proofs."""
+    center, scale = body.center_of_mass, body.radius
+    wrenches = WrenchSet.of(grasp, None, friction, center=center, torque_scale=scale)
+    return measured_set(wrenches, measure, gap)
