@@ -5,6 +5,7 @@ in the face where that is less. Faces that are not convex are cut into convex pi
 that contacts may be on the lines between these.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -103,23 +104,34 @@ def grounds_of(body: Polyhedron, clearance: float) -> Grounds:
             alone = replace(body, faces=(body.faces[face],))
             for piece in unit_pieces(clear_of_edges(alone, margin)):
                 pieces.append(replace(piece, face=face))
-    parts = [(piece, part) for piece in pieces for part in _small(piece.corners)]
+    return grounds_on(pieces)[0]
+
+
+def grounds_on(pieces: Sequence[FacePiece]) -> tuple[Grounds, Indices]:
+    """Return convex pieces as polygons of few corners, and the place of each one's piece, (p,).
+
+    Raises:
+        InputError: There is no piece, or there are too many.
+    """
+    parts = [(k, part) for k, piece in enumerate(pieces) for part in _small(piece.corners)]
     if not 0 < len(parts) <= MOST_PIECES:
         raise InputError(
-            f"best_grasp: expected an object whose faces have 1 to {MOST_PIECES} convex pieces "
-            f"with room for a contact, got {len(parts)}; take an object with fewer faces"
+            f"expected an object whose faces have 1 to {MOST_PIECES} convex pieces with room for a "
+            f"contact, got {len(parts)}; take an object with fewer faces"
         )
     corners = np.zeros((len(parts), ROOM, 2))
     for rows, (_, part) in zip(corners, parts, strict=True):
         rows[: len(part)] = part
-    return Grounds(
-        faces=np.array([piece.face for piece, _ in parts]),
-        normals=np.array([piece.normal for piece, _ in parts]),
-        origins=np.array([piece.origin for piece, _ in parts]),
-        frames=np.array([piece.frame for piece, _ in parts]),
+    own = np.array([k for k, _ in parts])
+    grounds = Grounds(
+        faces=np.array([piece.face for piece in pieces])[own],
+        normals=np.array([piece.normal for piece in pieces])[own],
+        origins=np.array([piece.origin for piece in pieces])[own],
+        frames=np.array([piece.frame for piece in pieces])[own],
         corners=corners,
         counts=np.array([len(part) for _, part in parts]),
     )
+    return grounds, own
 
 
 def _small(corners: Array) -> list[Array]:

@@ -82,6 +82,7 @@ class BestGrasp(ByValue):
         """
         return (
             is_a(self.proof, CutTree)
+            and self.proof.owners is None  # all contacts, not those on four given faces
             and self._has_its_measure()
             and is_number(self.clearance, least=0.0)
             and self.quality.verify()

@@ -92,16 +92,28 @@ def _same_points(images: Array, others: Array) -> bool:
     return bool(near) and len(set(nearest.tolist())) == len(images)
 
 
-def first_nodes(grounds: Grounds, maps: Array) -> tuple[Array, Indices, Indices]:
+def first_nodes(
+    grounds: Grounds, maps: Array, owners: Indices | None = None
+) -> tuple[Array, Indices, Indices]:
     """Return the nodes from which a search starts, one for each orbit of pieces.
 
-    Without symmetries there is one, in which every finger may be anywhere.
+    Without symmetries there is one, in which every finger may be anywhere, or on its own pieces.
+
+    Args:
+        grounds: The pieces.
+        maps: Symmetries that are used, the identity first, (g, 3, 3).
+        owners: The finger that may be on each piece, (p,), with the identity alone; None where any
+            may.
 
     Returns:
         Corners of each finger's polygons, (c, 4, p, 24, 2); how many, (c, 4, p); whether fingers
         are fresh, (c, 4).
     """
     pieces = len(grounds.counts)
+    if owners is not None:
+        counts = np.where(owners == np.arange(FINGERS)[:, None], grounds.counts, 0)[None]
+        corners = np.where((counts > 0)[..., None, None], grounds.corners, 0.0)
+        return corners, counts.astype(np.int64), np.zeros((1, FINGERS), dtype=np.int64)
     if len(maps) == 1:
         corners = np.broadcast_to(grounds.corners, (1, FINGERS, pieces, ROOM, 2)).copy()
         counts = np.broadcast_to(grounds.counts, (1, FINGERS, pieces)).copy()

@@ -68,6 +68,7 @@ from grasp_core.fields import is_a, is_array, is_indices, is_number
 from grasp_core.optimizing.best.grounds import Grounds
 from grasp_core.optimizing.best.same_places import first_nodes, fitting
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
+from grasp_core.values import FINGERS
 
 ROUNDING = 1e-9
 """How far rounding can lift a measure above the threshold, over 1 + mu: the derivation needs less
@@ -141,8 +142,13 @@ class CutTree(ByValue):
     first those below k, then the others, (l, 3)."""
     measure: Measure = FERRARI_CANNY
     """The loads whose largest resisted multiple is bounded."""
+    owners: Indices | None = None
+    """The finger that may be on each piece, (p,), where each finger has pieces of its own; None
+    where any finger may be on any piece."""
 
     def __post_init__(self) -> None:
+        if self.owners is not None:
+            object.__setattr__(self, "owners", frozen_indices(self.owners, (None,), "owners"))
         for name, shape in (("maps", (None, 3, 3)), ("twists", (None, 6)), ("lines", (None, 3))):
             object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
         for name in ("deeds", "asked"):
@@ -185,7 +191,16 @@ class CutTree(ByValue):
         longest = LONGEST_TWIST if self.measure.is_usual else 1.0 + TWIST_SLACK
         fits = fits and lengths.max(initial=1.0) <= longest
         alone = len(self.maps) == 1
+        if self.owners is not None:
+            return bool(fits) and alone and self._has_owners()
         return bool(fits) and (alone or fitting(self.maps, self.grounds, self.measure))
+
+    def _has_owners(self) -> bool:
+        """Return whether each piece has an owner, one of four fingers."""
+        owners = self.owners
+        if owners is None or not is_indices(owners, len(self.grounds.counts)):
+            return False
+        return int(owners.min()) >= 0 and int(owners.max()) < FINGERS
 
     def _has_fitting_threshold(self) -> bool:
         if self.measure.is_usual:
@@ -196,7 +211,7 @@ class CutTree(ByValue):
 
     def _replayed(self) -> bool:
         kernel = compiled(KERNEL)
-        corners, counts, fresh = first_nodes(self.grounds, self.maps)
+        corners, counts, fresh = first_nodes(self.grounds, self.maps, self.owners)
         grounds = self.grounds
         # (4), or the threshold itself
         answers = self.threshold * self.measure.demands(self.twists) - self._slack.lowered
