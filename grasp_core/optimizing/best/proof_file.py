@@ -35,8 +35,14 @@ def write_proof(path: Path, proof: CutTree) -> Path:
     """Write a proof to an npz file.
 
     Raises:
+        InputError: The proof is only about contacts on four given faces.
         OSError: The file cannot be written; the error names it.
     """
+    if proof.owners is not None:
+        raise InputError(
+            f"{path}: expected a proof about all contacts of an object, as best_grasp makes, got "
+            "one about four faces, which has no file"
+        )
     arrays: dict[str, Any] = {name: getattr(proof.grounds, name) for name in OF_GROUNDS}
     arrays |= {name: getattr(proof, name) for name in OF_TREE}
     arrays |= {name: arrays[name].astype(kind) for name, kind in SMALL.items()}
