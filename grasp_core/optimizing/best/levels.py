@@ -13,8 +13,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from grasp_core.arrays import Array
-from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
 from grasp_core.families.constructions import point_region, regions_of
 from grasp_core.families.free_contacts import closed_at, of_general_type
@@ -23,9 +21,10 @@ from grasp_core.optimizing.best.grounds import grounds_of
 from grasp_core.optimizing.best.incumbents import begin, climbed, piece_at
 from grasp_core.optimizing.best.result import BestGrasp, Ended, GapAt, measured
 from grasp_core.optimizing.best.same_places import exact_maps, first_nodes
-from grasp_core.optimizing.best.searching.parts import Found, Steps
-from grasp_core.optimizing.best.searching.search import CUTS, TWISTS, Searching
+from grasp_core.optimizing.best.searching.parts import Found
+from grasp_core.optimizing.best.searching.search import Searching
 from grasp_core.optimizing.best.searching.stop import Stop
+from grasp_core.optimizing.best.single_twists import lowered_twists, refuted_by_one
 from grasp_core.optimizing.best.support_cuts import SEARCHED_BELOW, CutTree, Slack
 from grasp_core.planning.certify import Candidate, certify, named, to_grasp
 from grasp_core.quality.measures import Measure
@@ -33,11 +32,6 @@ from grasp_core.values import ForceCone, Grasp
 
 WIDEST = 0.4
 """Gap of the first level at most: a level is cheap down to it, as the search is for one twist."""
-FIRST_TWISTS = 384
-"""Random twists to begin with, as many as a wave hands on; a quarter of them is moved to where the
-support of all faces is smaller."""
-FIRST_STEPS = 60
-"""Steps of these descents: they settle within it."""
 AIMED = 0.999
 """Share of the gap that is aimed at, as the grasp's quality is measured anew in the end."""
 SAME = 1e-9
@@ -66,8 +60,9 @@ class Levels:
         lowered = self.searched.lowered
         self.searching = Searching(self.grounds, friction, jobs, stop, measure, lowered)
         self.history: list[GapAt] = []
-        twists = self._twists()
-        self.steps, self.threshold = self._one_twist(twists)
+        twists = lowered_twists(self.searching, self.rng)
+        cases = len(self.nodes[0])
+        self.steps, self.threshold = refuted_by_one(self.searching, cases, self.searched, twists)
         found = begin(self.searching, twists, self.rng)
         if found is None:
             raise InputError(
@@ -119,56 +114,6 @@ class Levels:
         self.history.append(now)
         if self.progress is not None:
             self.progress(now)
-
-    def _twists(self) -> Array:
-        """Return twists in which all faces resist little, and let the search know them."""
-        descend = compiled(TWISTS).descend
-        points = [self.grounds.places(p, at) for p, at in enumerate(self.grounds.polygons())]
-        on = np.repeat(np.arange(len(points)), [len(each) for each in points])
-        corners, pieces = np.vstack(points), self.searching.pieces
-        found = self.rng.normal(size=(FIRST_TWISTS, 6))
-        # a task's loads themselves, the other way, ask for most
-        found = np.vstack([-self.measure.loads, found])
-        found /= np.linalg.norm(found, axis=1, keepdims=True)
-        low = len(self.measure.loads) + FIRST_TWISTS // 4
-        lowered = found[:low].copy()
-        for y in lowered:
-            descend(pieces, self.searching.demand, corners, on, len(on), y, FIRST_STEPS)
-        found = np.vstack([lowered, found[low:]])
-        self.searching.learn(found)
-        return np.array(self.searching.pool.twists[: len(found)])
-
-    def _one_twist(self, twists: Array) -> tuple[Steps, float]:
-        """Return the tree that asks a single twist, and the least threshold that it refutes."""
-        grounds, support = self.grounds, compiled(CUTS).support
-        slopes, pieces, at = compiled(CUTS).slopes, self.searching.pieces, np.empty(6)
-        reached = np.full(len(twists), -math.inf)
-        for k, y in enumerate(twists):
-            for p, polygon in enumerate(grounds.polygons()):
-                slopes(pieces, p, y, at)
-                highest = max(support(at, a, b, self.friction) for a, b in polygon)
-                reached[k] = max(reached[k], highest)
-        thresholds = self._refuted_alone(reached, self.measure.demands(twists))
-        best = int(thresholds.argmin())
-        count = len(self.nodes[0])
-        steps = Steps(
-            np.zeros(count, np.int64), np.zeros(count, np.int64), twists[best : best + 1],
-            np.empty((0, 3)),
-        )  # fmt: skip
-        return steps, float(thresholds[best])
-
-    def _refuted_alone(self, reached: Array, demands: Array) -> Array:
-        """Return the least thresholds that twists refute alone, as searches do, (n,).
-
-        Args:
-            reached: Largest supports that contacts have in the twists, (n,).
-            demands: Demands of the twists, (n,); none is refuted where that is zero.
-        """
-        raised, lowered = self.searched
-        if self.measure.is_usual:
-            return reached + raised
-        with np.errstate(divide="ignore"):
-            return np.where(demands > 0.0, (np.maximum(reached, 0.0) + lowered) / demands, np.inf)
 
     def result(self, ended: Ended) -> BestGrasp:
         """Return the best contacts as a grasp, with the proof."""

@@ -192,7 +192,9 @@ class Searching:
             search = nodes.Search(
                 pieces, part.stack, part.pool, part.tree, work, threshold, demand, self.spare
             )
+            before = int(part.tree.sizes[0])
             why = kernel.run(search, BUDGET, depth)
+            self.stop.spend(int(part.tree.sizes[0]) - before)
             if why == kernel.DONE:
                 part.finished = True
                 return

@@ -1,4 +1,4 @@
-"""Stops a search after a time, or when asked, on all of its threads."""
+"""Stops a search after a time, after so many nodes, or when asked, on all of its threads."""
 
 import threading
 from collections.abc import Generator
@@ -18,6 +18,23 @@ class Stop:
     def now(self) -> None:
         """Stop."""
         self._event.set()
+
+    def spend(self, nodes: int) -> None:
+        """Take note that a thread has visited so many nodes."""
+
+
+class StopAfter(Stop):
+    """Stops one thread after a number of nodes, which does not depend on the clock."""
+
+    def __init__(self, nodes: int) -> None:
+        super().__init__()
+        self._left = nodes
+
+    def spend(self, nodes: int) -> None:
+        """Count nodes, and stop when there were enough."""
+        self._left -= nodes
+        if self._left <= 0:
+            self.now()
 
 
 @contextmanager
