@@ -187,5 +187,5 @@ class _Asked:
             return np.empty(0)
         count = math.floor(math.log(least / first) / math.log(share))
         if self.known > 0.0:
-            return self.known / share ** np.arange(count, 0, -1)
-        return first * share ** np.arange(1, count + 1)
+            return np.asarray(self.known / share ** np.arange(count, 0, -1), dtype=np.float64)
+        return np.asarray(first * share ** np.arange(1, count + 1), dtype=np.float64)

@@ -160,7 +160,8 @@ class Planning:
     planned."""
     ceiling: Count | None = None
     """With --optimize: also prove an upper bound of the quality that contacts on the same faces can
-    reach, as far from edges; the number says into how many parts the faces may be divided."""
+    reach, as far from edges, within 5 % of what they are known to reach if that takes no more cases
+    than this number; 100000 are enough for most grasps."""
     seed: Seed = 0
     """Seed of all random choices."""
 

@@ -27,7 +27,7 @@ class _Task:
     finger_radius: float | None
     seed: int
     parts: int | None
-    """Number of parts of the faces for the bound; None for no bound."""
+    """Largest number of cases for the bound; None for no bound."""
 
 
 def improved(
@@ -42,7 +42,7 @@ def improved(
         body: The object.
         found: A plan for it.
         finger_radius: How far contacts stay from edges [m].
-        parts: How many parts of the faces to bound the best quality on; None for no bound.
+        parts: How many cases to look at for a bound of the best quality; None for no bound.
         jobs: Largest number of processes.
         progress: Called with (done, total, how many are raised) after each grasp.
     """

@@ -143,6 +143,7 @@ CALLS = [
         "friction": FRICTION,
         "known": NOT_NEGATIVE,
         "finger_radius": optional(each_of(NOT_NEGATIVE)) | {"larger than the object": 1.0},
+        "gap": POSITIVE | {"one": 1.0},
         "parts": AT_LEAST_ONE,
     }),
     Call("gc.max_resisted_wrench", two_arrays(friction=0.5, wrench=WRENCH, max_normal_force=1.0),

@@ -18,6 +18,11 @@ def proof(found, rng):
     grounds = found.grounds
     polygons = grounds.polygons()
     on = rng.integers(len(polygons), size=(SETS, 4))
+    if found.owners is not None:  # each finger on pieces of its own
+        own = [np.flatnonzero(np.asarray(found.owners) == finger) for finger in range(4)]
+        if not all(map(len, own)):
+            return True  # about no contacts
+        on = np.stack([rng.choice(each, size=SETS) for each in own], axis=1)
     weights = [[rng.dirichlet(np.full(len(polygons[p]), 0.3)) for p in row] for row in on]
     x = np.array(
         [
@@ -51,3 +56,7 @@ def best(found, rng):
     usual = found.proof.measure.name == "ferrari-canny"
     true = wrench_bounds.quality if usual else wrench_bounds.resisted
     return proof(found.proof, rng) and true(found.quality, rng)
+
+
+def ceiling(found, rng):
+    return found.proof.owners is not None and proof(found.proof, rng)

@@ -143,7 +143,7 @@ def ceiling(seed):
     body, friction, grasps = planned(seed)
     faces = tuple(int(f) for f in np.random.default_rng(seed).choice(len(body.faces), 4))
     faces = faces if seed % 2 and len(set(faces)) == 4 else grasps[seed % len(grasps)].faces
-    return gc.quality_ceiling(body, faces, friction, parts=6)
+    return gc.quality_ceiling(body, faces, friction, parts=2000)
 
 
 @cache
@@ -329,7 +329,7 @@ TABLE = {
     "FrictionInterval": Row(friction_interval, lambda c, _: exact_closure.interval(c), 0.6),
     "Absence": Row(absence, on_planes.absence, 0.6),
     "FerrariCanny": Row(quality, wrench_bounds.quality),
-    "QualityCeiling": Row(ceiling, wrench_bounds.ceiling, 0.7),
+    "QualityCeiling": Row(ceiling, best_grasps.ceiling, 0.7),
     "CertifiedRegions": Row(regions, on_planes.regions, 0.4),
     "TwistCover": Row(
         cover, lambda c, rng: on_planes.all_closed(c.regions, c.normals, c.friction, rng), 0.5

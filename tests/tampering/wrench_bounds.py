@@ -1,10 +1,7 @@
 """What is claimed of qualities and limits: by descent, hulls, and programs solved again."""
 
-import math
-
 import numpy as np
 from scipy.optimize import minimize
-from scipy.spatial import ConvexHull
 
 from tests.tampering.exact_closure import (
     UNIT,
@@ -14,7 +11,6 @@ from tests.tampering.exact_closure import (
     tangents,
     unit_arms,
 )
-from tests.tampering.on_planes import drawn, piece
 
 
 def support(G, mu, norm, y):
@@ -106,39 +102,6 @@ def _allowed(q):
     pushes = each[:, :, 0]
     summed = abs(pushes.sum(axis=1) - 1.0) if q.wrenches.norm == "l1" else pushes.max(axis=1) - 1.0
     return (across <= q.wrenches.friction * pushes + 1e-11).all() and (summed <= 1e-11).all()
-
-
-def hull_quality(x, n, mu):
-    """A lower bound: the hull of sixteen edges of each cone."""
-    turns = 2.0 * np.pi * np.arange(16) / 16
-    rows = []
-    for p, normal in zip(x, n, strict=True):
-        u = tangents(normal)
-        f = normal + mu * (np.cos(turns)[:, None] * u[:, 0] + np.sin(turns)[:, None] * u[:, 1])
-        rows.append(np.hstack([f, np.cross(p, f)]))
-    W = np.vstack(rows)
-    if np.linalg.matrix_rank(W - W[0], 1e-9) < 6:
-        return -math.inf
-    return float(-ConvexHull(W, qhull_options="QJ").equations[:, -1].max())
-
-
-def ceiling(c, rng):
-    """No contacts on the pieces have a larger quality, of those that are drawn."""
-    pieces = {id(p): p for choice in c.choices for p in choice}.values()
-    if not all(map(piece, pieces)) or not 0.0 <= c.friction < math.inf or not np.isfinite(c.upper):
-        return False
-    for leaf in c.leaves:
-        if abs(np.linalg.norm(leaf.direction) - 1.0) > UNIT or not 0 <= leaf.choice < len(
-            c.choices
-        ):
-            return False
-    for choice in c.choices:
-        n = np.array([p.normal for p in choice])
-        for _ in range(4):
-            x = np.array([p.origin + p.frame @ drawn(p.corners, rng) for p in choice])
-            if hull_quality(x, n, c.friction) > c.upper + 2e-9 * max(c.upper, 1.0):
-                return False
-    return True
 
 
 def wrench_limit(c):

@@ -120,14 +120,14 @@ def first_nodes(
         return corners, counts, np.ones((1, FINGERS), dtype=np.int64)
     images = _images(maps, grounds)
     # a symmetry's inverse is one as well, so that the images of a piece are its orbit
-    owners = images.min(axis=0)
-    firsts = np.flatnonzero(owners == np.arange(pieces))
+    leaders = images.min(axis=0)
+    firsts = np.flatnonzero(leaders == np.arange(pieces))
     corners = np.zeros((len(firsts), FINGERS, pieces, ROOM, 2))
     counts = np.zeros((len(firsts), FINGERS, pieces), dtype=np.int64)
     fresh = np.ones((len(firsts), FINGERS), dtype=np.int64)
     fresh[:, 0] = 0
     for case, first in enumerate(firsts):
-        later = owners >= first
+        later = leaders >= first
         corners[case, 1:, later] = grounds.corners[later][:, None]
         counts[case, 1:, later] = grounds.counts[later][:, None]
         polygon, count = _nearest_part(grounds, maps[images[:, first] == first], int(first))

@@ -215,7 +215,9 @@ class Searching:
                 return False
         if found.quality.upper >= threshold:
             return False
-        self.learn(found.quality.direction[None], part.pool, int(part.tree.sizes[0]))
+        # before the first node all twists are unused: this one must not be the next to go
+        now = max(1, int(part.tree.sizes[0]))
+        self.learn(found.quality.direction[None], part.pool, now)
         return True
 
     def measured(self, on: Indices, at: Array) -> Found:
