@@ -43,21 +43,46 @@ def test_surroundings_change_no_byte(named, usual, graspproof, tmp_path):
     assert contents(tmp_path / "b") == usual
 
 
-@pytest.mark.slow
-def test_where_no_folder_keeps_the_inner_loops_they_are_compiled_again(usual, tmp_path):
-    """A folder is found wherever tests can run, so that the list of folders is emptied."""
-    words = [*RUN, "--no-report", "--out", str(tmp_path)]
-    script = f"""
+NO_FOLDER = """
 from grasp_core import kept_loops
 kept_loops.folders = lambda _: ()
+"""
+"""A folder is found wherever tests can run, so that the list of folders is emptied."""
+CLOSED = """
+import grasp_core as gc
+from grasp_core.compiled import compiled, state_of
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS
+found = gc.force_closure(TETRA_CENTERS, TETRA_NORMALS, 0.5)
+print(found.forces.tobytes().hex(), found.margin.hex())
+print(state_of(compiled("grasp_core.solvers.nearest_point_kernel").solve))
+"""
+
+
+def said_by(script):
+    return subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+
+
+@pytest.mark.slow
+def test_where_no_folder_keeps_an_inner_loop_it_is_compiled_again():
+    there, here = said_by(NO_FOLDER + CLOSED), said_by(CLOSED)
+    assert (there.stderr, here.stderr) == ("", "")
+    *own, kept = here.stdout.splitlines()
+    assert (there.stdout.splitlines(), kept) == ([*own, "not kept"], "kept")
+
+
+@pytest.mark.slow
+@pytest.mark.more
+def test_a_run_that_compiles_all_of_its_inner_loops_ends_as_usual(usual, tmp_path):
+    words = [*RUN, "--no-report", "--out", str(tmp_path)]
+    script = f"""{NO_FOLDER}
 from grasp_core.compiled import compiled, state_of
 from sim_validate.main import main
 assert main({words!r}) == 0
 print(state_of(compiled("grasp_core.solvers.lp_kernel").solve))
 """
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
-    )
+    done = said_by(script)
     assert (done.stdout, done.stderr) == ("not kept\n", "")
     assert contents(tmp_path) == {name: usual[name] for name in contents(tmp_path)}
     assert "verdicts.json" in contents(tmp_path)

@@ -18,6 +18,7 @@ import sim_validate as sv
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.verifying.verify import verify
 from sim_validate.main import main
+from tests.marks import more
 from tests.patience import HANGING_S
 
 pytest.importorskip("pyarrow")
@@ -110,9 +111,10 @@ def test_a_bad_mesh_is_left_out_and_said(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_driver_killed_at_random_moments_loses_nothing(large_dataset, tmp_path):
+@pytest.mark.parametrize("times", [8, *more(20)])
+def test_a_driver_killed_at_random_moments_loses_nothing(times, large_dataset, tmp_path):
     folder, rng, killed = tmp_path / "ds", np.random.default_rng(0), 0
-    for _ in range(20):
+    for _ in range(times):
         process = subprocess.Popen(command(folder, 2), start_new_session=True)
         time.sleep(rng.uniform(0.5, 6.0))
         if process.poll() is None:
