@@ -12,15 +12,19 @@ import pytest
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.parallel import processes as engines
-from tests.faults.conftest import CLI, ROOT, contents
+from tests.faults.conftest import CLI, KEPT, ROOT, contents
+from tests.marks import more
 from tests.patience import HANGING_S
 
 RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]
 NOWHERE = "/proc/nowhere"
+NO_HOME = {"HOME": NOWHERE, "XDG_CONFIG_HOME": NOWHERE, "XDG_CACHE_HOME": NOWHERE}
+COLD = "no folder for kernels"
+"""Compiles all loops again, beside their modules, which `test_kept_loops` sees of one of them."""
 SURROUNDINGS = {
-    "no home": {"HOME": NOWHERE, "XDG_CONFIG_HOME": NOWHERE, "XDG_CACHE_HOME": NOWHERE},
+    "no home": {**NO_HOME, "NUMBA_CACHE_DIR": str(KEPT)},
     "no folder for matplotlib": {"MPLCONFIGDIR": NOWHERE, "MPLBACKEND": "nonsense"},
-    "no folder for kernels": {"NUMBA_CACHE_DIR": NOWHERE, "XDG_CACHE_HOME": NOWHERE},
+    COLD: {"NUMBA_CACHE_DIR": NOWHERE, "XDG_CACHE_HOME": NOWHERE},
     "no threads": {"OMP_NUM_THREADS": "many"},
     "no temporary folder": {"TMPDIR": NOWHERE},
     "no locale": {"LC_ALL": "xx_XX", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"},
@@ -36,7 +40,7 @@ def usual(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("named", SURROUNDINGS)
+@pytest.mark.parametrize("named", [*(name for name in SURROUNDINGS if name != COLD), *more(COLD)])
 def test_surroundings_change_no_byte(named, usual, graspproof, tmp_path):
     done = graspproof(*RUN, "--out", str(tmp_path / "b"), env=SURROUNDINGS[named])
     assert (done.returncode, done.stderr) == (0, "")

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from grasp_core.kept_loops import folder_for
 from tests.bad_input.mesh_texts import obj
+from tests.faults.conftest import KEPT
 from tests.patience import HANGING_S
 
 AUDITING = Path(__file__).with_name("auditing")
@@ -21,10 +21,6 @@ LIBRARIES = tuple(
 SYSTEM = ("/sys/", "/proc/", "/dev/null", "/dev/urandom", "/usr/", "/lib", "/etc/", "/dev/shm/")  # noqa: S108 - shared memory of processes
 """What the interpreter and libraries read about the machine; fonts, time zones."""
 CACHES = ("__pycache__", ".pytest_cache")
-KEPT = folder_for(
-    "grasp_core.solvers.lp_kernel", str(ROOT / "grasp_core/solvers/lp_kernel.py")
-).parent
-"""Where the loops are kept that other tests compile, so that the new home has them."""
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 CHANGING = (
     "os.remove", "os.rename", "os.mkdir", "os.rmdir", "os.link", "os.symlink", "os.chmod",

@@ -86,24 +86,24 @@ def test_a_changed_file_is_named(dataset, tmp_path, capsys):
     assert path.name in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("built_here")
 def test_a_toml_file_says_the_same_as_flags(dataset, tmp_path):
+    """The flags were given to a command that begins processes."""
     settings = tmp_path / "ds.toml"
     settings.write_text((dataset / "config.toml").read_text())
     folder = tmp_path / "ds"
-    assert (
-        main(["dataset", "build", str(settings), "--jobs", "1", "--out", str(folder), "-q"])
-        == Exit.GOOD
-    )
+    assert main(["dataset", "build", str(settings), "--out", str(folder), "-q"]) == Exit.GOOD
     assert files(folder) == files(dataset)
     again = ["dataset", "build", str(settings), "--limit", "3", "--out", str(tmp_path / "x")]
     assert main(again) == Exit.INPUT
 
 
+@pytest.mark.usefixtures("built_here")
 def test_a_bad_mesh_is_left_out_and_said(tmp_path, capsys):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "bad.stl").write_text("solid nothing")
     names = ["tetrahedron", str(tmp_path / "meshes"), *FLAGS[:4], *LIGHT[2:]]
-    code = main(["dataset", "build", *names, "--jobs", "1", "--out", str(tmp_path / "ds")])
+    code = main(["dataset", "build", *names, "--out", str(tmp_path / "ds")])
     assert code == Exit.PARTIAL
     assert "quarantine.jsonl" in capsys.readouterr().err
     (first, second) = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()

@@ -21,6 +21,7 @@ from grasp_core.quality.resisted_loads import ResistedLoads, resisted_loads
 from scenes.example_objects import example_object
 from tests.grasp_core.optimizing.best.independent_replay import replays
 from tests.grasp_core.optimizing.best.supports_of_contacts import supports
+from tests.marks import more
 
 FRICTION = 0.5
 LIFT = np.array(
@@ -45,7 +46,15 @@ def loosely_bounded():
     return best("tetrahedron", "weight", gap=0.3)
 
 
-@pytest.fixture(scope="module", params=CASES, ids="-".join)
+@pytest.fixture(
+    scope="module",
+    params=[
+        ("tetrahedron", "weight"),
+        ("random-4-1", "task"),
+        *more(("tetrahedron", "task"), ("random-4-1", "weight")),
+    ],
+    ids="-".join,
+)
 def searched(request):
     return best(*request.param, gap=CASES[request.param]), request.param
 

@@ -155,24 +155,24 @@ def test_a_lower_limit_of_memory_that_there_is_already_is_kept():
     assert ran.stdout.split() == [f"({3 * 2**30},", f"{4 * 2**30})"]
 
 
-def test_memory_is_limited_while_a_unit_is_done_and_no_longer(staging):
+def test_memory_is_limited_while_a_unit_is_done_and_a_process_that_never_ends_is_ended(staging):
+    """One process, which is limited for one unit and not for the next, and those after it."""
     import resource
 
     before = resource.getrlimit(resource.RLIMIT_AS)
     given = task(staging, note_memory, Limits(600.0, 2**30))
     with local_processes(1) as engine:
         engine.submit(do_task, given).result()
-    assert staging.result(given.unit) == "limited"
-    assert resource.getrlimit(resource.RLIMIT_AS) == before
-
-
-@pytest.mark.parametrize("never", [sleep, burn])
-def test_a_process_in_which_a_unit_never_ends_is_ended(staging, never):
-    with local_processes(1) as engine:
-        failed = engine.submit(do_task, task(staging, never, Limits(0.5))).exception(HANGING_S)
-        assert failed is not None
+        assert staging.result(given.unit) == "limited"
         engine.submit(do_task, task(staging, note_memory)).result()
-    assert staging.result(units_of(CONFIG)[0]) == "unlimited"
+        assert staging.result(given.unit) == "unlimited"
+        for never in (sleep, burn):
+            failed = engine.submit(do_task, task(staging, never, Limits(0.5))).exception(HANGING_S)
+            assert failed is not None
+            staging.forget(given.unit)
+        engine.submit(do_task, task(staging, note_memory)).result()
+    assert staging.result(given.unit) == "unlimited"
+    assert resource.getrlimit(resource.RLIMIT_AS) == before
 
 
 @pytest.mark.slow
