@@ -57,8 +57,9 @@ def bits(plan):
     ("what", "numbers"),
     [
         ("every method", (2, 3)),
-        *((what, (2,)) for what in PLANS if what != "every method"),
-        *(pytest.param(what, (3,), marks=MORE) for what in PLANS if what != "every method"),
+        ("complete", (2,)),
+        ("the most different", (2,)),
+        *(pytest.param(what, (2, 3), marks=MORE) for what in PLANS if what != "every method"),
     ],
 )
 def test_any_number_of_processes_gives_the_same_plan(what, numbers, monkeypatch):
