@@ -160,12 +160,13 @@ def test_memory_is_limited_while_a_unit_is_done_and_a_process_that_never_ends_is
     with local_processes(1) as engine:
         engine.submit(do_task, given).result()
         assert staging.result(given.unit) == "limited"
+        staging.forget(given.unit)
         engine.submit(do_task, task(staging, note_memory)).result()
         assert staging.result(given.unit) == "unlimited"
         for never in (sleep, burn):
             failed = engine.submit(do_task, task(staging, never, Limits(0.5))).exception(HANGING_S)
             assert failed is not None
-            staging.forget(given.unit)
+        staging.forget(given.unit)
         engine.submit(do_task, task(staging, note_memory)).result()
         lower = (3 * 2**30, 4 * 2**30)
         assert engine.submit(limit_twice, lower).result() == lower
