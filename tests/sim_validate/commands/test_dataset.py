@@ -20,6 +20,7 @@ from sim_validate.datasets.verifying.verify import verify
 from sim_validate.main import main
 from tests.marks import more
 from tests.patience import HANGING_S
+from tests.sim_validate.datasets.engines import here
 
 pytest.importorskip("pyarrow")
 FLAGS = ("--friction", "0.4", "--friction", "0.5", "--family", "concurrent", "--limit", "2")
@@ -54,7 +55,9 @@ def dataset(tmp_path_factory):
 @pytest.fixture(scope="module")
 def large_dataset(tmp_path_factory):
     """What the command of killed processes makes."""
-    return built(tmp_path_factory.mktemp("large") / "ds", OBJECTS, FLAGS)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("sim_validate.commands.dataset.local_processes", here)
+        return built(tmp_path_factory.mktemp("large") / "ds", OBJECTS, FLAGS)
 
 
 def test_a_dataset_is_made_and_nothing_is_wrong_with_it(dataset, capsys):
