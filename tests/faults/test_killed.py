@@ -43,7 +43,7 @@ def planned(tmp_path_factory):
     [
         ([*RUN, "--out", "OUT"], 1, 32),
         ([*RUN, "--no-report", "--traces", "--out", "OUT"], 5, 4),
-        ([*PLAN, "--regions", "--out", "OUT"], 3, 5),
+        ([*PLAN, "--limit", "2", "--regions", "--out", "OUT"], 3, 3),
         (["scene", "GRASPS", "-q", "--out", "OUT"], 3, 2),
         (["export", "GRASPS", "--to", "gltf", "-q", "--out", "OUT/a.glb"], 2, 1),
         (["regions", "GRASPS", "--max-cones", "64", "-q", "--out", "OUT"], 2, 4),
@@ -79,9 +79,9 @@ def test_nothing_of_an_earlier_run_is_mixed_with_a_new_one(everywhere, tmp_path)
     other = ["--friction", "0.4", "--traces", "--no-report", "-q"]
     assert main(["run", "tetrahedron", "--limit", "1", *other, "--out", str(given)]) == 0
     before = contents(given)
-    codes = everywhere("kill", tmp_path, *RUN, "--no-report", "--traces", "--out", "OUT", every=3)
+    codes = everywhere("kill", tmp_path, *RUN, "--no-report", "--traces", "--out", "OUT", every=6)
     whole = contents(tmp_path / "whole")
-    for step in range(0, 3 * len(codes), 3):
+    for step in range(0, 6 * len(codes), 6):
         names = contents(tmp_path / f"{step}.struck")
         found = {name: data for name, data in names.items() if UNFINISHED not in name}
         assert found.items() <= before.items() or found.items() <= whole.items(), step
