@@ -23,6 +23,7 @@ PLAN = ["plan", "tetrahedron", "--family", "concurrent", "--jobs", "1", "-q"]
 CLOSELY = (
     ([*RUN, "--out", "OUT"], 3, 16),
     ([*RUN, "--no-report", "--traces", "--out", "OUT"], 10, 2),
+    ([*PLAN, "--regions", "--out", "OUT"], 3, 5),
     (["validate", "GRASPS", "--traces", "--jobs", "1", "-q", "--out", "OUT"], 5, 2),
     (["scene", "GRASPS", "-q", "--out", "OUT"], 6, 1),
     (["regions", "GRASPS", "--max-cones", "64", "-q", "--out", "OUT"], 5, 2),
@@ -43,7 +44,7 @@ def planned(tmp_path_factory):
     [
         ([*RUN, "--out", "OUT"], 1, 32),
         ([*RUN, "--no-report", "--traces", "--out", "OUT"], 5, 4),
-        ([*PLAN, "--limit", "2", "--regions", "--out", "OUT"], 3, 3),
+        ([*PLAN, "--out", "OUT"], 1, 2),
         (["scene", "GRASPS", "-q", "--out", "OUT"], 3, 2),
         (["export", "GRASPS", "--to", "gltf", "-q", "--out", "OUT/a.glb"], 2, 1),
         (["regions", "GRASPS", "--max-cones", "64", "-q", "--out", "OUT"], 2, 4),
