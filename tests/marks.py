@@ -1,4 +1,4 @@
-"""Marks for more cases of what a light everyday case covers."""
+"""Marks for more cases of what a lighter case covers, one of every day or of the slow slice."""
 
 import pytest
 

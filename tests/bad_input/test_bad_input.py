@@ -7,6 +7,7 @@ import pytest
 from tests.bad_input import of_binary_meshes, of_obj
 from tests.bad_input.judging import complaints
 from tests.bad_input.trying import Trials, Tried
+from tests.marks import more
 
 GROUPS = (
     "of_files", "of_obj", "of_binary_meshes", "of_archives", "of_topology", "of_physics",
@@ -16,30 +17,33 @@ LEAST = 500
 """Refused cases that there must be."""
 
 
-def answers(cases):
-    """What is wrong, by case."""
+@pytest.fixture(scope="module")
+def wrong():
+    """What is wrong with the answers to some cases, by case."""
     with Trials() as trials:
-        tried = {f"{case.group}: {case.name}": (case, trials.tried(case)) for case in cases}
-    return {name: complaints(*both) for name, both in tried.items()}
+
+        def wrong_with(cases):
+            tried = {f"{case.group}: {case.name}": (case, trials.tried(case)) for case in cases}
+            assert len(tried) == len(cases)  # each has its name
+            found = {name: complaints(*both) for name, both in tried.items()}
+            return {name: said for name, said in found.items() if said}
+
+        yield wrong_with
 
 
-def wrong(cases):
-    found = answers(cases)
-    assert len(found) == len(cases)  # each has its name
-    return {name: said for name, said in found.items() if said}
-
-
-def test_some_bad_meshes_are_refused():
+def test_some_bad_meshes_are_refused(wrong):
     assert not wrong([*of_obj.cases()[::10], *of_binary_meshes.cases()[::20]])
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("every", [3, *more(1)])
 @pytest.mark.parametrize("group", GROUPS)
-def test_all_bad_input_is_refused(group):
+def test_bad_input_is_refused(group, every, wrong):
+    """Every third case of each group, or all of them."""
     from tests.bad_input import catalogue  # makes whole files, which takes a while
 
     cases = next(each.cases() for each in catalogue.GROUPS if each.__name__.endswith(group))
-    assert not wrong(cases)
+    assert not wrong(cases[::every])
 
 
 @pytest.mark.slow

@@ -3,12 +3,14 @@
 import shutil
 import subprocess
 import sys
+from itertools import count
 
 import pytest
 
 from grasp_core.files.whole_files import UNFINISHED, write_parts
 from sim_validate.main import main
 from tests.faults.conftest import CLI, ROOT, contents
+from tests.marks import MORE, more
 
 RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q", "--no-report"]
 SMALL = "mount -t tmpfs -o size={size}k none {folder} && exec "
@@ -33,15 +35,22 @@ def _can_mount(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "said"), [("full", "No space left"), ("broken", "output error")])
+@pytest.mark.parametrize(
+    ("kind", "said", "every"),
+    [
+        ("full", "No space left", 2), ("broken", "output error", 3),
+        pytest.param("full", "No space left", 1, marks=MORE),
+        pytest.param("broken", "output error", 1, marks=MORE),
+    ],
+)  # fmt: skip
 def test_a_step_that_fails_is_said_with_its_file_and_earlier_files_are_whole(
-    kind, said, everywhere, tmp_path
+    kind, said, every, everywhere, tmp_path
 ):
-    codes = everywhere(kind, tmp_path, *RUN, "--traces", "--out", "OUT")
+    codes = everywhere(kind, tmp_path, *RUN, "--traces", "--out", "OUT", every=every)
     whole = contents(tmp_path / "whole")
-    assert len(codes) > 12
+    assert len(codes) > 12 // every
     assert codes[-1] == [0, ""]
-    for step, (code, message) in enumerate(codes[:-1]):
+    for step, (code, message) in zip(count(step=every), codes[:-1], strict=False):
         if contents(tmp_path / str(step)) == whole and code == 0:
             continue  # there was another way: of two to a nameless file, or of one over a rest
         assert code == 4, (step, message)
@@ -57,7 +66,7 @@ def test_a_step_that_fails_is_said_with_its_file_and_earlier_files_are_whole(
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("_can_mount")
-@pytest.mark.parametrize("size", [4, 8, 12, 20, 28])
+@pytest.mark.parametrize("size", [4, 20, *more(8, 12, 28)])
 def test_a_small_disk_keeps_what_fits(size, tmp_path):
     at = tmp_path / "disk"
     at.mkdir()

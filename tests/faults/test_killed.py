@@ -14,9 +14,21 @@ import pytest
 from grasp_core.files.whole_files import UNFINISHED
 from sim_validate.main import main
 from tests.faults.conftest import CLI, ROOT, contents
+from tests.marks import MORE
 
 RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]
 PLAN = ["plan", "tetrahedron", "--family", "concurrent", "--jobs", "1", "-q"]
+
+
+CLOSELY = (
+    ([*RUN, "--out", "OUT"], 3, 16),
+    ([*RUN, "--no-report", "--traces", "--out", "OUT"], 10, 2),
+    ([*PLAN, "--regions", "--out", "OUT"], 3, 5),
+    (["validate", "GRASPS", "--traces", "--jobs", "1", "-q", "--out", "OUT"], 5, 2),
+    (["scene", "GRASPS", "-q", "--out", "OUT"], 6, 1),
+    (["regions", "GRASPS", "--max-cones", "64", "-q", "--out", "OUT"], 5, 2),
+)
+"""Commands, how many steps there must be at least, and how many steps apart they are struck."""
 
 
 @pytest.fixture(scope="module")
@@ -30,18 +42,18 @@ def planned(tmp_path_factory):
 @pytest.mark.parametrize(
     ("words", "least", "every"),
     [
-        ([*RUN, "--out", "OUT"], 3, 16),
-        ([*RUN, "--no-report", "--traces", "--out", "OUT"], 10, 2),
-        ([*PLAN, "--regions", "--out", "OUT"], 3, 5),
-        (["validate", "GRASPS", "--traces", "--jobs", "1", "-q", "--out", "OUT"], 5, 2),
-        (["scene", "GRASPS", "-q", "--out", "OUT"], 6, 1),
+        ([*RUN, "--out", "OUT"], 1, 32),
+        ([*RUN, "--no-report", "--traces", "--out", "OUT"], 5, 4),
+        ([*PLAN, "--out", "OUT"], 1, 2),
+        (["scene", "GRASPS", "-q", "--out", "OUT"], 3, 2),
         (["export", "GRASPS", "--to", "gltf", "-q", "--out", "OUT/a.glb"], 2, 1),
-        (["regions", "GRASPS", "--max-cones", "64", "-q", "--out", "OUT"], 5, 2),
+        (["regions", "GRASPS", "--max-cones", "64", "-q", "--out", "OUT"], 2, 4),
         (
             ["baseline", "record", "GRASPS", "--jobs", "1", "-q", "--out", "OUT/a.baseline.json"],
             2,
             2,
         ),
+        *(pytest.param(*case, marks=MORE) for case in CLOSELY),
     ],
 )
 def test_what_is_there_is_whole_and_the_next_run_is_as_undisturbed(
@@ -68,9 +80,9 @@ def test_nothing_of_an_earlier_run_is_mixed_with_a_new_one(everywhere, tmp_path)
     other = ["--friction", "0.4", "--traces", "--no-report", "-q"]
     assert main(["run", "tetrahedron", "--limit", "1", *other, "--out", str(given)]) == 0
     before = contents(given)
-    codes = everywhere("kill", tmp_path, *RUN, "--no-report", "--traces", "--out", "OUT", every=3)
+    codes = everywhere("kill", tmp_path, *RUN, "--no-report", "--traces", "--out", "OUT", every=6)
     whole = contents(tmp_path / "whole")
-    for step in range(0, 3 * len(codes), 3):
+    for step in range(0, 6 * len(codes), 6):
         names = contents(tmp_path / f"{step}.struck")
         found = {name: data for name, data in names.items() if UNFINISHED not in name}
         assert found.items() <= before.items() or found.items() <= whole.items(), step

@@ -12,15 +12,19 @@ import pytest
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.parallel import processes as engines
-from tests.faults.conftest import CLI, ROOT, contents
+from tests.faults.conftest import CLI, KEPT, ROOT, contents
+from tests.marks import more
 from tests.patience import HANGING_S
 
 RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]
 NOWHERE = "/proc/nowhere"
+NO_HOME = {"HOME": NOWHERE, "XDG_CONFIG_HOME": NOWHERE, "XDG_CACHE_HOME": NOWHERE}
+COLD = "no folder for kernels"
+"""Compiles all loops again, beside their modules, which `test_kept_loops` sees of one of them."""
 SURROUNDINGS = {
-    "no home": {"HOME": NOWHERE, "XDG_CONFIG_HOME": NOWHERE, "XDG_CACHE_HOME": NOWHERE},
+    "no home": {**NO_HOME, "NUMBA_CACHE_DIR": str(KEPT)},
     "no folder for matplotlib": {"MPLCONFIGDIR": NOWHERE, "MPLBACKEND": "nonsense"},
-    "no folder for kernels": {"NUMBA_CACHE_DIR": NOWHERE, "XDG_CACHE_HOME": NOWHERE},
+    COLD: {"NUMBA_CACHE_DIR": NOWHERE, "XDG_CACHE_HOME": NOWHERE},
     "no threads": {"OMP_NUM_THREADS": "many"},
     "no temporary folder": {"TMPDIR": NOWHERE},
     "no locale": {"LC_ALL": "xx_XX", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"},
@@ -35,29 +39,66 @@ def usual(tmp_path_factory):
     return contents(folder)
 
 
+def surroundings(named):
+    """Settings of the environment: those of one name, or all but the slow ones together."""
+    if named in SURROUNDINGS:
+        return SURROUNDINGS[named]
+    return {
+        key: value
+        for name in SURROUNDINGS
+        if name != COLD
+        for key, value in SURROUNDINGS[name].items()
+    }
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("named", SURROUNDINGS)
+@pytest.mark.parametrize("named", ["all at once", *more(*SURROUNDINGS)])
 def test_surroundings_change_no_byte(named, usual, graspproof, tmp_path):
-    done = graspproof(*RUN, "--out", str(tmp_path / "b"), env=SURROUNDINGS[named])
+    done = graspproof(*RUN, "--out", str(tmp_path / "b"), env=surroundings(named))
     assert (done.returncode, done.stderr) == (0, "")
     assert contents(tmp_path / "b") == usual
 
 
-@pytest.mark.slow
-def test_where_no_folder_keeps_the_inner_loops_they_are_compiled_again(usual, tmp_path):
-    """A folder is found wherever tests can run, so that the list of folders is emptied."""
-    words = [*RUN, "--no-report", "--out", str(tmp_path)]
-    script = f"""
+NO_FOLDER = """
 from grasp_core import kept_loops
 kept_loops.folders = lambda _: ()
+"""
+"""A folder is found wherever tests can run, so that the list of folders is emptied."""
+CLOSED = """
+import grasp_core as gc
+from grasp_core.compiled import compiled, state_of
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS
+found = gc.force_closure(TETRA_CENTERS, TETRA_NORMALS, 0.5)
+print(found.forces.tobytes().hex(), found.margin.hex())
+print(state_of(compiled("grasp_core.solvers.nearest_point_kernel").solve))
+"""
+
+
+def said_by(script):
+    return subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+
+
+@pytest.mark.slow
+def test_where_no_folder_keeps_an_inner_loop_it_is_compiled_again():
+    there, here = said_by(NO_FOLDER + CLOSED), said_by(CLOSED)
+    assert (there.stderr, here.stderr) == ("", "")
+    *own, kept = here.stdout.splitlines()
+    assert (there.stdout.splitlines(), kept) == ([*own, "not kept"], "kept")
+
+
+@pytest.mark.slow
+@pytest.mark.more
+def test_a_run_that_compiles_all_of_its_inner_loops_ends_as_usual(usual, tmp_path):
+    words = [*RUN, "--no-report", "--out", str(tmp_path)]
+    script = f"""{NO_FOLDER}
 from grasp_core.compiled import compiled, state_of
 from sim_validate.main import main
 assert main({words!r}) == 0
 print(state_of(compiled("grasp_core.solvers.lp_kernel").solve))
 """
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
-    )
+    done = said_by(script)
     assert (done.stdout, done.stderr) == ("not kept\n", "")
     assert contents(tmp_path) == {name: usual[name] for name in contents(tmp_path)}
     assert "verdicts.json" in contents(tmp_path)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.bad_input.mesh_texts import obj
+from tests.faults.conftest import KEPT
 from tests.patience import HANGING_S
 
 AUDITING = Path(__file__).with_name("auditing")
@@ -20,8 +21,6 @@ LIBRARIES = tuple(
 SYSTEM = ("/sys/", "/proc/", "/dev/null", "/dev/urandom", "/usr/", "/lib", "/etc/", "/dev/shm/")  # noqa: S108 - shared memory of processes
 """What the interpreter and libraries read about the machine; fonts, time zones."""
 CACHES = ("__pycache__", ".pytest_cache")
-KEPT = ROOT / ".pytest_cache" / "kernels"
-"""Where compiled loops are kept, so that the new home does not compile them again."""
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 CHANGING = (
     "os.remove", "os.rename", "os.mkdir", "os.rmdir", "os.link", "os.symlink", "os.chmod",
@@ -95,6 +94,7 @@ def _is_of(path, *roots):
 @pytest.mark.slow
 def test_only_what_is_named_is_read(witness):
     own = [witness.folder / name for name in ("part.obj", "out", "pages", "ds", "home", "scratch")]
+    own.append(KEPT)
     named = {name for event, name, *_ in witness.events if event == "open"}
     opened = {witness.path(name) for name in named if "/" in str(name)} - {None}
     assert "part.obj" in named
@@ -114,7 +114,7 @@ def test_only_folders_for_results_and_caches_are_written_to(witness):
             written.add(witness.path(given[0]))
     written -= {None, Path("/dev/null")}
     assert any(path.is_relative_to(roots[0]) for path in written)
-    strange = [p for p in written if not _is_of(p, *roots) and not set(p.parts) & set(CACHES)]
+    strange = [p for p in written if not _is_of(p, KEPT, *roots) and not set(p.parts) & set(CACHES)]
     assert not strange
 
 

@@ -10,7 +10,7 @@ from sim_validate.simulation.gate.known_cases import known_answers, mesh_touches
 from sim_validate.simulation.setup import Setup
 
 USUAL_FRICTION, USUAL_RADIUS_M = 0.5, 0.07
-MOST_KNOWN = 32
+MOST_KNOWN = 256
 """Number of settings whose results are kept."""
 
 

@@ -141,7 +141,7 @@ def test_two_hundred_contact_sets_are_decided_as_the_judges_decide_them(body):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", [0, *more_cases(1)])
+@pytest.mark.parametrize("part", more_cases(0, 1))
 @pytest.mark.parametrize("body", BODIES)
 def test_ten_thousand_contact_sets_are_decided_as_the_judges_decide_them(body, part):
     check_many(body, 5_000 // len(BODIES), seed=(2, part))

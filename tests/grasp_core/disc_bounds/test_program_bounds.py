@@ -17,6 +17,7 @@ from grasp_core.solvers.lp import RESIDUAL
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
 from tests.grasp_core.curved import curved_body
+from tests.marks import MORE
 
 BODIES = {
     "random": lambda: example_object("random-14-1"),
@@ -83,7 +84,9 @@ def test_with_a_larger_least_radius_bounds_above_it_stay_and_others_stay_below()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "friction"), [("tetrahedron", 0.4), ("wedge", 0.3)])
+@pytest.mark.parametrize(
+    ("name", "friction"), [("tetrahedron", 0.4), pytest.param("wedge", 0.3, marks=MORE)]
+)
 def test_a_plan_without_these_bounds_is_the_same(monkeypatch, name, friction):
     body = example_object(name)
     quick = gc.plan(body, friction, limit=12).grasps

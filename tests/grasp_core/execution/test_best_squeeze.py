@@ -132,7 +132,7 @@ def test_no_random_or_searched_squeeze_survives_more():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["box", *more("dodecahedron", "wedge")])
+@pytest.mark.parametrize("name", more("box", "dodecahedron", "wedge"))
 def test_no_squeeze_of_many_survives_more(name):
     assert against_brute_force(name, 3, 300) == 900
 

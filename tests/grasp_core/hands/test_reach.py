@@ -13,6 +13,7 @@ from grasp_core.hands.hand import Hand, HandFinger
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.posing.pose_search import TOUCHING
 from tests.grasp_core.hands.gripping import FRICTION, finger, grasps, plain_hand, reaches, scaled
+from tests.marks import MORE
 
 CASES = [("allegro", "dodecahedron", 0.035), ("leap", "dodecahedron", 0.035),
          ("allegro", "l-bracket", 0.04)]  # fmt: skip
@@ -66,7 +67,7 @@ def test_most_grasps_are_reached_and_each_claim_holds(hand, name, radius):
 
 @pytest.mark.parametrize(
     ("hand", "name", "radius"),
-    [CASES[0], pytest.param(*CASES[1], marks=pytest.mark.slow), CASES[2]],
+    [CASES[0], pytest.param(*CASES[1], marks=MORE), CASES[2]],
 )
 def test_points_strewn_over_links_are_outside_the_object(hand, name, radius):
     held, body, seen = gc.load_hand(hand), scaled(name, radius), 0

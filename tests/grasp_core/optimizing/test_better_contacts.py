@@ -7,6 +7,7 @@ import grasp_core as gc
 from grasp_core.optimizing.better_contacts import pieces_under
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_names, example_object
+from tests.marks import MORE
 
 NAMES = tuple(name for name in example_names() if "FACES" not in name)
 
@@ -27,8 +28,8 @@ def checked(grasp, found, friction):
 @pytest.mark.parametrize(
     ("name", "limit"),
     [("wedge", 3), ("tetrahedron", 3), ("double-wedge-bar", 1), ("random-20-7", 1),
-     pytest.param("double-wedge-bar", 3, marks=pytest.mark.slow),
-     pytest.param("random-20-7", 3, marks=pytest.mark.slow)],
+     pytest.param("double-wedge-bar", 3, marks=MORE),
+     pytest.param("random-20-7", 3, marks=MORE)],
 )  # fmt: skip
 def test_grasps_get_better_and_stay_certified(name, limit):
     body = example_object(name)

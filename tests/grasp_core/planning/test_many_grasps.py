@@ -10,7 +10,7 @@ import pytest
 
 import grasp_core as gc
 from scenes.example_objects import example_names, example_object
-from tests.marks import more
+from tests.marks import MORE, more
 
 THETA = math.radians(10.0)
 FRICTION = math.tan(THETA)
@@ -30,12 +30,13 @@ def bodies():
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-def test_a_thousand_grasps_of_each_family_are_closed_and_are_what_they_claim():
+@pytest.mark.parametrize("least", [200, *more(1000)])
+def test_many_grasps_of_each_family_are_closed_and_are_what_they_claim(least):
     found, rejected = Counter(), 0
     for body in bodies():
         if len(body.faces) > FACES_AT_MOST:
             continue
-        wanted = [f for f in ("concurrent", "pencil", "regulus") if found[f] < 1000]
+        wanted = [f for f in ("concurrent", "pencil", "regulus") if found[f] < least]
         if not wanted:
             break
         plan = gc.plan(body, FRICTION, families=wanted, cones="normal")
@@ -51,13 +52,16 @@ def test_a_thousand_grasps_of_each_family_are_closed_and_are_what_they_claim():
             assert np.abs(np.cross(x, f).sum(axis=0)).max() < 1e-8 * body.radius
             found[grasp.family] += 1
     assert rejected == 0
-    assert min(found.values()) >= 1000, found
+    assert min(found.values()) >= least, found
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-@pytest.mark.parametrize("family", ["pencil", *more("concurrent")])
-def test_no_contacts_in_the_regions_of_two_hundred_grasps_lose_closure(family):
+@pytest.mark.parametrize(
+    ("family", "count"),
+    [("pencil", 40), *(pytest.param(each, 200, marks=MORE) for each in ("pencil", "concurrent"))],
+)
+def test_no_contacts_in_the_regions_of_many_grasps_lose_closure(family, count):
     """A hundred choices each, corners and extremes first, then descent over the borders."""
     rng = np.random.default_rng(7)
     grasps = points = 0
@@ -66,7 +70,7 @@ def test_no_contacts_in_the_regions_of_two_hundred_grasps_lose_closure(family):
         planned = gc.plan(body, FRICTION, families=(family,), limit=240, cones="normal").grasps
         # with narrow cones, margins on the borders come near what the closure test can decide
         wide = [grasp for grasp in planned if grasp.force_cones[0].half_angle > 0.5 * THETA]
-        for grasp in wide[:: max(1, len(wide) // 44)]:
+        for grasp in wide[:: max(1, 5 * len(wide) // (count + 20))]:
             borders = [region.polygon for region in grasp.regions]
             places = list(choices(rng))
             margins = [margin(grasp, borders, place) for place in places]
@@ -74,7 +78,7 @@ def test_no_contacts_in_the_regions_of_two_hundred_grasps_lose_closure(family):
             start = places[int(np.argmin(margins[:CORNERS]))]
             assert descend(grasp, borders, start[0]) > 0.0, grasp.id
             grasps, points = grasps + 1, points + len(places)
-    assert grasps >= 200
+    assert grasps >= count
     assert points >= 100 * grasps
 
 

@@ -64,20 +64,21 @@ NORMAL = [(name, "normal") for name in ("icosahedron", "random-20-7", "random-30
 
 
 @pytest.mark.slow
-def test_no_returned_grasp_fails_an_independent_pyramid_of_64_sides():
+@pytest.mark.parametrize(("limit", "least"), [(8, 40), pytest.param(40, 150, marks=MORE)])
+def test_no_returned_grasp_fails_an_independent_pyramid_of_64_sides(limit, least):
     """Inner pyramids accept each grasp, so outer ones must as well; critical friction agrees."""
     tested = 0
     for name, cones in TILTED + NORMAL:
         families = ("concurrent",) if name == "screwdriver" else FAMILIES
         body = example_object(name)
-        for grasp in gc.plan(body, 0.5, limit=40, families=families, cones=cones).grasps:
+        for grasp in gc.plan(body, 0.5, limit=limit, families=families, cones=cones).grasps:
             for outer in (False, True):
                 assert pyramid_margin(grasp.positions, grasp.normals, 0.5, 64, outer=outer) > 1e-9
             below = 0.99 * grasp.critical_friction
             if below > 1e-3:
                 assert pyramid_margin(grasp.positions, grasp.normals, below, 64, outer=False) < 1e-9
             tested += 1
-    assert tested >= 150
+    assert tested >= least
 
 
 def test_every_grasp_lies_on_its_faces_inside_its_regions():

@@ -9,6 +9,7 @@ import grasp_core as gc
 from grasp_core.planning.reach import Finger, reach, segment_distances
 from scenes.example_objects import example_object
 from tests.grasp_core.curved import curved_body
+from tests.marks import MORE
 
 
 def nearest(start, end, triangle, rng):
@@ -28,7 +29,7 @@ def nearest(start, end, triangle, rng):
 
 def test_distances_of_segments_from_triangles_are_the_least():
     rng, crossing = np.random.default_rng(0), 0
-    for case in range(150):
+    for case in range(60):
         start, end, triangle = rng.normal(size=3), rng.normal(size=3), rng.normal(size=(3, 3))
         if case % 5 == 0:
             end = start  # the ball before it moves
@@ -37,7 +38,7 @@ def test_distances_of_segments_from_triangles_are_the_least():
         found = segment_distances(start, end, triangle[None])[0]
         assert found == pytest.approx(nearest(start, end, triangle, rng), abs=2e-6)
         crossing += found == 0.0
-    assert crossing >= 5
+    assert crossing >= 2
 
 
 STEPS = 24
@@ -76,7 +77,9 @@ def least_gap(body, grasp, finger, directions):
     return gap, accuracy
 
 
-@pytest.mark.parametrize(("name", "thickness"), [("l-bracket", 0.06), ("hex-nut", 0.2)])
+@pytest.mark.parametrize(
+    ("name", "thickness"), [("l-bracket", 0.06), pytest.param("hex-nut", 0.2, marks=MORE)]
+)
 def test_reached_contacts_have_free_rods_and_others_say_why(name, thickness):
     body = example_object(name)
     finger = Finger(thickness * body.radius, 0.8 * body.radius)
@@ -123,7 +126,7 @@ def test_a_plan_for_fingers_holds_only_grasps_that_they_reach():
     some = gc.plan(body, 0.5, finger=finger)
     assert 0 < len(some.grasps) < len(every.grasps)
     assert some.finger == finger
-    for grasp in some.grasps:
+    for grasp in some.grasps[::4]:
         gap, _ = least_gap(body, grasp, finger, -grasp.approach_directions)
         assert gap >= -2e-6 * body.radius
     assert all(grasp.approach_directions is None for grasp in every.grasps)

@@ -18,7 +18,9 @@ import sim_validate as sv
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.verifying.verify import verify
 from sim_validate.main import main
+from tests.marks import more
 from tests.patience import HANGING_S
+from tests.sim_validate.datasets.engines import here
 
 pytest.importorskip("pyarrow")
 FLAGS = ("--friction", "0.4", "--friction", "0.5", "--family", "concurrent", "--limit", "2")
@@ -53,7 +55,9 @@ def dataset(tmp_path_factory):
 @pytest.fixture(scope="module")
 def large_dataset(tmp_path_factory):
     """What the command of killed processes makes."""
-    return built(tmp_path_factory.mktemp("large") / "ds", OBJECTS, FLAGS)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("sim_validate.commands.dataset.local_processes", here)
+        return built(tmp_path_factory.mktemp("large") / "ds", OBJECTS, FLAGS)
 
 
 def test_a_dataset_is_made_and_nothing_is_wrong_with_it(dataset, capsys):
@@ -85,24 +89,24 @@ def test_a_changed_file_is_named(dataset, tmp_path, capsys):
     assert path.name in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("built_here")
 def test_a_toml_file_says_the_same_as_flags(dataset, tmp_path):
+    """The flags were given to a command that begins processes."""
     settings = tmp_path / "ds.toml"
     settings.write_text((dataset / "config.toml").read_text())
     folder = tmp_path / "ds"
-    assert (
-        main(["dataset", "build", str(settings), "--jobs", "1", "--out", str(folder), "-q"])
-        == Exit.GOOD
-    )
+    assert main(["dataset", "build", str(settings), "--out", str(folder), "-q"]) == Exit.GOOD
     assert files(folder) == files(dataset)
     again = ["dataset", "build", str(settings), "--limit", "3", "--out", str(tmp_path / "x")]
     assert main(again) == Exit.INPUT
 
 
+@pytest.mark.usefixtures("built_here")
 def test_a_bad_mesh_is_left_out_and_said(tmp_path, capsys):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "bad.stl").write_text("solid nothing")
     names = ["tetrahedron", str(tmp_path / "meshes"), *FLAGS[:4], *LIGHT[2:]]
-    code = main(["dataset", "build", *names, "--jobs", "1", "--out", str(tmp_path / "ds")])
+    code = main(["dataset", "build", *names, "--out", str(tmp_path / "ds")])
     assert code == Exit.PARTIAL
     assert "quarantine.jsonl" in capsys.readouterr().err
     (first, second) = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
@@ -110,9 +114,10 @@ def test_a_bad_mesh_is_left_out_and_said(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_driver_killed_at_random_moments_loses_nothing(large_dataset, tmp_path):
+@pytest.mark.parametrize("times", [8, *more(20)])
+def test_a_driver_killed_at_random_moments_loses_nothing(times, large_dataset, tmp_path):
     folder, rng, killed = tmp_path / "ds", np.random.default_rng(0), 0
-    for _ in range(20):
+    for _ in range(times):
         process = subprocess.Popen(command(folder, 2), start_new_session=True)
         time.sleep(rng.uniform(0.5, 6.0))
         if process.poll() is None:

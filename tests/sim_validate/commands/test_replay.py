@@ -136,12 +136,10 @@ def test_a_table_for_people(folder, capsys):
     assert "off a face: below zero fingertips press on their faces" in said
 
 
+@pytest.mark.usefixtures("built_here")
 def test_dataset_rows(tmp_path, replay, capsys):
     out = tmp_path / "ds"
-    assert (
-        main(["dataset", "build", "wedge", "--limit", "1", "--jobs", "1", "--out", str(out), "-q"])
-        == Exit.GOOD
-    )
+    assert main(["dataset", "build", "wedge", "--limit", "1", "--out", str(out), "-q"]) == Exit.GOOD
     capsys.readouterr()
     import sim_validate as sv
 

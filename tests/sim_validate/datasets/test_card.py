@@ -166,9 +166,9 @@ def test_licences_have_their_usual_names_where_they_are_known(manifest, given, h
     assert f"- {said}" in lines
 
 
+@pytest.mark.usefixtures("built_here")
 def test_a_build_says_once_which_flags_are_missing(tmp_path, capsys):
     names = ["dataset", "build", "tetrahedron", "--family", "concurrent", "--limit", "1"]
-    names += ["--jobs", "1"]
     flags = ["--license", "MIT", "--creator", "A", "--url", "https://a.b", "--published"]
     assert main([*names, "--out", str(tmp_path / "a")]) == Exit.GOOD
     said = capsys.readouterr().err

@@ -113,6 +113,7 @@ def test_predictions_with_torsion_are_what_simulation_finds(name):
 
 
 @pytest.mark.slow
+@pytest.mark.more
 @pytest.mark.timeout(600)
 def test_predictions_with_torsion_are_what_simulation_finds_on_a_handful_of_objects():
     compared = 0

@@ -38,11 +38,15 @@ def test_grasps_of_every_family_are_good(name, family):
 
 
 @pytest.mark.parametrize(
-    ("friction", "each"), [(0.5, 1), *(pytest.param(mu, 2, marks=MORE) for mu in (0.2, 0.5, 0.8))]
+    ("names", "friction", "each"),
+    [
+        (OBJECTS[::2], 0.5, 1),
+        *(pytest.param(OBJECTS, mu, 2, marks=MORE) for mu in (0.2, 0.5, 0.8)),
+    ],
 )
-def test_planned_grasps_hold_all_wrenches_and_no_control_does(friction, each):
+def test_planned_grasps_hold_all_wrenches_and_no_control_does(names, friction, each):
     tested = controls = 0
-    for name in OBJECTS:
+    for name in names:
         body, found = grasps(name, friction, each)
         for grasp in found:
             verdict = sv.validate(body, grasp, friction)
@@ -53,8 +57,8 @@ def test_planned_grasps_hold_all_wrenches_and_no_control_does(friction, each):
             assert not verdict.mismatches
             controls += len(verdict.controls)
             tested += 1
-    assert tested >= 6 * each
-    assert controls >= 12 * each
+    assert tested >= (len(names) - 1) * each
+    assert controls >= 2 * (len(names) - 1) * each
 
 
 def test_holding_leaves_a_wide_margin_to_the_threshold():
@@ -72,7 +76,7 @@ def test_all_that_can_be_asked_for_repeats_to_the_last_digit_at_any_number_of_th
         random_wrenches=2, limits="ramp", independent=True, rules=tuple(RULES), keep_traces=True
     )
     texts, traces = set(), []
-    for threads in (1, 2, 2):
+    for threads in (1, 2):
         verdict = sv.validate(body, grasp, 0.4, agenda=agenda, setup=Setup(threads=threads))
         texts.add(verdicts_to_json(body, 0.4, [verdict], verdict.gate, complete=True))
         traces.append(trace_arrays(verdict))

@@ -9,6 +9,7 @@ from scipy.optimize import linprog
 
 import grasp_core as gc
 from tests.judges import PROVED, random_contacts, random_rotation
+from tests.marks import more
 
 CASES = 60
 SAMPLES = 400
@@ -103,7 +104,7 @@ def test_torsion_adds_what_a_missing_turn_about_one_axis_needs():
         assert found.verify()
 
 
-@pytest.mark.parametrize("count", [2, 3, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [2, 3, *more(4)])
 def test_pyramids_inside_and_around_the_cones_agree(count):
     """Pyramids inside that close prove closure, pyramids around that do not prove the opposite."""
     rng = np.random.default_rng(count)

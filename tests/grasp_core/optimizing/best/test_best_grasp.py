@@ -18,12 +18,21 @@ from grasp_core.optimizing.best.searching.stop import Stop
 from scenes.example_objects import example_object
 from tests.grasp_core.optimizing.best.independent_replay import replays
 from tests.grasp_core.optimizing.best.supports_of_contacts import supports
+from tests.marks import more
 
 FRICTION = 0.5
 CASES = {"tetrahedron": 0.1, "box": 0.2, "random-4-1": 0.4, "prism": 0.3}
 
 
-@pytest.fixture(scope="module", params=CASES)
+@pytest.fixture(
+    scope="module",
+    params=[
+        "tetrahedron",
+        "random-4-1",
+        pytest.param("box", marks=pytest.mark.slow),
+        *more("prism"),
+    ],
+)
 def searched(request):
     body = example_object(request.param)
     return body, gc.best_grasp(body, FRICTION, gap=CASES[request.param], jobs=2), request.param
@@ -82,7 +91,7 @@ def test_no_random_contacts_exceed_the_bound(searched):
     rng, measured = np.random.default_rng(1), 0
     twists = rng.normal(size=(300, 6))
     twists = np.vstack([twists / np.linalg.norm(twists, axis=1)[:, None], found.proof.twists[:300]])
-    for _ in range(4):
+    for _ in range(2):
         on, at = random_contacts(found, rng, 2000)
         upper = supports(found, on, at, twists).max(axis=1).min(axis=1)
         for row in np.argsort(-upper)[:25]:
@@ -93,7 +102,7 @@ def test_no_random_contacts_exceed_the_bound(searched):
             )
             assert here.lower <= found.bound
             measured += here.lower > 0.0
-    assert measured >= 30
+    assert measured >= 15
 
 
 def test_no_climb_ends_above_the_bound(searched):

@@ -4,7 +4,6 @@ import itertools
 import os
 import shutil
 import subprocess
-import sys
 import time
 
 import pytest
@@ -43,6 +42,15 @@ def note_memory(unit, staging):
 
     most = resource.getrlimit(resource.RLIMIT_AS)[0]
     staging.quarantine(unit, "limited" if 0 < most < 2**40 else "unlimited")
+
+
+def limit_twice(limits):
+    """The limits of memory that are in force in this process, where a unit may take a lot more."""
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_AS, limits)
+    with tasks._memory_kept(2**40):
+        return resource.getrlimit(resource.RLIMIT_AS)
 
 
 def sleep(*_):
@@ -143,36 +151,27 @@ def test_a_fault_of_ours_with_one_object_does_not_stop_the_others(tmp_path, monk
     assert "internal error: ZeroDivisionError: a bug" in left_out
 
 
-def test_a_lower_limit_of_memory_that_there_is_already_is_kept():
-    command = (
-        "import resource; from sim_validate.datasets.building.worker import _memory_kept\n"
-        "resource.setrlimit(resource.RLIMIT_AS, (3 * 2**30, 4 * 2**30))\n"
-        "with _memory_kept(2**40): print(resource.getrlimit(resource.RLIMIT_AS))"
-    )
-    ran = subprocess.run(
-        [sys.executable, "-c", command], capture_output=True, text=True, check=True
-    )
-    assert ran.stdout.split() == [f"({3 * 2**30},", f"{4 * 2**30})"]
-
-
-def test_memory_is_limited_while_a_unit_is_done_and_no_longer(staging):
+def test_memory_is_limited_while_a_unit_is_done_and_a_process_that_never_ends_is_ended(staging):
+    """One process, which is limited for one unit and not for the next, and those after it."""
     import resource
 
     before = resource.getrlimit(resource.RLIMIT_AS)
     given = task(staging, note_memory, Limits(600.0, 2**30))
     with local_processes(1) as engine:
         engine.submit(do_task, given).result()
-    assert staging.result(given.unit) == "limited"
-    assert resource.getrlimit(resource.RLIMIT_AS) == before
-
-
-@pytest.mark.parametrize("never", [sleep, burn])
-def test_a_process_in_which_a_unit_never_ends_is_ended(staging, never):
-    with local_processes(1) as engine:
-        failed = engine.submit(do_task, task(staging, never, Limits(0.5))).exception(HANGING_S)
-        assert failed is not None
+        assert staging.result(given.unit) == "limited"
+        staging.forget(given.unit)
         engine.submit(do_task, task(staging, note_memory)).result()
-    assert staging.result(units_of(CONFIG)[0]) == "unlimited"
+        assert staging.result(given.unit) == "unlimited"
+        for never in (sleep, burn):
+            failed = engine.submit(do_task, task(staging, never, Limits(0.5))).exception(HANGING_S)
+            assert failed is not None
+        staging.forget(given.unit)
+        engine.submit(do_task, task(staging, note_memory)).result()
+        lower = (3 * 2**30, 4 * 2**30)
+        assert engine.submit(limit_twice, lower).result() == lower
+    assert staging.result(given.unit) == "unlimited"
+    assert resource.getrlimit(resource.RLIMIT_AS) == before
 
 
 @pytest.mark.slow

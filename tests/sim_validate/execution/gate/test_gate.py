@@ -9,6 +9,7 @@ import scenes
 import sim_validate as sv
 from scenes.execution.held import HeldSettings
 from sim_validate.execution.gate.gate import cases_of, measured_case, require_faithful_execution
+from tests.marks import MORE, more
 from tests.sim_validate.execution.gate.settings_of_gates import (
     BROKEN,
     RIGHT,
@@ -19,8 +20,19 @@ from tests.sim_validate.execution.gate.settings_of_gates import (
 )  # fmt: skip
 
 TABLE = list(product((0.05, 0.3, 2.0), (500.0, 2000.0, 10_000.0), (0.02, 0.07, 0.2)))
-EVERYDAY = (0, 10, 18, 22, 25)
-"""Places of the broken settings that are tried every day."""
+CORNERS = ((0.05, 500.0, 0.2), (0.05, 10_000.0, 0.2), (2.0, 500.0, 0.02), (2.0, 10_000.0, 0.02))
+"""Cases of the table that differ most from those of every day."""
+EVERYDAY, SLOW = (0, 10, 18, 22, 25), (2, 7, 9, 14, 19, 31, 33, 35)
+"""Places of the broken settings that are tried every day, and of one more of each kind."""
+DRAWN, BLOCK = 40, 8
+"""How many cases are drawn, and how many of them one test takes."""
+
+
+def mark_of(place):
+    """The marks of a broken setting."""
+    if place in EVERYDAY:
+        return ()
+    return pytest.mark.slow if place in SLOW else MORE
 
 
 def refused(where, numbers):
@@ -51,18 +63,21 @@ def test_so_do_stiff_and_soft_springs(where):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("where", TABLE)
+@pytest.mark.parametrize(
+    "where", [*CORNERS, *more(*(each for each in TABLE if each not in CORNERS))]
+)
 def test_each_closed_form_is_met_at_all_masses_stiffnesses_and_sizes(where):
     assert not refused(where, {})
 
 
 @pytest.mark.slow
-def test_so_it_is_with_other_pushes_frictions_fingertips_and_dampers():
+@pytest.mark.parametrize("start", [0, *more(*range(BLOCK, DRAWN, BLOCK))])
+def test_so_it_is_with_other_pushes_frictions_fingertips_and_dampers(start):
     rng = np.random.default_rng(1)
     least = np.log([0.01, 200.0, 0.01, 1.0, 0.1, 0.02, 0.005, 0.1])
     most = np.log([5.0, 2e4, 0.3, 50.0, 1.5, 0.3, 0.2, 2.0])
-    for _ in range(40):
-        m, k, r, push, friction, tip, tip_mass, damping = np.exp(rng.uniform(least, most)).tolist()
+    drawn = np.exp(rng.uniform(least, most, (DRAWN, 8)))[start : start + BLOCK]
+    for m, k, r, push, friction, tip, tip_mass, damping in drawn.tolist():
         case = held_case(
             m, k, r, push_n=push, friction=friction, tip_radius_m=tip * r, tip_mass_kg=tip_mass,
             damping_ratio=damping,
@@ -72,17 +87,16 @@ def test_so_it_is_with_other_pushes_frictions_fingertips_and_dampers():
 
 @pytest.mark.parametrize(
     ("where", "numbers"),
-    [
-        pytest.param(*case, marks=() if place in EVERYDAY else pytest.mark.slow)
-        for place, case in enumerate(BROKEN)
-    ],
+    [pytest.param(*case, marks=mark_of(place)) for place, case in enumerate(BROKEN)],
 )
 def test_broken_settings_are_refused(where, numbers):
     assert refused(where, numbers)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("where", "numbers"), [pytest.param(*case, marks=pytest.mark.slow) for case in RIGHT[1:]]
+    ("where", "numbers"),
+    [*RIGHT[1:4], *(pytest.param(*case, marks=MORE) for case in RIGHT[4:])],
 )
 def test_settings_that_change_nothing_are_accepted(where, numbers):
     assert not refused(where, numbers)

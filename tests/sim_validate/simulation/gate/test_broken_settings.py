@@ -9,7 +9,7 @@ from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.setup import Setup
 from sim_validate.validation.validation import simulated_critical_friction
 from sim_validate.validation.wrench_verdict import AGREEMENT
-from tests.marks import more
+from tests.marks import MORE, more
 
 USUAL, TINY = 0.07, 5e-4
 """Radius of the object under test [m]."""
@@ -36,11 +36,23 @@ EVERYDAY = (
     ("pads", "physics", {"condim": 4}, RANGE),
     ("pads", "physics", {"condim": 6}, RANGE),
 )
-REST = (
+SLOW = (
     ("pads", "physics", {"cone": "pyramidal"}, GATE),
+    ("pads", "physics", DEFAULTS, GATE),
+    ("pads", "physics", {"timestep": 0.01}, RANGE),
+    ("pads", "physics", {"solref": [0.02, 1.0]}, GATE),
+    ("pads", "physics", {"wind": [10.0, 0.0, 0.0], "density": 1000.0}, GATE),
+    ("mesh", "physics", {"margin": 1e-3}, GATE),
+    ("pads", "fingers", {"mass_kg": 1e6}, GATE),
+    ("pads", "fingers", {"stiffness_n_per_m": 10.0}, GATE),
+    ("pads", "hold", {"gap_threshold": 1.0}, GATE),
+    ("pads", "limit", {"ramp_threshold": 0.01}, GATE),
+    ("pads", "friction", {"spans": [0.9], "rounds": 1}, GATE),
+)
+"""One or two of each kind and each table that are not tried every day."""
+REST = (
     ("pads", "physics", {"autoreset": True}, GATE),
     ("pads", "physics", {"integrator": "implicitfast", "tolerance": 1e-8}, GATE),
-    ("pads", "physics", DEFAULTS, GATE),
     ("pads", "physics", {"impratio": 1e-3}, GATE),
     ("pads", "physics", {"impratio": 1.0}, GATE),
     ("pads", "physics", {"impratio": 10.0}, GATE),
@@ -51,34 +63,25 @@ REST = (
     ("pads", "physics", {"tolerance": 1e-8}, GATE),
     ("pads", "physics", {"timestep": 0.05}, RANGE),
     ("pads", "physics", {"timestep": 0.02}, RANGE),
-    ("pads", "physics", {"timestep": 0.01}, RANGE),
     ("pads", "physics", {"solimp": [0.5, 0.5, 0.001, 0.5, 2.0]}, GATE),
     ("pads", "physics", {"solref": [0.1, 1.0]}, GATE),
-    ("pads", "physics", {"solref": [0.02, 1.0]}, GATE),
     ("pads", "physics", {"margin": 1e-3}, GATE),
     ("pads", "physics", {"margin": 1e-2}, GATE),
-    ("pads", "physics", {"wind": [10.0, 0.0, 0.0], "density": 1000.0}, GATE),
     ("mesh", "physics", {"ccd_iterations": 2}, GATE),
     ("mesh", "physics", {"ccd_iterations": 3}, GATE),
     ("mesh", "physics", {"ccd_iterations": 5}, GATE),
     ("mesh", "physics", {"ccd_tolerance": 0.01}, GATE),
-    ("mesh", "physics", {"margin": 1e-3}, GATE),
-    ("pads", "fingers", {"mass_kg": 1e6}, GATE),
     ("pads", "fingers", {"mass_kg": 1e-6}, GATE),
     ("pads", "fingers", {"stiffness_n_per_m": 0.01}, GATE),
-    ("pads", "fingers", {"stiffness_n_per_m": 10.0}, GATE),
     ("pads", "fingers", {"stiffness_n_per_m": 1e6}, GATE),
     ("pads", "hold", {"hold_threshold": 0.02}, GATE),
     ("pads", "hold", {"hold_threshold": 1e-9}, GATE),
     ("pads", "hold", {"total_threshold": 1e-6}, GATE),
-    ("pads", "hold", {"gap_threshold": 1.0}, GATE),
-    ("pads", "limit", {"ramp_threshold": 0.01}, GATE),
     ("pads", "limit", {"ramp_threshold": 1e-9}, GATE),
     ("pads", "limit", {"spans": [0.9], "rounds": 1}, GATE),
     ("pads", "limit", {"spans": [1e-4]}, GATE),
     ("pads", "friction", {"threshold": 0.01}, GATE),
     ("pads", "friction", {"threshold": 1e-9}, GATE),
-    ("pads", "friction", {"spans": [0.9], "rounds": 1}, GATE),
     ("pads", "friction", {"spans": [1e-4]}, GATE),
 )
 AT_SMALL_SIZE = (
@@ -91,12 +94,12 @@ AT_SMALL_SIZE = (
 
 
 RIGHT = (
+    ("physics", {"timestep": 0.003}),
+    ("hold", {"squeeze_s": 0.05}),
     ("physics", {"timestep": 0.001}),
     ("physics", {"timestep": 0.002}),
-    ("physics", {"timestep": 0.003}),
     ("physics", {"integrator": "Euler"}),
     ("physics", {"integrator": "RK4"}),
-    ("hold", {"squeeze_s": 0.05}),
     ("hold", {"squeeze_s": 0.1}),
 )
 """They give the verdicts of the usual settings, on objects of every size."""
@@ -121,20 +124,29 @@ def test_broken_settings_are_refused_before_a_grasp_is_simulated(surface, table,
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("surface", "table", "numbers", "kind"), REST)
+@pytest.mark.parametrize(
+    ("surface", "table", "numbers", "kind"),
+    [*SLOW, *(pytest.param(*case, marks=MORE) for case in REST)],
+)
 def test_so_are_more_of_them(surface, table, numbers, kind):
     assert type(refusal(surface, table, numbers, USUAL)) is kind
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("surface", "table", "numbers", "kind"), AT_SMALL_SIZE)
+@pytest.mark.parametrize(
+    ("surface", "table", "numbers", "kind"),
+    [*AT_SMALL_SIZE[:2], *(pytest.param(*case, marks=MORE) for case in AT_SMALL_SIZE[2:])],
+)
 def test_what_is_too_coarse_for_a_small_object_is_refused_there(surface, table, numbers, kind):
     assert refusal(surface, table, numbers, USUAL, 1.0) is None
     assert type(refusal(surface, table, numbers, TINY, 1.0)) is kind
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("table", "numbers"), RIGHT)
+@pytest.mark.parametrize(
+    ("table", "numbers"),
+    [*RIGHT[:2], *(pytest.param(*case, marks=MORE) for case in RIGHT[2:])],
+)
 def test_settings_that_are_right_are_accepted(table, numbers):
     for radius_m in (TINY, USUAL, 1.0):
         assert refusal("pads", table, numbers, radius_m) is None
@@ -163,4 +175,4 @@ def test_long_steps_and_a_hasty_squeeze_do_not_tilt_a_lightly_held_bracket(table
 
 
 def test_enough_settings_are_tried():
-    assert len({repr(case) for case in EVERYDAY + REST}) >= 40
+    assert len({repr(case) for case in EVERYDAY + SLOW + REST}) >= 40
