@@ -9,7 +9,7 @@ from grasp_core.files.complaints import record_of
 from grasp_core.files.strict_json import object_of
 from grasp_core.files.text_files import read_text
 from scenes.drawing.pages import number
-from sim_validate.records.best_schema import OTHER, USUAL, BestFile, BestForLoadsFile
+from sim_validate.records.best.best_schema import OTHER, USUAL, BestFile, BestForLoadsFile
 from sim_validate.reports.agreement import Record
 
 MILLI, PERCENT = 1e3, 100.0

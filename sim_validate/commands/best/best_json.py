@@ -9,7 +9,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.result import BestGrasp
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
-from sim_validate.records.best_schema import OTHER, USUAL
+from sim_validate.records.best.best_schema import OTHER, USUAL
 
 
 @dataclass(frozen=True, slots=True)

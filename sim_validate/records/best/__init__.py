@@ -1,0 +1,1 @@
+"""What does the file of a search for the best grasp hold?"""
