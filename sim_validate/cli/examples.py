@@ -75,6 +75,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "dataset merge": ("dataset merge ds-a ds-b --out ds",),
     "dataset stats": ("dataset stats ds --out ds-stats",),
     "dataset sample": ("dataset sample ds --count 50 --out ds-rows",),
+    "dataset depth": (
+        "dataset depth ds --out ds-depth",
+        "dataset depth ds --out ds-depth --on-table --width 320 --height 240",
+    ),
     "dataset export": ("dataset export ds --to csv --out tables",),
     "baseline record": ("baseline record grasps.json -o wedge.baseline.json",),
     "baseline check": ("baseline check wedge.baseline.json --junit results.xml",),

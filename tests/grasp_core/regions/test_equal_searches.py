@@ -135,7 +135,7 @@ def test_a_ceiling_does_not_depend_on_last_digits(monkeypatch):
     exact, rng = quality_ceilings.grounds_on, np.random.default_rng(3)
 
     def ceiling():
-        return gc.quality_ceiling(body, grasp.faces, 0.5, gap=0.2, parts=20_000)
+        return gc.quality_ceiling(body, grasp.faces, 0.5, gap=0.3, parts=6_000)
 
     def shaken_grounds(pieces):
         grounds, places = exact(pieces)
