@@ -35,7 +35,7 @@ from grasp_core.optimizing.best.same_places import first_nodes
 from grasp_core.optimizing.best.searching.search import Searching
 from grasp_core.optimizing.best.searching.stop import StopAfter
 from grasp_core.optimizing.best.single_twists import lowered_twists, refuted_by_one
-from grasp_core.optimizing.best.support_cuts import SEARCHED_BELOW, CutTree, Slack
+from grasp_core.optimizing.best.support_cuts import LEAST_THRESHOLD, SEARCHED_BELOW, CutTree, Slack
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS, FaceQuadruple
@@ -96,8 +96,8 @@ def quality_ceiling(  # noqa: PLR0913 - each is a quantity of its own
         finger_radius: How far contacts stay from the edges of their faces [m], one for all faces
             or one each, such as an improvement's `clearances`; contacts nearer to an edge are not
             bounded. A twentieth of the object's radius if None.
-        gap: Share of the bound within which it comes to what is known, or to better contacts that
-            there are.
+        gap: Share of the bound by which it may exceed the best that is attained, unless `parts`
+            ends the search before.
         parts: How many cases to look at at most, some thousands more or less. Where this ends the
             search, the bound is larger, and may differ by some gaps between processors.
 
@@ -106,6 +106,11 @@ def quality_ceiling(  # noqa: PLR0913 - each is a quantity of its own
         SolverError: A program's answer failed its check.
     """
     check_body(body)
+    if body.patches is not None:
+        raise InputError(
+            f"quality_ceiling: expected an object with planar faces, got {body.name} with curved "
+            "ones; take a mesh with fewer, planar faces"
+        )
     friction = coefficient(friction)
     number(known, "known", least=0.0, most=LARGEST)
     number(gap, "gap", least=SMALLEST_GAP, most=LARGEST_GAP)
@@ -153,6 +158,8 @@ def _lowered(grounds: Grounds, owners: Indices, friction: float, asked: "_Asked"
     nodes = first_nodes(grounds, alone, owners)
     twists = lowered_twists(searching, np.random.default_rng(SEED))
     steps, threshold = refuted_by_one(searching, len(nodes[0]), searched, twists)
+    # where the faces hold nothing a twist may refute less; a larger threshold it refutes as well
+    threshold = max(threshold, LEAST_THRESHOLD)
     bounds = asked.bounds(threshold + proved.raised)
     done, last, stride = -1, len(bounds), 1  # those up to `done` are refuted, `last` is not
     while last - done > 1 and not stop():
@@ -180,12 +187,12 @@ class _Asked:
     def bounds(self, first: float) -> Array:
         """Return the bounds to try, falling, each by the gap; nothing found on the way moves them.
 
-        They are multiples of what is known, or of the first bound where nothing is.
+        They are multiples of what is known, or of the first bound where next to nothing is.
         """
         least, share = max(self.known, SMALLEST), 1.0 - self.gap
         if first * share <= least:
             return np.empty(0)
         count = math.floor(math.log(least / first) / math.log(share))
-        if self.known > 0.0:
+        if self.known >= SMALLEST:
             return np.asarray(self.known / share ** np.arange(count, 0, -1), dtype=np.float64)
         return np.asarray(first * share ** np.arange(1, count + 1), dtype=np.float64)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
+from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
 from grasp_core.files.strict_json import object_of
 from grasp_core.files.text_files import read_text
@@ -35,7 +36,8 @@ class Possible:
     """Id of the best grasp."""
     bound: float
     gap: float
-    ended: str
+    proof: str
+    """Name of the file with the proof of the bound; empty if it was not kept."""
     reached: Mapping[str, float]
     """Lower ends of the measure of the best grasp and the planned ones, by id."""
 
@@ -69,9 +71,13 @@ def _possible(
     found: Record, measure: str, quality: float, bound: float, rated: Mapping[str, float]
 ) -> Possible:
     name = found["grasp"]["id"]
+    if quality > bound:
+        raise InputError(
+            f"bound: expected at least the quality {quality:g} of {name}, got {bound:g}"
+        )
     return Possible(
         found["object"]["content_sha256"], found["friction"], measure, found["clearance_m"], name,
-        bound, found["gap"], found["ended"], {**rated, name: quality},
+        bound, found["gap"], found["proof"] or "", {**rated, name: quality},
     )  # fmt: skip
 
 
@@ -86,7 +92,7 @@ def described_possible(possible: Possible | None) -> Record | None:
             f"Best is {possible.best}: {number(possible.reached[possible.best])}{unit} of "
             f"{what}. No four contacts at least {number(MILLI * possible.clearance_m)} mm from "
             f"edges exceed {number(possible.bound)}{unit} at friction {number(possible.friction)}, "
-            f"which is proved; {PERCENT * possible.gap:.1f} % are between the two."
+            f"{_proved(possible)}; {PERCENT * possible.gap:.1f} % are between the two."
         ),
         "what": f"{what}{f' [{unit.strip()}]' if unit else ''}",
         "rows": [
@@ -97,6 +103,11 @@ def described_possible(possible: Possible | None) -> Record | None:
     }
 
 
+def _proved(possible: Possible) -> str:
+    """Say where the proof of the bound is."""
+    return f"by the proof in {possible.proof}" if possible.proof else "whose proof was not kept"
+
+
 def possible_facts(possible: Possible | None, grasp: str) -> Iterable[tuple[str, str, str]]:
     """Yield name, value and meaning of the share of the possible that a grasp reaches."""
     share = None if possible is None else possible.share(grasp)
@@ -105,7 +116,7 @@ def possible_facts(possible: Possible | None, grasp: str) -> Iterable[tuple[str,
     what, unit = MEASURES[possible.measure]
     yield (
         "Share of the possible", f"{PERCENT * share:.1f} %",
-        f"{what}, over the bound {number(possible.bound)}{unit} that is proved for all contacts "
+        f"{what}, over the bound {number(possible.bound)}{unit} for all contacts "
         f"at least {number(MILLI * possible.clearance_m)} mm from edges; grasps nearer to edges "
         "may exceed it",
     )  # fmt: skip

@@ -196,11 +196,11 @@ class CutTree(ByValue):
         return bool(fits) and (alone or fitting(self.maps, self.grounds, self.measure))
 
     def _has_owners(self) -> bool:
-        """Return whether each piece has an owner, one of four fingers."""
+        """Return whether each piece has an owner, and each of four fingers has a piece."""
         owners = self.owners
         if owners is None or not is_indices(owners, len(self.grounds.counts)):
             return False
-        return int(owners.min()) >= 0 and int(owners.max()) < FINGERS
+        return set(owners.tolist()) == set(range(FINGERS))
 
     def _has_fitting_threshold(self) -> bool:
         if self.measure.is_usual:

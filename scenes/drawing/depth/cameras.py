@@ -6,8 +6,8 @@ point (x, y, z) in that frame appears at
     u = f x / z + width / 2,    v = f y / z + height / 2,                                  (1)
 
 in pixels from the upper left corner of the image, so that the middle of pixel (row, column) is at
-(column + 1/2, row + 1/2). The camera's distance from the middle of the object is such that the
-sphere around it fits into the image in every direction.
+(column + 1/2, row + 1/2). The camera's distance from the centre of mass is such that the
+sphere around the object fits into the image in every direction.
 """
 
 import math

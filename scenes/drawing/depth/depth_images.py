@@ -22,7 +22,7 @@ from scenes.mjcf_text import add_element, document, element, quaternion
 NEAR, FAR = 0.02, 50.0
 """Distances of the planes between which the renderer draws, over the camera's distance."""
 TABLE_SIZE = 40.0
-"""Half the side of the table, in object radii: it fills the image below the horizon."""
+"""Half the side of the table, in object radii: it ends about two degrees below the horizon."""
 THICK = 0.5
 """Half the thickness of the table, in object radii."""
 FLIPPED = np.diag([1.0, -1.0, -1.0])

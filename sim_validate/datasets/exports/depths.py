@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.checked import seed_of, switch, whole
+from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
@@ -23,9 +24,10 @@ from sim_validate.datasets.open_dataset import Selection
 from sim_validate.files.writing import whole_folder, write_arrays
 
 INDEX = "depths.json"
-MOST_VIEWS = 1000
-BATCH = 8
-"""Number of objects that one process draws before it ends."""
+MOST_VIEWS, MOST_PIXELS = 1000, 200_000_000
+"""Largest numbers of images of an object, and of their pixels, which are a gigabyte."""
+MOST_OBJECTS, BATCH = 8, 64
+"""Numbers of objects, and of images unless one object has more, that one process draws."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +50,16 @@ class AskedDepths:
         whole(self.views, "views", least=1, most=MOST_VIEWS)
         switch(self.on_table, "on_table")
         seed_of(self.seed)
+        if (pixels := self.views * self.lens.width * self.lens.height) > MOST_PIXELS:
+            raise InputError(
+                f"views, width and height: expected at most {MOST_PIXELS} pixels for each object, "
+                f"got {pixels}; draw fewer or smaller images, with several seeds if need be"
+            )
+
+    @property
+    def batch(self) -> int:
+        """Number of objects that one process draws before it ends."""
+        return max(1, min(MOST_OBJECTS, BATCH // self.views))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +98,7 @@ def write_depths(
             )
             for row in chosen.rows("objects")
         )
-        while batch := list(islice(seen, BATCH)):
+        while batch := list(islice(seen, asked.batch)):
             listed += _written(folder, batch)
             report(len(listed), total)
         settings = asdict(asked) | {"units": "metres; pixels count from the upper left corner"}
@@ -107,6 +119,11 @@ def _seen(row: dict[str, Any], body: Polyhedron, asked: AskedDepths) -> _Seen:
         cameras = around(body.center_of_mass, distance, asked.views, rng)
         return _Seen(row, Views(body, cameras, asked.lens), None)
     resting = list(rest_rows(body))
+    if not resting:
+        raise InputError(
+            f"{row['source_name']}: expected a face of its hull on which the object rests, found "
+            "none; leave out --on-table"
+        )
     shares = np.array([rest["likelihood"] for rest in resting])
     chosen = rng.choice(len(resting), size=asked.views, p=shares / shares.sum())
     poses = np.array([resting[number]["T_table_object_m"] for number in chosen], dtype=np.float64)
@@ -115,7 +132,9 @@ def _seen(row: dict[str, Any], body: Polyhedron, asked: AskedDepths) -> _Seen:
     return _Seen(row, Views(body, cameras, asked.lens, tables), chosen)
 
 
-def _written(folder: Path, batch: Sequence[_Seen]) -> Iterator[dict[str, Any]]:
+def _written(folder: Path, batch: Sequence[_Seen]) -> list[dict[str, Any]]:
+    """Draw some objects, write their files, and return what the index says of them."""
+    listed = list[dict[str, Any]]()
     for seen, images in zip(batch, depth_images([each.views for each in batch]), strict=True):
         views, name = seen.views, seen.row["object_id"]
         arrays: dict[str, NDArray[Any]] = {
@@ -126,7 +145,8 @@ def _written(folder: Path, batch: Sequence[_Seen]) -> Iterator[dict[str, Any]]:
             arrays |= {"T_object_table_m": views.tables, "rest": seen.rests}
         path = Path(seen.row["split"]) / f"{name}.npz"
         write_arrays(folder / path, arrays)
-        yield {
+        listed.append({
             "object_id": name, "source_name": seen.row["source_name"],
             "split": seen.row["split"], "path": path.as_posix(),
-        }  # fmt: skip
+        })  # fmt: skip
+    return listed

@@ -76,6 +76,9 @@ def test_the_bound_can_be_checked_again_and_does_not_survive_tampering(bounded):
     assert not spoiled(owners=None).verify()
     assert not spoiled(owners=proof.owners + 1).verify()
     assert not spoiled(owners=proof.owners[1:]).verify()
+    # a finger without a piece would refute everything
+    alone = {"owners": np.zeros_like(proof.owners), "deeds": np.zeros(1, int)}
+    assert not spoiled(**alone, asked=np.zeros(1, int), threshold=1e-6).verify()
 
 
 def test_grasps_that_start_near_edges_do_not_end_above_the_ceiling():
@@ -117,6 +120,23 @@ def test_a_search_whose_twists_are_many_goes_on():
     """With a full pool of twists, none of them used yet, two new ones took each other's place."""
     body = example_object("tetrahedron")
     assert gc.quality_ceiling(body, (0, 1, 2, 3), 0.5, gap=0.15, parts=20_000).verify()
+
+
+def test_faces_that_hold_nothing_have_a_small_ceiling_that_is_proved():
+    body = example_object("tetrahedron")
+    for known in (0.0, 1e-7):
+        ceiling = gc.quality_ceiling(body, (0, 0, 0, 0), 0.1, known=known, parts=50)
+        assert 0.0 < ceiling.upper <= 1.1e-6
+        assert ceiling.verify()
+    assert gc.quality_ceiling(body, (0, 1, 2, 3), 0.5, known=1e-7, parts=2000).verify()
+
+
+def test_curved_objects_are_refused():
+    plane = example_object("icosahedron")
+    body = gc.Polyhedron.from_mesh(plane.vertices, plane.triangles, faces="patches")
+    assert body.patches is not None
+    with pytest.raises(gc.InputError, match="planar faces"):
+        gc.quality_ceiling(body, (0, 1, 2, 3))
 
 
 def test_bounding_stops_at_what_is_known():

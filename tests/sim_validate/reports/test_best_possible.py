@@ -62,6 +62,7 @@ def test_other_measures_are_named(tmp_path):
     ("change", "message"),
     [
         ({"bound_n": -1.0}, "bound_n"),
+        ({"bound_n": 0.1}, "expected at least the quality"),
         ({"schema": 3}, "schema"),
         ({"planned": [{"id": "x"}]}, "quality_n"),
         ({"object": {"name": "x", "content_sha256": "y"}}, "object"),

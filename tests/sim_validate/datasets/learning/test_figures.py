@@ -173,6 +173,14 @@ def test_a_hand_stands_where_its_joints_say(grasps):
         ({"hand_joints_rad": [9.0] * 16}, "not within the ranges of the joints"),
         ({"hand_joints_rad": [0.3] * 16}, "do not touch the object at hand_points_m"),
         ({"T_object_palm_m": np.eye(4).tolist()}, "overlaps the object or itself"),
+        ({"T_object_palm_m": (2.0 * np.eye(4)).tolist()}, "T_object_palm_m is not a rigid motion"),
+        ({"hand_normals": [[0.0, 0.0, 1.0]] * 4}, "hand_normals not its normals there"),
+        ({"hand_fingers": [0, 1, 2, 2]}, "not 4 of the hand's 4"),
+        ({"hand_fingers": [0, 1, 2, 7]}, "not 4 of the hand's 4"),
+        ({"hand_reached": None}, "hand_reached is None, but force_closed is True"),
+        ({"hand_reached": False}, "hand_reason is '', but hand_reached is False"),
+        ({"hand_open_joints_rad": [9.0] * 16}, "hand_open_joints_rad are not within the ranges"),
+        ({"hand_approach": [0.0, 0.0, 2.0]}, "hand_approach is not of unit length"),
         ({"hand_points_m": [[0.0] * 3] * 4}, "hand_points_m are not proved to be in force closure"),
     ],
 )
@@ -182,3 +190,16 @@ def test_forged_figures_are_named(spoiled, cells, message):
 
     forged(spoiled, "grasps", change)
     assert any(message in fault for fault in verify(spoiled))
+
+
+def test_a_hand_in_free_air_is_named(spoiled):
+    """The whole hand is moved away with its contacts, so that only the object is not where it
+    was."""
+
+    def change(rows):
+        row = next(row for row in rows if row["hand_reached"])
+        row["T_object_palm_m"][0][3] += 0.5
+        row["hand_points_m"] = [[x + 0.5, y, z] for x, y, z in row["hand_points_m"]]
+
+    forged(spoiled, "grasps", change)
+    assert any("hand_points_m are not on the object" in fault for fault in verify(spoiled))
