@@ -242,7 +242,7 @@ PUSHES = [1e2, 1e5, 1e7, 1e9]
 
 @pytest.mark.parametrize("push", PUSHES)
 def test_a_hand_that_is_held_back_by_motors_holds_as_much_whatever_its_largest_push(push):
-    """The same closed form as above; slacks are relative to forces that there are."""
+    """The mass meets the closed form above at any push, as slacks follow the real forces."""
     weights = np.tile([0.0, 0.0, 0.05], (4, 1))
     hand = carrying(box(), opposed(), pushing(opposed(), TORQUE), weights, 0.4, push)
     links, most = 1.6 * 0.05 / LEVER_M, 1.6 * TORQUE / LEVER_M
