@@ -10,18 +10,22 @@ from grasp_core.arrays import Array
 Row: TypeAlias = tuple[float, float, float]
 POSE = 4
 """Rows and columns of a homogeneous transform."""
+SAME_SIZE = 1e-7
+"""Difference between components that does not count: those of a regular object's normals are equal
+but for rounding, in computing or in a file."""
 
 
 def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:
     """Return two unit vectors that are orthogonal to each other and to the unit vector (x, y, z).
 
-    The first is orthogonal also to the axis of the smallest component, the first such axis. With
-    (x, y, z) in front, or behind, the three are right-handed.
+    The first is orthogonal also to the axis of the smallest component: the first axis whose
+    component is as small, but for `SAME_SIZE`. With (x, y, z) in front, or behind, the three are
+    right-handed.
     """
-    smallest = min(abs(x), abs(y), abs(z))
-    if abs(x) == smallest:
+    smallest = min(abs(x), abs(y), abs(z)) + SAME_SIZE
+    if abs(x) <= smallest:
         u, v, w = 0.0, -z, y
-    elif abs(y) == smallest:
+    elif abs(y) <= smallest:
         u, v, w = z, 0.0, -x
     else:
         u, v, w = -y, x, 0.0

@@ -35,15 +35,24 @@ from grasp_core.optimizing.best.same_places import first_nodes
 from grasp_core.optimizing.best.searching.search import Searching
 from grasp_core.optimizing.best.searching.stop import StopAfter
 from grasp_core.optimizing.best.single_twists import lowered_twists, refuted_by_one
-from grasp_core.optimizing.best.support_cuts import LEAST_THRESHOLD, SEARCHED_BELOW, CutTree, Slack
+from grasp_core.optimizing.best.support_cuts import (
+    LEAST_THRESHOLD,
+    SEARCH_DIGITS,
+    SEARCHED_BELOW,
+    CutTree,
+    Slack,
+)
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
+from grasp_core.solvers.ties import few_digits, on_grid
 from grasp_core.values import FINGERS, FaceQuadruple
 
 MOST_PARTS = 100_000_000
 SMALLEST_GAP, LARGEST_GAP = 1e-3, 0.9
 SMALLEST = 1e-5
 """Bound that is not lowered any more [N]."""
+FINER = 64.0
+"""How much finer than the gap the digits of bounds are."""
 SEED = 0
 
 
@@ -155,7 +164,8 @@ def _lowered(grounds: Grounds, owners: Indices, friction: float, asked: "_Asked"
     searched = Slack.of(friction, len(alone), FERRARI_CANNY, SEARCHED_BELOW)
     stop = StopAfter(asked.parts)
     searching = Searching(grounds, friction, 1, stop)
-    nodes = first_nodes(grounds, alone, owners)
+    corners, counts, fresh = first_nodes(grounds, alone, owners)
+    nodes = on_grid(corners, SEARCH_DIGITS), counts, fresh
     twists = lowered_twists(searching, np.random.default_rng(SEED))
     steps, threshold = refuted_by_one(searching, len(nodes[0]), searched, twists)
     # where the faces hold nothing a twist may refute less; a larger threshold it refutes as well
@@ -164,8 +174,8 @@ def _lowered(grounds: Grounds, owners: Indices, friction: float, asked: "_Asked"
     done, last, stride = -1, len(bounds), 1  # those up to `done` are refuted, `last` is not
     while last - done > 1 and not stop():
         place = min(done + stride, (done + last) // 2)
-        bound = float(bounds[place])
-        tree, _ = searching.refute(nodes, bound - searched.raised, np.inf, lambda _: None)
+        bound = few_digits(float(bounds[place]), asked.gap / FINER)
+        tree, _ = searching.refute(nodes, bound - searched.raised, np.inf)
         if tree is None:
             last = place
         else:

@@ -15,7 +15,7 @@ These rules replace it wherever something is chosen.
    counts the cells of a grid up to each. The grid is shifted by a fraction that no ratio of small
    whole numbers comes near: the numbers of regular objects (0, 1/2, 1/3) are far from borders.
 4. *Searches of many steps*, whose every comparison would need a margin, are given no last digits:
-   compiled loops get numbers that lie on a grid, see `on_grid`. Their sums have one order on all
+   compiled loops get numbers that lie on a grid, see `on_grid` and `few_digits`. Their sums have one order on all
    machines, so that they decide alike. What they find is proved for the exact numbers.
 
 What is left to chance is a number that comes within rounding of a border by accident: with
@@ -79,6 +79,13 @@ def on_grid(values: Array, digits: int = GRID_DIGITS) -> Array:
     The number has `digits` digits after the point, and is at most 0.62 units of the last one away.
     """
     return graded(values, digits) * 10.0**-digits
+
+
+def few_digits(number: float, share: float) -> float:
+    """Round a positive number down to few binary digits, by less than a share of it."""
+    digits = 2 - math.frexp(share)[1]
+    mantissa, exponent = math.frexp(number)
+    return math.ldexp(math.floor(math.ldexp(mantissa, digits)), exponent - digits)
 
 
 def ranks(values: ArrayLike, share: float = SAME_SHARE) -> Indices:

@@ -12,12 +12,12 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.polygons import edge_rows
 from grasp_core.objects.face_pieces import FacePiece
-from grasp_core.optimizing.ascent import ContactFaces
+from grasp_core.optimizing.ascent import STEP_DIGITS, ContactFaces
 from grasp_core.optimizing.best.grounds import Grounds
 from grasp_core.optimizing.best.searching.parts import Found
 from grasp_core.optimizing.best.searching.search import Searching
 from grasp_core.optimizing.best.task_ascent import climbed_for_task, climbs_for_weight
-from grasp_core.solvers.ties import surpassing
+from grasp_core.solvers.ties import on_grid, surpassing
 from grasp_core.values import FINGERS
 
 POINTS = 3000
@@ -46,7 +46,7 @@ def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Foun
     at = np.empty((POINTS, 2))
     for place in range(POINTS):
         polygon = polygons[int(on[place])]
-        at[place] = rng.dirichlet(np.ones(len(polygon))) @ polygon
+        at[place] = on_grid(rng.dirichlet(np.ones(len(polygon))) @ polygon, STEP_DIGITS)
     supports = _supports(grounds, searching.friction, on, at, twists)
     sets = np.sort(rng.integers(POINTS, size=(SETS, FINGERS)), axis=1)
     measure, demands = searching.measure, searching.measure.demands(twists)

@@ -25,15 +25,23 @@ from grasp_core.optimizing.best.searching.parts import Found
 from grasp_core.optimizing.best.searching.search import Searching
 from grasp_core.optimizing.best.searching.stop import Stop
 from grasp_core.optimizing.best.single_twists import lowered_twists, refuted_by_one
-from grasp_core.optimizing.best.support_cuts import SEARCHED_BELOW, CutTree, Slack
+from grasp_core.optimizing.best.support_cuts import (
+    SEARCH_DIGITS,
+    SEARCHED_BELOW,
+    CutTree,
+    Slack,
+)
 from grasp_core.planning.certify import Candidate, certify, named, to_grasp
 from grasp_core.quality.measures import Measure
+from grasp_core.solvers.ties import few_digits, on_grid, surpassing
 from grasp_core.values import ForceCone, Grasp
 
 WIDEST = 0.4
 """Gap of the first level at most: a level is cheap down to it, as the search is for one twist."""
 AIMED = 0.999
 """Share of the gap that is aimed at, as the grasp's quality is measured anew in the end."""
+FINER = 64.0
+"""How much finer than the gap the steps are in which qualities and bounds count."""
 SAME = 1e-9
 """Share of a bound that rounding may cost it."""
 
@@ -53,7 +61,8 @@ class Levels:
         self.grounds = grounds_of(body, clearance)
         self.measure = measure
         self.maps = exact_maps(body, self.grounds, measure)
-        self.nodes = first_nodes(self.grounds, self.maps)
+        corners, counts, fresh = first_nodes(self.grounds, self.maps)
+        self.nodes = on_grid(corners, SEARCH_DIGITS), counts, fresh
         self.proved = Slack.of(friction, len(self.maps), measure)
         # searches leave more than proofs, for a replay with other roundings
         self.searched = Slack.of(friction, len(self.maps), measure, SEARCHED_BELOW)
@@ -79,12 +88,13 @@ class Levels:
 
     def closed_to(self, gap: float) -> Ended:
         """Refute threshold after threshold, until the gap is reached or the search is stopped."""
+        self.grain = gap / FINER
         steps = max(0, math.ceil(math.log2(WIDEST / gap)))
         try:
             for k in range(steps, -1, -1):
                 share = 1.0 - AIMED * gap * 2.0**k
                 while self.best.quality.lower < share * (1.0 - SAME) * self.bound:
-                    wanted = self.best.quality.lower / share
+                    wanted = few_digits(self.best.quality.lower / share, self.grain)
                     if not self._refuted(wanted):
                         return "time" if self.searching.stop() else "undivided"
         except KeyboardInterrupt:
@@ -95,16 +105,16 @@ class Levels:
         """Lower the bound, or find better contacts; return whether one of them came about."""
         threshold = bound - self.searched.raised
         known = self.best.quality.lower
-        steps, better = self.searching.refute(self.nodes, threshold, known, lambda _: None)
+        surpassed = (1.0 + self.grain) * known
+        steps, better = self.searching.refute(self.nodes, threshold, surpassed)
         if steps is not None:
             self.steps = steps
             self.threshold = bound - self.proved.raised
         for found in better:
-            if found.quality.lower > self.best.quality.lower:
+            if found.quality.lower > surpassing(self.best.quality.lower):
                 self.best = found
         if better:
-            moved = climbed(self.searching, self.best.pieces, self.best.at)
-            self.best = max(self.best, moved, key=lambda found: found.quality.lower)
+            self.best = climbed(self.searching, self.best.pieces, self.best.at)
         self._tell()
         return steps is not None or self.best.quality.lower > known
 

@@ -13,7 +13,8 @@ from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
 from grasp_core.optimizing.best.searching.parts import Steps
 from grasp_core.optimizing.best.searching.search import CUTS, TWISTS, Searching
-from grasp_core.optimizing.best.support_cuts import Slack
+from grasp_core.optimizing.best.support_cuts import SEARCH_DIGITS, Slack
+from grasp_core.solvers.ties import on_grid
 
 COUNT = 384
 """Random twists to begin with, as many as a wave hands on; a quarter of them is moved to where the
@@ -35,11 +36,11 @@ def lowered_twists(searching: Searching, rng: np.random.Generator) -> Array:
     grounds, loads = searching.grounds, searching.measure.loads
     points = [grounds.places(p, at) for p, at in enumerate(grounds.polygons())]
     on = np.repeat(np.arange(len(points)), [len(each) for each in points])
-    corners, pieces = np.vstack(points), searching.pieces
+    corners, pieces = on_grid(np.vstack(points), SEARCH_DIGITS), searching.pieces
     found = rng.normal(size=(COUNT, 6))
     # a task's loads themselves, the other way, ask for most
     found = np.vstack([-loads, found])
-    found /= np.linalg.norm(found, axis=1, keepdims=True)
+    found = on_grid(found / np.linalg.norm(found, axis=1, keepdims=True))
     low = len(loads) + COUNT // 4
     lowered = found[:low].copy()
     for y in lowered:

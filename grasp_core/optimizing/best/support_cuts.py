@@ -51,6 +51,12 @@ and sums of six numbers in it are off by less than 1e-15 t L. A wrench of forces
 of sum one is shorter than 8 (1 + mu), with coordinates up to two, so that only t L <= 8 (1 + mu)
 need be considered, and a(y) is off by less than 1e-14 (1 + mu), a hundred-thousandth of the room.
 
+Search. A search must not depend on last digits, so it works with numbers on a grid, at most 7e-12
+from those of the proof (see rule 4 of `solvers.ties`). Coordinates being at most two, its points
+are off by 1e-10 at most, its supports by 2e-10 (1 + mu). It refutes a threshold that is lower by
+`SEARCHED_BELOW`, five times as much, so that what answers in the replay answers in the search: at
+each node the replay's polygons are within 1e-10 of the search's.
+
 Symmetries. See `same_places`: contacts can be moved by a symmetry, at the cost of its error. It
 takes the place of rounding in (3) and (4): `INEXACT` is added to `ROUNDING`.
 """
@@ -78,6 +84,8 @@ MOST_CUTS = 10_000
 SEARCHED_BELOW = 1e-9
 """How far below its threshold a proof is searched for, over 1 + mu, so that replaying it, with
 other roundings, meets no case that is just decided the other way."""
+SEARCH_DIGITS = 11
+"""Digits after the point that a search is given."""
 INEXACT = 1e-7
 """How far errors of symmetries can lift a measure, over 1 + mu (see `same_places`)."""
 TWIST_SLACK = 1e-12

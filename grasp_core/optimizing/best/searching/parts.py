@@ -6,7 +6,7 @@ memory grows where it is full.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from grasp_core.quality.ferrari_canny import FerrariCanny
 from grasp_core.quality.resisted_loads import ResistedLoads
 from grasp_core.values import FINGERS
 
+Nodes: TypeAlias = tuple[Array, Indices, Indices]
+"""Where fingers may be at each of some nodes, as `first_nodes` returns them: corners (n, 4, p,
+any, 2), how many count (n, 4, p), and which fingers are fresh (n, 4)."""
 NODES = "grasp_core.optimizing.best.searching.nodes_kernel"
 POOL = 512
 """Twists that a search keeps: asking is most of its work, and takes as long as there are twists."""
@@ -61,11 +64,18 @@ class Steps:
     lines: Array
 
 
-def part_from(first: tuple[Array, Indices, Indices], pieces: int) -> Part:
-    """Return a part that begins with nodes, as `first_nodes` returns them, on so many pieces."""
+def node_of(stack: Any, place: int) -> Nodes:
+    """Return a waiting node alone, in as little memory as it takes: there may be ten thousand."""
+    counts = stack.counts[place : place + 1].copy()
+    corners = stack.corners[place : place + 1, :, :, : counts.max()].copy()
+    return corners, counts, stack.fresh[place : place + 1].copy()
+
+
+def part_from(first: Nodes) -> Part:
+    """Return a part that begins with nodes."""
     nodes = compiled(NODES)
     corners, counts, fresh = first
-    deep = max(DEEP, len(corners) + FINGERS + 1)
+    deep, pieces = max(DEEP, len(corners) + FINGERS + 1), counts.shape[2]
     stack = nodes.Stack(
         np.zeros((deep, FINGERS, pieces, ROOM, 2)),
         np.zeros((deep, FINGERS, pieces), np.int64),
@@ -73,11 +83,14 @@ def part_from(first: tuple[Array, Indices, Indices], pieces: int) -> Part:
     )  # fmt: skip
     n = len(corners)
     # the last one is searched first
-    stack.corners[:n], stack.counts[:n], stack.fresh[:n] = (
-        corners[::-1], counts[::-1], fresh[::-1],
-    )  # fmt: skip
+    stack.corners[:n, :, :, : corners.shape[3]] = corners[::-1]
+    stack.counts[:n], stack.fresh[:n] = counts[::-1], fresh[::-1]
     stack.top[0] = n
-    return Part(stack, _empty_tree(FIRST_ROOM), None)
+    tree = nodes.Tree(
+        np.zeros(FIRST_ROOM, np.int64), np.zeros(FIRST_ROOM, np.int64),
+        np.zeros((FIRST_ROOM, 6)), np.zeros((FIRST_ROOM, 3)), np.zeros(3, np.int64),
+    )  # fmt: skip
+    return Part(stack, tree, None)
 
 
 def copied(pool: Any) -> Any:
@@ -88,32 +101,21 @@ def copied(pool: Any) -> Any:
     return copies
 
 
-def _empty_tree(room: int) -> Any:
-    return compiled(NODES).Tree(
-        np.zeros(room, np.int64), np.zeros(room, np.int64), np.zeros((room, 6)),
-        np.zeros((room, 3)), np.zeros(3, np.int64),
-    )  # fmt: skip
-
-
-def _larger(tree: Any) -> Any:
-    new = _empty_tree(2 * len(tree.deeds))
-    for old, room in zip(tree[:4], new[:4], strict=True):
-        room[: len(old)] = old
-    new.sizes[:] = tree.sizes
-    return new
-
-
 def enlarge(part: Part) -> None:
-    """Make room in a part's tree, and in its stack where that is full."""
-    if int(part.stack.top[0]) + FINGERS >= len(part.stack.depths):
-        part.stack = _doubled(part.stack)
-    part.tree = _larger(part.tree)
+    """Make room in what is full of a part's stack and tree; few twists serve many nodes."""
+    stack, tree = part.stack, part.tree
+    if int(stack.top[0]) + FINGERS >= len(stack.depths):
+        part.stack = type(stack)(*map(_doubled, stack[:4]), stack.top)
+    sizes = [int(tree.sizes[k]) for k in (0, 0, 1, 2)]
+    arrays = [
+        _doubled(array) if size + 1 >= len(array) else array
+        for array, size in zip(tree[:4], sizes, strict=True)
+    ]
+    part.tree = type(tree)(*arrays, tree.sizes)
 
 
-def _doubled(stack: Any) -> Any:
-    return type(stack)(
-        *(np.concatenate([array, np.zeros_like(array)]) for array in stack[:4]), stack.top
-    )
+def _doubled(array: Any) -> Any:
+    return np.concatenate([array, np.zeros_like(array)])
 
 
 def room() -> Any:

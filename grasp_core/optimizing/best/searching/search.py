@@ -8,7 +8,8 @@ tree that refutes one threshold must visit all of its nodes in any order, and th
 means here the loosest threshold first (see `best_grasp`).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -23,17 +24,21 @@ from grasp_core.optimizing.best.searching.parts import (
     NODES,
     POOL,
     Found,
+    Nodes,
     Part,
     Steps,
     copied,
     enlarge,
     joined,
+    node_of,
     part_from,
     room,
 )
 from grasp_core.optimizing.best.searching.stop import Stop
+from grasp_core.optimizing.best.support_cuts import SEARCH_DIGITS
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.quality.resisted_loads import measured_set
+from grasp_core.solvers.ties import on_grid
 from grasp_core.values import FINGERS
 
 KERNEL = "grasp_core.optimizing.best.searching.search_kernel"
@@ -53,6 +58,10 @@ BUDGET = 2000
 MUCH = 1.1
 """Ratio of qualities from which on contacts are a better start for other thresholds, where the
 measure is not the usual one and the first contacts may be poor."""
+ASIDE = 1.4
+"""Factor that keeps loads of round sizes away from powers of two."""
+SETTLED = 1.0 - 1e-6
+"""Share of a threshold below which contacts are refuted by a rounded twist."""
 EXACT_GAP = 1e-5
 """Gap between the bounds of the measure of contacts that may be better: a tenth of the smallest gap
 that a search may be asked for."""
@@ -85,17 +94,19 @@ class Searching:
     def pieces(self) -> Any:
         """Return the pieces as the kernels take them."""
         grounds = self.grounds
+        each = (grounds.normals, grounds.origins, grounds.frames)
         return compiled(CUTS).Pieces(
-            np.array(grounds.normals), np.array(grounds.origins), np.array(grounds.frames),
-            float(self.friction),
-        )  # fmt: skip
+            *(on_grid(numbers, SEARCH_DIGITS) for numbers in each), float(self.friction)
+        )
 
     @property
     def demand(self) -> Any:
         """Return the loads as the kernels take them."""
         kernel = compiled(TWISTS)
         kinds = {"ferrari-canny": kernel.USUAL, "weight": kernel.WEIGHT, "task": kernel.TASK}
-        return kernel.Demand(int(kinds[self.measure.name]), np.array(self.measure.loads))
+        scale = math.ldexp(1.0, math.frexp(ASIDE * self.measure.size)[1])
+        loads = scale * on_grid(self.measure.loads / scale, SEARCH_DIGITS)
+        return kernel.Demand(int(kinds[self.measure.name]), loads)
 
     def empty_pool(self) -> Any:
         """Return a pool without twists."""
@@ -112,34 +123,29 @@ class Searching:
             compiled(TWISTS).learn(pool, self.pieces, self.demand, np.array(y), now)
 
     def refute(
-        self, nodes: tuple[Array, Indices, Indices], threshold: float, known: float,
-        progress: Callable[[float], None],
-    ) -> tuple[Steps | None, list[Found]]:  # fmt: skip
+        self, nodes: Nodes, threshold: float, known: float
+    ) -> tuple[Steps | None, list[Found]]:
         """Try to refute that contacts of the first nodes reach a threshold.
 
         Args:
-            nodes: What `first_nodes` returns.
+            nodes: Where all contacts are, on a grid.
             threshold: The quality, or the multiple of the loads.
-            known: One that is attained.
-            progress: Called with the share of the parts that are done.
+            known: One that contacts must surpass to be of interest.
 
         Returns:
             The tree, or None if it was stopped or contacts reach the threshold; contacts found that
-            are better than known.
+            surpass what is known.
         """
-        trunk = part_from(nodes, self.count)
+        trunk = part_from(nodes)
         trunk.pool = copied(self.pool)
-        parts: list[Part] = []
-        better: list[Found] = []
-        for part in self._begun(trunk, threshold, known):
-            parts.append(part)
-        better += trunk.found
+        waiting = list(self._begun(trunk, threshold, known))
+        parts, better = list[Part](), list(trunk.found)
         self.nodes += int(trunk.tree.sizes[0])
         if not trunk.finished:
             return None, better
         with ThreadPoolExecutor(self.jobs) as threads:
-            for start in range(0, len(parts), WAVE):
-                wave = parts[start : start + WAVE]
+            for start in range(0, len(waiting), WAVE):
+                wave = [part_from(node) for node in waiting[start : start + WAVE]]
                 for part in wave:
                     part.pool = copied(self.pool)
                 self._together(threads, wave, threshold, known)
@@ -148,7 +154,7 @@ class Searching:
                 better += [found for part in wave for found in part.found]
                 if not all(part.finished for part in wave):
                     return None, better
-                progress(min(1.0, (start + WAVE) / len(parts)))
+                parts += wave
         return joined(trunk, parts), better
 
     def _together(
@@ -162,22 +168,14 @@ class Searching:
             self.stop.now()
             raise
 
-    def _begun(self, trunk: Part, threshold: float, known: float) -> Iterator[Part]:
-        """Search the beginning of a tree, and yield a part for each node that is left."""
+    def _begun(self, trunk: Part, threshold: float, known: float) -> Iterator[Nodes]:
+        """Search the beginning of a tree, and yield each node that is left for a part."""
         kernel = compiled(KERNEL)
         for why in self._runs(trunk, threshold, known, PART_DEPTH):
             if why == kernel.PART:
                 node = int(trunk.stack.top[0]) - 1
-                stack = trunk.stack
-                yield part_from(
-                    (
-                        stack.corners[node : node + 1].copy(),
-                        stack.counts[node : node + 1].copy(),
-                        stack.fresh[node : node + 1].copy(),
-                    ),
-                    self.count,
-                )
-                stack.top[0] = node
+                yield node_of(trunk.stack, node)
+                trunk.stack.top[0] = node
 
     def _search(self, part: Part, threshold: float, known: float) -> None:
         for _ in self._runs(part, threshold, known, 10**9):
@@ -213,18 +211,18 @@ class Searching:
             part.found.append(found)
             if not self.measure.is_usual and found.quality.lower > MUCH * known:
                 return False
-        if found.quality.upper >= threshold:
+        if found.quality.upper >= SETTLED * threshold:
             return False
         # before the first node all twists are unused: this one must not be the next to go
         now = max(1, int(part.tree.sizes[0]))
-        self.learn(found.quality.direction[None], part.pool, now)
+        self.learn(on_grid(found.quality.direction[None]), part.pool, now)
         return True
 
     def measured(self, on: Indices, at: Array) -> Found:
         """Bound the measure of contacts on pieces, (4,), at plane coordinates, (4, 2)."""
         points = np.array([self.grounds.places(p, y[None])[0] for p, y in zip(on, at, strict=True)])
         wrenches = WrenchSet.at(points, self.grounds.normals[on], np.full(FINGERS, self.friction))
-        quality = measured_set(wrenches, self.measure, EXACT_GAP)
+        quality = measured_set(wrenches.on_grid(), self.measure, EXACT_GAP)
         return Found(tuple(int(p) for p in on), np.array(at), quality)
 
     def _hand_on(self, wave: Sequence[Part]) -> None:
