@@ -4,7 +4,7 @@ A part has a stack of nodes that wait, a tree of nodes that were visited, and a 
 memory grows where it is full.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -52,6 +52,10 @@ class Part:
     pool: Any
     found: list[Found] = field(default_factory=list[Found])
     finished: bool = False
+    left: list[Nodes] = field(default_factory=list[Nodes])
+    """Nodes that are left to parts of their own, in the order of the tree."""
+    parts: list["Part"] = field(default_factory=list["Part"])
+    """These parts, in the same order."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,15 +68,17 @@ class Steps:
     lines: Array
 
 
-def node_of(stack: Any, place: int) -> Nodes:
-    """Return a waiting node alone, in as little memory as it takes: there may be ten thousand."""
+def leave(part: Part) -> None:
+    """Leave a part's next node, alone, in as little memory as it takes: thousands may wait."""
+    stack, place = part.stack, int(part.stack.top[0]) - 1
     counts = stack.counts[place : place + 1].copy()
     corners = stack.corners[place : place + 1, :, :, : counts.max()].copy()
-    return corners, counts, stack.fresh[place : place + 1].copy()
+    part.left.append((corners, counts, stack.fresh[place : place + 1].copy()))
+    stack.top[0] = place
 
 
-def part_from(first: Nodes) -> Part:
-    """Return a part that begins with nodes."""
+def part_from(first: Nodes, pool: Any) -> Part:
+    """Return a part that begins with nodes and the twists of a pool."""
     nodes = compiled(NODES)
     corners, counts, fresh = first
     deep, pieces = max(DEEP, len(corners) + FINGERS + 1), counts.shape[2]
@@ -90,10 +96,10 @@ def part_from(first: Nodes) -> Part:
         np.zeros(FIRST_ROOM, np.int64), np.zeros(FIRST_ROOM, np.int64),
         np.zeros((FIRST_ROOM, 6)), np.zeros((FIRST_ROOM, 3)), np.zeros(3, np.int64),
     )  # fmt: skip
-    return Part(stack, tree, None)
+    return Part(stack, tree, _copied(pool))
 
 
-def copied(pool: Any) -> Any:
+def _copied(pool: Any) -> Any:
     """Return a pool with the same twists, of which no tree has named any."""
     copies = type(pool)(*(array.copy() for array in pool))
     copies.names[:] = -1
@@ -128,27 +134,33 @@ def room() -> Any:
 
 
 def joined(trunk: Part, parts: Sequence[Part]) -> Steps:
-    """Put the trees of parts into their places in the trunk's tree."""
+    """Put the trees of parts into their places in the trunk's tree, and in each other's."""
     nodes = compiled(NODES)
-    trees = [trunk.tree, *(part.tree for part in parts)]
-    sizes = np.array([tree.sizes for tree in trees], dtype=np.int64)
+    every = [trunk, *parts]
+    sizes = np.array([part.tree.sizes for part in every], dtype=np.int64)
     starts = np.cumsum(sizes, axis=0) - sizes
-    each: list[tuple[Indices, Indices]] = []
-    for tree, (n, _, _), (_, twists, lines) in zip(trees, sizes, starts, strict=True):
-        deeds: Indices = tree.deeds[:n]
-        shifts = np.where(deeds < int(nodes.BY_PIECES), int(twists), int(lines))
-        asked: Indices = np.asarray(tree.asked[:n], dtype=np.int64) + shifts
-        each.append((deeds, asked))
-    deeds, asked = each[0]
-    rows: list[tuple[Indices, Indices]] = []
-    start = 0
-    for hole, part in zip(np.flatnonzero(deeds == nodes.SPLICE).tolist(), each[1:], strict=True):
-        rows += [(deeds[start:hole], asked[start:hole]), part]
-        start = hole + 1
-    rows.append((deeds[start:], asked[start:]))
+    asked: dict[int, Indices] = {}
+    for part, (n, _, _), (_, twists, lines) in zip(every, sizes, starts, strict=True):
+        shifts = np.where(part.tree.deeds[:n] < int(nodes.BY_PIECES), int(twists), int(lines))
+        asked[id(part)] = np.asarray(part.tree.asked[:n], dtype=np.int64) + shifts
+    rows = list(_in_order(trunk, int(nodes.SPLICE)))
     return Steps(
-        np.concatenate([one for one, _ in rows]),
-        np.concatenate([two for _, two in rows]),
-        np.concatenate([tree.twists[:m] for tree, m in zip(trees, sizes[:, 1], strict=True)]),
-        np.concatenate([tree.lines[:m] for tree, m in zip(trees, sizes[:, 2], strict=True)]),
+        np.concatenate([part.tree.deeds[some] for part, some in rows]),
+        np.concatenate([asked[id(part)][some] for part, some in rows]),
+        np.concatenate([part.tree.twists[:m] for part, m in zip(every, sizes[:, 1], strict=True)]),
+        np.concatenate([part.tree.lines[:m] for part, m in zip(every, sizes[:, 2], strict=True)]),
     )
+
+
+def _in_order(trunk: Part, splice: int) -> Iterator[tuple[Part, slice]]:
+    """Yield the nodes of parts in the order of the whole tree: children's trees in their places."""
+    path = [(trunk, 0, 0)]
+    while path:
+        part, start, child = path.pop()
+        deeds = part.tree.deeds[: part.tree.sizes[0]]
+        if child == len(part.parts):
+            yield part, slice(start, len(deeds))
+            continue
+        hole = start + int(np.argmax(deeds[start:] == splice))
+        yield part, slice(start, hole)
+        path += [(part, hole + 1, child + 1), (part.parts[child], 0, 0)]

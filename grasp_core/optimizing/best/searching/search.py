@@ -9,6 +9,7 @@ means here the loosest threshold first (see `best_grasp`).
 """
 
 import math
+from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -27,10 +28,9 @@ from grasp_core.optimizing.best.searching.parts import (
     Nodes,
     Part,
     Steps,
-    copied,
     enlarge,
     joined,
-    node_of,
+    leave,
     part_from,
     room,
 )
@@ -47,6 +47,10 @@ TWISTS = "grasp_core.optimizing.best.searching.twists_kernel"
 PART_DEPTH = 7
 """Nodes with several children above a node that becomes a part of its own: a full tree has at least
 128 such parts, four waves of them."""
+PART_NODES = 4000
+"""Nodes after which a part leaves those that wait to parts of their own: some parts have a
+hundred times as many as most, and one thread would search them while others wait."""
+MOST_DEPTH = 10**9
 WAVE = 32
 """Parts that are searched from the same twists: more threads would find nothing to do, and twists
 that a part finds are of no use to the others of its wave."""
@@ -136,50 +140,50 @@ class Searching:
             The tree, or None if it was stopped or contacts reach the threshold; contacts found that
             surpass what is known.
         """
-        trunk = part_from(nodes)
-        trunk.pool = copied(self.pool)
-        waiting = list(self._begun(trunk, threshold, known))
-        parts, better = list[Part](), list(trunk.found)
-        self.nodes += int(trunk.tree.sizes[0])
-        if not trunk.finished:
-            return None, better
+        trunk = part_from(nodes, self.pool)
+        self._search(trunk, threshold, known, PART_DEPTH)
+        wave, parts, better = [trunk], list[Part](), list[Found]()
+        # nodes that wait, with the part that left them and the twists they begin with
+        waiting = deque[tuple[Part, Nodes, Any]]()
         with ThreadPoolExecutor(self.jobs) as threads:
-            for start in range(0, len(waiting), WAVE):
-                wave = [part_from(node) for node in waiting[start : start + WAVE]]
-                for part in wave:
-                    part.pool = copied(self.pool)
-                self._together(threads, wave, threshold, known)
-                self._hand_on(wave)
+            while True:
                 self.nodes += sum(int(part.tree.sizes[0]) for part in wave)
                 better += [found for part in wave for found in part.found]
                 if not all(part.finished for part in wave):
                     return None, better
+                for part in wave:
+                    pool = self.pool if part is trunk else part.pool
+                    waiting += [(part, node, pool) for node in part.left]
+                    part.left, part.pool = [], None
+                if not waiting:
+                    return joined(trunk, parts), better
+                wave = []
+                for _ in range(min(WAVE, len(waiting))):
+                    above, node, pool = waiting.popleft()
+                    above.parts.append(part_from(node, pool))
+                    wave.append(above.parts[-1])
+                self._together(threads, wave, threshold, known)
+                self._hand_on(wave)
                 parts += wave
-        return joined(trunk, parts), better
 
     def _together(
         self, threads: ThreadPoolExecutor, wave: Sequence[Part], threshold: float, known: float
     ) -> None:
         """Search the parts of a wave; an interrupt stops all of them."""
         try:
-            for ended in [threads.submit(self._search, part, threshold, known) for part in wave]:
+            for ended in [
+                threads.submit(self._search, part, threshold, known, MOST_DEPTH) for part in wave
+            ]:
                 ended.result()
         except BaseException:
             self.stop.now()
             raise
 
-    def _begun(self, trunk: Part, threshold: float, known: float) -> Iterator[Nodes]:
-        """Search the beginning of a tree, and yield each node that is left for a part."""
-        kernel = compiled(KERNEL)
-        for why in self._runs(trunk, threshold, known, PART_DEPTH):
-            if why == kernel.PART:
-                node = int(trunk.stack.top[0]) - 1
-                yield node_of(trunk.stack, node)
-                trunk.stack.top[0] = node
-
-    def _search(self, part: Part, threshold: float, known: float) -> None:
-        for _ in self._runs(part, threshold, known, 10**9):
-            pass
+    def _search(self, part: Part, threshold: float, known: float, depth: int) -> None:
+        """Search a part; nodes at a depth are left, and all that wait after `PART_NODES`."""
+        for why in self._runs(part, threshold, known, depth):
+            if why == compiled(KERNEL).PART:
+                leave(part)
         part.stack = None  # the memory of a part that is done
 
     def _runs(self, part: Part, threshold: float, known: float, depth: int) -> Iterator[int]:
@@ -191,7 +195,7 @@ class Searching:
                 pieces, part.stack, part.pool, part.tree, work, threshold, demand, self.spare
             )
             before = int(part.tree.sizes[0])
-            why = kernel.run(search, BUDGET, depth)
+            why = kernel.run(search, BUDGET, depth if before < PART_NODES else -1)
             self.stop.spend(int(part.tree.sizes[0]) - before)
             if why == kernel.DONE:
                 part.finished = True
@@ -234,4 +238,3 @@ class Searching:
             old = {y.tobytes() for y in self.pool.twists}
             fresh = [y for y in part.pool.twists[newest] if y.tobytes() not in old]
             self.learn(np.array(fresh).reshape(-1, 6), now=part.tree.sizes[0])
-            part.pool = None
