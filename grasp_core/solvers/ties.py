@@ -15,8 +15,9 @@ These rules replace it wherever something is chosen.
    counts the cells of a grid up to each. The grid is shifted by a fraction that no ratio of small
    whole numbers comes near: the numbers of regular objects (0, 1/2, 1/3) are far from borders.
 4. *Searches of many steps*, whose every comparison would need a margin, are given no last digits:
-   compiled loops get numbers that lie on a grid, see `on_grid` and `few_digits`. Their sums have one order on all
-   machines, so that they decide alike. What they find is proved for the exact numbers.
+   compiled loops get numbers that lie on a grid, see `on_grid` and `few_digits`. Their sums have
+   one order on all machines, so that they decide alike. What they find is proved for the exact
+   numbers.
 
 What is left to chance is a number that comes within rounding of a border by accident: with
 fourteen good digits and cells of 1e-7, one in ten million.

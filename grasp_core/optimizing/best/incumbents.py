@@ -1,10 +1,11 @@
 """Finds good contacts to begin with: random ones that many twists weigh well, moved uphill.
 
 The quality of contacts is at most what each of many twists allows: their largest support over the
-twist's demand. Random contacts are ordered by the least of these bounds, and the first of different
-sets of faces climb.
+twist's demand. Random contacts are ordered by the least of these bounds; the first of them that are
+in force closure are measured, and the best of these climb.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,19 +18,23 @@ from grasp_core.optimizing.best.grounds import Grounds
 from grasp_core.optimizing.best.searching.parts import Found
 from grasp_core.optimizing.best.searching.search import Searching
 from grasp_core.optimizing.best.task_ascent import climbed_for_task, climbs_for_weight
-from grasp_core.solvers.ties import on_grid, surpassing
+from grasp_core.quality.ferrari_canny import wrench_set_quality
+from grasp_core.solvers.ties import largest_first, on_grid, surpassing
 from grasp_core.values import FINGERS
 
 POINTS = 3000
 """Random contacts."""
 SETS = 40_000
 """Random sets of four of them."""
-CLIMBED = 6
-"""Sets of different faces that climb."""
-LATER = 500
-"""Sets not in force closure that are passed over for others on the same faces: twists of other
-measures than the usual one say less of closure."""
 AT_ONCE = 4000
+RATED, MOST_RATED = 200, 4000
+"""Sets whose quality is measured, and how many more are looked at while few are in force closure,
+as at low friction."""
+ROUGH = 0.1
+"""Gap of these qualities, by which sets are ordered."""
+CLIMBED, ALIKE = 16, 3
+"""Sets that climb, and how many of them on the same pieces: climbs from several starts on the same
+pieces end in several local optima."""
 
 
 def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Found | None:
@@ -40,41 +45,55 @@ def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Foun
         twists: Twists that bound qualities, (n, 6).
         rng: For the random contacts.
     """
-    grounds = searching.grounds
+    alike, climbs = Counter[tuple[int, ...]](), 0
+    best: Found | None = None
+    for on, at in _closed_sets(searching, twists, rng):
+        key = tuple(sorted(on.tolist()))
+        alike[key] += 1
+        if alike[key] > ALIKE:
+            continue
+        found = climbed(searching, on, at)
+        if best is None or found.quality.lower > surpassing(best.quality.lower):
+            best = found
+        climbs += 1
+        if climbs == CLIMBED:
+            break
+    return best if best is not None and best.quality.lower > 0.0 else None
+
+
+def _closed_sets(
+    searching: Searching, twists: Array, rng: np.random.Generator
+) -> list[tuple[Indices, Array]]:
+    """Return random contacts in force closure, on (4,) at (4, 2), the most promising first."""
+    grounds, measure = searching.grounds, searching.measure
     on = rng.integers(len(grounds.counts), size=POINTS)
     polygons = grounds.polygons()
-    at = np.empty((POINTS, 2))
-    for place in range(POINTS):
-        polygon = polygons[int(on[place])]
-        at[place] = on_grid(rng.dirichlet(np.ones(len(polygon))) @ polygon, STEP_DIGITS)
+    weights = [rng.dirichlet(np.ones(len(polygons[int(p)]))) for p in on]
+    inside = [w @ polygons[int(p)] for w, p in zip(weights, on, strict=True)]
+    at = on_grid(np.array(inside), STEP_DIGITS)
     supports = _supports(grounds, searching.friction, on, at, twists)
     sets = np.sort(rng.integers(POINTS, size=(SETS, FINGERS)), axis=1)
-    measure, demands = searching.measure, searching.measure.demands(twists)
+    demands = measure.demands(twists)
     bounds = np.concatenate(
         [
             measure.multiples(supports[sets[k : k + AT_ONCE]].max(axis=1), demands).min(axis=1)
             for k in range(0, SETS, AT_ONCE)
         ]
     )
-    tried, closed_later = set[tuple[int, ...]](), 0 if measure.is_usual else LATER
-    best: Found | None = None
-    for k in np.argsort(-bounds, kind="stable"):
-        chosen = sets[k]
-        key = tuple(sorted(on[chosen].tolist()))
-        if key in tried:
-            continue
-        tried.add(key)
-        found = climbed(searching, on[chosen], at[chosen])
-        if found.quality.lower <= 0.0 and closed_later > 0:
-            # others on the same faces may be in force closure
-            tried.discard(key)
-            closed_later -= 1
-            continue
-        if best is None or found.quality.lower > surpassing(best.quality.lower):
-            best = found
-        if len(tried) == CLIMBED:
+    closed: list[tuple[Indices, Array]] = []
+    rated: list[float] = []
+    for place, k in enumerate(np.argsort(-bounds, kind="stable")[:MOST_RATED]):
+        if place >= RATED and len(closed) >= CLIMBED:
             break
-    return best if best is not None and best.quality.lower > 0.0 else None
+        chosen = sets[k]
+        wrenches = searching.wrenches(on[chosen], at[chosen])
+        lower = wrench_set_quality(wrenches, ROUGH).lower
+        if lower > 0.0:
+            closed.append((on[chosen], at[chosen]))
+            rated.append(lower)
+    # the Ferrari-Canny quality says little about other loads: these keep the order of their bounds
+    order = largest_first(rated) if measure.is_usual else range(len(closed))
+    return [closed[k] for k in order]
 
 
 def climbed(searching: Searching, on: Sequence[int] | Indices, at: Array) -> Found:

@@ -114,6 +114,21 @@ def choose(search: Search, node: int) -> tuple[int, float]:
 
 
 @loop("numpy")
+def with_new(search: Search, node: int, best: int, cost: float, k: int) -> tuple[int, float]:
+    """Return the better of the best question and a twist that is new to the pool, if k is one."""
+    if k < 0:
+        return best, cost
+    if k == best:  # it has taken the place of the best
+        return choose(search, node)
+    if _estimated(search, node, k) == 0.0:
+        return k, 0.0
+    found, answers = _measured(search, node, k)
+    if (answers > 1 or found <= SHRUNK) and found < cost:
+        return k, found
+    return best, cost
+
+
+@loop("numpy")
 def _estimated(search: Search, node: int, k: int) -> float:
     """Return about what `_measured` does, without cutting."""
     cost, twin, stays, answers = 0.0, False, False, 0

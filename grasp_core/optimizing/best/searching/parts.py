@@ -23,10 +23,10 @@ any, 2), how many count (n, 4, p), and which fingers are fresh (n, 4)."""
 NODES = "grasp_core.optimizing.best.searching.nodes_kernel"
 POOL = 512
 """Twists that a search keeps: asking is most of its work, and takes as long as there are twists."""
-DEEP = 320
-"""Nodes that may wait in one part at first; room is doubled where it is full."""
-FIRST_ROOM = 4096
-"""Nodes for which a part's tree has room at first; it is doubled when it is full."""
+DEEP, FIRST_ROOM = 24, 256
+"""Nodes that may wait in a part at first, and nodes for which its tree has room: most parts are
+small, and most of the time of clearing more memory would be lost. Room is doubled where it is full.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

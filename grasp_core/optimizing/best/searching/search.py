@@ -224,10 +224,14 @@ class Searching:
 
     def measured(self, on: Indices, at: Array) -> Found:
         """Bound the measure of contacts on pieces, (4,), at plane coordinates, (4, 2)."""
-        points = np.array([self.grounds.places(p, y[None])[0] for p, y in zip(on, at, strict=True)])
-        wrenches = WrenchSet.at(points, self.grounds.normals[on], np.full(FINGERS, self.friction))
-        quality = measured_set(wrenches.on_grid(), self.measure, EXACT_GAP)
+        quality = measured_set(self.wrenches(on, at), self.measure, EXACT_GAP)
         return Found(tuple(int(p) for p in on), np.array(at), quality)
+
+    def wrenches(self, on: Indices, at: Array) -> WrenchSet:
+        """Return the wrenches of contacts on pieces, (4,), at plane coordinates, on a grid."""
+        points = np.array([self.grounds.places(p, y[None])[0] for p, y in zip(on, at, strict=True)])
+        friction = np.full(FINGERS, self.friction)
+        return WrenchSet.at(points, self.grounds.normals[on], friction).on_grid()
 
     def _hand_on(self, wave: Sequence[Part]) -> None:
         """Add the newest twists of each part to those that the next wave begins with."""

@@ -8,7 +8,13 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
-from grasp_core.optimizing.best.searching.asking_kernel import ask, choose, look, look_again
+from grasp_core.optimizing.best.searching.asking_kernel import (
+    ask,
+    choose,
+    look,
+    look_again,
+    with_new,
+)
 from grasp_core.optimizing.best.searching.cuts_kernel import MOST_CORNERS, Pieces
 from grasp_core.optimizing.best.searching.nodes_kernel import (
     ALL,
@@ -24,8 +30,9 @@ from grasp_core.optimizing.best.searching.twists_kernel import descend, learn, m
 DONE, PAUSED, FULL, PART, FOUND, LOST = 0, 1, 2, 3, 4, 5
 """Why a run ends: nothing left, budget of nodes spent, no room in the tree, a node that is to be a
 part of its own, contacts that may reach the threshold, a node too small to be divided."""
-ASKED_ABOVE = 1.3
-"""Cost of a question up to which it is asked rather than dividing a polygon, which costs 1.41."""
+ASKED_ABOVE = 1.05
+"""Cost of a question up to which it is asked rather than dividing a polygon, which costs 1.41. It
+was measured: after a division more twists have a single answer."""
 STEPS, CLOSE_STEPS = 40, 120
 """Steps of descents for a node, and for its middle."""
 
@@ -64,14 +71,13 @@ def _visit(search: Search, node: int, now: int) -> bool:
     look_again(search, node)
     best, cost = choose(search, node)
     if cost > 0.0 and _is_single(search, node):
-        found, refuted = _lowered(search, node, now)
+        place, refuted = _lowered(search, node, now)
+        best, cost = with_new(search, node, best, cost, place)
         if not refuted:
-            near, closer = _middle_lowered(search, node, now)
+            near, place = _middle_lowered(search, node, now)
             if near >= search.t:
                 return False
-            found = found or closer
-        if found:
-            best, cost = choose(search, node)
+            best, cost = with_new(search, node, best, cost, place)
     if best >= 0 and cost <= ASKED_ABOVE:
         ask(search, node, best, now)
     elif not divide(search, node):
@@ -94,8 +100,8 @@ def _is_single(search: Search, node: int) -> bool:
 
 
 @loop("numpy")
-def _lowered(search: Search, node: int, now: int) -> tuple[bool, bool]:
-    """Lower what all corners of a node resist; return whether that gave a twist, and refutes."""
+def _lowered(search: Search, node: int, now: int) -> tuple[int, bool]:
+    """Lower what all corners of a node resist; return the new twist or -1, and if that refutes."""
     work, stack, pieces = search.work, search.stack, search.pieces
     least, first = np.inf, 0
     for k in range(search.pool.size[0]):
@@ -119,14 +125,13 @@ def _lowered(search: Search, node: int, now: int) -> tuple[bool, bool]:
             m += 1
     y = search.pool.twists[first].copy()
     found = descend(pieces, search.demand, points, on, m, y, STEPS)
-    if found < least:
-        _learn(search, node, y, now)
-    return found < least, min(found, least) < search.t
+    place = _learned(search, node, y, now) if found < least else -1
+    return place, min(found, least) < search.t
 
 
 @loop("numpy")
-def _middle_lowered(search: Search, node: int, now: int) -> tuple[float, bool]:
-    """Lower what contacts in a node's middle resist; return it, and whether it gave a twist."""
+def _middle_lowered(search: Search, node: int, now: int) -> tuple[float, int]:
+    """Lower what contacts in a node's middle resist; return it, and the new twist or -1."""
     pieces, pool, work = search.pieces, search.pool, search.work
     near, nearest = np.inf, 0
     points, on = np.empty((FINGERS, 3)), work.on
@@ -144,16 +149,17 @@ def _middle_lowered(search: Search, node: int, now: int) -> tuple[float, bool]:
             near, nearest = found, k
     y = pool.twists[nearest].copy()
     found = descend(pieces, search.demand, points, on, FINGERS, y, CLOSE_STEPS)
-    if found < near:
-        _learn(search, node, y, now)
-    return min(found, near), found < near
+    place = _learned(search, node, y, now) if found < near else -1
+    return min(found, near), place
 
 
 @loop("numpy")
-def _learn(search: Search, node: int, y: Array, now: int) -> None:
+def _learned(search: Search, node: int, y: Array, now: int) -> int:
+    """Learn a twist, and return its place in the pool."""
     place = learn(search.pool, search.pieces, search.demand, y, now)
     for i in range(FINGERS):
         look(search, node, i, place, place + 1)
+    return place
 
 
 @loop("numpy")
