@@ -1,15 +1,16 @@
 """Whether anything exceeds the bound on the best grasp: `python -m tests.benchmarks.best_bounds`.
 
 For each object and friction a bound is proved once. Then contacts are looked for that exceed it:
-random ones (anywhere clear of edges, near corners, and near the best grasp), planned grasps that
-are optimised, an independent global search (scipy's differential evolution), and all sets of four
+random ones (anywhere clear of edges, near corners, and near the best grasp), random ones in force
+closure that climb to a local optimum, planned grasps that are optimised, an independent global search (scipy's differential evolution), and all sets of four
 points of a grid. The quality of contacts is measured by the definition: in many twists from above,
 and where these allow more than a bound, by `ferrari_canny`. Proofs are also spoiled at random while
 they claim less than a known grasp attains: none of them may be accepted. Ends with an error if
 something exceeds a bound, or a spoiled proof is accepted.
 
     python -m tests.benchmarks.best_bounds [OBJECT ...] [--friction MU ...] [--gap 0.15]
-        [--random 1000000] [--optimized 300] [--evolutions 20] [--tampered 5000] [--grid 6]
+        [--random 1000000] [--climbs 10000] [--optimized 300] [--evolutions 20]
+        [--tampered 5000] [--grid 4]
 """
 
 import argparse
@@ -20,6 +21,9 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 import grasp_core as gc
+from grasp_core.optimizing.best.incumbents import climbed
+from grasp_core.optimizing.best.searching.search import Searching
+from grasp_core.optimizing.best.searching.stop import Stop
 from scenes.example_objects import example_object
 from tests.benchmarks.best_grasps import clear
 from tests.grasp_core.optimizing.best.supports_of_contacts import supports
@@ -40,19 +44,21 @@ def main():
     parser.add_argument("--friction", nargs="+", type=float, default=FRICTIONS)
     parser.add_argument("--gap", type=float, default=0.15)
     parser.add_argument("--random", type=int, default=1_000_000)
+    parser.add_argument("--climbs", type=int, default=10_000)
     parser.add_argument("--optimized", type=int, default=300)
     parser.add_argument("--evolutions", type=int, default=20)
     parser.add_argument("--tampered", type=int, default=5_000)
-    parser.add_argument("--grid", type=int, default=6)
+    parser.add_argument("--grid", type=int, default=4)
     options = parser.parse_args()
     cases = list(itertools.product(options.objects, options.friction))
     each = {
         name: share(getattr(options, name), len(cases))
-        for name in ("random", "optimized", "evolutions", "tampered")
+        for name in ("random", "climbs", "optimized", "evolutions", "tampered")
     }
-    totals = dict.fromkeys(("random", "measured", "optimized", "evolutions", "grid", "tampered"), 0)
+    totals = dict.fromkeys(("measured", "grid", *each), 0)
     print(
-        "object friction | best bound gap % | nearest to the bound: random optimised evolved grid"
+        "object friction | best bound gap % | nearest to the bound: "
+        "random climbed optimised evolved grid"
     )
     for number, (name, friction) in enumerate(cases):
         body = example_object(name)
@@ -61,6 +67,7 @@ def main():
         rng = np.random.default_rng([number, 7])
         told = [
             random_ones(body, found, each["random"][number], rng, totals),
+            climbed_ones(found, each["climbs"][number], rng, totals),
             optimized_ones(body, found, each["optimized"][number], totals),
             evolved_ones(found, each["evolutions"][number], rng, totals),
             gridded(found, options.grid, totals) if name in GRIDDED else None,
@@ -159,6 +166,22 @@ def of_grasp(body, found):
         on.append(chosen)
         at.append(flat[chosen])
     return np.array(on), np.array(at)
+
+
+def climbed_ones(found, count, rng, totals):
+    """The largest quality of random contacts in force closure that climb to a local optimum."""
+    grounds, friction = found.proof.grounds, found.proof.friction
+    polygons, twists, nearest, left = grounds.polygons(), twists_for(found, rng, 100), 0.0, count
+    hunt, equally = Searching(grounds, friction, 1, Stop()), np.arange(len(polygons) + 1)
+    while left > 0:
+        on, at = placed(rng.random((1000, 12)), polygons, equally / len(polygons))
+        upper = supports(found, on, at, twists).max(axis=1).min(axis=1)
+        for row in np.flatnonzero(upper > 0.0)[:left]:
+            end = climbed(hunt, on[row], np.round(at[row], 6)).quality.lower
+            if end > 0.0:
+                nearest, left = max(nearest, end), left - 1
+                totals["climbs"] += 1
+    return nearest if count else None
 
 
 def optimized_ones(body, found, count, totals):
