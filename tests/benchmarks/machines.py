@@ -5,7 +5,8 @@
 Each arithmetic stands for another machine: the environment of a process tells OpenBLAS, NumPy
 and Numba which processor to work for. Every object is planned at every friction in each of them,
 with all methods and a limit, and those of few faces without a limit; the first grasps are
-simulated, get regions and are improved. All must give what this machine's own arithmetic gives.
+simulated, get regions and are improved; the best grasps of objects of few faces are sought. All
+must give what this machine's own arithmetic gives.
 """
 
 import argparse
@@ -16,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -86,7 +88,7 @@ def answers(names):
             plan = gc.plan(body, friction, limit=LIMIT)
             found[f"{name} at {friction:.4f}"] = [as_json(body, grasp) for grasp in plan.grasps]
             if friction == FRICTIONS[2] and plan.grasps:
-                for kind in (simulated, regions, improved):
+                for kind in (simulated, regions, improved, best):
                     found[f"{name} {kind.__name__}"] = kind(body, plan.grasps[0], friction)
             if len(body.faces) <= FEW_FACES:
                 every = gc.plan(body, friction).grasps
@@ -132,6 +134,20 @@ def improved(body, grasp, friction):
     return {
         "exact": [found.grasp.id, found.after.verify()],
         "frictions": [found.grasp.critical_friction],
+        "places": places(body, found.grasp.positions),
+    }
+
+
+def best(body, _, friction):
+    """The best grasp and its proof, which must be the same to the last bit."""
+    if body.patches is not None or len(body.faces) > FEW_FACES:
+        return {"exact": None, "figures": [], "places": []}
+    found = gc.best_grasp(body, friction, gap=0.25, jobs=2)
+    proof = found.proof
+    numbers = b"".join(each.tobytes() for each in (proof.deeds, proof.asked, proof.twists))
+    return {
+        "exact": [found.ended, found.bound, len(proof.deeds), zlib.crc32(numbers), found.verify()],
+        "figures": [found.quality.lower],
         "places": places(body, found.grasp.positions),
     }
 

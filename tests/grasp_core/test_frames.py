@@ -1,8 +1,11 @@
+import itertools
+
 import numpy as np
 import pytest
 
 import grasp_core as gc
 import scenes
+from grasp_core.frames import plane_tangents
 
 FINGER = gc.Finger(0.003, 0.05)
 
@@ -35,6 +38,21 @@ def test_fingers_that_go_along_z_from_their_poses_arrive_at_the_contacts(body):
             ways = grasp.normals if finger is None else grasp.approach_directions
             assert np.allclose(poses[:, :3, 2], ways, atol=1e-12)
             assert np.array_equal(grasp.approach_poses()[:, :3, 3], grasp.positions)
+
+
+def test_directions_with_equal_components_have_tangents_that_rounding_cannot_turn():
+    """Normals of an octahedron, of a dodecahedron and along the axes, shaken by last digits."""
+    rng, golden = np.random.default_rng(0), (1.0 + 5.0**0.5) / 2.0
+    rows = [(1.0, 1.0, 1.0), (0.0, 1.0, golden), (1.0, golden, 0.0), (0.0, 0.0, 1.0)]
+    tried = 0
+    for row, signs in itertools.product(rows, itertools.product((-1.0, 1.0), repeat=3)):
+        unit = np.array(row) * signs / np.linalg.norm(row)
+        own = np.array(plane_tangents(*unit))
+        for _ in range(20):
+            shaken = unit + 1e-15 * rng.uniform(-1.0, 1.0, 3)
+            assert np.abs(np.array(plane_tangents(*shaken)) - own).max() < 1e-14
+            tried += 1
+    assert tried == 640
 
 
 def test_a_distance_below_zero_is_refused(body):

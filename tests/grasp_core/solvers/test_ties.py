@@ -28,6 +28,16 @@ def test_numbers_of_regular_objects_are_far_from_the_borders_of_cells():
     np.testing.assert_array_equal(ties.graded(numbers + ROUNDING), ties.graded(numbers - ROUNDING))
 
 
+def test_few_digits_round_down_by_less_than_a_share():
+    rng = np.random.default_rng(0)
+    for sizes in rng.uniform((-6.0, -6.0), (3.0, -0.5), (2000, 2)):
+        number, share = 10.0**sizes
+        rounded = ties.few_digits(number, share)
+        assert number * (1.0 - share) < rounded <= number
+        assert ties.few_digits(rounded, share) == rounded
+        assert ties.few_digits(number * (1.0 + 1e-15), share) == rounded
+
+
 def test_coarse_bounds_are_upper_bounds_shared_by_equals():
     numbers = np.random.default_rng(0).uniform(0.0, 3.0, 10_000)
     bounds = ties.coarse(numbers)

@@ -100,10 +100,10 @@ def part_from(first: Nodes, pool: Any) -> Part:
 
 
 def _copied(pool: Any) -> Any:
-    """Return a pool with the same twists, of which no tree has named any."""
+    """Return a pool with the same twists, all used before a tree begins, which has named none."""
     copies = type(pool)(*(array.copy() for array in pool))
     copies.names[:] = -1
-    copies.used[:] = 0
+    copies.used[:] -= copies.used.max() + 1
     return copies
 
 

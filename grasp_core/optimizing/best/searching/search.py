@@ -1,10 +1,12 @@
 """Searches for a tree of cuts that refutes a threshold, on all cores, the same tree on any number.
 
 A level of the search refutes one threshold. Its tree is begun by one thread up to a depth; each
-node left there is a part of its own, searched with its own twists. Parts are searched in waves of a
-fixed number. After a wave its newest twists, part by part, join those that the next wave begins
-with. So nothing depends on which thread does what, or when. Inside a level depth comes first: a
-tree that refutes one threshold must visit all of its nodes in any order, and the best node first
+node left there is a part of its own, searched with its own twists. A part that has visited many
+nodes leaves those that wait to parts of their own, which begin with its twists. Parts are searched
+in waves of a fixed number. After a wave its newest twists, part by part, join those that parts of
+the trunk begin with. So nothing depends on which thread does what, or when; and numbers are on a
+grid, so that nothing depends on last digits (see `support_cuts`). Inside a level depth comes first:
+a tree that refutes one threshold must visit all of its nodes in any order, and the best node first
 means here the loosest threshold first (see `best_grasp`).
 """
 
@@ -13,7 +15,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -69,6 +71,9 @@ SETTLED = 1.0 - 1e-6
 EXACT_GAP = 1e-5
 """Gap between the bounds of the measure of contacts that may be better: a tenth of the smallest gap
 that a search may be asked for."""
+
+_Waiting: TypeAlias = tuple[Part, Nodes, Any]
+"""A node that waits, with the part that left it and the pool of twists that it begins with."""
 
 
 @dataclass(slots=True, eq=False)
@@ -143,8 +148,7 @@ class Searching:
         trunk = part_from(nodes, self.pool)
         self._search(trunk, threshold, known, PART_DEPTH)
         wave, parts, better = [trunk], list[Part](), list[Found]()
-        # nodes that wait, with the part that left them and the twists they begin with
-        waiting = deque[tuple[Part, Nodes, Any]]()
+        waiting = deque[_Waiting]()
         with ThreadPoolExecutor(self.jobs) as threads:
             while True:
                 self.nodes += sum(int(part.tree.sizes[0]) for part in wave)
@@ -157,11 +161,7 @@ class Searching:
                     part.left, part.pool = [], None
                 if not waiting:
                     return joined(trunk, parts), better
-                wave = []
-                for _ in range(min(WAVE, len(waiting))):
-                    above, node, pool = waiting.popleft()
-                    above.parts.append(part_from(node, pool))
-                    wave.append(above.parts[-1])
+                wave = [_next(waiting) for _ in range(min(WAVE, len(waiting)))]
                 self._together(threads, wave, threshold, known)
                 self._hand_on(wave)
                 parts += wave
@@ -242,3 +242,10 @@ class Searching:
             old = {y.tobytes() for y in self.pool.twists}
             fresh = [y for y in part.pool.twists[newest] if y.tobytes() not in old]
             self.learn(np.array(fresh).reshape(-1, 6), now=part.tree.sizes[0])
+
+
+def _next(waiting: deque[_Waiting]) -> Part:
+    """Make a part of the node that has waited longest, below the part that left it."""
+    above, node, pool = waiting.popleft()
+    above.parts.append(part_from(node, pool))
+    return above.parts[-1]

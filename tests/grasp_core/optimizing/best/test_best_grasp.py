@@ -13,6 +13,7 @@ from grasp_core.optimizing.best.grounds import grounds_of
 from grasp_core.optimizing.best.incumbents import climbed
 from grasp_core.optimizing.best.proof_file import read_proof, write_proof
 from grasp_core.optimizing.best.same_places import exact_maps
+from grasp_core.optimizing.best.searching import search
 from grasp_core.optimizing.best.searching.search import Searching
 from grasp_core.optimizing.best.searching.stop import Stop
 from scenes.example_objects import example_object
@@ -215,6 +216,42 @@ def test_the_proof_is_the_same_on_any_number_of_threads():
     one, two = (gc.best_grasp(body, FRICTION, gap=0.2, jobs=jobs) for jobs in (1, 3))
     assert one.proof == two.proof
     assert one.grasp == two.grasp
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        ("tetrahedron", 0.1, "ferrari-canny"),
+        ("octahedron", 0.3, "ferrari-canny"),
+        ("tetrahedron", 0.2, "weight"),
+        *more(("double-wedge-bar", 0.1, "ferrari-canny"), ("l-bracket", 0.2, "ferrari-canny")),
+    ],
+)
+def test_corners_shaken_by_last_digits_give_the_same_grasp_and_proof(case):
+    """Symmetric objects have equal twists and equal contacts, between which rounding may choose."""
+    name, gap, measure = case
+    body, rng = example_object(name), np.random.default_rng(0)
+    shaken = body.vertices + 1e-15 * body.radius * rng.uniform(-1.0, 1.0, body.vertices.shape)
+    other = gc.Polyhedron.from_mesh(shaken, body.triangles)
+    assert (other.vertices != body.vertices).any()
+    one, two = (gc.best_grasp(each, FRICTION, gap=gap, measure=measure) for each in (body, other))
+    for field in ("deeds", "asked", "twists", "lines"):
+        assert np.array_equal(getattr(one.proof, field), getattr(two.proof, field))
+    assert one.grasp.faces == two.grasp.faces
+    assert np.abs(one.grasp.positions - two.grasp.positions).max() < 1e-9 * body.radius
+    assert one.bound == two.bound
+
+
+def test_parts_that_leave_nodes_to_others_prove_as_much(monkeypatch):
+    body = example_object("tetrahedron")
+    whole = gc.best_grasp(body, FRICTION, gap=0.1)
+    monkeypatch.setattr(search, "PART_NODES", 60)
+    monkeypatch.setattr(search, "BUDGET", 10)
+    one, two = (gc.best_grasp(body, FRICTION, gap=0.1, jobs=jobs) for jobs in (1, 2))
+    assert one.proof == two.proof
+    assert one.proof != whole.proof
+    assert one.bound == whole.bound
+    assert one.verify()
 
 
 def test_a_time_limit_ends_the_search_with_a_proved_bound():
