@@ -88,24 +88,24 @@ class Levels:
 
     def closed_to(self, gap: float) -> Ended:
         """Refute threshold after threshold, until the gap is reached or the search is stopped."""
-        self.grain = gap / FINER
+        grain = gap / FINER
         steps = max(0, math.ceil(math.log2(WIDEST / gap)))
         try:
             for k in range(steps, -1, -1):
                 share = 1.0 - AIMED * gap * 2.0**k
                 while self.best.quality.lower < share * (1.0 - SAME) * self.bound:
-                    wanted = few_digits(self.best.quality.lower / share, self.grain)
-                    if not self._refuted(wanted):
+                    wanted = few_digits(self.best.quality.lower / share, grain)
+                    if not self._refuted(wanted, grain):
                         return "time" if self.searching.stop() else "undivided"
         except KeyboardInterrupt:
             return "interrupt"
         return "gap"
 
-    def _refuted(self, bound: float) -> bool:
-        """Lower the bound, or find better contacts; return whether one of them came about."""
+    def _refuted(self, bound: float, grain: float) -> bool:
+        """Lower the bound, or find contacts better by a grain; return whether either came about."""
         threshold = bound - self.searched.raised
         known = self.best.quality.lower
-        surpassed = (1.0 + self.grain) * known
+        surpassed = (1.0 + grain) * known
         steps, better = self.searching.refute(self.nodes, threshold, surpassed)
         if steps is not None:
             self.steps = steps
