@@ -14,7 +14,6 @@ nearer to an edge may have a larger quality. Faces that are not convex count as 
 borders.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -51,6 +50,8 @@ MOST_PARTS = 100_000_000
 SMALLEST_GAP, LARGEST_GAP = 1e-3, 0.9
 SMALLEST = 1e-5
 """Bound that is not lowered any more [N]."""
+AIMED = 0.999
+"""Share of the gap between bounds: multiples of round numbers would be where digits are cut."""
 FINER = 64.0
 """How much finer than the gap the digits of bounds are."""
 SEED = 0
@@ -174,7 +175,7 @@ def _lowered(grounds: Grounds, owners: Indices, friction: float, asked: "_Asked"
     done, last, stride = -1, len(bounds), 1  # those up to `done` are refuted, `last` is not
     while last - done > 1 and not stop():
         place = min(done + stride, (done + last) // 2)
-        bound = few_digits(float(bounds[place]), asked.gap / FINER)
+        bound = bounds[place]
         tree, _ = searching.refute(nodes, bound - searched.raised, np.inf)
         if tree is None:
             last = place
@@ -194,15 +195,14 @@ class _Asked:
     gap: float
     parts: int
 
-    def bounds(self, first: float) -> Array:
-        """Return the bounds to try, falling, each by the gap; nothing found on the way moves them.
+    def bounds(self, first: float) -> list[float]:
+        """Return the bounds below a first one to try, falling, each by the gap.
 
-        They are multiples of what is known, or of the first bound where next to nothing is.
+        They are multiples of what is known, or of the smallest bound where next to nothing is:
+        nothing that is found on the way moves them.
         """
-        least, share = max(self.known, SMALLEST), 1.0 - self.gap
-        if first * share <= least:
-            return np.empty(0)
-        count = math.floor(math.log(least / first) / math.log(share))
-        if self.known >= SMALLEST:
-            return np.asarray(self.known / share ** np.arange(count, 0, -1), dtype=np.float64)
-        return np.asarray(first * share ** np.arange(1, count + 1), dtype=np.float64)
+        least, share = max(self.known, SMALLEST), 1.0 - AIMED * self.gap
+        rising = [least / share if self.known >= SMALLEST else least]
+        while rising[-1] < first * share:
+            rising.append(rising[-1] / share)
+        return [few_digits(bound, self.gap / FINER) for bound in rising[::-1] if bound < first]

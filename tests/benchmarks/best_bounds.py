@@ -3,10 +3,11 @@
 For each object and friction a bound is proved once. Then contacts are looked for that exceed it:
 random ones (anywhere clear of edges, near corners, and near the best grasp), random ones in force
 closure that climb to a local optimum, planned grasps that are optimised, an independent global
-search (scipy's differential evolution), and all sets of four points of a grid. The quality of contacts is measured by the definition: in many twists from above,
-and where these allow more than a bound, by `ferrari_canny`. Proofs are also spoiled at random while
-they claim less than a known grasp attains: none of them may be accepted. Ends with an error if
-something exceeds a bound, or a spoiled proof is accepted.
+search (scipy's differential evolution), and all sets of four points of a grid. The quality of
+contacts is measured by the definition: in many twists from above, and where these allow more than a
+bound, by `ferrari_canny`. Proofs are also spoiled at random while they claim less than a known
+grasp attains: none of them may be accepted. Ends with an error if something exceeds a bound, or a
+spoiled proof is accepted.
 
     python -m tests.benchmarks.best_bounds [OBJECT ...] [--friction MU ...] [--gap 0.15]
         [--random 1000000] [--climbs 10000] [--optimized 300] [--evolutions 20]

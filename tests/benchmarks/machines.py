@@ -144,7 +144,9 @@ def best(body, _, friction):
         return {"exact": None, "figures": [], "places": []}
     found = gc.best_grasp(body, friction, gap=0.25, jobs=2)
     proof = found.proof
-    numbers = b"".join(each.tobytes() for each in (proof.deeds, proof.asked, proof.twists))
+    numbers = b"".join(
+        each.tobytes() for each in (proof.deeds, proof.asked, proof.twists, proof.lines)
+    )
     return {
         "exact": [found.ended, found.bound, len(proof.deeds), zlib.crc32(numbers), found.verify()],
         "figures": [found.quality.lower],

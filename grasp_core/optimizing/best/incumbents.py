@@ -13,7 +13,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.polygons import edge_rows
 from grasp_core.objects.face_pieces import FacePiece
-from grasp_core.optimizing.ascent import STEP_DIGITS, ContactFaces
+from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.optimizing.best.grounds import Grounds
 from grasp_core.optimizing.best.searching.parts import Found
 from grasp_core.optimizing.best.searching.search import Searching
@@ -70,7 +70,7 @@ def _closed_sets(
     polygons = grounds.polygons()
     weights = [rng.dirichlet(np.ones(len(polygons[int(p)]))) for p in on]
     inside = [w @ polygons[int(p)] for w, p in zip(weights, on, strict=True)]
-    at = on_grid(np.array(inside), STEP_DIGITS)
+    at = on_grid(np.array(inside))
     supports = _supports(grounds, searching.friction, on, at, twists)
     sets = np.sort(rng.integers(POINTS, size=(SETS, FINGERS)), axis=1)
     demands = measure.demands(twists)
@@ -121,7 +121,7 @@ def climbed(searching: Searching, on: Sequence[int] | Indices, at: Array) -> Fou
             float((piece.E @ y - piece.b).max()) <= 0.0
             for piece, y in zip(pieces, moved, strict=True)
         )
-        if inside and there.quality.lower > best.quality.lower:
+        if inside and there.quality.lower > surpassing(best.quality.lower):
             best = there
     return best
 

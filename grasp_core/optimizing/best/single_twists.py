@@ -14,13 +14,15 @@ from grasp_core.compiled import compiled
 from grasp_core.optimizing.best.searching.parts import Steps
 from grasp_core.optimizing.best.searching.search import CUTS, TWISTS, Searching
 from grasp_core.optimizing.best.support_cuts import SEARCH_DIGITS, Slack
-from grasp_core.solvers.ties import on_grid
+from grasp_core.solvers.ties import few_digits, first_best, on_grid
 
 COUNT = 384
 """Random twists to begin with, as many as a wave hands on; a quarter of them is moved to where the
 support of all polygons is smaller."""
 FIRST_STEPS = 60
 """Steps of these descents: they settle within it."""
+ROUNDED_UP = 1e-6
+"""Share by which a threshold is rounded up at least, and less than three times as much."""
 
 
 def lowered_twists(searching: Searching, rng: np.random.Generator) -> Array:
@@ -44,7 +46,9 @@ def lowered_twists(searching: Searching, rng: np.random.Generator) -> Array:
     low = len(loads) + COUNT // 4
     lowered = found[:low].copy()
     for y in lowered:
-        compiled(TWISTS).descend(pieces, searching.demand, corners, on, len(on), y, FIRST_STEPS)
+        compiled(TWISTS).descend(
+            pieces, searching.demand, corners, on, len(on), y, FIRST_STEPS, 0.0
+        )
     found = np.vstack([lowered, found[low:]])
     searching.learn(found)
     return np.array(searching.pool.twists[: len(found)])
@@ -64,8 +68,9 @@ def refuted_by_one(
     support, slopes = compiled(CUTS).support, compiled(CUTS).slopes
     pieces, at = searching.pieces, np.empty(6)
     reached = np.full(len(twists), -math.inf)
+    polygons = [on_grid(polygon, SEARCH_DIGITS) for polygon in searching.grounds.polygons()]
     for k, y in enumerate(twists):
-        for p, polygon in enumerate(searching.grounds.polygons()):
+        for p, polygon in enumerate(polygons):
             slopes(pieces, p, y, at)
             highest = max(support(at, a, b, searching.friction) for a, b in polygon)
             reached[k] = max(reached[k], highest)
@@ -76,9 +81,12 @@ def refuted_by_one(
         with np.errstate(divide="ignore"):  # a twist without demand refutes nothing
             resisted = (np.maximum(reached, 0.0) + slack.lowered) / demands
         thresholds = np.where(demands > 0.0, resisted, np.inf)
-    best = int(thresholds.argmin())
+    best = first_best(-thresholds)
+    threshold = float(thresholds[best])
+    if threshold > 0.0:
+        threshold = few_digits((1.0 + 2.0 * ROUNDED_UP) * threshold, ROUNDED_UP)
     steps = Steps(
         np.zeros(cases, np.int64), np.zeros(cases, np.int64), twists[best : best + 1],
         np.empty((0, 3)),
     )  # fmt: skip
-    return steps, float(thresholds[best])
+    return steps, threshold

@@ -52,10 +52,10 @@ of sum one is shorter than 8 (1 + mu), with coordinates up to two, so that only 
 need be considered, and a(y) is off by less than 1e-14 (1 + mu), a hundred-thousandth of the room.
 
 Search. A search must not depend on last digits, so it works with numbers on a grid, at most 7e-12
-from those of the proof (see rule 4 of `solvers.ties`). Coordinates being at most two, its points
-are off by 1e-10 at most, its supports by 2e-10 (1 + mu). It refutes a threshold that is lower by
-`SEARCHED_BELOW`, five times as much, so that what answers in the replay answers in the search: at
-each node the replay's polygons are within 1e-10 of the search's.
+from those of the proof (see rule 4 of `solvers.ties`). With coordinates of at most two its points
+are off by less than 1e-10, its supports by 2e-10 (1 + mu), and t d(y) of a task by 4e-10 (1 + mu).
+It refutes a threshold that is lower by `SEARCHED_BELOW`, more than all of these, so that what
+answers in the replay answers in the search. No proof rests on that: the replay decides.
 
 Symmetries. See `same_places`: contacts can be moved by a symmetry, at the cost of its error. It
 takes the place of rounding in (3) and (4): `INEXACT` is added to `ROUNDING`.

@@ -67,7 +67,7 @@ measure is not the usual one and the first contacts may be poor."""
 ASIDE = 1.4
 """Factor that keeps loads of round sizes away from powers of two."""
 SETTLED = 1.0 - 1e-6
-"""Share of a threshold below which contacts are refuted by a rounded twist."""
+"""Share of a threshold below which contacts count as refuted."""
 EXACT_GAP = 1e-5
 """Gap between the bounds of the measure of contacts that may be better: a tenth of the smallest gap
 that a search may be asked for."""
@@ -189,7 +189,7 @@ class Searching:
     def _runs(self, part: Part, threshold: float, known: float, depth: int) -> Iterator[int]:
         """Run the kernel until a part is done, and yield why it pauses for the caller."""
         kernel, nodes, pieces = compiled(KERNEL), compiled(NODES), self.pieces
-        work, demand = room(), self.demand
+        work, demand, found_at = room(), self.demand, -1
         while not self.stop():
             search = nodes.Search(
                 pieces, part.stack, part.pool, part.tree, work, threshold, demand, self.spare
@@ -204,8 +204,14 @@ class Searching:
                 return
             if why == kernel.FULL:
                 enlarge(part)
-            elif why == kernel.FOUND and not self._is_refuted(part, work, threshold, known):
-                return
+            elif why == kernel.FOUND:
+                if not self._is_refuted(part, work, threshold, known):
+                    return
+                size = int(part.tree.sizes[0])
+                # found again: the twist refutes the contacts by less than rounding
+                if size == found_at and not nodes.divide(search, int(part.stack.top[0]) - 1):
+                    return
+                found_at = size
             yield why
 
     def _is_refuted(self, part: Part, work: Any, threshold: float, known: float) -> bool:
@@ -217,8 +223,7 @@ class Searching:
                 return False
         if found.quality.upper >= SETTLED * threshold:
             return False
-        # before the first node all twists are unused: this one must not be the next to go
-        now = max(1, int(part.tree.sizes[0]))
+        now = int(part.tree.sizes[0])
         self.learn(on_grid(found.quality.direction[None]), part.pool, now)
         return True
 

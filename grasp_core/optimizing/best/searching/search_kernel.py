@@ -101,14 +101,17 @@ def _is_single(search: Search, node: int) -> bool:
 
 @loop("numpy")
 def _lowered(search: Search, node: int, now: int) -> tuple[int, bool]:
-    """Lower what all corners of a node resist; return the new twist or -1, and if that refutes."""
+    """Lower what all corners of a node resist; return the new twist or -1, and if that refutes.
+
+    Supports count with what is spared of an answer, as in `answer_to`.
+    """
     work, stack, pieces = search.work, search.stack, search.pieces
     least, first = np.inf, 0
     for k in range(search.pool.size[0]):
         found = work.reach[0, k]
         for i in range(1, FINGERS):
             found = max(found, work.reach[i, k])
-        found = multiple(found, search.pool.demands[k])
+        found = multiple(found + search.spare, search.pool.demands[k])
         if found < least:
             least, first = found, k
     room = FINGERS * MOST_CORNERS
@@ -124,7 +127,7 @@ def _lowered(search: Search, node: int, now: int) -> tuple[int, bool]:
             on[m] = p
             m += 1
     y = search.pool.twists[first].copy()
-    found = descend(pieces, search.demand, points, on, m, y, STEPS)
+    found = descend(pieces, search.demand, points, on, m, y, STEPS, search.spare)
     place = _learned(search, node, y, now) if found < least else -1
     return place, min(found, least) < search.t
 
@@ -144,11 +147,11 @@ def _middle_lowered(search: Search, node: int, now: int) -> tuple[float, int]:
             one, two = at[3, k] - at[5, k] * b, at[4, k] + at[5, k] * a
             s = at[0, k] + at[1, k] * a + at[2, k] * b
             found = max(found, s + pieces.friction * np.sqrt(one * one + two * two))
-        found = multiple(found, pool.demands[k])
+        found = multiple(found + search.spare, pool.demands[k])
         if found < near:
             near, nearest = found, k
     y = pool.twists[nearest].copy()
-    found = descend(pieces, search.demand, points, on, FINGERS, y, CLOSE_STEPS)
+    found = descend(pieces, search.demand, points, on, FINGERS, y, CLOSE_STEPS, search.spare)
     place = _learned(search, node, y, now) if found < near else -1
     return min(found, near), place
 

@@ -170,9 +170,12 @@ def _velocity(x: Array, y: Array) -> tuple[float, float, float]:
 
 @loop("numpy")
 def descend(  # noqa: C901, PLR0913, PLR0917 - loops that are written out
-    pieces: Pieces, demand: Demand, points: Array, on: Indices, m: int, y: Array, steps: int
-) -> float:
+    pieces: Pieces, demand: Demand, points: Array, on: Indices, m: int, y: Array, steps: int,
+    spare: float,
+) -> float:  # fmt: skip
     """Move a unit twist to where contacts resist less; return the least multiple that one allows.
+
+    For other measures than the usual one supports are taken to be larger by `spare` in the end.
 
     Each step follows the wrench that attains the support, less the load that asks for most, as far
     as would lower the multiple to an aim if these stayed the largest.
@@ -212,7 +215,7 @@ def descend(  # noqa: C901, PLR0913, PLR0917 - loops that are written out
     if demand.kind == USUAL:
         return best
     found = highest(pieces, points, on, m, y, slope)
-    return multiple(found, demanded(demand, y, hardest))
+    return multiple(found + spare, demanded(demand, y, hardest))
 
 
 @loop("numpy")

@@ -242,6 +242,23 @@ def test_corners_shaken_by_last_digits_give_the_same_grasp_and_proof(case):
     assert one.bound == two.bound
 
 
+def test_contacts_that_no_learned_twist_refutes_are_divided(monkeypatch):
+    """As with thresholds so small that rounding decides; the search must not ask for ever."""
+    measured, times = search.Searching.measured, []
+
+    def useless(self, on, at):
+        found = measured(self, on, at)
+        times.append(found.quality.upper)
+        twist = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        return replace(found, quality=replace(found.quality, direction=twist))
+
+    monkeypatch.setattr(search.Searching, "measured", useless)
+    found = gc.best_grasp(example_object("tetrahedron"), FRICTION, gap=0.02, time_limit_s=120.0)
+    assert found.ended == "undivided"
+    assert found.verify()
+    assert len(times) > 200
+
+
 def test_parts_that_leave_nodes_to_others_prove_as_much(monkeypatch):
     body = example_object("tetrahedron")
     whole = gc.best_grasp(body, FRICTION, gap=0.1)
