@@ -28,6 +28,8 @@ UNIT = 1e-9
 LARGEST = 2.0
 """Largest coordinate of a point, in object radii."""
 HALF = 0.5
+SEARCH_DIGITS = 11
+"""Digits after the point that a search is given of polygons (see `support_cuts`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -17,7 +17,7 @@ from grasp_core.errors import InputError
 from grasp_core.families.constructions import point_region, regions_of
 from grasp_core.families.free_contacts import closed_at, of_general_type
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.grounds import grounds_of
+from grasp_core.optimizing.best.grounds import SEARCH_DIGITS, grounds_of
 from grasp_core.optimizing.best.incumbents import begin, climbed, piece_at
 from grasp_core.optimizing.best.result import BestGrasp, Ended, GapAt, measured
 from grasp_core.optimizing.best.same_places import exact_maps, first_nodes
@@ -25,12 +25,7 @@ from grasp_core.optimizing.best.searching.parts import Found
 from grasp_core.optimizing.best.searching.search import Searching
 from grasp_core.optimizing.best.searching.stop import Stop
 from grasp_core.optimizing.best.single_twists import lowered_twists, refuted_by_one
-from grasp_core.optimizing.best.support_cuts import (
-    SEARCH_DIGITS,
-    SEARCHED_BELOW,
-    CutTree,
-    Slack,
-)
+from grasp_core.optimizing.best.support_cuts import SEARCHED_BELOW, CutTree, Slack
 from grasp_core.planning.certify import Candidate, certify, named, to_grasp
 from grasp_core.quality.measures import Measure
 from grasp_core.solvers.ties import few_digits, on_grid, surpassing

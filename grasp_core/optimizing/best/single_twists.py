@@ -11,9 +11,10 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
+from grasp_core.optimizing.best.grounds import SEARCH_DIGITS
 from grasp_core.optimizing.best.searching.parts import Steps
 from grasp_core.optimizing.best.searching.search import CUTS, TWISTS, Searching
-from grasp_core.optimizing.best.support_cuts import SEARCH_DIGITS, Slack
+from grasp_core.optimizing.best.support_cuts import Slack
 from grasp_core.solvers.ties import few_digits, first_best, on_grid
 
 COUNT = 384

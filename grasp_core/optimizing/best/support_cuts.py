@@ -84,8 +84,6 @@ MOST_CUTS = 10_000
 SEARCHED_BELOW = 1e-9
 """How far below its threshold a proof is searched for, over 1 + mu, so that replaying it, with
 other roundings, meets no case that is just decided the other way."""
-SEARCH_DIGITS = 11
-"""Digits after the point that a search is given."""
 INEXACT = 1e-7
 """How far errors of symmetries can lift a measure, over 1 + mu (see `same_places`)."""
 TWIST_SLACK = 1e-12

@@ -22,7 +22,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
-from grasp_core.optimizing.best.grounds import Grounds
+from grasp_core.optimizing.best.grounds import SEARCH_DIGITS, Grounds
 from grasp_core.optimizing.best.searching.parts import (
     NODES,
     POOL,
@@ -37,7 +37,6 @@ from grasp_core.optimizing.best.searching.parts import (
     room,
 )
 from grasp_core.optimizing.best.searching.stop import Stop
-from grasp_core.optimizing.best.support_cuts import SEARCH_DIGITS
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.quality.resisted_loads import measured_set
 from grasp_core.solvers.ties import on_grid
