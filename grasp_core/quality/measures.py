@@ -118,7 +118,7 @@ class Measure(ByValue):
     @property
     def is_usual(self) -> bool:
         """Return whether this is the Ferrari-Canny quality."""
-        return self.name == "ferrari-canny"
+        return is_a(self.name, str) and self.name == "ferrari-canny"
 
     @property
     def size(self) -> float:
