@@ -29,7 +29,8 @@ from grasp_core.fields import is_a
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.grounds import SEARCH_DIGITS, Grounds, grounds_on
+from grasp_core.optimizing.best.grounds import Grounds, grounds_on
+from grasp_core.optimizing.best.levels import FINER
 from grasp_core.optimizing.best.same_places import first_nodes
 from grasp_core.optimizing.best.searching.search import Searching
 from grasp_core.optimizing.best.searching.stop import StopAfter
@@ -42,7 +43,7 @@ from grasp_core.optimizing.best.support_cuts import (
 )
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
-from grasp_core.solvers.ties import few_digits, on_grid
+from grasp_core.solvers.ties import few_digits
 from grasp_core.values import FINGERS, FaceQuadruple
 
 MOST_PARTS = 100_000_000
@@ -51,8 +52,6 @@ SMALLEST = 1e-5
 """Bound that is not lowered any more [N]."""
 AIMED = 0.999
 """Share of the gap between bounds: multiples of round numbers would be where digits are cut."""
-FINER = 64.0
-"""How much finer than the gap the digits of bounds are."""
 SEED = 0
 
 
@@ -164,8 +163,7 @@ def _lowered(grounds: Grounds, owners: Indices, friction: float, asked: "_Asked"
     searched = Slack.of(friction, len(alone), FERRARI_CANNY, SEARCHED_BELOW)
     stop = StopAfter(asked.parts)
     searching = Searching(grounds, friction, 1, stop)
-    corners, counts, fresh = first_nodes(grounds, alone, owners)
-    nodes = on_grid(corners, SEARCH_DIGITS), counts, fresh
+    nodes = first_nodes(grounds, alone, owners)
     twists = lowered_twists(searching, np.random.default_rng(SEED))
     steps, threshold = refuted_by_one(searching, len(nodes[0]), searched, twists)
     # where the faces hold nothing a twist may refute less; a larger threshold it refutes as well

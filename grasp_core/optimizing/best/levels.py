@@ -17,7 +17,7 @@ from grasp_core.errors import InputError
 from grasp_core.families.constructions import point_region, regions_of
 from grasp_core.families.free_contacts import closed_at, of_general_type
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.grounds import SEARCH_DIGITS, grounds_of
+from grasp_core.optimizing.best.grounds import grounds_of
 from grasp_core.optimizing.best.incumbents import begin, climbed, piece_at
 from grasp_core.optimizing.best.result import BestGrasp, Ended, GapAt, measured
 from grasp_core.optimizing.best.same_places import exact_maps, first_nodes
@@ -28,7 +28,7 @@ from grasp_core.optimizing.best.single_twists import lowered_twists, refuted_by_
 from grasp_core.optimizing.best.support_cuts import SEARCHED_BELOW, CutTree, Slack
 from grasp_core.planning.certify import Candidate, certify, named, to_grasp
 from grasp_core.quality.measures import Measure
-from grasp_core.solvers.ties import few_digits, on_grid, surpassing
+from grasp_core.solvers.ties import few_digits, surpassing
 from grasp_core.values import ForceCone, Grasp
 
 WIDEST = 0.4
@@ -56,8 +56,7 @@ class Levels:
         self.grounds = grounds_of(body, clearance)
         self.measure = measure
         self.maps = exact_maps(body, self.grounds, measure)
-        corners, counts, fresh = first_nodes(self.grounds, self.maps)
-        self.nodes = on_grid(corners, SEARCH_DIGITS), counts, fresh
+        self.nodes = first_nodes(self.grounds, self.maps)
         self.proved = Slack.of(friction, len(self.maps), measure)
         # searches leave more than proofs, for a replay with other roundings
         self.searched = Slack.of(friction, len(self.maps), measure, SEARCHED_BELOW)

@@ -25,7 +25,7 @@ POOL = 512
 """Twists that a search keeps: asking is most of its work, and takes as long as there are twists."""
 DEEP, FIRST_ROOM = 24, 256
 """Nodes that may wait in a part at first, and nodes for which its tree has room: most parts are
-small, and most of the time of clearing more memory would be lost. Room is doubled where it is full.
+small, and clearing more memory took longer than searching them. Room is doubled where it is full.
 """
 
 

@@ -136,7 +136,7 @@ class Searching:
         """Try to refute that contacts of the first nodes reach a threshold.
 
         Args:
-            nodes: Where all contacts are, on a grid.
+            nodes: What `first_nodes` returns.
             threshold: The quality, or the multiple of the loads.
             known: One that contacts must surpass to be of interest.
 
@@ -144,7 +144,8 @@ class Searching:
             The tree, or None if it was stopped or contacts reach the threshold; contacts found that
             surpass what is known.
         """
-        trunk = part_from(nodes, self.pool)
+        corners, counts, fresh = nodes
+        trunk = part_from((on_grid(corners, SEARCH_DIGITS), counts, fresh), self.pool)
         self._search(trunk, threshold, known, PART_DEPTH)
         wave, parts, better = [trunk], list[Part](), list[Found]()
         waiting = deque[_Waiting]()
