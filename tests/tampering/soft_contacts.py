@@ -16,6 +16,7 @@ from tests.tampering.exact_closure import (
     locals_of,
     unit_arms,
 )
+from tests.tampering.exact_closure import closure as hard_closure
 
 
 def soft_locals(x, n, mu, mu_t):
@@ -57,9 +58,14 @@ def soft_margin(x, n, mu, mu_t):
 
 
 def closure(c):
-    """A closure certificate of soft contacts is true in every field."""
+    """A closure certificate of soft contacts is true in every field.
+
+    One that has lost its torsion speaks of hard contacts, of which it may still be true.
+    """
     x, n, mu, mu_t = c.positions, c.normals, c.friction, c.torsion_m
-    if mu_t is None or not make_sense(x, n, mu, mu_t) or not isinstance(c.closed, bool):
+    if mu_t is None:
+        return c.torques is None and hard_closure(c)
+    if not make_sense(x, n, mu, mu_t) or not isinstance(c.closed, bool):
         return False
     n = n / np.linalg.norm(n, axis=1, keepdims=True)
     optimum = soft_margin(x, n, mu, mu_t)
