@@ -69,8 +69,11 @@ for (const node of document.querySelectorAll(".wide")) {
 return found;
 """
 """What of a page is not wholly on the screen, or not wholly on its chart."""
-OWN = ("file://", "data:", "chrome://")
-"""How addresses begin that ask nothing of a network; the last are the browser's first page."""
+OWN = ("file://", "data:", "chrome://", "chrome-untrusted://")
+"""How addresses begin that ask nothing of a network; the last two are the browser's own pages,
+which a file cannot ask for."""
+PATIENCE = 60.0
+"""Seconds until a page must show text."""
 
 
 def headless(profile):
@@ -85,12 +88,16 @@ def headless(profile):
              "disable-dev-shm-usage", f"user-data-dir={profile}")  # fmt: skip
     for flag in flags:
         options.add_argument(f"--{flag}")
+    options.add_experimental_option("prefs", {"session.restore_on_startup": 4,
+                                              "session.startup_urls": ["about:blank"]})  # fmt: skip
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     return webdriver.Chrome(options=options, service=Service(DRIVER))
 
 
 def opened(browser, path, *, width=1200, dark=False, touch=False):
-    """Open a file; what was asked for, and said on the console, since."""
+    """Open a file, and wait until it shows text, which it may do only after it is loaded."""
+    from selenium.webdriver.support.wait import WebDriverWait
+
     for log in ("browser", "performance"):
         browser.get_log(log)
     scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
@@ -98,6 +105,9 @@ def opened(browser, path, *, width=1200, dark=False, touch=False):
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": touch}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     browser.get(path.as_uri())
+    WebDriverWait(browser, PATIENCE).until(
+        lambda page: page.execute_script("return document.body.innerText.trim().length > 0")
+    )
 
 
 def requests_of(browser):
