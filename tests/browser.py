@@ -72,6 +72,11 @@ return found;
 OWN = ("file://", "data:", "chrome://", "chrome-untrusted://")
 """How addresses begin that ask nothing of a network; the last two are the browser's own pages,
 which a file cannot ask for."""
+SHOWN = """
+return document.readyState === "complete" && document.body?.innerText.trim().length > 0
+  && decodeURIComponent(location.pathname).endsWith(`/${arguments[0]}`);
+"""
+"""Whether a file of a name is there and shows text; a driver may say so too early."""
 PATIENCE = 60.0
 """Seconds until a page must show text."""
 
@@ -105,9 +110,7 @@ def opened(browser, path, *, width=1200, dark=False, touch=False):
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": touch}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     browser.get(path.as_uri())
-    WebDriverWait(browser, PATIENCE).until(
-        lambda page: page.execute_script("return document.body.innerText.trim().length > 0")
-    )
+    WebDriverWait(browser, PATIENCE).until(lambda page: page.execute_script(SHOWN, path.name))
 
 
 def requests_of(browser):
