@@ -9,6 +9,7 @@ from grasp_core.mesh_files.polygon_soup import Polygons, points_of
 from grasp_core.mesh_files.refusals import broken, outside, shown, unsupported
 from grasp_core.mesh_files.words import (
     LONGEST_LINE,
+    check_unused,
     numbered_lines,
     numbers,
     plain_text,
@@ -17,17 +18,18 @@ from grasp_core.mesh_files.words import (
 )
 
 PASSED_OVER = frozenset(
-    b"vt vn g o s usemtl mtllib usemap maplib lod bevel c_interp d_interp shadow_obj trace_obj mg "
-    b"l p".split()
+    b"vt vn vp vc g o s usemtl mtllib usemap maplib lod bevel c_interp d_interp shadow_obj "
+    b"trace_obj mg l p".split()
 )
 """OBJ keywords that are ignored: they set appearance, groups or curves, not the surface."""
+OTHER_COMMENTS = (b"//", b";")
+"""Beginnings of comments in other languages, which some programs write into OBJ files."""
 SURFACE = re.compile(rb"\s*[vf]\s")
 CORNER = re.compile(rb"[+-]?\d++(/([+-]?\d++)?){0,2}")
 """The form of one corner of a face: a vertex number, then optional texture and normal numbers."""
 WIDTHS = (3, 4, 6, 7)
-"""Allowed counts of numbers on a `v` line: a point, an optional weight, an optional colour."""
-WEIGHTED = (4, 7)
-FLOATS = 3
+"""Allowed counts of numbers on a `v` line: a point, then a weight, a colour, or both of them."""
+FLOATS, WEIGHTED = 3, 4
 GOES_ON = b"\\\n"
 
 
@@ -44,7 +46,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
             points.extend(_vertex(words, where))
         elif keyword == b"f":
             polygons.add(_corners(words, len(points) // FLOATS, where), where)
-        elif keyword not in PASSED_OVER:
+        elif keyword not in PASSED_OVER and not keyword.startswith(OTHER_COMMENTS):
             unsupported(f"{where}: keyword {shown(keyword)!r}", "export polygons only")
     return polygons.on(points_of(points))
 
@@ -80,11 +82,12 @@ def _joined(text: bytes) -> Iterator[tuple[int, list[bytes]]]:
 
 
 def _vertex(words: list[bytes], where: str) -> list[float]:
-    values = numbers(words, where)
-    if len(values) not in WIDTHS:
-        broken(where, f"a vertex needs three numbers, got {len(values)}")
-    if len(values) in WEIGHTED and values[FLOATS] != 1.0:
+    values = numbers(words if len(words) == WEIGHTED else words[:FLOATS], where)
+    if len(words) not in WIDTHS:
+        broken(where, f"a vertex needs three numbers, got {len(words)}")
+    if len(values) == WEIGHTED and values[FLOATS] != 1.0:
         unsupported(f"{where}: a vertex of weight {values[FLOATS]:g}", "export weights of 1")
+    check_unused(words[FLOATS:], where)
     return values[:FLOATS]
 
 

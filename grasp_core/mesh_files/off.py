@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from grasp_core.arrays import Array, Indices
 from grasp_core.mesh_files.polygon_soup import Polygons, points_of
 from grasp_core.mesh_files.refusals import broken
-from grasp_core.mesh_files.words import numbers, plain_text, whole, worded_lines
+from grasp_core.mesh_files.words import check_unused, numbers, plain_text, whole, worded_lines
 
 Lines = Iterator[tuple[int, list[bytes]]]
-HEAD = re.compile(rb"(ST)?C?N?OFF")
-"""Words that begin an OFF file; texture, colour and normal values after a point are ignored."""
+HEAD = re.compile(rb"(?:ST)?C?N?OFF(\d*)", re.IGNORECASE)
+"""Words that begin an OFF file, some with the first count behind them, as in ModelNet40; texture,
+colour and normal values after a point are ignored."""
 COUNTS = (2, 3)
 FLOATS = 3
 
@@ -27,10 +28,10 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     points, polygons = array("d"), Polygons(most)
     for _ in range(vertices):
         number, words = _next(lines, "a vertex")
-        values = numbers(words, f"line {number}")
-        if len(values) < FLOATS:
-            broken(f"line {number}", f"a vertex needs three numbers, got {len(values)}")
-        points.extend(values[:FLOATS])
+        if len(words) < FLOATS:
+            broken(f"line {number}", f"a vertex needs three numbers, got {len(words)}")
+        points.extend(numbers(words[:FLOATS], f"line {number}"))
+        check_unused(words[FLOATS:], f"line {number}")
     for _ in range(faces):
         number, words = _next(lines, "a face")
         where = f"line {number}"
@@ -48,12 +49,11 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
 
 def _counts(lines: Lines) -> tuple[int, int]:
     number, words = _next(lines, "OFF")
-    if not HEAD.fullmatch(words[0]):
+    if not (head := HEAD.fullmatch(words[0])):
         broken(f"line {number}", "expected the word OFF")
-    if len(words) == 1:
+    counts = [word for word in (head[1], *words[1:]) if word]
+    if not counts:
         number, counts = _next(lines, "the counts")
-    else:
-        counts = words[1:]
     if len(counts) not in COUNTS:
         broken(f"line {number}", f"expected counts of vertices, faces and edges, got {len(counts)}")
     vertices, faces = (whole(count, f"line {number}") for count in counts[:2])

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.mesh_files.ply_header import LISTS, POINT, Element, Header, Property, read_header
 from grasp_core.mesh_files.polygon_soup import CORNERS, Polygons, points_of, too_many
-from grasp_core.mesh_files.refusals import broken, not_finite, shown
-from grasp_core.mesh_files.words import numbers, plain_text, whole, worded_lines
+from grasp_core.mesh_files.refusals import broken, not_finite
+from grasp_core.mesh_files.words import check_unused, numbers, plain_text, whole, worded_lines
 
 LARGEST_CORNER = 2**32
 LARGEST_ROW = 2**30
 """Largest number of bytes in one row of a table that numpy can describe."""
-CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
+CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I",
+         "i8": "q", "u8": "Q", "f2": "e", "f4": "f", "f8": "d"}  # fmt: skip
 Lines = Iterator[tuple[int, list[bytes]]]
 Cells = dict[str, Sequence[float]]
 """The values of one row that describe the surface, by the name of their property."""
@@ -82,14 +83,14 @@ def _text_vertices(element: Element, lines: Lines) -> Array:
         else:
             three = [words[place] for place in places]
             if len(words) > len(three):
-                _check_numbers(words, where)
+                check_unused(words, where)
         coordinates.extend(numbers(three, where))
     return _as_typed(element, points_of(coordinates))
 
 
 def _text_cells(element: Element, words: list[bytes], where: str) -> dict[str, list[bytes]]:
     """Split the words of one row by property name; a list comes as several words."""
-    _check_numbers(words, where)
+    check_unused(words, where)
     found, place = dict[str, list[bytes]](), 0
     for each in element.properties:
         length = 1
@@ -104,15 +105,6 @@ def _text_cells(element: Element, words: list[bytes], where: str) -> dict[str, l
     if place < len(words):
         broken(where, "the row has more values than the header has properties")
     return found
-
-
-def _check_numbers(words: list[bytes], where: str) -> None:
-    """Refuse words that are not numbers in columns that are not used; nan is allowed there."""
-    try:
-        for word in words:
-            float(word)
-    except ValueError:
-        broken(where, f"expected numbers, got {shown(b' '.join(words))!r}")
 
 
 def _as_typed(element: Element, points: Array) -> Array:
@@ -130,11 +122,11 @@ def _as_typed(element: Element, points: Array) -> Array:
 
 def _text_corners(each: Property, values: list[float], where: str) -> list[int]:
     kind = np.dtype(each.kind)
-    if kind == np.float32:
+    low, high = -LARGEST_CORNER, LARGEST_CORNER
+    if kind.kind == "f":
         with np.errstate(over="ignore"):
             values = np.array(values).astype(kind).tolist()
-    low, high = -LARGEST_CORNER, LARGEST_CORNER
-    if kind.kind != "f":
+    else:
         low, high = int(np.iinfo(kind).min), int(np.iinfo(kind).max)
     if not all(low <= value <= high and value == int(value) for value in values):
         broken(where, "the corners of a face must be vertex numbers, whole and in range")

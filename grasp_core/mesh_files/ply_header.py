@@ -9,12 +9,13 @@ from grasp_core.mesh_files.words import whole
 TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
     "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
-    "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
+    "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8",
+    "float16": "f2", "float32": "f4", "float64": "f8",
 }  # fmt: skip
 ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
-END = re.compile(rb"\nend_header[ \t]*\r?\n")
+END = re.compile(rb"\n[ \t]*end_header[ \t]*\r?\n|\r[ \t]*end_header[ \t]*\r")
 LONGEST_HEADER = 2**16
-NAME = re.compile(r"\w{1,100}", re.ASCII)
+NAME = re.compile(r"[!-~\ufffd]{1,100}")
 LISTS = ("vertex_indices", "vertex_index")
 POINT = ("x", "y", "z")
 
@@ -96,7 +97,7 @@ def read_header(data: bytes) -> Header:
 def _lines(text: bytes) -> tuple[str, list[Element]]:
     first, *lines = [line.split() for line in text.decode("ascii", "replace").splitlines()]
     order, elements = "", list[Element]()
-    if first != ["ply"]:
+    if [word.lower() for word in first] != ["ply"]:
         broken("the header", "expected the first line `ply`")
     for number, words in enumerate(lines, 2):
         where = f"header line {number}"
@@ -127,8 +128,8 @@ def _check_properties(vertex: Element, face: Element) -> None:
 def _check_element(element: Element) -> None:
     names = [element.name, *(each.name for each in element.properties)]
     if not all(NAME.fullmatch(name) for name in names) or len(names[1:]) > len(set(names[1:])):
-        broken("the header", "names must consist of letters, digits and _, and must not repeat")
-    if element.rows < 0 or not element.properties:
+        broken("the header", "names must be words of at most 100 letters, and must not repeat")
+    if element.rows < 0 or (element.rows and not element.properties):
         broken("the header", f"element {element.name} needs properties and a count from 0 on")
 
 

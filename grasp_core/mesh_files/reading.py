@@ -11,6 +11,8 @@ from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.files.whole_files import bounded_bytes
 from grasp_core.mesh_files import glb, obj, off, ply, stl
 from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.mesh_files.refusals import shown
+from grasp_core.mesh_files.words import CONTROL, without_mark
 
 READERS = {"obj": obj.read, "stl": stl.read, "ply": ply.read, "off": off.read, "glb": glb.read}
 FORMATS = tuple(READERS)
@@ -21,7 +23,8 @@ OTHER_FILES = {
     b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"DRACO": "a Draco file",
 }  # fmt: skip
 """First bytes of files that are not meshes, each with a name of the format for messages."""
-MAGIC = {"ply": b"ply", "glb": b"glTF"}
+MAGIC = {"ply": b"ply", "glb": b"gltf"}
+"""First bytes of files of some formats, in small letters."""
 
 
 def read_triangles(path: Path, limits: MeshLimits) -> tuple[Array, Indices, bytes]:
@@ -65,6 +68,8 @@ def triangles_of(kind: str, data: bytes, most: int) -> tuple[Array, Indices]:
     Raises:
         MeshError: The file breaks its format, has no triangles, or more than `most`.
     """
+    if not (kind == "stl" and stl.is_binary(data)):
+        data = without_mark(data)
     check_beginning(kind, data)
     points, triangles = READERS[kind](data, most)
     if not len(triangles):
@@ -96,21 +101,27 @@ def check_beginning(kind: str, data: bytes) -> None:
         if data.startswith(beginning):
             message = f"the file is {other}, expected {kind.upper()}; unpack or convert it first"
             raise MeshError(MeshRefusal.FORMAT, message)
+    first = data[:4].lower()
     for other, beginning in MAGIC.items():
-        if other != kind and data.startswith(beginning):
+        if other != kind and first.startswith(beginning):
             message = (
                 f"the file is {other.upper()} by its first bytes; rename it to end in .{other}"
             )
             raise MeshError(MeshRefusal.FORMAT, message)
     if kind == "stl" and not stl.is_text(data) and not stl.is_binary(data):
-        counted = int.from_bytes(data[stl.HEADER : stl.HEADER + 4], "little")
+        begins = data[: stl.HEADER + 4]
+        counted = int.from_bytes(begins[stl.HEADER :], "little")
         message = (
             "the file is neither a text nor a binary STL file: its count of "
             f"{counted} triangles would be {stl.HEADER + 4 + stl.TRIANGLE * counted} bytes, "
-            f"but it has {len(data)}; "
-            "export it again"
+            f"but it has {len(data)}"
         )
+        if not CONTROL.search(begins):
+            message = (
+                f"the file does not begin with `solid` as a text STL does, got {shown(begins)!r}"
+            )
+        message += "; export it again"
         raise MeshError(MeshRefusal.UNREADABLE, message)
-    if not data.startswith(MAGIC.get(kind, b"")):
+    if not first.startswith(MAGIC.get(kind, b"")):
         message = f"does not begin as a {kind.upper()} file does; export it again"
         raise MeshError(MeshRefusal.UNREADABLE, message)

@@ -1,5 +1,6 @@
 """Reads STL files, binary or text; their normals are ignored, as many programs write none."""
 
+import re
 from array import array
 from collections.abc import Iterator
 
@@ -15,6 +16,7 @@ HEADER, TRIANGLE = 80, 50
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 FLOATS_OF_TRIANGLE = 9
 FLOATS = 3
+BEGINNING = re.compile(rb"\s*(#[^\r\n]*\s+)*solid", re.IGNORECASE)
 KEYWORDS = frozenset(b"facet normal outer loop vertex endloop endfacet".split())
 Lines = Iterator[tuple[int, list[bytes]]]
 Words = Iterator[tuple[int, bytes]]
@@ -27,8 +29,8 @@ def is_binary(data: bytes) -> bool:
 
 
 def is_text(data: bytes) -> bool:
-    """Tell whether the bytes begin with `solid`, like a text STL."""
-    return data.lstrip()[:5].lower() == b"solid"
+    """Tell whether the bytes begin with `solid`, like a text STL, perhaps below comments."""
+    return BEGINNING.match(data) is not None
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices]:
@@ -56,9 +58,9 @@ def _of_binary(data: bytes, most: int) -> Array:
 def _of_text(text: bytes, most: int) -> Array:
     """Read the corners of all solids of a text STL; line breaks between words do not matter."""
     coordinates = array("d")
-    lines = worded_lines(text)
+    lines = worded_lines(text, comments=True)
     for number, words in lines:
-        _expect(number, words[0], b"solid")
+        _expect(number, words[0][: len(b"solid")], b"solid")  # its name may have no space before it
         inside = _until_its_end(lines)
         for place, word in inside:
             _expect(place, word, b"facet")
@@ -72,7 +74,7 @@ def _until_its_end(lines: Lines) -> Words:
     """Yield the words of a solid with their line numbers; `endsolid` and its name are left out."""
     for number, words in lines:
         for word in words:
-            if word.lower() == b"endsolid":
+            if word.lower().startswith(b"endsolid"):
                 return
             yield number, word
     broken("the end", "expected `endsolid`")
@@ -80,10 +82,9 @@ def _until_its_end(lines: Lines) -> Words:
 
 def _corners(words: Words) -> list[float]:
     """Read the nine coordinates of one triangle of a text STL."""
-    _expect(*_next(words), b"normal")
     number, word = _next(words)
-    for _ in range(FLOATS):  # a normal, or none
-        if word.lower() not in KEYWORDS:
+    for _ in range(1 + FLOATS):  # the word `normal` and its numbers, or not all of them
+        if word.lower() != b"outer":
             number, word = _next(words)
     _expect(number, word, b"outer")
     _expect(*_next(words), b"loop")

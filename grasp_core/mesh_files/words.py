@@ -10,33 +10,44 @@ from grasp_core.mesh_files.refusals import broken, not_finite, shown
 LONGEST_LINE = 2**20
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
-CONTROL = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
+PADDING = b"\0\x1a"
+"""Bytes that may follow the last line: zeros of a fixed length, and the end mark of old systems."""
+CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 OTHER_ALPHABETS = bytes(range(128)) + b"?" * 128
 NUMBER = re.compile(rb"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d{1,9})?")
 """A decimal number; possessive groups (`++`) keep long wrong words from taking quadratic time."""
 WHOLE = re.compile(rb"[+-]?\d{1,18}")
-NOT_FINITE = re.compile(rb"[+-]?(nan|inf(inity)?)", re.IGNORECASE)
+NOT_FINITE = re.compile(rb"[+-]?(nan(\([\w#]{0,40}\))?|inf(inity)?|1\.\?[a-z]+\d*)", re.IGNORECASE)
+"""Spellings of what is not finite: of every C library, with the `#` of some as `plain_text` has it.
+"""
 Where = str
+
+
+def without_mark(data: bytes) -> bytes:
+    """Leave out the byte-order mark of a text, and turn UTF-16, which needs one, into UTF-8."""
+    if data.startswith(UTF_16):
+        return data.decode("utf-16", "replace").encode()
+    return data.removeprefix(BYTE_ORDER_MARK)
 
 
 def plain_text(data: bytes, start: int = 0) -> bytes:
     """Convert the bytes of a text file to ASCII with line-feed line ends.
 
-    Letters outside ASCII, as in comments and names, become `?`.
+    Letters outside ASCII, as in comments and names, become `?`, and so does the `#` of a number
+    such as `1.#QNAN`, which begins no comment.
 
     Args:
         data: The bytes of a file.
         start: Where the text begins.
 
     Raises:
-        MeshError: The text is UTF-16, or holds control characters.
+        MeshError: The text holds control characters.
     """
-    if data.startswith(UTF_16):
-        broken("byte 0", "expected UTF-8 text, got UTF-16")
-    if found := CONTROL.search(data, start):
-        broken(f"byte {found.start()}", f"expected text, got the control character {found[0]!r}")
-    text = data[start:] if start else data.removeprefix(BYTE_ORDER_MARK)
-    text = text.translate(OTHER_ALPHABETS)
+    text = data[start:].rstrip(PADDING)
+    if found := CONTROL.search(text):
+        place = start + found.start()
+        broken(f"byte {place}", f"expected text, got the control character {found[0]!r}")
+    text = text.translate(OTHER_ALPHABETS).replace(b".#", b".?")
     return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
 
@@ -82,6 +93,21 @@ def numbers(words: Sequence[bytes], where: Where) -> list[float]:
     if not math.isfinite(sum(values)) or b"_" in b"".join(words):
         values = [_finite(word, where) for word in words]
     return values
+
+
+def check_unused(words: Sequence[bytes], where: Where) -> None:
+    """Refuse words that are not numbers in columns that are not used, as colours; nan may be there.
+
+    Raises:
+        MeshError: A word is neither a number nor one of the names of what is not finite.
+    """
+    try:
+        for word in words:
+            float(word)
+    except ValueError:
+        for word in words:
+            if not (NUMBER.fullmatch(word) or NOT_FINITE.fullmatch(word)):
+                broken(where, f"expected a number, got {shown(word)!r}")
 
 
 def _finite(word: bytes, where: Where) -> float:

@@ -21,6 +21,7 @@ STLS = {
     "a coordinate that is nan": (STL[:96] + NAN + STL[100:], "triangle 0|finite|repair"),
     "no triangles": (bytes(84), "no triangles"),
     "binary that begins with solid, cut": (stl(head=b"solid")[:-7], "control character|export"),
+    "text that begins otherwise": ("; by hand\n" + STL_TEXT, "does not begin with `solid`|by hand"),
     "text without its end": (STL_TEXT.replace("endsolid hand\n", ""), "the end|endsolid"),
     "text cut in a triangle": (STL_TEXT[:200], "the end|endsolid"),
     "text that ends in a triangle": (STL_TEXT[:200] + "\nendsolid\n", "the end|incomplete"),

@@ -50,7 +50,7 @@ BAD = {
     "a million digits and no number": (GOOD + "v " + "1" * 10**6 + "x 0 0\n", "line 9|number"),
     "a million hashes": (GOOD + "#" * 10**6 + "\nx\n", "line 10|polygons"),
     "a zero byte": (GOOD + "# \0\n", "control character"),
-    "a form feed": (GOOD + "# \f\n", "control character"),
+    "coordinates of an old C library's nan": (_with(X, "v 0.1 0 1.#QNAN"), "line 2|finite"),
     "a line of two megabytes": (GOOD + "#" + "x" * 2**21 + "\n", "line 9|longer"),
     "a line of fifty megabytes": ("v " + "1 " * (25 * 2**20), "line 1|longer"),
     "a million comments only": ("# nothing here\n" * 10**6, "no triangles"),
@@ -59,8 +59,8 @@ BAD = {
     "points only": (GOOD.split("f ")[0] + "p 1 2 3 4\n", "no triangles"),
     "all in one line": (GOOD.replace("\n", " "), "line 1"),
     "cut in a number": (GOOD[:-4], "line 8"),
-    "UTF-16": (GOOD.encode("utf-16"), "UTF-16"),
-    "UTF-32": (GOOD.encode("utf-32"), "UTF-16"),
+    "UTF-16 without a mark": (GOOD.encode("utf-16-le"), "control character"),
+    "UTF-32": (GOOD.encode("utf-32"), "control character"),
     "three hundred thousand faces": (
         obj(CORNERS, TRIANGLES * 75_000), "GP-MESH-TOO-MANY|simplify"),
 }  # fmt: skip
@@ -75,6 +75,8 @@ GOOD_TEXTS = {
     .encode(),
     "a plus sign": _with("f 1 3 2", "f +1 +3 +2").encode(),
     "a byte order mark": b"\xef\xbb\xbf" + GOOD.encode(),
+    "UTF-16": GOOD.encode("utf-16"),
+    "form feeds": (GOOD.replace("f 1 3", "\f\nf 1 3") + "# \f\n").encode(),
     "a continued line": _with("f 1 3 2", "f 1 \\\n3 2").encode(),
     "a library of materials elsewhere": ("mtllib ../../etc/passwd\nusemtl a\n" + GOOD).encode(),
     "a library of materials with a pipe": ("mtllib |id\n" + GOOD).encode(),

@@ -9,9 +9,20 @@ Point = tuple[float, float, float]
 Triangle = tuple[Point, Point, Point]
 
 
+def unmarked(data):
+    """Bytes without their byte-order mark, in UTF-8."""
+    if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
+        return data.decode("utf-16", "replace").encode()
+    return data[3:] if data[:3] == b"\xef\xbb\xbf" else data
+
+
 def text_of(data):
-    """Text of which only ASCII means anything, with the line ends of any system."""
-    text = "".join(chr(byte) if byte < 128 else "?" for byte in data)
+    """Text of which only ASCII means anything, with the line ends of any system, as `\n`.
+
+    The `#` of `1.#QNAN` is that of a number.
+    """
+    text = "".join(chr(byte) if byte < 128 else "?" for byte in unmarked(data))
+    text = text.rstrip("\0\x1a").replace(".#", ".?")
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -21,7 +32,7 @@ def fan(corners):
 
 def of_obj(data: bytes) -> list[Triangle]:
     points, corners = [], []
-    lines = re.sub("#[^\n]*", "", text_of(data).removeprefix("???")).replace("\\\n", "").split("\n")
+    lines = re.sub("#[^\n]*", "", text_of(data)).replace("\\\n", "").split("\n")
     for words in (line.split() for line in lines):
         if words[:1] == ["v"]:
             points.append(tuple(map(float, words[1:4])))
@@ -38,9 +49,9 @@ def of_stl(data: bytes) -> list[Triangle]:
         rows = [struct.unpack_from("<12f", data, 84 + 50 * i)[3:] for i in range(count)]
         return [(row[:3], row[3:6], row[6:]) for row in rows]
     words = []
-    for line in text_of(data).lower().split("\n"):
+    for line in re.sub("#[^\n]*", "", text_of(data).lower()).split("\n"):
         before, _, _ = line.partition("endsolid")
-        words += [] if line.split()[:1] == ["solid"] else before.split()
+        words += [] if line.split() and line.split()[0][:5] == "solid" else before.split()
     places = [i for i, word in enumerate(words) if word == "vertex"]
     points = [tuple(map(float, words[i + 1 : i + 4])) for i in places]
     assert len(points) % 3 == 0
@@ -48,10 +59,11 @@ def of_stl(data: bytes) -> list[Triangle]:
 
 
 def of_off(data: bytes) -> list[Triangle]:
-    text = text_of(data).removeprefix("???")
-    lines = [line for line in (line.split("#")[0].split() for line in text.split("\n")) if line]
-    head = lines[0][1:] or lines[1]
-    rows = lines[1:] if lines[0][1:] else lines[2:]
+    lines = [line.split("#")[0].split() for line in text_of(data).split("\n")]
+    lines = [line for line in lines if line]
+    head = [word for word in [re.sub("^[A-Za-z]*", "", lines[0][0]), *lines[0][1:]] if word]
+    rows = lines[1:] if head else lines[2:]
+    head = head or lines[1]
     vertices, faces = int(head[0]), int(head[1])
     points = [tuple(map(float, row[:3])) for row in rows[:vertices]]
     assert len(rows) == vertices + faces
@@ -63,23 +75,25 @@ def of_off(data: bytes) -> list[Triangle]:
 PLY_CODES = {
     "char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f",
     "double": "d", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i",
-    "uint32": "I", "float32": "f", "float64": "d",
+    "uint32": "I", "float32": "f", "float64": "d", "int64": "q", "uint64": "Q", "float16": "e",
 }  # fmt: skip
 
 
 def of_ply(data: bytes) -> list[Triangle]:  # noqa: C901 - one loop, as the format is
-    ended = re.search(rb"\nend_header[ \t]*\r?\n", data)
+    data = unmarked(data)
+    ended = re.search(rb"\n[ \t]*end_header[ \t]*\r?\n|\r[ \t]*end_header[ \t]*\r", data)
     header = [line.split() for line in data[: ended.start()].decode("latin-1").splitlines()]
     body, kind = data[ended.end() :], next(w[1] for w in header if w[:1] == ["format"])
-    words = re.sub(rb"#[^\n]*", b"", body).split()
+    words = re.sub(rb"#[^\n]*", b"", body.rstrip(b"\0\x1a")).split()
     place = 0
 
     def one(code):
         nonlocal place
         if kind == "ascii":
             place += 1
-            value = float(words[place - 1])
-            return struct.unpack("f", struct.pack("f", value))[0] if code == "f" else value
+            word = words[place - 1]
+            value = float("nan" if b"(ind)" in word else word)
+            return struct.unpack(code, struct.pack(code, value))[0] if code in "ef" else value
         form = ("<" if kind == "binary_little_endian" else ">") + code
         place += struct.calcsize(form)
         return struct.unpack_from(form, body, place - struct.calcsize(form))[0]

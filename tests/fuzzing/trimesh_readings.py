@@ -49,7 +49,8 @@ def is_misread(kind, data):
         lines = [line.lower().split() for line in text.split(b"\n")]
         names = b" ".join(b" ".join(line[1:]) for line in lines if line[:1] != [b"vertex"])
         parted = any(b"vertex" in line and len(line) != 4 for line in lines)
-        return parted or b"vertex" in names or b"solid" in names
+        said = names + b" ".join(COMMENT.findall(data.lower()))
+        return parted or b"vertex" in said or b"solid" in said
     return False
 
 

@@ -15,7 +15,7 @@ from grasp_core.mesh_files import obj
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles, triangles_of
 from sim_validate.main import main
-from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, off, ply, stl, stl_text
+from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, off, ply, ply_binary, stl, stl_text
 from tests.bad_input.mesh_texts import obj as obj_text
 from tests.bad_input.of_binary_meshes import glb, tree
 from tests.fuzzing.mesh_files import same_triangles
@@ -225,7 +225,59 @@ LISTED_VERTICES = (
     b"property float x\nproperty float y\nproperty float z\nelement face 4\n"
     b"property list uchar int vertex_indices\nend_header\n"
 )
+MARK = b"\xef\xbb\xbf"
+COLOURED = off().replace("OFF", "COFF")
+
+
+def coloured(values):
+    """An OBJ text with values behind each vertex."""
+    return "\n".join(f"{line} {values}" if line[:1] == "v" else line for line in LINES)
+
+
+def ply_coloured(value):
+    """A PLY text with one more column of vertices."""
+    text = ply().decode().replace("float z\n", "float z\nproperty float red.1\n")
+    head, rows = text.split("end_header\n")
+    rows = [f"{row} {value}" if i < 4 else row for i, row in enumerate(rows.split("\n"))]
+    return head + "end_header\n" + "\n".join(rows)
+
+
 RIGHT = {
+    "an OBJ with colours of nan": ("obj", coloured("nan nan nan")),
+    "an OBJ with colours of nan, as Windows spells it": ("obj", coloured("-nan(ind) nan -nan")),
+    "an OBJ with colours of nan, as old Windows does": ("obj", coloured("1.#QNAN -1.#IND 1.#INF")),
+    "an OBJ with four numbers of a colour": ("obj", coloured("0.5 0.5 0.5 1")),
+    "an OBJ with colours on lines of their own": ("obj", obj_text(more="vc 1 0 0\nvp 0 0\n")),
+    "an OBJ with comments of C": ("obj", "// by hand\n; v 1 2 3\n" + obj_text()),
+    "an OBJ with form feeds": ("obj", obj_text().replace("f 1 3", "\f\nf 1\v3")),
+    "an OBJ with an end mark": ("obj", obj_text() + "\x1a"),
+    "an OBJ in UTF-16": ("obj", obj_text().encode("utf-16")),
+    "an OBJ in the other UTF-16": ("obj", b"\xfe\xff" + obj_text().encode("utf-16-be")),
+    "an STL with a mark": ("stl", MARK + stl_text().encode()),
+    "a binary STL whose header is a mark and solid": ("stl", stl(head=MARK + b"solid")),
+    "an STL in UTF-16": ("stl", stl_text().encode("utf-16")),
+    "an STL with comments": ("stl", "# solid 1\n\n# b\n" + stl_text().replace("\nv", " # c\nv")),
+    "an STL with the name against its word": ("stl", stl_text().replace("solid ", "solid")),
+    "an STL without the word normal": ("stl", stl_text().replace(" normal 0 0 0", "")),
+    "an STL filled up with zeros": ("stl", stl_text().encode() + bytes(100)),
+    "an OFF with a mark": ("off", MARK + off().encode()),
+    "an OFF with the word against its counts": ("off", off().replace("OFF\n", "OFF")),
+    "an OFF with a mark, the word against its counts": (
+        "off", MARK + COLOURED.replace("OFF\n", "OFF").replace("\n", "\r\n").encode()),
+    "an OFF in small letters": ("off", off().replace("OFF", "off")),
+    "an OFF with colours of nan": ("off", COLOURED.replace(" 0.0\n", " 0.0 nan -nan(ind) inf\n")),
+    "a PLY with a mark": ("ply", MARK + ply()),
+    "a binary PLY with a mark": (
+        "ply", MARK + ply(form="binary_little_endian", body=ply_binary())),
+    "a PLY in large letters": ("ply", ply().replace(b"ply\n", b"PLY\n")),
+    "a PLY with the line ends of old": ("ply", ply().replace(b"\n", b"\r")),
+    "a binary PLY with the line ends of old": (
+        "ply", ply(form="binary_little_endian", body=b"").replace(b"\n", b"\r") + ply_binary()),
+    "a PLY with spaces before its lines": ("ply", ply().replace(b"\n", b"\n ")),
+    "a PLY with colours of nan": ("ply", ply_coloured("-nan(ind)")),
+    "a PLY with corners of 64 bits": ("ply", ply().replace(b"uchar int", b"uint64 int64")),
+    "a PLY with a table of no columns": (
+        "ply", ply().replace(b"element face", b"element edge 0\nelement face")),
     "relative corners amid an OBJ": ("obj", "\n".join(AMID)),
     "corners with a plus sign": ("obj", obj_text().replace("f 1 3 2", "f +1 +3 +2")),
     "OBJ faces before their vertices": ("obj", "\n".join([*LINES[4:], *LINES[:4]])),
@@ -254,9 +306,11 @@ RIGHT = {
 @pytest.mark.parametrize("case", RIGHT)
 def test_what_is_right_by_its_format_is_read_as_it_says(case):
     kind, text = RIGHT[case]
-    points, corners = triangles_of(kind, text if isinstance(text, bytes) else text.encode(), MOST)
+    data = text if isinstance(text, bytes) else text.encode()
+    points, corners = triangles_of(kind, data, MOST)
+    same_triangles(kind, data, (points, corners))
     found = sorted(points[corners].tolist())
-    if kind == "ply":
+    if kind == "ply" or "binary" in case:
         np.testing.assert_array_equal(found, sorted(np.float32(WHOLE).tolist()))
     else:
         assert found == sorted(WHOLE)
@@ -289,7 +343,7 @@ def test_a_comment_that_could_swallow_a_vertex_is_refused():
         (ply().replace(b"float x", b"uchar x"), "vertex 1: x does not fit its whole-number type"),
         (ply().replace(b"uchar int", b"uchar char").replace(b"3 0 2 1", b"3 0 2 300"), "corners"),
         (ply().replace(b"float z", b"float z\nproperty float w").replace(b" 0.0\n", b" 0.0 w\n"),
-         "expected numbers"),
+         "expected a number, got 'w'"),
     ],
 )  # fmt: skip
 def test_ply_text_that_its_types_cannot_hold_is_refused(text, said):
