@@ -37,8 +37,8 @@ WRONG_TREE = (
 """Errors that Python raises while reading JSON whose keys or values are not those of glTF."""
 
 
-def read(data: bytes, most: int) -> tuple[Array, Indices]:
-    """Read the vertices (n, 3) and triangles (t, 3) of a GLB file's default scene.
+def read(data: bytes, most: int) -> tuple[Array, Indices, int]:
+    """Read the vertices (n, 3) and triangles (t, 3) of a GLB file's default scene; no digits.
 
     Raises:
         MeshError: The file breaks a rule, or has more than `most` triangles.
@@ -46,7 +46,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
     tree, binary = _chunks(data)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
-            return _scene(tree, binary, most)
+            return *_scene(tree, binary, most), 0
     except WRONG_TREE as error:
         message = f"the JSON part of the file is not glTF ({type(error).__name__}: {shown(error)})"
         raise MeshError(MeshRefusal.UNREADABLE, f"{message}; export it again") from error

@@ -1,12 +1,12 @@
 """Reads OBJ files: vertices and polygons; groups and looks are ignored, curved surfaces refused."""
 
 import re
-from array import array
 from collections.abc import Iterator
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.mesh_files.polygon_soup import Polygons, points_of
+from grasp_core.mesh_files.polygon_soup import Polygons
 from grasp_core.mesh_files.refusals import broken, outside, shown, unsupported
+from grasp_core.mesh_files.rounding import TextPoints
 from grasp_core.mesh_files.words import (
     LONGEST_LINE,
     check_unused,
@@ -33,22 +33,22 @@ FLOATS, WEIGHTED = 3, 4
 GOES_ON = b"\\\n"
 
 
-def read(data: bytes, most: int) -> tuple[Array, Indices]:
-    """Read the vertices (n, 3) and triangles (t, 3) of an OBJ file.
+def read(data: bytes, most: int) -> tuple[Array, Indices, int]:
+    """Read the vertices (n, 3), triangles (t, 3) and coordinates' digits of an OBJ file.
 
     Raises:
         MeshError: The text breaks a rule, with the line, or has more than `most` triangles.
     """
-    points, polygons = array("d"), Polygons(most, first=1)
+    points, polygons = TextPoints(), Polygons(most, first=1)
     for number, (keyword, *words) in _statements(plain_text(data)):
         where = f"line {number}"
         if keyword == b"v":
-            points.extend(_vertex(words, where))
+            points.add(words[:FLOATS], _vertex(words, where))
         elif keyword == b"f":
-            polygons.add(_corners(words, len(points) // FLOATS, where), where)
+            polygons.add(_corners(words, len(points), where), where)
         elif keyword not in PASSED_OVER and not keyword.startswith(OTHER_COMMENTS):
             unsupported(f"{where}: keyword {shown(keyword)!r}", "export polygons only")
-    return polygons.on(points_of(points))
+    return *polygons.on(points.array), points.digits
 
 
 def _statements(text: bytes) -> Iterator[tuple[int, list[bytes]]]:

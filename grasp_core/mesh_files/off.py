@@ -1,12 +1,12 @@
 """Reads OFF files: the word OFF, three counts, the vertices and the polygons."""
 
 import re
-from array import array
 from collections.abc import Iterator
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.mesh_files.polygon_soup import Polygons, points_of
+from grasp_core.mesh_files.polygon_soup import Polygons
 from grasp_core.mesh_files.refusals import broken
+from grasp_core.mesh_files.rounding import TextPoints
 from grasp_core.mesh_files.words import check_unused, numbers, plain_text, whole, worded_lines
 
 Lines = Iterator[tuple[int, list[bytes]]]
@@ -17,20 +17,21 @@ COUNTS = (2, 3)
 FLOATS = 3
 
 
-def read(data: bytes, most: int) -> tuple[Array, Indices]:
-    """Read the vertices (n, 3) and triangles (t, 3) of an OFF file.
+def read(data: bytes, most: int) -> tuple[Array, Indices, int]:
+    """Read the vertices (n, 3), triangles (t, 3) and coordinates' digits of an OFF file.
 
     Raises:
         MeshError: The text breaks a rule, with the line, or has more than `most` triangles.
     """
     lines = worded_lines(plain_text(data), comments=True)
     vertices, faces = _counts(lines)
-    points, polygons = array("d"), Polygons(most)
+    points, polygons = TextPoints(), Polygons(most)
     for _ in range(vertices):
         number, words = _next(lines, "a vertex")
         if len(words) < FLOATS:
             broken(f"line {number}", f"a vertex needs three numbers, got {len(words)}")
-        points.extend(numbers(words[:FLOATS], f"line {number}"))
+        three = words[:FLOATS]
+        points.add(three, numbers(three, f"line {number}"))
         check_unused(words[FLOATS:], f"line {number}")
     for _ in range(faces):
         number, words = _next(lines, "a face")
@@ -44,7 +45,7 @@ def read(data: bytes, most: int) -> tuple[Array, Indices]:
             f"line {after[0]}",
             f"the file has more lines than its {vertices} vertices and {faces} faces",
         )
-    return polygons.on(points_of(points))
+    return *polygons.on(points.array), points.digits
 
 
 def _counts(lines: Lines) -> tuple[int, int]:

@@ -11,6 +11,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.mesh_files.ply_header import LISTS, POINT, Element, Header, Property, read_header
 from grasp_core.mesh_files.polygon_soup import CORNERS, Polygons, points_of, too_many
 from grasp_core.mesh_files.refusals import broken, not_finite
+from grasp_core.mesh_files.rounding import TextPoints
 from grasp_core.mesh_files.words import check_unused, numbers, plain_text, whole, worded_lines
 
 LARGEST_CORNER = 2**32
@@ -23,32 +24,33 @@ Cells = dict[str, Sequence[float]]
 """The values of one row that describe the surface, by the name of their property."""
 
 
-def read(data: bytes, most: int) -> tuple[Array, Indices]:
-    """Read the vertices (n, 3) and triangles (t, 3) of a PLY file.
+def read(data: bytes, most: int) -> tuple[Array, Indices, int]:
+    """Read the vertices (n, 3), triangles (t, 3) and coordinates' digits of a PLY file.
 
     Raises:
         MeshError: The file breaks a rule, or has more than `most` triangles.
     """
     header = read_header(data)
-    polygons = Polygons(most)
+    polygons, digits = Polygons(most), 0
     if header.order == "=":
-        points = _text_points(header, data, polygons)
+        points, digits = _text_points(header, data, polygons)
     else:
         points = _binary_points(header, data, polygons)
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
         said = "a coordinate must be finite in the precision of its type"
         not_finite(f"vertex {bad[0]}", said, points[bad[0]].tolist())
-    return polygons.on(points)
+    return *polygons.on(points), digits
 
 
-def _text_points(header: Header, data: bytes, polygons: Polygons) -> Array:
-    """Read the vertices (n, 3) of a text PLY, and add its faces to `polygons`."""
-    points = np.empty((0, 3))
+def _text_points(header: Header, data: bytes, polygons: Polygons) -> tuple[Array, int]:
+    """Read the vertices (n, 3) of a text PLY and their digits, and add its faces to `polygons`."""
+    points, digits = np.empty((0, 3)), 0
     lines = worded_lines(plain_text(data, header.end))
     for element in header.elements:
         if element.name == "vertex":
-            points = _text_vertices(element, lines)
+            written = _text_vertices(element, lines)
+            points, digits = _as_typed(element, written.array), written.digits
             continue
         corners = element.place(LISTS) if element.name == "face" else None
         for where, words in _rows_of(element, lines):
@@ -60,7 +62,7 @@ def _text_points(header: Header, data: bytes, polygons: Polygons) -> Array:
         broken(
             f"line {after[0]} after the header", "the file has more lines than its header announces"
         )
-    return points
+    return points, digits
 
 
 def _rows_of(element: Element, lines: Lines) -> Iterator[tuple[str, list[bytes]]]:
@@ -72,9 +74,9 @@ def _rows_of(element: Element, lines: Lines) -> Iterator[tuple[str, list[bytes]]
         yield f"{element.name} {row}, line {number} after the header", words
 
 
-def _text_vertices(element: Element, lines: Lines) -> Array:
-    """Read the vertex table of a text PLY as points (n, 3)."""
-    coordinates = array("d")
+def _text_vertices(element: Element, lines: Lines) -> TextPoints:
+    """Read the vertex table of a text PLY."""
+    points = TextPoints()
     places = [element.properties.index(element.place((axis,))) for axis in POINT]
     for where, words in _rows_of(element, lines):
         if element.lists or len(words) != len(element.properties):
@@ -84,8 +86,8 @@ def _text_vertices(element: Element, lines: Lines) -> Array:
             three = [words[place] for place in places]
             if len(words) > len(three):
                 check_unused(words, where)
-        coordinates.extend(numbers(three, where))
-    return _as_typed(element, points_of(coordinates))
+        points.add(three, numbers(three, where))
+    return points
 
 
 def _text_cells(element: Element, words: list[bytes], where: str) -> dict[str, list[bytes]]:

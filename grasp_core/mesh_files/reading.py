@@ -4,6 +4,7 @@ Reading takes time and memory in proportion to the bytes of the file, and no mor
 allowed are kept: `MeshLimits` bounds both.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from grasp_core.arrays import Array, Indices
@@ -12,6 +13,7 @@ from grasp_core.files.whole_files import bounded_bytes
 from grasp_core.mesh_files import glb, obj, off, ply, stl
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.refusals import shown
+from grasp_core.mesh_files.rounding import single_rounding, text_rounding
 from grasp_core.mesh_files.words import CONTROL, without_mark
 
 READERS = {"obj": obj.read, "stl": stl.read, "ply": ply.read, "off": off.read, "glb": glb.read}
@@ -27,16 +29,34 @@ MAGIC = {"ply": b"ply", "glb": b"gltf"}
 """First bytes of files of some formats, in small letters."""
 
 
-def read_triangles(path: Path, limits: MeshLimits) -> tuple[Array, Indices, bytes]:
-    """Read a mesh file: vertices (n, 3) in its unit, triangles (t, 3), and its bytes.
+@dataclass(frozen=True, slots=True, eq=False)
+class MeshFile:
+    """The surface that a mesh file holds, in the file's unit of length."""
+
+    vertices: Array
+    """Vertices, (n, 3)."""
+    triangles: Indices
+    """Vertex indices, (t, 3)."""
+    rounding: float
+    """Largest rounding error of a coordinate that the numbers of the file show; 0 if they show
+    none."""
+    data: bytes
+    """The bytes of the file."""
+
+    def __post_init__(self) -> None:
+        self.vertices.setflags(write=False)
+        self.triangles.setflags(write=False)
+
+
+def read_triangles(path: Path, limits: MeshLimits) -> MeshFile:
+    """Read a mesh file.
 
     Raises:
         MeshError: The file is not a complete mesh of a known format, or exceeds a limit.
     """
     try:
         kind = mesh_kind(path)
-        data = _bytes_of(path, limits)
-        return *triangles_of(kind, data, limits.max_triangles), data
+        return mesh_of_bytes(kind, _bytes_of(path, limits), limits.max_triangles)
     except MeshError as error:
         raise MeshError(error.reason, f"{path}: {error.message}") from error
     except MemoryError as error:
@@ -57,8 +77,8 @@ def mesh_kind(path: Path) -> str:
     return kind
 
 
-def triangles_of(kind: str, data: bytes, most: int) -> tuple[Array, Indices]:
-    """Convert the bytes of a mesh file to vertices (n, 3) in its unit and triangles (t, 3).
+def mesh_of_bytes(kind: str, data: bytes, most: int) -> MeshFile:
+    """Read the bytes of a mesh file.
 
     Args:
         kind: One of `FORMATS`.
@@ -68,13 +88,13 @@ def triangles_of(kind: str, data: bytes, most: int) -> tuple[Array, Indices]:
     Raises:
         MeshError: The file breaks its format, has no triangles, or more than `most`.
     """
-    if not (kind == "stl" and stl.is_binary(data)):
-        data = without_mark(data)
-    check_beginning(kind, data)
-    points, triangles = READERS[kind](data, most)
+    text = data if kind == "stl" and stl.is_binary(data) else without_mark(data)
+    check_beginning(kind, text)
+    points, triangles, digits = READERS[kind](text, most)
     if not len(triangles):
         raise MeshError(MeshRefusal.EMPTY, "the file holds no triangles; export a surface mesh")
-    return points, triangles
+    rounding = max(single_rounding(points), text_rounding(points, digits))
+    return MeshFile(points, triangles, rounding, data)
 
 
 def _bytes_of(path: Path, limits: MeshLimits) -> bytes:

@@ -1,20 +1,19 @@
 """Reads STL files, binary or text; their normals are ignored, as many programs write none."""
 
 import re
-from array import array
 from collections.abc import Iterator
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.mesh_files.polygon_soup import points_of, too_many
+from grasp_core.mesh_files.polygon_soup import too_many
 from grasp_core.mesh_files.refusals import broken, not_finite, shown
+from grasp_core.mesh_files.rounding import TextPoints
 from grasp_core.mesh_files.words import numbers, plain_text, worded_lines
 
 HEADER, TRIANGLE = 80, 50
 """Bytes before the number of triangles in a binary file, and bytes of each triangle."""
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-FLOATS_OF_TRIANGLE = 9
 FLOATS = 3
 BEGINNING = re.compile(rb"\s*(#[^\r\n]*\s+)*solid", re.IGNORECASE)
 KEYWORDS = frozenset(b"facet normal outer loop vertex endloop endfacet".split())
@@ -33,19 +32,24 @@ def is_text(data: bytes) -> bool:
     return BEGINNING.match(data) is not None
 
 
-def read(data: bytes, most: int) -> tuple[Array, Indices]:
-    """Read the vertices (3 t, 3), three for each triangle, and the triangles (t, 3) of an STL file.
+def read(data: bytes, most: int) -> tuple[Array, Indices, int]:
+    """Read the vertices (3 t, 3), triangles (t, 3) and coordinates' digits of an STL file.
 
     Raises:
         MeshError: The file breaks a rule, or has more than `most` triangles.
     """
-    points = _of_binary(data, most) if is_binary(data) else _of_text(plain_text(data), most)
+    digits = 0
+    if is_binary(data):
+        points = _of_binary(data, most)
+    else:
+        read_points = _of_text(plain_text(data), most)
+        points, digits = read_points.array, read_points.digits
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
         not_finite(
             f"triangle {bad[0] // 3}", "a coordinate must be finite", points[bad[0]].tolist()
         )
-    return points, np.arange(len(points)).reshape(-1, 3)
+    return points, np.arange(len(points)).reshape(-1, 3), digits
 
 
 def _of_binary(data: bytes, most: int) -> Array:
@@ -55,19 +59,19 @@ def _of_binary(data: bytes, most: int) -> Array:
     return records["corners"].reshape(-1, 3).astype(np.float64)
 
 
-def _of_text(text: bytes, most: int) -> Array:
+def _of_text(text: bytes, most: int) -> TextPoints:
     """Read the corners of all solids of a text STL; line breaks between words do not matter."""
-    coordinates = array("d")
+    points = TextPoints()
     lines = worded_lines(text, comments=True)
     for number, words in lines:
         _expect(number, words[0][: len(b"solid")], b"solid")  # its name may have no space before it
         inside = _until_its_end(lines)
         for place, word in inside:
             _expect(place, word, b"facet")
-            coordinates.extend(_corners(inside))
-            if len(coordinates) > FLOATS_OF_TRIANGLE * most:
-                too_many(len(coordinates) // FLOATS_OF_TRIANGLE, most)
-    return points_of(coordinates)
+            _add_triangle(inside, points)
+            if len(points) > 3 * most:
+                too_many(len(points) // 3, most)
+    return points
 
 
 def _until_its_end(lines: Lines) -> Words:
@@ -80,25 +84,23 @@ def _until_its_end(lines: Lines) -> Words:
     broken("the end", "expected `endsolid`")
 
 
-def _corners(words: Words) -> list[float]:
-    """Read the nine coordinates of one triangle of a text STL."""
+def _add_triangle(words: Words, points: TextPoints) -> None:
+    """Read one triangle of a text STL, and add its corners to the points."""
     number, word = _next(words)
     for _ in range(1 + FLOATS):  # the word `normal` and its numbers, or not all of them
         if word.lower() != b"outer":
             number, word = _next(words)
     _expect(number, word, b"outer")
     _expect(*_next(words), b"loop")
-    found = list[float]()
     for _ in range(3):
         number, word = _next(words)
         _expect(number, word, b"vertex")
         three = [_next(words)[1] for _ in range(FLOATS)]
         if not KEYWORDS.isdisjoint(three):
             broken(f"line {number}", "a vertex needs three numbers, got fewer")
-        found += numbers(three, f"line {number}")
+        points.add(three, numbers(three, f"line {number}"))
     _expect(*_next(words), b"endloop")
     _expect(*_next(words), b"endfacet")
-    return found
 
 
 def _next(words: Words) -> tuple[int, bytes]:

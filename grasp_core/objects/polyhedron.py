@@ -200,13 +200,13 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
     check_choices(faces, patches, flatness)
     path = path_of(path, "path")
     instance(limits, MeshLimits, "limits")
-    vertices, triangles, data = read_triangles(path, limits)
+    mesh = read_triangles(path, limits)
     try:
         return polyhedron_from_mesh(
-            vertices * UNITS_M[unit],
-            triangles,
+            mesh.vertices * UNITS_M[unit],
+            mesh.triangles,
             name=path.stem,
-            source_sha256=hashlib.sha256(data).hexdigest(),
+            source_sha256=hashlib.sha256(mesh.data).hexdigest(),
             flatness=flatness,
             faces=faces,
             patches=patches,

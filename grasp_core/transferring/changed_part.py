@@ -77,8 +77,7 @@ def fitting_unit(path: Path, old: Polyhedron, limits: MeshLimits = DEFAULT_LIMIT
         InputError: The size fits in no unit.
         MeshError: The file cannot be read.
     """
-    vertices, _, _ = read_triangles(path, limits)
-    size = _diagonal(vertices) / _diagonal(old.vertices)
+    size = _diagonal(read_triangles(path, limits).vertices) / _diagonal(old.vertices)
     off = {unit: abs(math.log(size * length)) if size > 0.0 else math.inf
            for unit, length in UNITS_M.items()}  # fmt: skip
     best = min(off, key=off.__getitem__)

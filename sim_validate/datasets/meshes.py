@@ -38,13 +38,13 @@ def stored_surface(folder: Path, object_id: str) -> tuple[Array, Indices]:
         InputError: The mesh is that of another object.
     """
     path = mesh_path(folder, object_id)
-    vertices, triangles, _ = read_triangles(path, DEFAULT_LIMITS)
-    if (found := content_hash(vertices, triangles)) != object_id:
+    mesh = read_triangles(path, DEFAULT_LIMITS)
+    if (found := content_hash(mesh.vertices, mesh.triangles)) != object_id:
         raise InputError(
             f"{path}: this is the mesh of another object, whose hash is {found}; see `graspproof "
             "dataset verify`"
         )
-    return vertices, triangles
+    return mesh.vertices, mesh.triangles
 
 
 def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Polyhedron:

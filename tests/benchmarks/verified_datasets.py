@@ -27,11 +27,11 @@ SIZES_M = (1e-3, 3e-2, 0.3, 2.0)
 
 def turned(path, size, rng):
     """The text of an OBJ file of a mesh, turned, and of a size [m]."""
-    points, corners, _ = read_triangles(path, MeshLimits())
-    points = Rotation.random(rng=rng).apply(points - points.mean(axis=0))
+    mesh = read_triangles(path, MeshLimits())
+    points = Rotation.random(rng=rng).apply(mesh.vertices - mesh.vertices.mean(axis=0))
     points *= size / np.ptp(points, axis=0).max()
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
-    return "\n".join(lines + [f"f {i} {j} {k}" for i, j, k in (corners + 1).tolist()]) + "\n"
+    return "\n".join(lines + [f"f {i} {j} {k}" for i, j, k in (mesh.triangles + 1).tolist()]) + "\n"
 
 
 def verified(paths, size, folder, options):

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 
 import grasp_core as gc
-from grasp_core.mesh_files.reading import FORMATS, triangles_of
+from grasp_core.mesh_files.reading import FORMATS, mesh_of_bytes
 from tests.fuzzing.plain_meshes import PLAIN
 from tests.fuzzing.targets import Target
 from tests.fuzzing.trimesh_readings import by_trimesh, is_misread
@@ -18,6 +18,12 @@ MOST = 10_000
 """Triangles of a fuzzed file."""
 ROUNDING = 1e-9
 VOLUME_ROUNDING = 1e-6
+
+
+def triangles_of(kind, data, most):
+    """The vertices and triangles of a file's bytes."""
+    mesh = mesh_of_bytes(kind, data, most)
+    return mesh.vertices, mesh.triangles
 
 
 def read(kind, data):

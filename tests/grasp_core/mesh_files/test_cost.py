@@ -8,7 +8,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
-from grasp_core.mesh_files.reading import triangles_of
+from grasp_core.mesh_files.reading import mesh_of_bytes
 from tests.bad_input.mesh_texts import off, ply
 from tests.bad_input.of_binary_meshes import changed
 from tests.grasp_core.mesh_files.hostile import FILES
@@ -42,7 +42,7 @@ def seconds(kind, data):
     """The processor time of one reading, in which other processes do not count."""
     begun = time.process_time()
     with contextlib.suppress(gc.MeshError):
-        triangles_of(kind, data, MOST)
+        mesh_of_bytes(kind, data, MOST)
     return time.process_time() - begun
 
 
@@ -59,10 +59,10 @@ def test_time_grows_as_bytes_do(name):
 def test_announced_billions_are_refused_before_they_are_allocated(case):
     kind, data = BILLIONS[case]
     with pytest.raises(gc.MeshError):
-        triangles_of(kind, data, MOST)  # imports, and tables of regular expressions
+        mesh_of_bytes(kind, data, MOST)  # imports, and tables of regular expressions
     tracemalloc.start()
     with pytest.raises(gc.MeshError) as caught:
-        triangles_of(kind, data, 10**10)
+        mesh_of_bytes(kind, data, 10**10)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert caught.value.reason is MeshRefusal.UNREADABLE
@@ -72,16 +72,16 @@ def test_announced_billions_are_refused_before_they_are_allocated(case):
 def test_parts_of_a_glb_share_vertices_without_copies_of_them():
     """Each part keeps the vertices of its own triangle only."""
     data = FILES["glb: parts among shared vertices"](2**17)
-    points, triangles = triangles_of("glb", data, MOST)
-    assert len(triangles) > 1000
-    assert len(points) <= 3 * len(triangles)
+    mesh = mesh_of_bytes("glb", data, MOST)
+    assert len(mesh.triangles) > 1000
+    assert len(mesh.vertices) <= 3 * len(mesh.triangles)
 
 
 def test_a_json_part_of_millions_of_values_is_refused_before_it_is_parsed():
     data = FILES["glb: empty lists"](13 * 2**20)
     tracemalloc.start()
     with pytest.raises(gc.MeshError, match="values, the limit") as caught:
-        triangles_of("glb", data, MOST)
+        mesh_of_bytes("glb", data, MOST)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert caught.value.reason is MeshRefusal.TOO_MANY

@@ -13,12 +13,12 @@ import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.mesh_files import obj
 from grasp_core.mesh_files.limits import MeshLimits
-from grasp_core.mesh_files.reading import read_triangles, triangles_of
+from grasp_core.mesh_files.reading import read_triangles
 from sim_validate.main import main
 from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, off, ply, ply_binary, stl, stl_text
 from tests.bad_input.mesh_texts import obj as obj_text
 from tests.bad_input.of_binary_meshes import glb, tree
-from tests.fuzzing.mesh_files import same_triangles
+from tests.fuzzing.mesh_files import same_triangles, triangles_of
 
 MOST = 1000
 SINGLE = st.floats(-1e3, 1e3, width=32).map(float)
@@ -358,9 +358,10 @@ def test_bytes_and_triangles_are_bounded_by_their_limits(kind, tmp_path):
     data = FILES.get(kind) or glb(tree())
     path.write_bytes(data)
     just = MeshLimits(max_bytes=len(data), max_triangles=4)
-    points, corners, held = read_triangles(path, just)
-    assert (len(corners), held) == (4, data)
-    assert np.isfinite(points).all()
+    mesh = read_triangles(path, just)
+    assert (len(mesh.triangles), mesh.data) == (4, data)
+    assert np.isfinite(mesh.vertices).all()
+    assert not mesh.vertices.flags.writeable
     for limits in (MeshLimits(max_bytes=len(data) - 1), MeshLimits(max_triangles=3)):
         with pytest.raises(gc.MeshError, match=rf"part\.{kind}: .*limit") as caught:
             read_triangles(path, limits)
@@ -404,7 +405,7 @@ def test_many_threads_read_each_its_own_file(tmp_path):
         path.write_text(off(f"4 {4 * count} 0", faces=TRIANGLES * count))
 
     def read(path):
-        found[path] = len(read_triangles(path, MeshLimits())[1])
+        found[path] = len(read_triangles(path, MeshLimits()).triangles)
 
     threads = [threading.Thread(target=read, args=(path,)) for path in files]
     for thread in threads:
