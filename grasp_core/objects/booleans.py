@@ -103,21 +103,27 @@ def intersection_volume(one: Solid, two: Solid) -> float:
     return float((_manifold(one) ^ _manifold(two)).volume())
 
 
-def union_volume(solids: Sequence[Solid]) -> float:
-    """Compute the volume of the union of solids [m^3]."""
+def union(solids: Sequence[tuple[Solid, Indices]]) -> tuple[Solid, Indices]:
+    """Unite solids whose triangles are numbered, and number the triangles of the union, (t,).
+
+    A triangle of the union has the number of the triangle that it is a part of.
+    """
     kernel = _kernel()
-    parts = [_manifold(solid) for solid in solids]
-    return float(kernel.Manifold.batch_boolean(parts, kernel.OpType.Add).volume())
+    parts = [_manifold(solid, numbers) for solid, numbers in solids]
+    body = kernel.Manifold.batch_boolean(parts, kernel.OpType.Add)
+    return _solid(body), np.asarray(body.to_mesh64().face_id, dtype=np.int64)
 
 
 def _kernel() -> Any:
     return importlib.import_module("manifold3d")
 
 
-def _manifold(solid: Solid) -> Any:
+def _manifold(solid: Solid, numbers: Indices | None = None) -> Any:
     kernel = _kernel()
     mesh = kernel.Mesh64(
-        np.array(solid.vertices, order="C"), np.array(solid.triangles, dtype=np.uint64, order="C")
+        np.array(solid.vertices, order="C"),
+        np.array(solid.triangles, dtype=np.uint64, order="C"),
+        face_id=None if numbers is None else np.array(numbers, dtype=np.uint64),
     )
     body = kernel.Manifold(mesh)
     if body.status() != kernel.Error.NoError:

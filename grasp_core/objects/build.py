@@ -1,36 +1,37 @@
 """Checks a triangle mesh and finds its faces, or refuses it with a reason.
 
-The checks come in this order: the numbers of the file, one consistent orientation, closure with two
-triangles per edge, the volume, and that no two parts of the mesh overlap. Close vertices are
-welded, and a closed inside-out mesh is turned. A surface on which nearly flat patches replace the
-faces need not be closed: if it is faulty, its largest part is used, with the orientation it has.
-The notes say what was changed. Nothing else is repaired.
+First come the numbers of the file, then `sound_surface` makes one surface of the triangles, and then
+faces are found on it: exact planar ones, which need a closed surface, or nearly flat patches, which
+do not. The notes say what was changed.
 """
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, real_array
-from grasp_core.checked import instance, one_of
+from grasp_core.checked import instance, number, one_of
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.mesh_files.limits import MeshLimits
-from grasp_core.objects.booleans import Solid, hull, triangulate
+from grasp_core.mesh_files.rounding import single_rounding
+from grasp_core.objects.booleans import Solid, hull
 from grasp_core.objects.curved_patches import flat_patches
 from grasp_core.objects.face import Face, FaceKind, PatchLimits
 from grasp_core.objects.mass import MassProperties, mass_properties
-from grasp_core.objects.planar_faces import MAX_FACES, FlatnessLimits, coplanar_groups, planar_faces
-from grasp_core.objects.solid_checks import (
-    check_volume,
-    largest_part,
-    oriented,
-    surface_fault,
-    welded,
+from grasp_core.objects.planar_faces import (
+    MAX_FACES,
+    PLANAR,
+    Flatness,
+    coplanar_groups,
+    planar_faces,
 )
+from grasp_core.objects.solid_checks import check_volume
+from grasp_core.objects.sound_surface import SoundSurface, sound_surface
+from grasp_core.objects.surface import Surface
 from grasp_core.values import FINGERS
 
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
@@ -39,8 +40,36 @@ wrong."""
 SURROUNDINGS = 1e-6
 """Largest distance of a given centre of mass from the object's bounding box, relative to the
 extent."""
-DEFAULT_FLATNESS = FlatnessLimits()
+MARGIN = 8.0
+"""Number of rounding errors of a coordinate that a corner of a face may be off its plane: twice that
+of a corner and of a plane through three corners, in all three coordinates."""
+COARSEST = 1e-3
+"""Largest distance from a plane, relative to the extent, that is explained by rounding: in a file
+that is coarser than this, shapes and rounding cannot be told apart."""
 DEFAULT_LIMITS = MeshLimits()
+
+
+@dataclass(frozen=True, slots=True)
+class MeshChoices:
+    """How a mesh is taken; `load_polyhedron` explains the fields."""
+
+    faces: FaceKind = "auto"
+    patches: PatchLimits | None = None
+    flatness_m: float | None = None
+    largest_part: bool = False
+    limits: MeshLimits = DEFAULT_LIMITS
+
+    def __post_init__(self) -> None:
+        one_of(self.faces, get_args(FaceKind), "faces")
+        if self.patches is not None:
+            instance(self.patches, PatchLimits, "patches")
+        if self.flatness_m is not None:
+            number(self.flatness_m, "flatness_m", least=0.0, most=LARGEST_EXTENT_M)
+        instance(self.largest_part, bool, "largest_part")
+        instance(self.limits, MeshLimits, "limits")
+
+
+DEFAULT_CHOICES = MeshChoices()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,64 +86,96 @@ class Parts:
     """Hash of the mesh with vertices and triangles in sorted order."""
     patches: PatchLimits | None
     """Limits of flatness for patches that replace faces; None where faces are exactly planar."""
+    surface: Surface
     notes: tuple[str, ...]
     """Notes, for people to read, on what was changed in the mesh."""
 
 
-def build(  # noqa: PLR0913, PLR0917 - as `load_polyhedron`
+def build(
     vertices: ArrayLike,
     triangles: ArrayLike,
-    flatness: FlatnessLimits,
-    faces: FaceKind,
-    patches: PatchLimits | None,
-    center_of_mass: ArrayLike | None,
-    limits: MeshLimits,
+    choices: MeshChoices,
+    *,
+    rounding: float | None = None,
+    center_of_mass: ArrayLike | None = None,
+    known: Surface | None = None,
 ) -> Parts:
-    """Check a triangle mesh and find its faces; `load_polyhedron` explains the arguments.
+    """Check a triangle mesh and find its faces.
+
+    Args:
+        vertices: Vertices, (n, 3) [m].
+        triangles: Vertex indices, (t, 3).
+        choices: How the mesh is taken.
+        rounding: Largest rounding error of a coordinate [m]; if not given, that of single precision
+            where all coordinates have it.
+        center_of_mass: Centre of mass, (3,) [m]; that of uniform density if not given.
+        known: What is known of the surface of an object that was built before.
 
     Raises:
         InputError: The centre of mass is not a point.
         MeshError: The mesh is not a solid; its `reason` says why.
     """
-    check_choices(faces, patches, flatness)
-    points, corners = _checked_arrays(vertices, triangles, limits.max_triangles)
-    center = _given_center(points, center_of_mass)
-    points, corners, dropped = welded(points, corners)
-    notes = [f"dropped {dropped} triangles without area"] if dropped else []
-    groups = _planar_groups(points, corners, flatness, faces)
-    if len(groups or ()) > limits.max_faces:
-        message = (
-            f"{len(groups or ())} planar faces exceed the limit of {limits.max_faces}; simplify "
-            "the mesh, or plan on nearly flat patches (--faces patches)"
-        )
-        raise MeshError(MeshRefusal.TOO_MANY, message)
-    flat = (patches or PatchLimits()) if groups is None else None
-    fault = surface_fault(corners)
-    if fault and (flat is None or fault.reason is MeshRefusal.WINDING):
-        raise fault
-    points, corners, said = _sound_surface(points, corners, fault, limits.max_parts)
-    notes += said
-    if flat is not None:
-        found, said = _patched(points, corners, flat, fault)
-        notes += said
+    points, corners = _checked_arrays(vertices, triangles, choices.limits.max_triangles)
+    extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
+    off = single_rounding(points) if rounding is None else rounding
+    blur = known.flatness_m if known else _flatness(off, choices.flatness_m, extent)
+    found = sound_surface(
+        points,
+        corners,
+        blur,
+        most_parts=choices.limits.max_parts,
+        largest_part=choices.largest_part,
+        known=known,
+    )
+    flatness = Flatness.of(extent, blur)
+    groups = _planar_groups(found, flatness, choices)
+    if groups is None:
+        found = found.outward(largest_part=choices.largest_part)
+        patches = choices.patches or PatchLimits()
+        faces, said = _patched(found, patches)
+    elif found.fault:
+        raise found.fault
     else:
-        found = planar_faces(points, corners, groups or [], flatness, triangulate)
-    solid = hull(points) if fault and fault.reason is MeshRefusal.OPEN else Solid(points, corners)
+        patches = None
+        faces = planar_faces(found.points, found.corners, groups, flatness)
+        said = _uneven(found, groups, faces, PLANAR * extent)
+    center = _given_center(found.points, center_of_mass)
+    surface = found.surface
+    if known is None:
+        surface = replace(surface, center_given=center is not None)
+    solid = Solid(found.points, found.corners) if surface.closed else hull(found.points)
     check_volume(solid)
-    mass = mass_properties(solid, center)
-    return Parts(points, corners, found, mass, content_hash(points, corners), flat, tuple(notes))
+    return Parts(
+        found.points,
+        found.corners,
+        faces,
+        mass_properties(solid, center),
+        content_hash(found.points, found.corners),
+        patches,
+        surface,
+        (*surface.notes(), *said),
+    )
 
 
-def check_choices(faces: FaceKind, patches: PatchLimits | None, flatness: FlatnessLimits) -> None:
-    """Refuse values of `faces`, `patches` or `flatness` that are of the wrong kind.
+def _uneven(
+    found: SoundSurface, groups: list[Indices], faces: tuple[Face, ...], usual: float
+) -> list[str]:
+    """Say how far corners are off the planes of their faces, if that is more than usual [m]."""
+    off = max(
+        float(np.abs((found.points[found.corners[group]] - face.centroid) @ face.normal).max())
+        for group, face in zip(groups, faces, strict=True)
+    )
+    if off <= usual:
+        return []
+    return [f"the coordinates are rounded: corners are up to {1e3 * off:.2g} mm off their faces"]
 
-    Raises:
-        InputError: A value is of the wrong kind.
-    """
-    one_of(faces, get_args(FaceKind), "faces")
-    if patches is not None:
-        instance(patches, PatchLimits, "patches")
-    instance(flatness, FlatnessLimits, "flatness")
+
+def _flatness(rounding: float, asked: float | None, extent: float) -> float:
+    """Return the distance from a plane that rounding explains; 0 where it is next to nothing [m]."""
+    if asked is not None:
+        return asked
+    explained = min(MARGIN * rounding, COARSEST * extent)
+    return explained if explained > PLANAR * extent else 0.0
 
 
 def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | None:
@@ -133,31 +194,26 @@ def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | No
 
 
 def _planar_groups(
-    points: Array, corners: Indices, flatness: FlatnessLimits, faces: FaceKind
+    found: SoundSurface, flatness: Flatness, choices: MeshChoices
 ) -> list[Indices] | None:
     """Group triangles into planar faces; None where patches are used instead."""
-    if faces == "patches":
+    if choices.faces == "patches":
         return None
-    groups = coplanar_groups(points, corners, flatness)
-    return groups if faces == "planar" or len(groups) <= MAX_FACES else None
+    groups = coplanar_groups(found.points, found.corners, flatness, found.surface.caps)
+    if choices.faces == "auto" and len(groups) > MAX_FACES:
+        return None
+    if len(groups) > choices.limits.max_faces:
+        message = (
+            f"{len(groups)} planar faces exceed the limit of {choices.limits.max_faces}; simplify "
+            "the mesh, or plan on nearly flat patches (--faces patches)"
+        )
+        raise MeshError(MeshRefusal.TOO_MANY, message)
+    return groups
 
 
-def _sound_surface(
-    points: Array, corners: Indices, fault: MeshError | None, most: int
-) -> tuple[Array, Indices, list[str]]:
-    """Orient a surface outwards or, if it is faulty, return its largest part as it is."""
-    if fault:
-        return largest_part(points, corners)
-    corners, flipped = oriented(points, corners, most)
-    said = ["the mesh was inside out; its triangles were turned"] if flipped else []
-    return points, corners, said
-
-
-def _patched(
-    points: Array, corners: Indices, limits: PatchLimits, fault: MeshError | None
-) -> tuple[tuple[Face, ...], list[str]]:
+def _patched(found: SoundSurface, limits: PatchLimits) -> tuple[tuple[Face, ...], list[str]]:
     """Find the patches of a surface, and write notes about them."""
-    patches = flat_patches(points, corners, limits)
+    patches = flat_patches(found.points, found.corners, limits, found.surface.caps)
     if len(patches) < FINGERS:
         raise MeshError(
             MeshRefusal.NOT_FLAT,
@@ -171,13 +227,8 @@ def _patched(
         f"the surface is curved; its {len(patches)} patches stand for faces, and lean from their "
         f"planes by up to {math.degrees(lean):.3g} deg and are up to {1e3 * off:.3g} mm off them"
     ]
-    if fault and fault.reason is MeshRefusal.OPEN:
-        notes.append(
-            f"the surface is not closed ({fault}); only its patches are used, and the centre of "
-            "mass is that of the convex hull unless it is given"
-        )
-    elif fault:
-        notes.append(f"the surface is faulty ({fault}); only its patches are used")
+    if found.fault and found.surface.closed:
+        notes.append(f"the surface is faulty ({found.fault}); only its patches are used")
     return patches, notes
 
 

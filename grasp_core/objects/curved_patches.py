@@ -27,7 +27,7 @@ from grasp_core.cones.spanning import angles_between
 from grasp_core.geometry.clearings import clearest_point, clearing
 from grasp_core.geometry.polygons import area_and_centroid, edge_rows, plane_frame
 from grasp_core.objects.face import Face, PatchLimits
-from grasp_core.objects.planar_faces import triangle_neighbours
+from grasp_core.objects.planar_faces import NO_CAPS, triangle_neighbours
 from grasp_core.solvers.ties import first_best, graded, largest_first, ranks
 
 SMOOTHING = 10
@@ -43,19 +43,22 @@ BORDER_GAP = 1e-9
 object's extent."""
 
 
-def flat_patches(vertices: Array, triangles: Indices, limits: PatchLimits) -> tuple[Face, ...]:
+def flat_patches(
+    vertices: Array, triangles: Indices, limits: PatchLimits, caps: Indices = NO_CAPS
+) -> tuple[Face, ...]:
     """Find the largest nearly flat patches of a surface, those with the largest discs first.
 
     Args:
         vertices: Vertices, (n, 3) [m].
         triangles: Vertex indices, (t, 3), counter-clockwise seen from outside.
         limits: Limits of flatness, and the number of patches.
+        caps: Indices of triangles that belong to no patch, (c,).
     """
     surface = _Surface.of(vertices, triangles)
     depth = limits.depth * surface.extent
     found: list[tuple[float, Face]] = []
     radii: list[float] = []
-    for group in _groups(surface, math.radians(limits.spread_deg), depth):
+    for group in _groups(surface, math.radians(limits.spread_deg), depth, caps):
         # groups come by falling area, and no disc is larger than its group
         enough = len(radii) >= limits.most
         if enough and math.pi * radii[-limits.most] ** 2 >= group.area:
@@ -123,12 +126,13 @@ class _Group:
     area: float
 
 
-def _groups(surface: _Surface, spread: float, depth: float) -> list[_Group]:
+def _groups(surface: _Surface, spread: float, depth: float, caps: Indices) -> list[_Group]:
     """Divide the triangles into disjoint nearly flat groups, the largest first."""
     smooth = _smoothed(surface)
     flatness: Array = np.einsum("ti,ti->t", smooth, surface.normals)
     flat_first = np.argsort(-graded(flatness, FLATNESS_DIGITS), kind="stable")
     free = np.ones(len(surface.areas), dtype=np.bool_)
+    free[caps] = False
     groups: list[_Group] = []
     for seed in flat_first:
         if not free[seed]:

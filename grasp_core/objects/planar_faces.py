@@ -5,14 +5,12 @@ own plane, never from neighbour to neighbour, so that the facets of a fine spher
 creep into one "face".
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.checked import number
 from grasp_core.geometry.polygons import (
     area_and_centroid,
     is_convex,
@@ -21,6 +19,7 @@ from grasp_core.geometry.polygons import (
     signed_area,
     without_straight_corners,
 )
+from grasp_core.objects.booleans import triangulate
 from grasp_core.objects.face import Face
 from grasp_core.solvers.ties import largest_first
 
@@ -30,77 +29,126 @@ quadruples, some 6 million of which positively span."""
 SIDES = 2
 """Number of triangles that meet at an edge of a closed surface."""
 
-Triangulate: TypeAlias = Callable[[list[Array]], Indices]
-"""Function from the corners of an outer border and holes, in order, to counter-clockwise triangles.
-"""
+PLANAR = 1e-6
+"""Largest distance from a plane, relative to the extent, that always counts as in it: some ten times
+the rounding of single precision."""
+FITS = 3
+"""Number of times that a plane is fitted again to a group of triangles with rounded corners."""
+NO_CAPS = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True)
-class FlatnessLimits:
+class Flatness:
     """Limits within which triangles count as one planar face."""
 
+    distance: float
+    """Largest distance from the plane [m]."""
+    blur: float = 0.0
+    """Largest distance by which rounding may have moved one side of a triangle against the opposite
+    corner [m]: a triangle of this height may lean by a radian more."""
     angle: float = 1e-3
     """Largest angle between normals [rad]: about a thousand times the error of the normal of a
     triangle one millimetre high in single precision, and far below any friction angle of interest.
     """
-    distance: float = 1e-6
-    """Largest distance from the plane, relative to the object's largest extent: some ten times the
-    rounding of single precision."""
 
-    def __post_init__(self) -> None:
-        number(self.angle, "angle", least=0.0, most=1.0)
-        number(self.distance, "distance", least=0.0, most=0.1)
+    @classmethod
+    def of(cls, extent: float, flatness_m: float) -> "Flatness":
+        """Make the limits for an object of an extent, whose rounding explains a distance [m]."""
+        return cls(max(PLANAR * extent, flatness_m), 0.5 * flatness_m)
 
 
 def planar_faces(
-    vertices: Array,
-    triangles: Indices,
-    groups: Sequence[Indices],
-    limits: FlatnessLimits,
-    triangulate: Triangulate,
+    vertices: Array, triangles: Indices, groups: Sequence[Indices], flatness: Flatness
 ) -> tuple[Face, ...]:
-    """Outline one planar face for each group of coplanar triangles of a closed, outward mesh."""
-    slack = limits.distance * float(np.ptp(vertices, axis=0).max())
-    return tuple(_face(vertices, triangles[group], slack, triangulate) for group in groups)
+    """Outline one planar face for each group of coplanar triangles of an outward mesh."""
+    return tuple(_face(vertices, triangles[group], flatness.distance) for group in groups)
 
 
-def coplanar_groups(vertices: Array, triangles: Indices, limits: FlatnessLimits) -> list[Indices]:
+def coplanar_groups(
+    vertices: Array, triangles: Indices, flatness: Flatness, caps: Indices = NO_CAPS
+) -> list[Indices]:
     """Group triangles that lie in one plane within the limits and connect across edges, (g,) each.
 
     Groups are in the order of their first triangle, and do not depend on the winding.
 
-    Groups grow from the largest triangles first, whose planes are the least affected by rounding. A
-    triangle thinner than the distance limit has no meaningful normal, so only its distance counts.
+    Groups grow from the largest triangles first, whose planes are the least affected by rounding.
+    Where coordinates are rounded, the plane is fitted again to what has grown. A triangle thinner
+    than the distance limit has no meaningful normal, so only its distance counts.
+
+    Args:
+        vertices: Vertices, (n, 3) [m].
+        triangles: Vertex indices, (t, 3).
+        flatness: The limits.
+        caps: Indices of triangles that belong to no face, (c,).
     """
-    corners = vertices[triangles]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    double_area = np.linalg.norm(cross, axis=1)
-    normals = cross / np.where(double_area > 0.0, double_area, 1.0)[:, None]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    distance = limits.distance * float(np.ptp(vertices, axis=0).max())
-    sliver = double_area <= distance * longest
-    neighbours = triangle_neighbours(triangles)
+    table = _Triangles.of(vertices[triangles], triangle_neighbours(triangles), flatness)
     group_of = np.full(len(triangles), -1)
-    for seed in largest_first(double_area):
+    group_of[caps] = len(triangles)
+    for seed in largest_first(table.double_areas):
         if group_of[seed] >= 0:
             continue
-        normal, origin = normals[seed], corners[seed, 0]
-        stack, group_of[seed] = [int(seed)], seed
-        while stack:
-            for other in neighbours[stack.pop()]:
-                if other < 0 or group_of[other] >= 0:
-                    continue
-                tilt = 0.0 if sliver[other] else np.linalg.norm(normals[other] - normal)
-                if tilt <= limits.angle and _off(corners[other], origin, normal) <= distance:
-                    group_of[other] = seed
-                    stack.append(int(other))
-    _, first, counts = np.unique(group_of, return_index=True, return_counts=True)
-    members = np.split(np.argsort(group_of, kind="stable"), np.cumsum(counts)[:-1])
+        normal, origin = table.normals[seed], table.corners[seed, 0]
+        members = table.grown(int(seed), normal, origin, group_of)
+        for _ in range(FITS if flatness.blur else 0):
+            group_of[members] = -1
+            members = table.grown(int(seed), *table.fitted(members), group_of)
+        group_of[members] = seed
+    group_of[caps] = -1
+    kept = np.flatnonzero(group_of >= 0)
+    _, first, counts = np.unique(group_of[kept], return_index=True, return_counts=True)
+    members = np.split(kept[np.argsort(group_of[kept], kind="stable")], np.cumsum(counts)[:-1])
     return [members[group] for group in np.argsort(first, kind="stable")]
 
 
-def _off(points: Array, origin: Array, normal: Array) -> float:
-    return float(np.abs((points - origin) @ normal).max())
+@dataclass(frozen=True, slots=True, eq=False)
+class _Triangles:
+    """Triangles with what is needed to grow groups of them."""
+
+    corners: Array
+    """Corners, (t, 3, 3) [m]."""
+    crosses: Array
+    """Normals twice as long as the areas, (t, 3)."""
+    double_areas: Array
+    normals: Array
+    tilts: Array
+    """Largest difference of each normal from that of a plane, (t,); infinite for slivers."""
+    neighbours: Indices
+    distance: float
+
+    @classmethod
+    def of(cls, corners: Array, neighbours: Indices, flatness: Flatness) -> "_Triangles":
+        crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        double_areas = np.linalg.norm(crosses, axis=1)
+        normals = crosses / np.where(double_areas > 0.0, double_areas, 1.0)[:, None]
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        sliver = double_areas <= flatness.distance * longest
+        heights = np.where(sliver, 1.0, double_areas) / longest
+        tilts = np.where(sliver, np.inf, flatness.angle + flatness.blur / heights)
+        return cls(corners, crosses, double_areas, normals, tilts, neighbours, flatness.distance)
+
+    def grown(self, seed: int, normal: Array, origin: Array, group_of: Indices) -> list[int]:
+        """Collect the triangles near a plane that connect with a seed, and mark them as its own."""
+        members, stack = [seed], [seed]
+        group_of[seed] = seed
+        while stack:  # each triangle is marked once
+            for other in self.neighbours[stack.pop()]:
+                if other < 0 or group_of[other] >= 0:
+                    continue
+                tilt = float(np.linalg.norm(self.normals[other] - normal))
+                off = np.abs((self.corners[other] - origin) @ normal).max()
+                if tilt <= self.tilts[other] and off <= self.distance:
+                    group_of[other] = seed
+                    members.append(int(other))
+                    stack.append(int(other))
+        return members
+
+    def fitted(self, members: list[int]) -> tuple[Array, Array]:
+        """Fit a plane to triangles: its normal and a point on it."""
+        whole, weights = self.crosses[members].sum(axis=0), self.double_areas[members]
+        length = float(np.linalg.norm(whole))
+        if length == 0.0:
+            return self.normals[members[0]], self.corners[members[0], 0]
+        return whole / length, weights @ self.corners[members].mean(axis=1) / weights.sum()
 
 
 def triangle_neighbours(triangles: Indices) -> Indices:
@@ -118,7 +166,7 @@ def triangle_neighbours(triangles: Indices) -> Indices:
     return across.reshape(-1, 3)
 
 
-def _face(vertices: Array, triangles: Indices, slack: float, triangulate: Triangulate) -> Face:
+def _face(vertices: Array, triangles: Indices, slack: float) -> Face:
     corners = vertices[triangles]
     outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
     normal = -outward / np.linalg.norm(outward)
@@ -137,7 +185,7 @@ def _face(vertices: Array, triangles: Indices, slack: float, triangulate: Triang
     found = [flat(loop) for loop in border_loops(triangles)]
     loops = [found[place] for place in largest_first([signed_area(loop) for loop in found])]
     outer, holes = loops[0], loops[1:]
-    pieces = convex_pieces(loops, triangulate, slack)
+    pieces = convex_pieces(loops, slack)
     area, centroid = area_and_centroid(loops)
     return Face(
         normal=normal,
@@ -149,12 +197,11 @@ def _face(vertices: Array, triangles: Indices, slack: float, triangulate: Triang
     )
 
 
-def convex_pieces(loops: list[Array], triangulate: Triangulate, slack: float) -> list[Array]:
+def convex_pieces(loops: list[Array], slack: float) -> list[Array]:
     """Split a plane figure into convex polygons, (k, 2) each.
 
     Args:
         loops: Outer border, counter-clockwise, and holes, clockwise, each (k, 2).
-        triangulate: Triangulates a border with holes by an outside library.
         slack: Corners within this distance of a line count as on it.
     """
     if len(loops) == 1 and is_convex(loops[0]):

@@ -26,10 +26,10 @@ from grasp_core.errors import InputError, MeshError
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.notebooks import InNotebooks
-from grasp_core.objects.build import DEFAULT_FLATNESS, DEFAULT_LIMITS, build, check_choices
+from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, MeshChoices, build
 from grasp_core.objects.conversion import mesh_of, triangles_of
 from grasp_core.objects.face import Face, FaceKind, PatchLimits
-from grasp_core.objects.planar_faces import FlatnessLimits
+from grasp_core.objects.surface import Surface
 from grasp_core.short_text import counted, summary
 
 UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
@@ -58,6 +58,8 @@ class Polyhedron(ByValue, InNotebooks):
     patches: PatchLimits | None = None
     """Limits of flatness for the patches of a curved surface; None where faces are exactly planar.
     """
+    surface: Surface = field(default_factory=Surface)
+    """What is known of the triangles, such as whether they are closed."""
     notes: tuple[str, ...] = field(default=(), compare=False)
     """Notes, for people to read, on what was changed when the mesh was read; not compared."""
     radius: float = field(init=False, compare=False)
@@ -84,6 +86,7 @@ class Polyhedron(ByValue, InNotebooks):
         several(self.notes, partial(text, name="notes"), "notes", "texts")
         if self.patches is not None:
             instance(self.patches, PatchLimits, "patches")
+        instance(self.surface, Surface, "surface")
 
     @classmethod
     def from_mesh(
@@ -94,6 +97,8 @@ class Polyhedron(ByValue, InNotebooks):
         name: str = "object",
         faces: FaceKind = "auto",
         patches: PatchLimits | None = None,
+        flatness_m: float | None = None,
+        largest_part: bool = False,
         center_of_mass: ArrayLike | None = None,
     ) -> Self:
         """Build a polyhedron from a triangle mesh, with the same checks as for a mesh file.
@@ -104,15 +109,17 @@ class Polyhedron(ByValue, InNotebooks):
             name: Name of the object.
             faces: See `load_polyhedron`.
             patches: See `load_polyhedron`.
+            flatness_m: See `load_polyhedron`.
+            largest_part: See `load_polyhedron`.
             center_of_mass: See `load_polyhedron`.
 
         Raises:
             MeshError: The mesh is not a solid; its `reason` says why.
         """
+        choices = MeshChoices(faces, patches, flatness_m, largest_part)
         return polyhedron_from_mesh(
-            vertices, triangles, name=name, faces=faces, patches=patches,
-            center_of_mass=center_of_mass, kind=cls,
-        )  # fmt: skip
+            vertices, triangles, choices, name=name, center_of_mass=center_of_mass, kind=cls
+        )
 
     def to_trimesh(self) -> Any:
         """Return the surface as a `trimesh.Trimesh` with the same vertices and triangles [m]."""
@@ -125,9 +132,14 @@ class Polyhedron(ByValue, InNotebooks):
             density_kg_m3: Density, such as 1000 for water [kg/m^3].
 
         Raises:
-            InputError: The density is out of range.
+            InputError: The density is out of range, or the volume is not known.
         """
         density = positive(density_kg_m3, "density_kg_m3")
+        if not self.surface.closed:
+            raise InputError(
+                f"{self.name}: a density gives no mass, because the surface is open and its volume "
+                "is not known; give the mass, or close the surface"
+            )
         return float(to_digits(np.array(self.volume * density)))
 
     @property
@@ -147,7 +159,13 @@ class Polyhedron(ByValue, InNotebooks):
 
 
 def from_trimesh(
-    mesh: Any, *, name: str = "object", faces: FaceKind = "auto", patches: PatchLimits | None = None
+    mesh: Any,
+    *,
+    name: str = "object",
+    faces: FaceKind = "auto",
+    patches: PatchLimits | None = None,
+    flatness_m: float | None = None,
+    largest_part: bool = False,
 ) -> Polyhedron:
     """Build a polyhedron from a `trimesh.Trimesh`, with the same checks as for a mesh file.
 
@@ -156,13 +174,16 @@ def from_trimesh(
         name: What to call the object.
         faces: See `load_polyhedron`.
         patches: See `load_polyhedron`.
+        flatness_m: See `load_polyhedron`.
+        largest_part: See `load_polyhedron`.
 
     Raises:
         InputError: The value is not a mesh, or an option is refused.
         MeshError: The mesh is not a solid; its `reason` says why.
     """
     vertices, triangles = triangles_of(mesh)
-    return Polyhedron.from_mesh(vertices, triangles, name=name, faces=faces, patches=patches)
+    choices = MeshChoices(faces, patches, flatness_m, largest_part)
+    return polyhedron_from_mesh(vertices, triangles, choices, name=name)
 
 
 AnyPolyhedron = TypeVar("AnyPolyhedron", bound=Polyhedron)
@@ -172,46 +193,52 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
     path: str | Path,
     *,
     unit: str = "m",
-    flatness: FlatnessLimits = DEFAULT_FLATNESS,
+    scale: float = 1.0,
     faces: FaceKind = "auto",
     patches: PatchLimits | None = None,
+    flatness_m: float | None = None,
+    largest_part: bool = False,
     center_of_mass: ArrayLike | None = None,
     limits: MeshLimits = DEFAULT_LIMITS,
 ) -> Polyhedron:
     """Read a solid from a mesh file and find its faces.
 
+    Small holes are closed, and parts that overlap are united; the notes of the result say so.
+
     Args:
         path: An OBJ, STL, PLY, OFF or GLB file.
         unit: Unit of length of the file: "m", "cm", "mm" or "in".
-        flatness: Limits within which triangles count as one planar face.
+        scale: Factor on the coordinates of the file, besides its unit.
         faces: `planar` for exact planar faces; `patches` for the nearly flat parts of a curved or
-            scanned surface, which may have holes; `auto` takes patches where there are more than
-            `MAX_FACES` planar faces.
+            scanned surface, which may have large holes; `auto` takes patches where there are more
+            than `MAX_FACES` planar faces.
         patches: Limits of flatness for patches, and their number.
+        flatness_m: Distance within which corners count as in one plane [m]. If not given, it is a
+            millionth of the extent, or what the rounding of the file's coordinates explains.
+        largest_part: Whether to use the largest part alone where the file holds several. Otherwise
+            at most 1 % of the surface is ever left out.
         center_of_mass: Centre of mass in the file's frame, (3,) [m]. If not given, it is that of
-            uniform density, estimated from the convex hull where the surface has holes.
+            uniform density, estimated from the convex hull where the surface has large holes.
         limits: Largest size of the file, and largest cost of reading it.
 
     Raises:
-        InputError: The unit is unknown.
+        InputError: The unit is unknown, or a number is out of range.
         MeshError: The file is not a solid; its `reason` says why.
     """
     one_of(unit, UNITS_M, "unit")
-    check_choices(faces, patches, flatness)
+    choices = MeshChoices(faces, patches, flatness_m, largest_part, limits)
+    size = UNITS_M[unit] * positive(scale, "scale")
     path = path_of(path, "path")
-    instance(limits, MeshLimits, "limits")
     mesh = read_triangles(path, limits)
     try:
         return polyhedron_from_mesh(
-            mesh.vertices * UNITS_M[unit],
+            mesh.vertices * size,
             mesh.triangles,
+            choices,
             name=path.stem,
             source_sha256=hashlib.sha256(mesh.data).hexdigest(),
-            flatness=flatness,
-            faces=faces,
-            patches=patches,
             center_of_mass=center_of_mass,
-            limits=limits,
+            rounding=mesh.rounding * size,
         )
     except MeshError as error:
         raise MeshError(error.reason, f"{path}: {error.message}") from error
@@ -219,17 +246,16 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
         raise InputError(f"{path}: {error}") from error
 
 
-def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
+def polyhedron_from_mesh(  # noqa: PLR0913 - what is known of a mesh, a keyword each
     vertices: ArrayLike,
     triangles: ArrayLike,
+    choices: MeshChoices = DEFAULT_CHOICES,
     *,
     name: str = "object",
     source_sha256: str | None = None,
-    flatness: FlatnessLimits = DEFAULT_FLATNESS,
-    faces: FaceKind = "auto",
-    patches: PatchLimits | None = None,
     center_of_mass: ArrayLike | None = None,
-    limits: MeshLimits = DEFAULT_LIMITS,
+    rounding: float | None = None,
+    known: Surface | None = None,
     kind: type[AnyPolyhedron] = Polyhedron,
 ) -> AnyPolyhedron:
     """Check a triangle mesh and build the polyhedron of its faces.
@@ -237,13 +263,13 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
     Args:
         vertices: Vertices, (n, 3) [m].
         triangles: Vertex indices, (t, 3).
+        choices: How the mesh is taken.
         name: Name of the object.
         source_sha256: Hash of the file that the mesh came from, if any.
-        flatness: See `load_polyhedron`.
-        faces: See `load_polyhedron`.
-        patches: See `load_polyhedron`.
         center_of_mass: See `load_polyhedron`.
-        limits: See `load_polyhedron`.
+        rounding: Largest rounding error of a coordinate [m]; that of single precision if not given,
+            and if all coordinates have it.
+        known: What is known of the surface of a polyhedron that is built again.
         kind: The class to build.
 
     Raises:
@@ -251,7 +277,9 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
         MeshError: The mesh is not a solid; its `reason` says why.
     """
     text(name, "name")
-    parts = build(vertices, triangles, flatness, faces, patches, center_of_mass, limits)
+    parts = build(
+        vertices, triangles, choices, rounding=rounding, center_of_mass=center_of_mass, known=known
+    )
     return kind(
         name=name,
         vertices=parts.vertices,
@@ -263,5 +291,6 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - as `load_polyhedron`
         content_sha256=parts.content_sha256,
         source_sha256=source_sha256 or parts.content_sha256,
         patches=parts.patches,
+        surface=parts.surface,
         notes=parts.notes,
     )

@@ -25,10 +25,9 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.objects.booleans import triangulate
 from grasp_core.objects.face import Face
 from grasp_core.objects.face_pieces import Shapes, face_shapes
-from grasp_core.objects.planar_faces import FlatnessLimits, convex_pieces
+from grasp_core.objects.planar_faces import Flatness, convex_pieces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.trimmed_faces import shared_quadruples
 from grasp_core.solvers.ties import graded
@@ -85,7 +84,8 @@ def standard(body: Polyhedron) -> Standard:
         return Standard(body, faces, mirrored=False, owners=faces)
     _, image, frame = first
     order: list[int] = np.lexsort(_cells(image, frame).T[::-1]).tolist()
-    slack = FlatnessLimits().distance * float(np.ptp(body.vertices, axis=0).max())
+    extent = float(np.ptp(body.vertices, axis=0).max())
+    slack = Flatness.of(extent, body.surface.flatness_m).distance
     faces = tuple(_relisted(image.faces[face], image, frame, slack) for face in order)
     owners, body_in_order = tuple(range(len(faces))), replace(image, faces=faces)
     return Standard(body_in_order, tuple(order), mirrored=image is not body, owners=owners)
@@ -189,7 +189,7 @@ def _relisted(face: Face, body: Polyhedron, frame: Array, slack: float) -> Face:
     along = along / np.linalg.norm(along)
     plane = np.column_stack([along, np.cross(face.normal, along)])
     loops = [(loop - polygon[0]) @ plane for loop in (polygon, *holes)]
-    pieces = [polygon[0] + piece @ plane.T for piece in convex_pieces(loops, triangulate, slack)]
+    pieces = [polygon[0] + piece @ plane.T for piece in convex_pieces(loops, slack)]
     return replace(face, polygon=polygon, holes=tuple(holes), pieces=tuple(pieces))
 
 

@@ -1,0 +1,263 @@
+"""Makes one solid of the closed shells of a mesh: turns, unites, leaves out, or refuses them.
+
+A shell is a part of the mesh that connects across edges. A shell that encloses a positive volume is
+a body; one of negative volume is a cavity if a body encloses it, and a body that is inside out if
+it is beside all others. Bodies that overlap or touch are united. A body inside the material of
+another cannot be told from a cavity that is wound like the outside, so it is refused, as are bodies
+apart from each other. Parts that would be refused are left out if all of them together have next to
+no area, or if the user asks for the largest part alone.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.errors import InputError, MeshError, MeshRefusal
+from grasp_core.geometry.connectivity import components
+from grasp_core.objects.booleans import Solid, intersection_volume, union
+from grasp_core.objects.solid_checks import THINNEST, check_volume, triangle_areas
+
+OVERLAP = 1e-6
+"""Volume shared by two parts, relative to the whole, above which they overlap; parts that only
+touch share what rounding leaves."""
+SMALL = 0.01
+"""Largest share of the surface that is left out without being asked for."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shells:
+    """The surface of one solid, made of the shells of a mesh."""
+
+    points: Array
+    """Vertices, (n, 3) [m]."""
+    corners: Indices
+    """Vertex indices, (t, 3)."""
+    caps: Indices
+    """Indices of the triangles that are or come from caps, (c,)."""
+    dropped: float
+    """Area of the parts that were left out, as a share of the whole."""
+    said: tuple[str, ...]
+    """What was changed, in words."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Body:
+    """A body with its cavities; `marks` are the triangles' numbers in the mesh."""
+
+    solid: Solid
+    marks: Indices
+
+    @property
+    def area(self) -> float:
+        return float(triangle_areas(self.solid.vertices, self.solid.triangles).sum())
+
+    def joined(self, other: "_Body") -> "_Body":
+        solid, added = self.solid, other.solid
+        return _Body(
+            Solid(
+                np.concatenate([solid.vertices, added.vertices]),
+                np.concatenate([solid.triangles, added.triangles + len(solid.vertices)]),
+            ),
+            np.concatenate([self.marks, other.marks]),
+        )
+
+    def turned(self) -> "_Body":
+        return _Body(Solid(self.solid.vertices, self.solid.triangles[:, ::-1]), self.marks)
+
+
+def one_solid(
+    points: Array, corners: Indices, caps: Indices, *, most: int, largest_part: bool
+) -> Shells:
+    """Orient the shells of a mesh outwards, and make one solid of them.
+
+    Args:
+        points: Vertices, (n, 3) [m].
+        corners: Vertex indices, (t, 3); every edge has as many triangles on one side as on the
+            other.
+        caps: Indices of the triangles that close holes, (c,).
+        most: Largest number of shells.
+        largest_part: Whether to leave out all bodies but the largest.
+
+    Raises:
+        MeshError: The shells do not make one solid; the `reason` says why.
+    """
+    whole = Solid(points, corners)
+    check_volume(whole)
+    said = list[str]()
+    if whole.volume < 0.0:
+        corners = corners[:, ::-1]
+        said.append("the mesh was inside out; its triangles were turned")
+    bodies = _shells(points, corners, most)
+    as_it_is = Shells(points, corners, caps, 0.0, tuple(said))
+    if len(bodies) == 1:
+        return as_it_is
+    try:
+        found = _of_many(bodies, caps, abs(whole.volume), largest_part=largest_part)
+    except InputError as error:
+        if isinstance(error, MeshError):
+            raise
+        raise MeshError(MeshRefusal.NON_MANIFOLD, f"parts cannot be compared: {error}") from error
+    return replace(found, said=(*said, *found.said)) if found.said else as_it_is
+
+
+def _of_many(shells: list[_Body], caps: Indices, volume: float, *, largest_part: bool) -> Shells:
+    said = list[str]()
+    area = sum(shell.area for shell in shells)
+    slack = OVERLAP * volume
+    bodies, bad, why = _sorted_out(shells, slack, said)
+    united = _united(bodies, slack, said)
+    kept = max(united, key=lambda body: body.area)
+    apart = [body for body in united if body is not kept]
+    if apart and why is None:
+        why = MeshError(
+            MeshRefusal.SEPARATE,
+            f"the mesh holds {len(united)} solids, expected one solid; give each its own file, or "
+            "use the largest alone (--largest-part)",
+        )
+    dropped = sum(body.area for body in (*apart, *bad)) / area
+    if why is not None and dropped > SMALL and not largest_part:
+        raise why
+    if apart or bad:
+        said.append(left_out(len(apart) + len(bad), dropped))
+    used = np.unique(kept.solid.triangles)
+    local = np.searchsorted(used, kept.solid.triangles)
+    is_cap = np.flatnonzero(np.isin(kept.marks, caps))
+    return Shells(kept.solid.vertices[used], local, is_cap, dropped, tuple(said))
+
+
+def left_out(count: int, share: float) -> str:
+    """Say that parts with a share of the surface are not used."""
+    return f"{count} part{'s' * (count > 1)} with {100.0 * share:.3g} % of the surface left out"
+
+
+def _sorted_out(
+    shells: list[_Body], slack: float, said: list[str]
+) -> tuple[list[_Body], list[_Body], MeshError | None]:
+    """Give each cavity to its body; return bodies, parts that cannot be used, and the reason."""
+    flat = [s for s in shells if abs(s.solid.volume) <= _thinnest(s)]
+    bodies = [s for s in shells if s not in flat and s.solid.volume > 0.0]
+    bad, why = flat, None
+    if flat:
+        why = MeshError(
+            MeshRefusal.ZERO_VOLUME,
+            f"{len(flat)} parts enclose almost no volume; delete them, or close them around solids",
+        )
+    for shell in shells:
+        if shell.solid.volume > 0.0 or shell in flat:
+            continue
+        hollow = shell.turned()
+        shared = [intersection_volume(body.solid, hollow.solid) for body in bodies]
+        around = [k for k, part in enumerate(shared) if part >= hollow.solid.volume - slack]
+        if around:
+            host = min(around, key=lambda k: bodies[k].solid.volume)
+            bodies[host] = bodies[host].joined(shell)
+        elif sum(shared) <= slack:
+            bodies.append(hollow)
+            said.append("a part that was inside out was turned")
+        else:
+            bad = [*bad, hollow]
+            why = MeshError(
+                MeshRefusal.WINDING,
+                "one part is inside out and not a cavity of another; wind its triangles "
+                "counter-clockwise seen from outside",
+            )
+    inner = [body for k, body in enumerate(bodies) if _is_inside_another(k, bodies, slack)]
+    if inner:
+        why = MeshError(
+            MeshRefusal.OVERLAP,
+            f"{len(inner)} closed parts lie inside the material of another and are wound like it; "
+            "if they are cavities, turn their triangles, and if they are not, delete them or unite "
+            "the parts in a modelling program",
+        )
+    outer = [body for body in bodies if body not in inner]
+    return outer, [*bad, *inner], why
+
+
+def _thinnest(shell: _Body) -> float:
+    return THINNEST * float(np.ptp(shell.solid.vertices, axis=0).max()) ** 3
+
+
+def _is_inside_another(place: int, bodies: list[_Body], slack: float) -> bool:
+    """Tell whether a larger body, or an equal one before it, holds a body in its material."""
+    inner = bodies[place].solid
+    return any(
+        (other.solid.volume, place) > (inner.volume, k)
+        and _boxes_meet(other.solid, inner)
+        and intersection_volume(other.solid, inner) >= inner.volume - slack
+        for k, other in enumerate(bodies)
+    )
+
+
+def _boxes_meet(one: Solid, two: Solid) -> bool:
+    return bool(
+        (one.vertices.min(axis=0) <= two.vertices.max(axis=0)).all()
+        and (two.vertices.min(axis=0) <= one.vertices.max(axis=0)).all()
+    )
+
+
+def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
+    """Unite bodies that overlap or touch; those that do not are returned as they are."""
+    if len(bodies) == 1:
+        return bodies
+    solid, marks = union([(body.solid, body.marks) for body in bodies])
+    found = _with_cavities(_parts(_Body(solid, marks)), slack)
+    if len(found) == len(bodies):
+        return bodies
+    said.append(f"{len(bodies)} parts that overlap or touch were united")
+    return found
+
+
+def _with_cavities(shells: list[_Body], slack: float) -> list[_Body]:
+    """Give the cavities of a union to their bodies."""
+    bodies = [shell for shell in shells if shell.solid.volume > 0.0]
+    for shell in shells:
+        if shell.solid.volume <= 0.0:
+            hollow = shell.turned()
+            shared = [intersection_volume(body.solid, hollow.solid) for body in bodies]
+            host = int(np.argmax(shared))
+            if shared[host] > slack:
+                bodies[host] = bodies[host].joined(shell)
+    return bodies
+
+
+def _shells(points: Array, corners: Indices, most: int) -> list[_Body]:
+    """Split a mesh into shells.
+
+    Raises:
+        MeshError: There are more shells than `most`.
+    """
+    label = _labels(corners)
+    if label.max() >= most:
+        raise MeshError(
+            MeshRefusal.SEPARATE,
+            f"the mesh has {label.max() + 1} parts, more than the limit of {most}; give one solid",
+        )
+    return _split(_Body(Solid(points, corners), np.arange(len(corners))), label)
+
+
+def _parts(body: _Body) -> list[_Body]:
+    return _split(body, _labels(body.solid.triangles))
+
+
+def _split(body: _Body, label: Indices) -> list[_Body]:
+    parts = list[_Body]()
+    for part in range(int(label.max()) + 1):
+        mine = label == part
+        used, local = np.unique(body.solid.triangles[mine], return_inverse=True)
+        parts.append(
+            _Body(Solid(body.solid.vertices[used], local.reshape(-1, 3)), body.marks[mine])
+        )
+    return parts
+
+
+def _labels(corners: Indices) -> Indices:
+    """Number the part that each triangle belongs to; parts share no edge, (t,)."""
+    edges = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2), axis=2)
+    _, place = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
+    place = place.reshape(-1, 3)
+    first = np.full(place.max() + 1, -1, dtype=np.int64)
+    first[place.ravel()[::-1]] = np.repeat(np.arange(len(corners)), 3)[::-1]
+    links = np.column_stack([np.repeat(np.arange(len(corners)), 3), first[place.ravel()]])
+    _, label = np.unique(components(len(corners), links), return_inverse=True)
+    return label

@@ -1,0 +1,78 @@
+"""Says what is known of the surface that an object was made from, and what was changed in it.
+
+Whatever depends on how far a mesh can be trusted asks here: planning puts no finger on a cap, a
+density gives a mass only where the volume is known, commands and pages show the notes, and files of
+grasps, baselines and datasets keep all of it beside the mesh. An orientation that is not certain
+has no field, because such meshes are refused.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Indices, frozen_indices
+from grasp_core.by_value import ByValue
+from grasp_core.checked import LARGEST, number, several, text, whole
+
+VolumeSource: TypeAlias = Literal["surface", "capped surface", "convex hull"]
+"""What volume, inertia and the centre of mass of uniform density are computed from."""
+MM = 1e3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface(ByValue):
+    """What is known of an object's triangles."""
+
+    closed: bool = True
+    """Whether the triangles, caps included, enclose a solid. Where they do not, the mass properties
+    are those of the convex hull."""
+    caps: Indices = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    """Indices of the triangles that close small holes, (c,); no finger may stand on them."""
+    holes: int = 0
+    """Number of holes that were closed."""
+    largest_hole_m: float = 0.0
+    """Largest distance between two corners of one closed hole [m]."""
+    volume_error: float = 0.0
+    """Largest error of the volume if each closed hole was a half-sphere, as a share of it."""
+    dropped: float = 0.0
+    """Area of the parts that were left out, as a share of the whole."""
+    flatness_m: float = 0.0
+    """Distance from one plane that the rounding of the coordinates explains [m]; 0 where no more is
+    known of them than that they are in double precision."""
+    center_given: bool = False
+    """Whether the centre of mass was given, and is not that of uniform density."""
+    repairs: tuple[str, ...] = ()
+    """What else was changed, in words."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "caps", frozen_indices(self.caps, (None,), "caps"))
+        whole(self.holes, "holes", least=0)
+        for name in ("largest_hole_m", "volume_error", "flatness_m"):
+            number(getattr(self, name), name, least=0.0, most=LARGEST)
+        number(self.dropped, "dropped", least=0.0, most=1.0)
+        several(self.repairs, partial(text, name="repairs"), "repairs", "texts")
+
+    @property
+    def volume_source(self) -> VolumeSource:
+        """What the mass properties are computed from."""
+        if not self.closed:
+            return "convex hull"
+        return "capped surface" if self.holes else "surface"
+
+    def notes(self) -> Iterator[str]:
+        """Yield what people must know of the surface, a sentence each."""
+        yield from self.repairs
+        if self.holes:
+            yield (
+                f"{self.holes} hole{'s' * (self.holes > 1)} in the surface, at most "
+                f"{MM * self.largest_hole_m:.3g} mm wide, "
+                f"{'are' if self.holes > 1 else 'is'} closed for volume and centre of mass, which "
+                f"makes the volume uncertain by at most {100.0 * self.volume_error:.2g} %; no "
+                "finger is placed there"
+            )
+        if not self.closed:
+            what = "its volume is" if self.center_given else "its volume and centre of mass are"
+            yield f"the surface is open, so {what} of the convex hull, and a density gives no mass"

@@ -1,0 +1,131 @@
+"""Decides which side of a surface is inside, by winding numbers, and winds triangles alike.
+
+The winding number of a point is the sum of the solid angles of all triangles as seen from it,
+divided by that of the whole sphere. It is one inside a closed surface that is wound
+counter-clockwise seen from outside, and zero outside. It jumps by one across each triangle, so on a
+triangle the mean of both sides, in which the triangle itself does not count, is
+
+    1/2   where the triangle bounds the solid,
+    -1/2  where it does so inside out,
+    3/2   where it is inside another part of the solid.
+
+Holes change these values by the share of the sphere that they fill, seen from the triangle.
+
+Sources: Van Oosterom and Strackee, "The solid angle of a plane triangle", 1983; Jacobson, Kavan and
+Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding numbers", 2013.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.objects.planar_faces import triangle_neighbours
+
+MOST_ANGLES = 4_000_000
+"""Largest number of solid angles that are computed for one mesh."""
+FEWEST_SAMPLES, MOST_SAMPLES = 32, 256
+BLOCK = 200_000
+"""Number of solid angles computed at a time, which needs some twenty megabytes."""
+
+
+def sampled(areas: Array) -> Indices:
+    """Choose triangles that stand for equal shares of a surface each, (s,).
+
+    Args:
+        areas: Areas of all triangles, (t,), in any unit.
+    """
+    count = min(max(MOST_ANGLES // len(areas), FEWEST_SAMPLES), MOST_SAMPLES, len(areas))
+    upto = np.cumsum(areas)
+    middles = (np.arange(count) + 0.5) / count * upto[-1]
+    return np.minimum(np.searchsorted(upto, middles), len(areas) - 1)
+
+
+def winding_on(corners: Array, places: Indices) -> Array:
+    """Compute the mean of the winding numbers on both sides of triangles, at their middles, (s,).
+
+    Args:
+        corners: Corners of all triangles, (t, 3, 3), in any unit.
+        places: Indices of the triangles asked about, (s,).
+    """
+    found = np.zeros(len(places))
+    step = max(BLOCK // len(corners), 1)
+    for start in range(0, len(places), step):
+        asked = places[start : start + step]
+        away = corners[None] - corners[asked].mean(axis=1)[:, None, None]
+        angles = _solid_angles(away)
+        angles[np.arange(len(asked)), asked] = 0.0
+        found[start : start + step] = angles.sum(axis=1) / (4.0 * math.pi)
+    return found
+
+
+def _solid_angles(away: Array) -> Array:
+    """Compute the solid angles of triangles, (..., 3, 3), as seen from the origin."""
+    a, b, c = (away[..., corner, :] for corner in range(3))
+    la, lb, lc = (np.linalg.norm(side, axis=-1) for side in (a, b, c))
+    volume = (a * np.cross(b, c)).sum(axis=-1)
+    spread = (
+        la * lb * lc
+        + (a * b).sum(axis=-1) * lc
+        + (b * c).sum(axis=-1) * la
+        + (c * a).sum(axis=-1) * lb
+    )
+    return 2.0 * np.arctan2(volume, spread)
+
+
+def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.bool_]] | None:
+    """Wind triangles like their neighbours; None if the surface has only one side.
+
+    In each part that connects across edges of two triangles, the larger area keeps its winding.
+
+    Args:
+        corners: Vertex indices, (t, 3).
+        areas: Areas, (t,), in any unit.
+
+    Returns:
+        The triangles, and which of them were turned.
+    """
+    across = triangle_neighbours(corners)
+    against = _against(corners, across)
+    turned, part = np.zeros(len(corners), dtype=np.bool_), np.full(len(corners), -1)
+    for seed in range(len(corners)):
+        if part[seed] < 0:
+            _spread(seed, across, against, turned, part)
+    inner = across >= 0
+    if (inner & ((turned[:, None] ^ turned[across]) != against)).any():
+        return None
+    size, swept = (
+        np.bincount(part, weights=weight, minlength=len(corners))
+        for weight in (areas, areas * turned)
+    )
+    turned ^= (swept > 0.5 * size)[part]  # noqa: PLR2004 - half of the area
+    return np.where(turned[:, None], corners[:, ::-1], corners), turned
+
+
+def _spread(
+    seed: int,
+    across: Indices,
+    against: NDArray[np.bool_],
+    turned: NDArray[np.bool_],
+    part: Indices,
+) -> None:
+    """Carry the winding of one triangle to all that connect with it; each is reached once."""
+    part[seed] = seed
+    front = [seed]
+    while front:
+        here = front.pop()
+        for side in range(3):
+            other = int(across[here, side])
+            if other >= 0 and part[other] < 0:
+                part[other], turned[other] = seed, turned[here] ^ against[here, side]
+                front.append(other)
+
+
+def _against(corners: Indices, across: Indices) -> NDArray[np.bool_]:
+    """Tell across which edges the neighbour runs along the edge in the same direction, (t, 3)."""
+    tails, heads = corners, np.roll(corners, -1, axis=1)
+    others = corners[across]
+    ahead = np.roll(others, -1, axis=2)
+    same = (others == tails[..., None]) & (ahead == heads[..., None])
+    return same.any(axis=2) & (across >= 0)
