@@ -16,6 +16,12 @@ from grasp_core.geometry.polygons import area_and_centroid, clip, signed_area
 from grasp_core.solvers.ties import first_best, surpassing
 
 ROUNDS = 5
+SLENDEREST = 1e-5
+"""Least width of a polygon that grows further, relative to its length: places that are stretched to
+a disc are rounded by some 1e-16 of the length divided by this, which must be well below the gap."""
+SAME_HEIGHT = 1.0 - 1e-12
+"""Share of a half-plane's distance from the middle at which an end of a segment counts as beyond.
+"""
 CANDIDATES = 400
 """Largest number of points that are tried as the middle of a polygon."""
 
@@ -52,12 +58,18 @@ def clearing(start: Array, segments: Array, gap: float) -> Array | None:
         if len(polygon) < 3 or signed_area(polygon) <= least:  # noqa: PLR2004
             break
         best = polygon
-        middle, stretch = _ellipse(polygon)
+        if (ellipse := _ellipse(polygon)) is None:
+            break
+        middle, stretch = ellipse
     return best
 
 
 def _cut(box: Array, middle: Array, segments: Array, stretch: Array, gap: float) -> Array:
-    """Cut a polygon by one half-plane for each segment, the nearest segment first."""
+    """Cut a polygon by one half-plane for each segment, the nearest segment first.
+
+    Each half-plane is put where its own segment is beyond it as computed, so that at least this
+    segment is dropped: the rounding of `away` moves the ends of a long segment near the middle.
+    """
     left = (segments - middle) @ stretch.T
     polygon = box
     while len(left):
@@ -66,13 +78,18 @@ def _cut(box: Array, middle: Array, segments: Array, stretch: Array, gap: float)
         if distances[nearest] <= 0.0:
             return np.empty((0, 2))
         away = points[nearest] / distances[nearest]
+        heights = left @ away
         limit = distances[nearest]
+        if (own := heights[nearest].min()) < limit * SAME_HEIGHT:
+            limit = own
+        if limit <= 0.0:
+            return np.empty((0, 2))
         row = away @ stretch
         length = float(np.linalg.norm(row))
         polygon = clip(
             polygon, row[None] / length, np.array([(limit + row @ middle) / length - gap])
         )
-        left = left[(left @ away < limit * (1.0 - 1e-12)).any(axis=1)]
+        left = left[(heights < limit * SAME_HEIGHT).any(axis=1)]
     return polygon
 
 
@@ -85,10 +102,15 @@ def _nearest(point: Array, segments: Array) -> tuple[Array, Array]:
     return points, np.linalg.norm(points - point, axis=1)
 
 
-def _ellipse(polygon: Array) -> tuple[Array, Array]:
-    """Return a polygon's centre, and the map that turns its second moments into a disc's."""
+def _ellipse(polygon: Array) -> tuple[Array, Array] | None:
+    """Return a polygon's centre, and the map that turns its second moments into a disc's.
+
+    The result is None for a polygon so slender that rounding would distort the map.
+    """
     _, centre = area_and_centroid([polygon])
     after = np.roll(polygon, -1, axis=0)
     corners = np.concatenate([polygon, 0.5 * (polygon + after)]) - centre
     values, axes = np.linalg.eigh(corners.T @ corners)
+    if values[0] <= SLENDEREST**2 * values[1]:
+        return None
     return centre, (axes / np.sqrt(values)) @ axes.T

@@ -1,0 +1,43 @@
+"""Loading ends on long and thin shapes however they lie, and works about as much in each way."""
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from tests.grasp_core.long_shapes import KINDS, ORIENTATIONS, SHAPES, lying, shape
+from tests.marks import more
+from tests.work import calls_of
+
+MOST_WORK = 5.0
+"""Largest number of calls in one orientation, over the median of all."""
+QUICK = ("rod", "thin rod", "needle", "hexagonal bar", "sheet", "ruler", "square bar", "card")
+"""Shapes of the slow tests that are run before every change."""
+
+
+@pytest.mark.timeout(120)  # neither ended once
+@pytest.mark.parametrize(
+    ("name", "kind", "faces"), [("rod", "auto", 20), ("square bar", "patches", 6)]
+)
+def test_a_long_shape_that_lies_anyhow_is_loaded(name, kind, faces):
+    body = _load(*lying(name, 1), kind)
+    assert len(body.faces) == faces
+    assert body.patches == gc.PatchLimits()
+
+
+def test_the_long_shapes_have_12_to_4000_triangles():
+    sizes = [len(shape(name)[1]) for name in SHAPES]
+    assert (len(sizes), min(sizes), max(sizes)) == (20, 12, 4000)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("name", [*QUICK, *more(*sorted(set(SHAPES) - set(QUICK)))])
+def test_every_orientation_is_loaded_with_about_the_same_work(name):
+    for kind in KINDS:
+        _load(*lying(name, 0), kind)  # what it imports is no work of its own
+        calls = [calls_of(_load, *lying(name, number), kind) for number in range(ORIENTATIONS)]
+        assert max(calls) <= MOST_WORK * np.median(calls), kind
+
+
+def _load(vertices, triangles, kind):
+    return gc.Polyhedron.from_mesh(vertices, triangles, faces=kind)
