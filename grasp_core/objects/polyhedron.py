@@ -172,6 +172,7 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
     path: str | Path,
     *,
     unit: str = "m",
+    scale: float = 1.0,
     flatness: FlatnessLimits = DEFAULT_FLATNESS,
     faces: FaceKind = "auto",
     patches: PatchLimits | None = None,
@@ -183,6 +184,7 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
     Args:
         path: An OBJ, STL, PLY, OFF or GLB file.
         unit: Unit of length of the file: "m", "cm", "mm" or "in".
+        scale: Factor on the coordinates of the file, besides its unit.
         flatness: Limits within which triangles count as one planar face.
         faces: `planar` for exact planar faces; `patches` for the nearly flat parts of a curved or
             scanned surface, which may have holes; `auto` takes patches where there are more than
@@ -193,17 +195,18 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
         limits: Largest size of the file, and largest cost of reading it.
 
     Raises:
-        InputError: The unit is unknown.
+        InputError: The unit is unknown, or the scale is not a positive number.
         MeshError: The file is not a solid; its `reason` says why.
     """
     one_of(unit, UNITS_M, "unit")
+    scale = positive(scale, "scale")
     check_choices(faces, patches, flatness)
     path = path_of(path, "path")
     instance(limits, MeshLimits, "limits")
     mesh = read_triangles(path, limits)
     try:
         return polyhedron_from_mesh(
-            mesh.vertices * UNITS_M[unit],
+            mesh.vertices * (UNITS_M[unit] * scale),
             mesh.triangles,
             name=path.stem,
             source_sha256=hashlib.sha256(mesh.data).hexdigest(),

@@ -29,7 +29,12 @@ which it was given by the user."""
 
 
 def load_changed_part(
-    path: Path, old: Polyhedron, unit: str, limits: MeshLimits = DEFAULT_LIMITS
+    path: Path,
+    old: Polyhedron,
+    unit: str,
+    limits: MeshLimits = DEFAULT_LIMITS,
+    *,
+    scale: float = 1.0,
 ) -> Polyhedron:
     """Read a changed part from its mesh file, with exact planar faces.
 
@@ -41,12 +46,15 @@ def load_changed_part(
         old: The part before.
         unit: Unit of length of the file.
         limits: Largest size of the file, and largest cost of reading it.
+        scale: Factor on the coordinates of the file, besides its unit.
 
     Raises:
         MeshError: The file is not a solid; its `reason` says why.
     """
     center = given_center(old)
-    return load_polyhedron(path, unit=unit, faces="planar", center_of_mass=center, limits=limits)
+    return load_polyhedron(
+        path, unit=unit, scale=scale, faces="planar", center_of_mass=center, limits=limits
+    )
 
 
 def given_center(body: Polyhedron) -> Array | None:
@@ -65,28 +73,52 @@ def growth(old: Polyhedron, new: Polyhedron) -> float:
     return _diagonal(new.vertices) / _diagonal(old.vertices)
 
 
-def fitting_unit(path: Path, old: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS) -> str:
+def fitting_unit(
+    path: Path, old: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS, *, scale: float = 1.0
+) -> str:
     """Find the unit in which a mesh file holds a part about as large as the old one.
 
     Args:
         path: The mesh file.
         old: The part before.
         limits: Largest size of the file, and largest cost of reading it.
+        scale: Factor on the coordinates of the file, besides its unit.
 
     Raises:
         InputError: The size fits in no unit.
         MeshError: The file cannot be read.
     """
-    size = _diagonal(read_triangles(path, limits).vertices) / _diagonal(old.vertices)
+    size = scale * _times(path, old, limits)
     off = {unit: abs(math.log(size * length)) if size > 0.0 else math.inf
            for unit, length in UNITS_M.items()}  # fmt: skip
     best = min(off, key=off.__getitem__)
     if off[best] > math.log(SURE_GROWTH):
         raise InputError(
             f"{path}: the unit of the changed part is not clear: in {best}, which fits best, its "
-            f"size is {size * UNITS_M[best]:.3g} times that of the old part; say the unit"
+            f"size is {size * UNITS_M[best]:.3g} times that of the old part; say the unit, and the "
+            "scale if it has one"
         )
     return best
+
+
+def fitting_scale(path: Path, body: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS) -> float:
+    """Find the scale at which a mesh file in metres is as large as a body, to nine digits.
+
+    Args:
+        path: The mesh file, which is not empty.
+        body: The solid that was read from it.
+        limits: Largest size of the file, and largest cost of reading it.
+
+    Raises:
+        MeshError: The file cannot be read.
+    """
+    return float(f"{1.0 / _times(path, body, limits):.9g}")
+
+
+def _times(path: Path, body: Polyhedron, limits: MeshLimits) -> float:
+    """Return the size of a mesh file, in its own unit, relative to that of a body."""
+    mesh = read_triangles(path, limits)
+    return _diagonal(mesh.vertices[np.unique(mesh.triangles)]) / _diagonal(body.vertices)
 
 
 def _diagonal(vertices: Array) -> float:
