@@ -23,6 +23,8 @@ from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 SURE_GROWTH = 1.5
 """Largest ratio of the two sizes at which the unit is sure: an inch and a centimetre, the two units
 nearest to each other, differ by 2.54, which is more than the square of it."""
+SAME = 1e-6
+"""Largest relative difference of two lengths that differ by rounding and joined vertices only."""
 GIVEN = 1e-7
 """Distance of a centre of mass from that of uniform density, relative to the part's radius, above
 which it was given by the user."""
@@ -101,18 +103,24 @@ def fitting_unit(
     return best
 
 
-def fitting_scale(path: Path, body: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS) -> float:
-    """Find the scale at which a mesh file in metres is as large as a body, to nine digits.
+def fitting_lengths(
+    path: Path, body: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS
+) -> tuple[str, float]:
+    """Find a unit and a scale at which a mesh file is as large as the body that was read from it.
+
+    Unless the scale is 1, the unit is the metre, and the scale has nine digits.
 
     Args:
-        path: The mesh file, which is not empty.
-        body: The solid that was read from it.
+        path: The mesh file.
+        body: The solid.
         limits: Largest size of the file, and largest cost of reading it.
 
     Raises:
         MeshError: The file cannot be read.
     """
-    return float(f"{1.0 / _times(path, body, limits):.9g}")
+    length = float(f"{1.0 / _times(path, body, limits):.9g}")
+    same = (unit for unit, metres in UNITS_M.items() if math.isclose(length, metres, rel_tol=SAME))
+    return next(((unit, 1.0) for unit in same), ("m", length))
 
 
 def _times(path: Path, body: Polyhedron, limits: MeshLimits) -> float:

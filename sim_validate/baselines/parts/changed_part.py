@@ -11,7 +11,11 @@ from pathlib import Path
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron
 from grasp_core.records.grasps_json import RECORDED, SavedGrasps
-from grasp_core.transferring.changed_part import fitting_scale, fitting_unit, load_changed_part
+from grasp_core.transferring.changed_part import (
+    fitting_lengths,
+    fitting_unit,
+    load_changed_part,
+)
 from grasp_core.transferring.like_faces import check_planar, likeness
 from grasp_core.transferring.transfer import Transfer, transfer
 from sim_validate.baselines.parts.if_changed import CARRY, FAIL, IfChanged
@@ -97,7 +101,7 @@ class Present:
             return None, None
         unit = self.unit or self.source.unit or fitting_exactly(file, self.planned, scale)
         if unit is None:
-            unit, scale = "m", fitting_scale(file, self.planned, RECORDED)
+            unit, scale = fitting_lengths(file, self.planned, RECORDED)
         return unit, None if scale == 1.0 else scale
 
     @property
