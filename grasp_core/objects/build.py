@@ -259,7 +259,9 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tup
         extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
     if not SMALLEST_EXTENT_M <= extent <= LARGEST_EXTENT_M:
         wrong = (
-            "small (without --unit it is metres)" if extent < 1.0 else "large (--unit mm, perhaps)"
+            "small (without --unit it is metres; --scale multiplies it)"
+            if extent < 1.0
+            else "large (--unit mm, perhaps, or --scale)"
         )
         message = (
             f"the object is {extent:.3g} m across, expected {SMALLEST_EXTENT_M} to "

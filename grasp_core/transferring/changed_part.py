@@ -23,13 +23,20 @@ from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 SURE_GROWTH = 1.5
 """Largest ratio of the two sizes at which the unit is sure: an inch and a centimetre, the two units
 nearest to each other, differ by 2.54, which is more than the square of it."""
+SAME = 1e-6
+"""Largest relative difference of two lengths that differ by rounding and joined vertices only."""
 GIVEN = 1e-7
 """Distance of a centre of mass from that of uniform density, relative to the part's radius, above
 which it was given by the user."""
 
 
 def load_changed_part(
-    path: Path, old: Polyhedron, unit: str, limits: MeshLimits = DEFAULT_LIMITS
+    path: Path,
+    old: Polyhedron,
+    unit: str,
+    limits: MeshLimits = DEFAULT_LIMITS,
+    *,
+    scale: float = 1.0,
 ) -> Polyhedron:
     """Read a changed part from its mesh file, with exact planar faces.
 
@@ -41,12 +48,15 @@ def load_changed_part(
         old: The part before.
         unit: Unit of length of the file.
         limits: Largest size of the file, and largest cost of reading it.
+        scale: Factor on the coordinates of the file, besides its unit.
 
     Raises:
         MeshError: The file is not a solid; its `reason` says why.
     """
     center = given_center(old)
-    return load_polyhedron(path, unit=unit, faces="planar", center_of_mass=center, limits=limits)
+    return load_polyhedron(
+        path, unit=unit, scale=scale, faces="planar", center_of_mass=center, limits=limits
+    )
 
 
 def given_center(body: Polyhedron) -> Array | None:
@@ -65,28 +75,58 @@ def growth(old: Polyhedron, new: Polyhedron) -> float:
     return _diagonal(new.vertices) / _diagonal(old.vertices)
 
 
-def fitting_unit(path: Path, old: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS) -> str:
+def fitting_unit(
+    path: Path, old: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS, *, scale: float = 1.0
+) -> str:
     """Find the unit in which a mesh file holds a part about as large as the old one.
 
     Args:
         path: The mesh file.
         old: The part before.
         limits: Largest size of the file, and largest cost of reading it.
+        scale: Factor on the coordinates of the file, besides its unit.
 
     Raises:
         InputError: The size fits in no unit.
         MeshError: The file cannot be read.
     """
-    size = _diagonal(read_triangles(path, limits).vertices) / _diagonal(old.vertices)
+    size = scale * _times(path, old, limits)
     off = {unit: abs(math.log(size * length)) if size > 0.0 else math.inf
            for unit, length in UNITS_M.items()}  # fmt: skip
     best = min(off, key=off.__getitem__)
     if off[best] > math.log(SURE_GROWTH):
         raise InputError(
             f"{path}: the unit of the changed part is not clear: in {best}, which fits best, its "
-            f"size is {size * UNITS_M[best]:.3g} times that of the old part; say the unit"
+            f"size is {size * UNITS_M[best]:.3g} times that of the old part; say the unit, and the "
+            "scale if it has one"
         )
     return best
+
+
+def fitting_lengths(
+    path: Path, body: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS
+) -> tuple[str, float]:
+    """Find a unit and a scale at which a mesh file is as large as the body that was read from it.
+
+    Unless the scale is 1, the unit is the metre, and the scale has nine digits.
+
+    Args:
+        path: The mesh file.
+        body: The solid.
+        limits: Largest size of the file, and largest cost of reading it.
+
+    Raises:
+        MeshError: The file cannot be read.
+    """
+    length = float(f"{1.0 / _times(path, body, limits):.9g}")
+    same = (unit for unit, metres in UNITS_M.items() if math.isclose(length, metres, rel_tol=SAME))
+    return next(((unit, 1.0) for unit in same), ("m", length))
+
+
+def _times(path: Path, body: Polyhedron, limits: MeshLimits) -> float:
+    """Return the size of a mesh file, in its own unit, relative to that of a body."""
+    mesh = read_triangles(path, limits)
+    return _diagonal(mesh.vertices[np.unique(mesh.triangles)]) / _diagonal(body.vertices)
 
 
 def _diagonal(vertices: Array) -> float:

@@ -24,8 +24,9 @@ def baseline_to_json(baseline: Baseline) -> str:
         **{each.name: getattr(baseline, each.name) for each in fields(Baseline)},
     }
     del header["entries"], header["part"]
-    if baseline.unit is None:
-        del header["unit"]
+    for name in ("unit", "scale"):
+        if header[name] is None:
+            del header[name]
     head = json.dumps(header, indent=1, sort_keys=True, allow_nan=False).removesuffix("\n}")
     lines = ",\n  ".join(
         json.dumps(fields_of(entry), allow_nan=False) for entry in baseline.entries

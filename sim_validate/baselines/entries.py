@@ -122,6 +122,9 @@ class Baseline:
     unit: str | None = None
     """Unit of length of the mesh file; None where there is none, or it was not known, and then no
     file mentions it."""
+    scale: Size | None = None
+    """Factor on the coordinates of the mesh file, besides its unit; None where there is none, and
+    then no file mentions it."""
     part: RecordedPart | None = None
     """The part that it was written on; None where that is the one that the grasps were planned on,
     and then no file mentions it."""

@@ -92,7 +92,8 @@ def _next_steps(name: str, at: str | None, files: tuple[Path, Path], now: Presen
         yield check
         return
     part = shlex.quote(str(now.source.file))
-    yield f"  its contacts: graspproof transfer {grasps} {part} --unit {now.unit} --out carried"
+    lengths = f"--unit {now.unit}" + (f" --scale {now.scale!r}" if now.scale != 1.0 else "")
+    yield f"  its contacts: graspproof transfer {grasps} {part} {lengths} --out carried"
     if at is not None:
         which = f"--grasp {shlex.quote(now.id_on_part(name) or name)}{chosen}"
         yield f"  to see it: graspproof replay carried/grasps.json {which} --out replay"

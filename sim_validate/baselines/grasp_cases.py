@@ -17,7 +17,7 @@ from sim_validate.records.grasps import read_grasps
 
 FRICTION = 0.5
 """Friction of grasps for which the test gives none."""
-SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit")
+SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit", "scale")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,8 +68,8 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
     Args:
         folder: Folder in which relative paths start.
         args: Path of a grasps.json; if empty, grasps are planned.
-        settings: `object` (a mesh file or a built-in object), `unit`, and the arguments of `plan`;
-            with a file, `friction`, and `changed_part` with the fields of `IfChanged`.
+        settings: `object` (a mesh file or a built-in object), `unit`, `scale`, and the arguments of
+            `plan`; with a file, `friction`, and `changed_part` with the fields of `IfChanged`.
 
     Raises:
         InputError: A setting is unknown, missing or refused, no grasp was found, or the mesh that
@@ -102,7 +102,7 @@ def _cases_of_file(folder: Path, path: Path, settings: Mapping[str, Any]) -> lis
     friction = _number(settings.get("friction", saved.friction))
     _check_any(saved.grasps, saved.body, friction)
     asked = if_changed(settings.get(TABLE, {}))
-    source = source_of(saved, path, [folder])
+    source = source_of(saved, path, [folder], scale=asked.scale)
     now = present(replace(saved, friction=friction), path, source, asked)
     tested = {grasp.id: grasp for grasp in now.saved.grasps}
     return [
@@ -137,9 +137,10 @@ def _planned(body: Polyhedron, wanted: Mapping[str, Any]) -> Sequence[Grasp]:
 
 def _body(folder: Path, wanted: dict[str, Any]) -> Polyhedron:
     """Load the object, and remove its settings from the wanted ones."""
-    name, unit = wanted.pop("object", None), wanted.pop("unit", "m")
+    name = wanted.pop("object", None)
+    lengths = {each: wanted.pop(each) for each in ("unit", "scale") if each in wanted}
     if not isinstance(name, str):
         raise InputError("@pytest.mark.grasp needs the path of a grasps.json, or object=...")
     if Path(name).suffix:
-        return load_polyhedron(folder / name, unit=unit)
+        return load_polyhedron(folder / name, **lengths)
     return example_object(name)

@@ -135,7 +135,8 @@ def complete(found: Measured, now: Present) -> Baseline:
     """
     if found.refused:
         raise InputError("; ".join(found.refused.values()))
-    return replace(found.baseline, part=now.recorded, unit=now.file_unit)
+    unit, scale = now.file_lengths
+    return replace(found.baseline, part=now.recorded, unit=unit, scale=scale)
 
 
 def with_planned_fingers(how: How, before: Baseline, saved: SavedGrasps) -> How:

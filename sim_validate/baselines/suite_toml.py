@@ -94,7 +94,20 @@ class Suite:
         Raises:
             InputError: A file is refused.
         """
-        return source_of(self.saved, self.grasps, [self.path.parent], self.object)
+        folders = [self.path.parent]
+        return source_of(self.saved, self.grasps, folders, self.object, self.asked.scale)
+
+    @cached_property
+    def asked(self) -> IfChanged:
+        """Return what to do if the part has changed, with the scale of the baseline if it has one.
+
+        A baseline that is refused is no reason to stop here, as it may be about to be replaced.
+        """
+        try:
+            recorded = self.kept.scale
+        except InputError:
+            recorded = None
+        return self.changed_part.with_scale(recorded)
 
     @cached_property
     def present(self) -> Present:
@@ -104,7 +117,7 @@ class Suite:
             InputError: The part has changed, and that is refused or cannot be judged, or a file is
                 refused.
         """
-        return present(self.saved, self.grasps, self.source, self.changed_part)
+        return present(self.saved, self.grasps, self.source, self.asked)
 
     @cached_property
     def compared(self) -> Present:

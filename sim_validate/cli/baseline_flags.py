@@ -8,7 +8,7 @@ from tyro.conf import OmitArgPrefixes, Positional, arg, subcommand
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from sim_validate.cli.flag_bounds import at_least
-from sim_validate.cli.flag_groups import Count, Repeats, Seed, Speech
+from sim_validate.cli.flag_groups import Count, Repeats, Seed, Speech, UnitName, Usual
 from sim_validate.cli.transfer_flags import Carrying
 from sim_validate.parallel.processes import available_cores
 
@@ -23,9 +23,12 @@ class ChangedPart:
     refuse_changed_part: bool = False
     """Refuse a mesh file that has changed, in place of carrying the grasps over to it."""
     carrying: OmitArgPrefixes[Carrying] = field(default_factory=Carrying)
-    unit: Literal["m", "cm", "mm", "in"] | None = None
+    unit: UnitName | None = None
     """Unit of length in a mesh file that has changed; if not given, the one in which the part is
     about as large as it was."""
+    scale: Usual | None = None
+    """Factor on the coordinates of a mesh file, besides its unit; if not given, that of the
+    baseline."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, subcommand
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from sim_validate.cli.flag_bounds import FINITE, at_least
-from sim_validate.cli.flag_groups import Count, Friction, Positive, Seed, Speech
+from sim_validate.cli.flag_groups import Count, Friction, Lengths, Positive, Seed, Speech
 from sim_validate.cli.learning_flags import Learned
 from sim_validate.datasets.columns import ExportFormat, SplitName
 from sim_validate.parallel.processes import available_cores
@@ -50,8 +50,7 @@ class Settings:
 
     friction: UseAppendAction[tuple[Friction, ...]] = ()
     """Coulomb coefficient to plan and simulate with; may be repeated; 0.5 if not given."""
-    unit: Literal["m", "cm", "mm", "in"] = "m"
-    """Length of one unit in a mesh file."""
+    lengths: OmitArgPrefixes[Lengths] = field(default_factory=Lengths)
     faces: Literal["auto", "planar", "patches"] = "auto"
     """Faces to plan on: exact planar faces, or nearly flat patches of a curved or scanned surface.
     """

@@ -55,7 +55,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "hand allegro",
         "hand my_hand.xml --fingertips ff,mf,rf,th",
     ),
-    "inspect": ("inspect part.stl --unit mm", "inspect part.stl --unit mm --picture part.png"),
+    "inspect": (
+        "inspect part.stl --unit mm",
+        "inspect part.stl --unit mm --picture part.png",
+        "inspect mug.obj --scale 0.00026824",
+    ),
     "objects": ("objects",),
     "doctor": ("doctor",),
     "view": (

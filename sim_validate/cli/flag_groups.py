@@ -33,6 +33,7 @@ Friction = Annotated[float, at_least(SMALLEST, up_to=LARGEST_FRICTION)]
 Count = Annotated[int, at_least(1, up_to=MOST_COUNT)]
 Seed = Annotated[int, at_least(0, up_to=MOST_SEED)]
 Edges = Annotated[int, at_least(3, up_to=MOST_EDGES)]
+UnitName = Literal["m", "cm", "mm", "in"]
 Point = tuple[Finite, Finite, Finite]
 Direction = Annotated[Point, not_zero(SMALLEST, LARGEST)]
 Wrench = Annotated[
@@ -84,11 +85,20 @@ class MeshLimits:
 
 
 @dataclass(frozen=True, slots=True)
+class Lengths:
+    """What lengths the numbers of a mesh file mean."""
+
+    unit: UnitName = "m"
+    """Unit of length in a mesh file."""
+    scale: Usual = 1.0
+    """Factor on the coordinates of a mesh file, besides its unit."""
+
+
+@dataclass(frozen=True, slots=True)
 class Mesh:
     """How a mesh file is read."""
 
-    unit: Literal["m", "cm", "mm", "in"] = "m"
-    """Unit of length in a mesh file."""
+    lengths: OmitArgPrefixes[Lengths] = Lengths()
     faces: Literal["auto", "planar", "patches"] = "auto"
     """Faces to plan on: exact planar faces, or nearly flat patches of a curved or scanned surface,
     which may have holes; auto takes patches where there are more than 200 planar faces."""

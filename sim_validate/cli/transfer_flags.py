@@ -5,12 +5,19 @@ This module imports nothing that is slow to load, so that help and usage errors 
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from sim_validate.cli.flag_bounds import at_least
-from sim_validate.cli.flag_groups import Friction, MeshLimits, NotNegative, Point, Speech
+from sim_validate.cli.flag_groups import (
+    Friction,
+    Lengths,
+    MeshLimits,
+    NotNegative,
+    Point,
+    Speech,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +43,7 @@ class Transfer:
     carrying: OmitArgPrefixes[Carrying] = Carrying()
     friction: Friction | None = None
     """Coulomb coefficient to judge with, before and after; if not given, the one planned for."""
-    unit: Literal["m", "cm", "mm", "in"] = "m"
-    """Unit of length in the mesh file of the changed part."""
+    lengths: OmitArgPrefixes[Lengths] = field(default_factory=Lengths)
     center_of_mass_m: Annotated[Point | None, arg(metavar="X Y Z")] = None
     """Centre of mass of the changed part in the file's frame, in metres; if not given, that of
     uniform density, or the old part's if that was given."""

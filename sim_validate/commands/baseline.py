@@ -3,8 +3,10 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from grasp_core.files.text_files import write_text
+from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import Checked, check
 from sim_validate.baselines.compare import Finding, Status, failing
@@ -29,8 +31,7 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     """Simulate grasps and write the results as a baseline, to compare later results with."""
     check_writable(command.out)
     saved = read_grasps(command.grasps)
-    source = source_of(saved, command.grasps, [command.out.parent], command.changed.object)
-    now = present(saved, command.grasps, source, _asked(command.changed))
+    now = _present(saved, command.grasps, command.out, command.changed)
     agenda = Agenda(
         random_wrenches=command.random_wrenches,
         wrenches=() if command.wrenches is None else wrenches_from_file(command.wrenches),
@@ -58,8 +59,7 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     before = read_baseline(command.baseline)
     path = command.grasps or command.baseline.parent / before.grasps_file
     saved = read_grasps(path)
-    source = source_of(saved, path, [command.baseline.parent], command.changed.object)
-    now = present(saved, path, source, _asked(command.changed))
+    now = _present(saved, path, command.baseline, command.changed, before.scale)
     now = now.against(before.shape)
     how = of_settings(before.settings, str(command.baseline))
     if command.setup is not None:
@@ -80,14 +80,31 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     return exit_code(done.findings, strict=command.strict)
 
 
-def _asked(given: baseline_flags.ChangedPart) -> IfChanged:
-    """Turn the flags about changed parts into their settings."""
-    return IfChanged(
+def _present(
+    saved: SavedGrasps,
+    grasps: Path,
+    baseline: Path,
+    given: baseline_flags.ChangedPart,
+    recorded_scale: float | None = None,
+) -> Present:
+    """Carry grasps over to their part as it is now, as the flags about changed parts ask for.
+
+    Args:
+        saved: The grasps.
+        grasps: Path of their file.
+        baseline: Path of the baseline, beside which the part may lie.
+        given: The flags.
+        recorded_scale: Scale of the part's file that the baseline holds, if any.
+    """
+    asked = IfChanged(
         refuse=given.refuse_changed_part,
         unit=given.unit,
+        scale=given.scale,
         distance_m=given.carrying.distance_m,
         angle_deg=given.carrying.angle_deg,
-    )
+    ).with_scale(recorded_scale)
+    source = source_of(saved, grasps, [baseline.parent], given.object, asked.scale)
+    return present(saved, grasps, source, asked)
 
 
 def _say_mesh(now: Present, reporter: Reporter) -> None:

@@ -158,7 +158,8 @@ def _asked(command: dataset_flags.Build) -> DatasetConfig:
 def _settings(settings: dataset_flags.Settings) -> dict[str, Any]:
     """Rename the flags' settings to the names that a dataset configuration has for them."""
     given = {each.name: getattr(settings, each.name) for each in fields(settings)}
-    return {"frictions": given.pop("friction") or (FRICTION,), **given}
+    lengths = asdict(given.pop("lengths"))
+    return {"frictions": given.pop("friction") or (FRICTION,), **lengths, **given}
 
 
 def is_mesh(path: Path) -> bool:

@@ -38,7 +38,7 @@ def transfer_file(command: transfer_flags.Transfer, reporter: Reporter) -> int:
     if not 1.0 / SURE_GROWTH <= (times := growth(saved.body, new)) <= SURE_GROWTH:
         reporter.warn(
             f"{command.part}: the changed part is {times:.4g} times as large as the old one; if "
-            "that is not so, say its unit with --unit"
+            "that is not so, say its unit with --unit, or its scale with --scale"
         )
     friction = saved.friction if command.friction is None else command.friction
     with alone_in(command.out), reporter.progress("carrying over"):
@@ -80,7 +80,7 @@ def _changed_part(command: transfer_flags.Transfer, old: Polyhedron) -> Polyhedr
     return load_object(
         command.part,
         flag_groups.Mesh(
-            unit=command.unit, faces="planar", center_of_mass_m=center, limits=command.limits
+            command.lengths, faces="planar", center_of_mass_m=center, limits=command.limits
         ),
     )
 

@@ -12,9 +12,10 @@ from datetime import date
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, cast, get_args
 
-from grasp_core.checked import LARGEST_FRICTION, MOST_RANDOM_WRENCHES
+from grasp_core.checked import LARGEST_FRICTION, MOST_RANDOM_WRENCHES, positive
 from grasp_core.errors import InputError
 from grasp_core.files.strict_json import place, shown
+from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.face import FaceKind
 from grasp_core.objects.polyhedron import UNITS_M
 from grasp_core.planning.request import METHODS, ConeKind
@@ -72,6 +73,8 @@ class DatasetConfig:
     cones: ConeKind = "tilted"
     unit: str = "m"
     """Unit of length in mesh files, such as `mm`."""
+    scale: float = 1.0
+    """Factor on the coordinates of mesh files, besides their unit."""
     faces: FaceKind = "auto"
     limits: LimitsKind = "none"
     """How the largest multiples of wrenches are found in simulation."""
@@ -105,6 +108,7 @@ class DatasetConfig:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frictions", tuple(map(float, self.frictions)))
+        object.__setattr__(self, "scale", positive(self.scale, "scale"))
         for name in ("objects", "frictions", "families"):
             values: tuple[object, ...] = getattr(self, name)
             twice = [value for value, count in Counter(values).items() if count > 1]
@@ -165,9 +169,18 @@ class DatasetConfig:
     @property
     def groups(self) -> dict[str, int]:
         """Groups of columns that the tables have on request, with their sizes."""
+        units = {} if self.scale == 1.0 else {"units": 1}
         if self.learning is None:
-            return {}
-        return self.learning.groups(executed=self.execution is not None)
+            return units
+        return units | self.learning.groups(executed=self.execution is not None)
+
+    def lengths_of(self, name: str) -> tuple[str, float]:
+        """Return unit and scale of an object: its own, or the usual ones, which are for files."""
+        of_file = Path(name).suffix.lower().lstrip(".") in FORMATS
+        scale = self.scale if of_file else 1.0
+        if self.learning is None:
+            return self.unit, scale
+        return self.learning.unit_of(name, self.unit), self.learning.scale_of(name, scale)
 
     @property
     def sha256(self) -> str:
@@ -211,6 +224,8 @@ def _typed(name: str, value: Any) -> Any:
     if name == LEARNING:
         return asked_learning(value)
     kinds = {**LISTS, **dict.fromkeys(LEAST, int), **dict.fromkeys(SWITCHES, bool)}
+    if name == "scale":  # checked by the class
+        return value
     wanted = kinds.get(name, str)
     if name not in LISTS:
         if not _is(value, wanted):

@@ -26,7 +26,8 @@ def object_row(body: Polyhedron, unit: WorkUnit) -> Mapping[str, Any]:
     asked, config = unit.config.learning, unit.config
     more: Mapping[str, Any] = {}
     if asked is not None:
-        more = object_cells(body, unit.object, asked, config.unit, config.seed)
+        more = object_cells(body, unit.object, asked, config.seed)
+    length, scale = config.lengths_of(unit.object)
     return {
         "object_id": body.content_sha256,
         "source_name": Path(unit.object).name,
@@ -39,5 +40,7 @@ def object_row(body: Polyhedron, unit: WorkUnit) -> Mapping[str, Any]:
         "volume_m3": body.volume,
         "radius_m": body.radius,
         "center_of_mass_m": body.center_of_mass.tolist(),
+        "unit": length,
+        "scale": scale,
         **more,
     }

@@ -17,6 +17,7 @@ from types import MappingProxyType
 
 from grasp_core.errors import GraspError, InputError
 from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.objects.face import FaceKind
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron, polyhedron_from_mesh
 from grasp_core.provenance import versions
 from scenes.example_objects import example_object
@@ -116,7 +117,9 @@ def units_of(config: DatasetConfig) -> list[WorkUnit]:
 
 def of_unit(config: DatasetConfig, name: str, friction: float) -> DatasetConfig:
     """Return the settings of one unit, whose size does not grow with the number of objects."""
-    learning = None if config.learning is None else config.learning.of_object(name)
+    learning = config.learning
+    if learning is not None:
+        learning = learning.of_object(name, config.lengths_of(name)[1])
     return replace(config, objects=(name,), frictions=(friction,), learning=learning)
 
 
@@ -135,8 +138,9 @@ def body_of(unit: WorkUnit) -> Polyhedron:
         MeshError: The mesh is not a solid.
         WorkerError: The file is missing, or has changed since the build began.
     """
+    length, scale = unit.config.lengths_of(unit.object)
     if unit.path is None:
-        return _scaled(example_object(unit.object), unit)
+        return _scaled(example_object(unit.object), scale, unit.config.faces)
     if not unit.path.is_file():
         raise WorkerError(
             f"{unit.path}: a worker process cannot find this mesh; all processes must share a "
@@ -146,22 +150,16 @@ def body_of(unit: WorkUnit) -> Polyhedron:
         raise WorkerError(
             f"{unit.path}: this mesh has changed since the build began; start the build again"
         )
-    config = unit.config
-    length = config.unit
-    if config.learning is not None:
-        length = config.learning.unit_of(unit.object, config.unit)
-    return _scaled(load_polyhedron(unit.path, unit=length, faces=config.faces), unit)
+    return load_polyhedron(unit.path, unit=length, scale=scale, faces=unit.config.faces)
 
 
-def _scaled(body: Polyhedron, unit: WorkUnit) -> Polyhedron:
-    """Return an object at the scale that is asked for."""
-    asked = unit.config.learning
-    scale = 1.0 if asked is None else asked.scale_of(unit.object)
+def _scaled(body: Polyhedron, scale: float, faces: FaceKind) -> Polyhedron:
+    """Return a built-in object at the scale that is asked for."""
     if scale == 1.0:
         return body
     return polyhedron_from_mesh(
         body.vertices * scale, body.triangles, name=body.name, source_sha256=body.source_sha256,
-        faces=unit.config.faces,
+        faces=faces,
     )  # fmt: skip
 
 

@@ -37,6 +37,7 @@ CALLS = [
     Call("gc.load_polyhedron", lambda: {"path": mesh_file()}, {
         "path": PATH,
         "unit": WORD,
+        "scale": POSITIVE,
         "flatness": VALUE,
         "faces": WORD,
         "patches": optional(VALUE),

@@ -157,6 +157,25 @@ def test_a_mesh_file_and_its_unit(here, capsys):
     assert json.loads((here / "p" / "grasps.json").read_text())["object"]["name"] == "part"
 
 
+def test_a_scale_multiplies_what_a_mesh_file_says(here, capsys):
+    import trimesh
+
+    body, said = scenes.example_object("wedge"), []
+    for name, size in (("part.obj", 1e3), ("double.obj", 2e3)):
+        trimesh.Trimesh(size * body.vertices, body.triangles).export(here / name)
+    for name, scale in (("part.obj", "1"), ("double.obj", "0.5")):
+        assert main(["inspect", name, "--unit", "mm", "--scale", scale, "--json"]) == Exit.GOOD
+        said.append(json.loads(capsys.readouterr().out))
+    assert said[0].pop("name") != said[1].pop("name")
+    assert said[0] == said[1]
+    assert said[0]["radius_m"] == pytest.approx(body.radius)
+    assert main(["inspect", "double.obj"]) == Exit.INPUT
+    assert "--scale" in capsys.readouterr().err
+    for refused in ("0", "-1", "inf", "nan", "half"):
+        assert main(["inspect", "double.obj", "--scale", refused]) == Exit.USAGE
+        assert "--scale" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
@@ -415,6 +434,7 @@ def test_plans_ordered_by_what_grasps_carry_show_it(capsys):
         (["--complete", "--family", "pencil"], "needs the free method"),
         (["--optimize", "--share-faces-m", "0.01"], "leave out --optimize or these"),
         (["--unit", "mm"], "box is a built-in object"),
+        (["--scale", "2"], "leave out --unit, --scale"),
     ],
 )
 @pytest.mark.usefixtures("here")

@@ -11,7 +11,11 @@ from pathlib import Path
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron
 from grasp_core.records.grasps_json import RECORDED, SavedGrasps
-from grasp_core.transferring.changed_part import fitting_unit, load_changed_part
+from grasp_core.transferring.changed_part import (
+    fitting_lengths,
+    fitting_unit,
+    load_changed_part,
+)
 from grasp_core.transferring.like_faces import check_planar, likeness
 from grasp_core.transferring.transfer import Transfer, transfer
 from sim_validate.baselines.parts.if_changed import CARRY, FAIL, IfChanged
@@ -81,12 +85,24 @@ class Present:
         )
 
     @property
-    def file_unit(self) -> str | None:
-        """Find the unit of a mesh file with planar faces, for a baseline; None without a file."""
-        if self.source.file is None or self.saved.body.patches is not None:
-            return None
-        known = self.unit or self.source.unit
-        return known or fitting_exactly(self.source.file, self.planned)
+    def scale(self) -> float:
+        """Return the factor on the coordinates of the mesh file, besides its unit."""
+        return self.asked.scale or 1.0
+
+    @property
+    def file_lengths(self) -> tuple[str | None, float | None]:
+        """Find the unit and the scale of a mesh file with planar faces, for a baseline.
+
+        Without a file they are None, and so is a scale of 1. A file that fits in no unit was read
+        with a scale that nobody says here: then it is taken to be in metres, times a scale.
+        """
+        file, scale = self.source.file, self.scale
+        if file is None or self.saved.body.patches is not None:
+            return None, None
+        unit = self.unit or self.source.unit or fitting_exactly(file, self.planned, scale)
+        if unit is None:
+            unit, scale = fitting_lengths(file, self.planned, RECORDED)
+        return unit, None if scale == 1.0 else scale
 
     @property
     def moves(self) -> Moves:
@@ -199,8 +215,9 @@ def _carried(saved: SavedGrasps, path: Path, file: Path, asked: IfChanged) -> tu
     """
     try:
         check_planar(saved.body, "the old part")
-        unit = asked.unit or fitting_unit(file, saved.body, RECORDED)
-        new = load_changed_part(file, saved.body, unit, RECORDED)
+        scale = asked.scale or 1.0
+        unit = asked.unit or fitting_unit(file, saved.body, RECORDED, scale=scale)
+        new = load_changed_part(file, saved.body, unit, RECORDED, scale=scale)
         return unit, transfer(
             saved.body, new, saved.grasps, saved.friction, distance=asked.distance_m,
             angle_deg=asked.angle_deg, finger=saved.finger,

@@ -1,10 +1,10 @@
 """Reads what to do if the mesh file of a part has changed or is missing."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, cast
 
-from grasp_core.checked import number, one_of, switch
+from grasp_core.checked import number, one_of, positive, switch
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import settings_of
 from grasp_core.files.strict_json import shown
@@ -32,6 +32,9 @@ class IfChanged:
     unit: str | None = None
     """Unit of length of the mesh file; None for the one in which the part is about as large as it
     was."""
+    scale: float | None = None
+    """Factor on the coordinates of the mesh file, besides its unit; None for that of the baseline,
+    or 1 without one."""
     distance_m: float | None = None
     """Largest distance by which a contact may move [m]; None for a twentieth of the part's radius.
     """
@@ -43,9 +46,15 @@ class IfChanged:
         one_of(self.missing, (NOTE, FAIL), "missing")
         if self.unit is not None:
             one_of(self.unit, UNITS_M, "unit")
+        if self.scale is not None:
+            positive(self.scale, "scale")
         if self.distance_m is not None:
             number(self.distance_m, "distance_m", least=0.0)
         number(self.angle_deg, "angle_deg", least=0.0, most=WIDEST_DEG)
+
+    def with_scale(self, recorded: float | None) -> "IfChanged":
+        """Return these settings with the scale that a baseline holds, if none is given."""
+        return replace(self, scale=recorded) if self.scale is None else self
 
 
 CARRY = IfChanged()

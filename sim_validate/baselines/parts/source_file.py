@@ -34,7 +34,11 @@ class Source:
 
 
 def source_of(
-    saved: SavedGrasps, grasps: Path, folders: Iterable[Path], named: Path | None = None
+    saved: SavedGrasps,
+    grasps: Path,
+    folders: Iterable[Path],
+    named: Path | None = None,
+    scale: float | None = None,
 ) -> Source:
     """Find the mesh file that grasps were planned from.
 
@@ -45,6 +49,7 @@ def source_of(
         grasps: Path of the file of grasps, for messages; its folder is searched first.
         folders: Further folders in which a mesh file with the object's name is searched.
         named: The mesh file if the user names it; then nothing else is searched.
+        scale: Factor on the coordinates of the file, besides its unit; None for 1.
 
     Raises:
         InputError: The named file is missing, or the grasps were not planned from a file.
@@ -59,7 +64,7 @@ def source_of(
         return Source()
     found = [named] if named is not None else _beside(body.name, [grasps.parent, *folders])
     for path in found:
-        if (unit := _unit_of_same(path, body)) is not None:
+        if (unit := _unit_of_same(path, body, scale)) is not None:
             return Source(file=path, unit=unit)
     if found:
         return Source(file=found[0], changed=True)
@@ -88,27 +93,29 @@ def _entries(folder: Path) -> list[Path]:
         return []
 
 
-def _unit_of_same(path: Path, body: Polyhedron) -> str | None:
+def _unit_of_same(path: Path, body: Polyhedron, scale: float | None) -> str | None:
     """Return the unit in which a file holds a body; None if it does not.
 
     Empty if the body was read from these very bytes, whatever their unit.
     """
     if hashlib.sha256(read_bytes(path)).hexdigest() == body.source_sha256:
         return ""
-    return fitting_exactly(path, body)
+    return fitting_exactly(path, body, scale)
 
 
-def fitting_exactly(path: Path, body: Polyhedron) -> str | None:
+def fitting_exactly(path: Path, body: Polyhedron, scale: float | None) -> str | None:
     """Return the unit in which a file holds the very solid of a body; None if it does in none."""
-    same = (unit for unit in UNITS_M if _content(path, unit, body) == body.content_sha256)
-    return next(same, None)
+    units = (unit for unit in UNITS_M if _content(path, unit, scale, body) == body.content_sha256)
+    return next(units, None)
 
 
-def _content(path: Path, unit: str, body: Polyhedron) -> str:
+def _content(path: Path, unit: str, scale: float | None, body: Polyhedron) -> str:
     """Hash the solid in a file; empty if the file holds no solid in this unit."""
     faces = "planar" if body.patches is None else "patches"
     try:
-        read = load_polyhedron(path, unit=unit, faces=faces, patches=body.patches, limits=RECORDED)
+        read = load_polyhedron(
+            path, unit=unit, scale=scale or 1.0, faces=faces, patches=body.patches, limits=RECORDED
+        )
     except MeshError:
         return ""
     return read.content_sha256

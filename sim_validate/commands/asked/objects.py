@@ -27,7 +27,8 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
         given = mesh.limits
         return load_polyhedron(
             path,
-            unit=mesh.unit,
+            unit=mesh.lengths.unit,
+            scale=mesh.lengths.scale,
             faces=mesh.faces,
             patches=PatchLimits(mesh.patch_spread_deg, mesh.patch_depth, mesh.patches),
             center_of_mass=mesh.center_of_mass_m,
@@ -45,7 +46,7 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
         )
     if replace(mesh, limits=flag_groups.MeshLimits()) != flag_groups.Mesh():
         raise InputError(
-            f"{name} is a built-in object, so leave out --unit, --faces, --patches, "
+            f"{name} is a built-in object, so leave out --unit, --scale, --faces, --patches, "
             "--patch-spread-deg, --patch-depth and --center-of-mass-m, which say how mesh files "
             "are read"
         )

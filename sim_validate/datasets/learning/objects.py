@@ -21,23 +21,18 @@ COMPACT, LONG = 0.6, 0.5
 middle to the longest side of a long one; others are flat."""
 
 
-def object_cells(
-    body: Polyhedron, name: str, asked: Learning, unit: str, seed: int
-) -> Mapping[str, Any]:
+def object_cells(body: Polyhedron, name: str, asked: Learning, seed: int) -> Mapping[str, Any]:
     """Return the cells of an object's row that are there on request.
 
     Args:
         body: The object.
         name: A mesh file as it was given, or the name of a built-in object.
         asked: What is asked for.
-        unit: Unit of mesh files that have none of their own.
         seed: Seed of the points.
     """
     cells: dict[str, Any] = {
         "shape_class": asked.classes.get(Path(name).name, shape_class(body)),
         "box_sides_m": box_sides(body).tolist(),
-        "unit": asked.unit_of(name, unit),
-        "scale": asked.scale_of(name),
     }
     if asked.points:
         points, normals = cloud(body, asked.points, seed)

@@ -65,7 +65,8 @@ class Learning:
     units: dict[str, str] = field(default_factory=dict[str, str])
     """Length of one unit in a mesh file, by the file's name; others have that of the dataset."""
     scales: dict[str, float] = field(default_factory=dict[str, float])
-    """Factor by which an object is scaled besides, by its name or its file's."""
+    """Factor by which an object is scaled besides, by its name or its file's; other files have that
+    of the dataset."""
     classes: dict[str, str] = field(default_factory=dict[str, str])
     """Class of an object's shape, by its name or its file's; others get one by their geometry."""
     synthetic: int = CONTROLS
@@ -114,19 +115,24 @@ class Learning:
         in_name = path.with_suffix("").suffix[1:] if self.units_in_names else ""
         return self.units.get(path.name, in_name if in_name in UNITS_M else usual)
 
-    def scale_of(self, name: str) -> float:
-        """Return the factor by which an object is scaled."""
-        return self.scales.get(Path(name).name, 1.0)
+    def scale_of(self, name: str, usual: float = 1.0) -> float:
+        """Return the factor by which an object is scaled: of the table, or the usual one."""
+        return self.scales.get(Path(name).name, usual)
 
-    def of_object(self, name: str) -> "Learning":
-        """Return the settings of one object, whose size does not grow with the number of all."""
+    def of_object(self, name: str, scale: float) -> "Learning":
+        """Return the settings of one object, whose size does not grow with the number of all.
+
+        Args:
+            name: A mesh file, or the name of a built-in object.
+            scale: The factor by which it is scaled.
+        """
         own = Path(name).name
         kept = {
             table: {key: value for key, value in getattr(self, table).items() if key == own}
             for table in BY_NAME
         }
         if self.has_units:  # so that all units of work have the same columns
-            kept["scales"] = {own: self.scale_of(name)}
+            kept["scales"] = {own: scale}
         return replace(self, **kept)
 
     def check_names(self, names: Sequence[str]) -> None:

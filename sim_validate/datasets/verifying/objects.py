@@ -21,24 +21,23 @@ ON_IT = 1e-9
 
 
 def object_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> Iterator[str]:
-    """Yield sentences on what is wrong with the shapes, points and resting poses of objects.
+    """Yield sentences on what is wrong with the units, shapes, points and rests of objects.
 
     Raises:
         InputError: An object's mesh is damaged.
     """
     asked = config.learning
-    if asked is None:
-        return
     for row in rows["objects"]:
         name = row["source_name"]
+        if "scale" in row and (row["unit"], row["scale"]) != config.lengths_of(name):
+            yield f"objects: unit and scale of {name} are not those of the settings"
+        if asked is None:
+            continue
         body = stored_body(folder, row["object_id"], name, config.faces)
         if row["shape_class"] != asked.classes.get(name, shape_class(body)):
             yield f"objects: shape_class of {name} is not that of its mesh"
         if not np.allclose(row["box_sides_m"], box_sides(body), rtol=0.0, atol=SAME * body.radius):
             yield f"objects: box_sides_m of {name} are not those of its mesh"
-        own = (asked.unit_of(name, config.unit), asked.scale_of(name))
-        if "scale" in row and (row["unit"], row["scale"]) != own:
-            yield f"objects: unit and scale of {name} are not those of the settings"
         if asked.points and not _are_on(row, body):
             yield f"objects: cloud_points_m of {name} are not on it, or not with its normals"
         if asked.rests and not _are_rests(rows, body):

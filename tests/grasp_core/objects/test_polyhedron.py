@@ -35,6 +35,21 @@ def test_the_unit_scales_lengths(box, tmp_path):
         gc.load_polyhedron(tmp_path / "box.stl", unit="furlong")
 
 
+def test_a_scale_multiplies_the_coordinates_of_a_file_besides_its_unit(box, tmp_path):
+    path = tmp_path / "box.obj"
+    box.copy().apply_scale(2000.0).export(path)
+    for lengths in ({"unit": "mm", "scale": 0.5}, {"scale": 5e-4}, {"unit": "cm", "scale": 0.05}):
+        body = gc.load_polyhedron(path, **lengths)
+        assert body.volume == pytest.approx(0.006, rel=1e-6)
+    assert gc.load_polyhedron(path, unit="mm").volume == pytest.approx(0.048, rel=1e-6)
+    for scale in (0.0, -1.0, np.inf, np.nan, 1e10, "2", True):
+        with pytest.raises(gc.InputError, match=r"scale must be a number from 1e-09"):
+            gc.load_polyhedron(path, unit="mm", scale=scale)
+    for scale in (1.0, 1e-7):
+        with pytest.raises(gc.MeshError, match=r"--unit .*--scale"):
+            gc.load_polyhedron(path, scale=scale)
+
+
 def test_the_content_hash_ignores_names_and_orders(box, tmp_path):
     rng = np.random.default_rng(0)
     body = polyhedron_from_mesh(box.vertices, box.faces, name="one")

@@ -41,6 +41,15 @@ def transfer(folder, part, *more):
     return main(["transfer", str(grasps), str(folder / part), "--unit", "mm", *more])
 
 
+def test_a_scale_is_that_of_the_changed_part(folder, tmp_path, capsys):
+    moved = with_face_moved(example_object("box"), 3, 1e-3)
+    write_text(tmp_path / "odd.obj", obj((4e3 * moved.vertices).tolist(), moved.triangles.tolist()))
+    assert transfer(folder, tmp_path / "odd.obj") == Exit.NONE
+    assert "say its unit with --unit, or its scale with --scale" in capsys.readouterr().err
+    assert transfer(folder, tmp_path / "odd.obj", "--scale", "0.25") == Exit.GOOD
+    assert "6 of 6 grasps were carried over" in capsys.readouterr().out
+
+
 def test_it_writes_grasps_and_what_became_of_them(folder, tmp_path, capsys):
     assert transfer(folder, "moved.obj", "--out", str(tmp_path / "new")) == Exit.GOOD
     said = capsys.readouterr().out

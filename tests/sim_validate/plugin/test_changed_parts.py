@@ -387,6 +387,64 @@ def test_a_part_saved_in_another_unit_is_said_to_be(project, digits):
     assert "its numbers" not in run_pytest(project)[1]
 
 
+ODD = 0.00026824
+"""A scale of an object in a public collection."""
+
+
+@pytest.fixture
+def odd(parted, tmp_path):
+    """A part in no unit, grasps planned on it with a scale, and their baseline."""
+    copied(parted, tmp_path)
+    rescaled(tmp_path, 1e-3 / ODD, 15)
+    body = gc.load_polyhedron(tmp_path / "part.obj", scale=ODD)
+    (grasp,) = grasps_from_json((parted / "grasps.json").read_text()).grasps
+    plan = gc.plan(body, 0.5, families=("concurrent",))
+    chosen = tuple(each for each in plan.grasps if each.faces == grasp.faces)
+    text = plan_to_json(body, dataclasses.replace(plan, grasps=chosen[:1]))
+    grasps = write_text(tmp_path / "grasps.json", text)
+    baseline = tmp_path / "part.baseline.json"
+    assert main(["baseline", "record", str(grasps), "-o", str(baseline), "-q"]) == Exit.GOOD
+    return tmp_path
+
+
+def test_a_baseline_keeps_the_scale_of_its_part(odd, capsys):
+    """The scale is found from the part and its file, and again used where the file has changed."""
+    path = odd / "part.baseline.json"
+    record = json.loads(path.read_text())
+    assert (record["unit"], record["scale"]) == ("m", ODD)
+    part = odd / "part.obj"
+    write_text(part, "# exported again\n" + part.read_text())
+    check = ["baseline", "check", str(path)]
+    assert main(check) == Exit.GOOD
+    assert "has changed" not in capsys.readouterr().out
+    edited(odd, 1e-3 / ODD)
+    assert main([*check, "--bless"]) == Exit.GOOD
+    assert f"{part} has changed: {FACE} moved 1.00 mm" in " ".join(capsys.readouterr().out.split())
+    record = json.loads(path.read_text())
+    assert (record["unit"], record["scale"]) == ("m", ODD)
+    code, said = run_pytest(odd)
+    assert code == 0, said
+    assert main([*check, "--scale", "1"]) == Exit.INPUT
+    said = capsys.readouterr().err
+    assert "the unit of the changed part is not clear" in said
+    assert "the scale if it has one" in said
+
+
+def test_a_scale_is_said_where_a_changed_part_has_no_baseline(odd):
+    edited(odd, 1e-3 / ODD)
+    with pytest.raises(ChangedPartError, match="the scale if it has one"):
+        grasp_cases(odd, ["grasps.json"], {})
+    volume = gc.load_polyhedron(odd / "part.obj", scale=ODD).volume
+    for args, settings in (
+        (["grasps.json"], {"changed_part": {"scale": ODD}}),
+        ([], {"object": "part.obj", "scale": ODD}),
+    ):
+        (case,) = grasp_cases(odd, args, settings)
+        assert case.body.volume == pytest.approx(volume, rel=1e-12)
+    with pytest.raises(gc.InputError, match=r"changed_part.*scale"):
+        grasp_cases(odd, ["grasps.json"], {"changed_part": {"scale": 0.0}})
+
+
 def test_a_shifted_part_is_said_to_be_shifted(project):
     part = project / "part.obj"
     rows = [row.split() for row in part.read_text().splitlines()]

@@ -13,17 +13,22 @@ import trimesh
 
 import grasp_core as gc
 import sim_validate
+from scenes.example_objects import example_object
+from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets import table_files
 from sim_validate.datasets.building import build as build_module
 from sim_validate.datasets.building.build import build
 from sim_validate.datasets.building.worker import Limits
-from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.config import DatasetConfig, config_from_toml
 from sim_validate.datasets.units import units_of
 from sim_validate.datasets.verifying.redo import Sample
 from sim_validate.datasets.verifying.verify import verify
+from sim_validate.main import main
 from sim_validate.parallel.processes import local_processes
 from tests.marks import more
 from tests.sim_validate.datasets.engines import Here, WorkerEndedError, contents, silent
+from tests.sim_validate.datasets.forging import forged
+from tests.sim_validate.datasets.learned import rows_of
 from tests.sim_validate.datasets.pair import CONFIG, all_rows
 
 pytest.importorskip("pyarrow")
@@ -55,6 +60,25 @@ def test_its_tables_are_the_same_bytes_in_another_order(dataset, tmp_path):
     tables = {path for path in before if path.startswith("data/")}
     assert len(tables) >= 3
     assert tables == {path for path in after if path.startswith("data/")}
+
+
+def test_mesh_files_have_the_scale_that_is_asked_for(tmp_path):
+    """The tables say it, and later builds of the dataset's own configuration keep it."""
+    body = example_object("tetrahedron")
+    mesh, out = tmp_path / "mesh.obj", tmp_path / "ds"
+    trimesh.Trimesh(2e3 * body.vertices, body.triangles).export(mesh)
+    line = ["dataset", "build", str(mesh), "wedge", "--limit", "1", "--family", "concurrent"]
+    lengths = ["--unit", "mm", "--scale", "0.5"]
+    assert main([*line, *lengths, "--jobs", "1", "--out", str(out), "-q"]) == Exit.GOOD
+    rows = {row["source_name"]: row for row in rows_of(out, "objects")}
+    assert rows["mesh.obj"]["radius_m"] == pytest.approx(body.radius, rel=1e-6)
+    assert [(rows[name]["unit"], rows[name]["scale"]) for name in ("mesh.obj", "wedge")] == [
+        ("mm", 0.5), ("mm", 1.0)
+    ]  # fmt: skip
+    assert config_from_toml(out / "config.toml").scale == 0.5
+    assert verify(out) == []
+    forged(out, "objects", lambda rows: rows[0].update(scale=0.25))
+    assert any("unit and scale of" in fault for fault in verify(out))
 
 
 @pytest.mark.parametrize("killed_at", [0, 3, *more(1, 2)])

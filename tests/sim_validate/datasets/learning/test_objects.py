@@ -12,6 +12,7 @@ from sim_validate.datasets.describing.card import CARD
 from sim_validate.datasets.learning.objects import box_sides, cloud, rest_rows, shape_class
 from sim_validate.datasets.learning.settings import Learning
 from sim_validate.datasets.learning.splitting import assigned
+from sim_validate.datasets.object_rows import object_row
 from sim_validate.datasets.units import body_of, units_of
 from sim_validate.datasets.verifying.verify import verify
 from tests.sim_validate.datasets.forging import forged
@@ -131,6 +132,28 @@ def test_units_and_scales_of_files_are_their_own(tmp_path):
     )  # fmt: skip
     longest = {unit.path.name: box_sides(body_of(unit))[0] for unit in units_of(config)}
     assert longest == pytest.approx({"a.mm.obj": 0.003, "b.obj": 0.06, "c.in.obj": 3.0}, rel=1e-6)
+
+
+def test_the_scale_of_a_dataset_is_for_files_without_one_of_their_own(tmp_path):
+    text = gc.Polyhedron.to_trimesh(box(0.01, 0.02, 0.03)).export(file_type="obj")
+    paths = [tmp_path / name for name in ("a.obj", "b.obj")]
+    for number, path in enumerate(paths):
+        path.write_text(f"# {number}\n{text}", encoding="utf-8")
+    for learning, own in ((None, 0.5), (Learning(scales={"b.obj": 2.0}), 2.0)):
+        config = DatasetConfig(
+            objects=(*map(str, paths), "wedge"), scale=0.5, unit="m", learning=learning
+        )
+        units = {unit.object: unit for unit in units_of(config)}
+        longest = [box_sides(body_of(units[str(path)]))[0] for path in paths]
+        assert longest == pytest.approx([0.015, 0.03 * own], rel=1e-6)
+        assert body_of(units["wedge"]) == example_object("wedge")
+        rows = [object_row(body_of(unit), unit) for unit in units.values()]
+        assert {(row["source_name"], row["unit"], row["scale"]) for row in rows} == {
+            ("a.obj", "m", 0.5), ("b.obj", "m", own), ("wedge", "m", 1.0)
+        }  # fmt: skip
+        names = [[each.name for each in unit.config.tables["objects"]] for unit in units.values()]
+        assert all({"unit", "scale"} < {*columns} for columns in names)
+        assert len(set(map(tuple, names))) == 1
 
 
 def test_a_unit_does_not_depend_on_the_tables_of_other_objects():
