@@ -1,8 +1,8 @@
 """Checks a triangle mesh and finds its faces, or refuses it with a reason.
 
-First come the numbers of the file, then `sound_surface` makes one surface of the triangles, and then
-faces are found on it: exact planar ones, which need a closed surface, or nearly flat patches, which
-do not. The notes say what was changed.
+First come the numbers of the file, then `sound_surface` makes one surface of the triangles, and
+then faces are found on it: exact planar ones, which need a closed surface, or nearly flat patches,
+which do not. The notes say what was changed.
 """
 
 import hashlib
@@ -41,8 +41,8 @@ SURROUNDINGS = 1e-6
 """Largest distance of a given centre of mass from the object's bounding box, relative to the
 extent."""
 MARGIN = 8.0
-"""Number of rounding errors of a coordinate that a corner of a face may be off its plane: twice that
-of a corner and of a plane through three corners, in all three coordinates."""
+"""Number of rounding errors of a coordinate that a corner of a face may be off its plane: a corner
+may be off by the root of three, and a plane through three of them as far from a fourth by more."""
 COARSEST = 1e-3
 """Largest distance from a plane, relative to the extent, that is explained by rounding: in a file
 that is coarser than this, shapes and rounding cannot be told apart."""
@@ -171,7 +171,7 @@ def _uneven(
 
 
 def _flatness(rounding: float, asked: float | None, extent: float) -> float:
-    """Return the distance from a plane that rounding explains; 0 where it is next to nothing [m]."""
+    """Return the distance from a plane that rounding explains, 0 if next to nothing [m]."""
     if asked is not None:
         return asked
     explained = min(MARGIN * rounding, COARSEST * extent)

@@ -30,8 +30,8 @@ SIDES = 2
 """Number of triangles that meet at an edge of a closed surface."""
 
 PLANAR = 1e-6
-"""Largest distance from a plane, relative to the extent, that always counts as in it: some ten times
-the rounding of single precision."""
+"""Largest distance from a plane, relative to the extent, that always counts as in it: some ten
+times the rounding of single precision."""
 FITS = 3
 """Number of times that a plane is fitted again to a group of triangles with rounded corners."""
 NO_CAPS = np.empty(0, dtype=np.int64)

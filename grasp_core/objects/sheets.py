@@ -63,7 +63,7 @@ def outward_sheets(points: Array, corners: Indices, *, largest_part: bool) -> Sh
     unsound = float(sizes[~sound].sum()) / whole
     if unsound > SMALL and mean > CERTAIN:
         raise _crossing(unsound)
-    if unsound > SMALL or not CERTAIN <= mean:
+    if unsound > SMALL or not mean >= CERTAIN:
         raise MeshError(
             MeshRefusal.OPEN,
             "the surface is open, and it is not certain which side is inside: the mean winding "

@@ -99,7 +99,7 @@ def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.boo
         np.bincount(part, weights=weight, minlength=len(corners))
         for weight in (areas, areas * turned)
     )
-    turned ^= (swept > 0.5 * size)[part]  # noqa: PLR2004 - half of the area
+    turned ^= (swept > 0.5 * size)[part]
     return np.where(turned[:, None], corners[:, ::-1], corners), turned
 
 

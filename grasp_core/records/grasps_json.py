@@ -15,9 +15,11 @@ from grasp_core.angles import radians_of
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import text_of
 from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.objects.build import MeshChoices
 from grasp_core.objects.face import PatchLimits
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
+from grasp_core.objects.surface import Surface
 from grasp_core.planning.certify import check_witness, find_critical_frictions
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import MethodCounts, Moved, Outcomes, Plan, PlanCounts
@@ -25,7 +27,7 @@ from grasp_core.provenance import versions
 from grasp_core.values import Contact, ContactRegion, ForceCone, Grasp, Witness, four
 
 if TYPE_CHECKING:
-    from grasp_core.records.grasps_schema import GraspRecord, GraspsRecord
+    from grasp_core.records.grasps_schema import GraspRecord, GraspsRecord, SurfaceRecord
 
 SCHEMA = 1
 SAME_DIRECTION = 1e-6
@@ -62,6 +64,7 @@ def plan_to_json(body: Polyhedron, plan: Plan) -> str:
                 "triangles": body.triangles.tolist(),
             },
             "center_of_mass_m": body.center_of_mass.tolist(),
+            "surface": surface_record(body.surface),
             "patches": None if body.patches is None else asdict(body.patches),
         },
         "friction": plan.friction,
@@ -85,6 +88,21 @@ def plan_to_json(body: Polyhedron, plan: Plan) -> str:
         "grasps": [_grasp_to_record(grasp) for grasp in plan.grasps],
     }
     return text_of(document)
+
+
+def surface_record(surface: Surface) -> dict[str, object]:
+    """Return what is known of a surface as the fields of a `SurfaceRecord`."""
+    return {**asdict(surface), "caps": surface.caps.tolist(), "repairs": list(surface.repairs)}
+
+
+def surface_of_record(record: "SurfaceRecord") -> Surface:
+    """Return what a record says of a surface.
+
+    Raises:
+        InputError: A number is out of range.
+    """
+    known = record.model_dump()
+    return Surface(**{**known, "repairs": tuple(known["repairs"])})
 
 
 def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:
@@ -189,15 +207,19 @@ def _record_of(text: str) -> "GraspsRecord":
 
 def _body_of(record: "GraspsRecord") -> Polyhedron:
     mesh, patches = record.object.mesh, record.object.patches
+    choices = MeshChoices(
+        faces="patches" if patches else "planar",
+        patches=PatchLimits(**patches.model_dump()) if patches else None,
+        limits=RECORDED,
+    )
     body = polyhedron_from_mesh(
         mesh.vertices_m,
         mesh.triangles,
+        choices,
         name=record.object.name,
         source_sha256=record.object.source_sha256,
-        faces="patches" if patches else "planar",
-        patches=PatchLimits(**patches.model_dump()) if patches else None,
         center_of_mass=record.object.center_of_mass_m,
-        limits=RECORDED,
+        known=surface_of_record(record.object.surface),
     )
     if body.content_sha256 != record.object.content_sha256:
         raise InputError(

@@ -31,6 +31,26 @@ class PatchesRecord(_Record):
     most: int
 
 
+class SurfaceRecord(_Record):
+    """What is known of the triangles; see `Surface`."""
+
+    closed: bool = True
+    """Whether they enclose a solid; if not, the centre of mass is that of the convex hull unless it
+    was given."""
+    caps: list[Annotated[int, Field(ge=0)]] = []
+    """Numbers of the triangles that close small holes, where no finger may stand."""
+    holes: Annotated[int, Field(ge=0)] = 0
+    largest_hole_m: Annotated[Finite, Field(ge=0.0)] = 0.0
+    volume_error: Annotated[Finite, Field(ge=0.0)] = 0.0
+    """Share of the volume that the holes may hide."""
+    dropped: Annotated[Finite, Field(ge=0.0, le=1.0)] = 0.0
+    """Share of the surface that was left out."""
+    flatness_m: Annotated[Finite, Field(ge=0.0)] = 0.0
+    """Distance within which corners count as in one plane, where rounding explains it."""
+    center_given: bool = False
+    repairs: list[str] = []
+
+
 class ObjectRecord(_Record):
     """The object that the grasps were planned on."""
 
@@ -39,6 +59,7 @@ class ObjectRecord(_Record):
     content_sha256: str
     mesh: MeshRecord
     center_of_mass_m: Triple
+    surface: SurfaceRecord = SurfaceRecord()
     patches: PatchesRecord | None = None
     """Limits of patches on a curved surface; None where faces are exactly planar."""
 

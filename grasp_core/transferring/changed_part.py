@@ -15,19 +15,15 @@ from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
-from grasp_core.objects.booleans import Solid
 from grasp_core.objects.build import DEFAULT_LIMITS
-from grasp_core.objects.mass import mass_properties
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
+from grasp_core.objects.shells import SMALL
 
 SURE_GROWTH = 1.5
 """Largest ratio of the two sizes at which the unit is sure: an inch and a centimetre, the two units
 nearest to each other, differ by 2.54, which is more than the square of it."""
 SAME = 1e-6
 """Largest relative difference of two lengths that differ by rounding and joined vertices only."""
-GIVEN = 1e-7
-"""Distance of a centre of mass from that of uniform density, relative to the part's radius, above
-which it was given by the user."""
 
 
 def load_changed_part(
@@ -55,19 +51,19 @@ def load_changed_part(
     """
     center = given_center(old)
     return load_polyhedron(
-        path, unit=unit, scale=scale, faces="planar", center_of_mass=center, limits=limits
+        path,
+        unit=unit,
+        scale=scale,
+        faces="planar",
+        largest_part=old.surface.dropped > SMALL,
+        center_of_mass=center,
+        limits=limits,
     )
 
 
 def given_center(body: Polyhedron) -> Array | None:
-    """Return the centre of mass of a part with planar faces if it is not that of uniform density.
-
-    Args:
-        body: A closed solid.
-    """
-    uniform = mass_properties(Solid(body.vertices, body.triangles)).center
-    off = float(np.linalg.norm(body.center_of_mass - uniform))
-    return body.center_of_mass if off > GIVEN * body.radius else None
+    """Return the centre of mass of a part if it was given and is not that of uniform density."""
+    return body.center_of_mass if body.surface.center_given else None
 
 
 def growth(old: Polyhedron, new: Polyhedron) -> float:

@@ -31,7 +31,10 @@ def baseline_to_json(baseline: Baseline) -> str:
     lines = ",\n  ".join(
         json.dumps(fields_of(entry), allow_nan=False) for entry in baseline.entries
     )
-    part = "" if baseline.part is None else f' "part": {json.dumps(asdict(baseline.part))},\n'
+    part = ""
+    if (now := baseline.part) is not None:
+        record = asdict(now) | {"surface": now.surface.model_dump()}
+        part = f' "part": {json.dumps(record)},\n'
     return f'{head},\n{part} "grasps": [\n  {lines}\n ]\n}}\n'
 
 

@@ -111,7 +111,12 @@ class Mesh:
     """Largest distance of the surface from a patch's plane, relative to the object's extent."""
     center_of_mass_m: Annotated[Point | None, arg(metavar="X Y Z")] = None
     """Centre of mass in the file's frame, in metres. If not given, it is that of uniform density,
-    or of the convex hull where the surface has holes."""
+    or of the convex hull where the surface has large holes."""
+    flatness_m: NotNegative | None = None
+    """Distance within which corners count as in one plane [m]. If not given, it is a millionth of
+    the extent, or what the rounding of the file's coordinates explains."""
+    largest_part: bool = False
+    """Use the largest part of the mesh alone; otherwise at most 1 % of its surface is left out."""
     limits: OmitArgPrefixes[MeshLimits] = MeshLimits()
 
 

@@ -12,6 +12,7 @@ from grasp_core.objects.face import Face
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
+from grasp_core.records.grasps_json import surface_record
 from grasp_core.short_text import vector
 from grasp_core.transferring.face_places import face_in_words
 from scenes.drawing.pictures import MOST_NUMBERED, write_object_picture
@@ -43,6 +44,7 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
         "largest_spread_deg": math.degrees(max((face.spread for face in body.faces), default=0.0)),
         "largest_depth_m": max((face.depth for face in body.faces), default=0.0),
         "volume_m3": body.volume,
+        "surface": surface_record(body.surface) | {"volume_source": body.surface.volume_source},
         "radius_m": body.radius,
         "center_of_mass_m": body.center_of_mass.tolist(),
         "spanning_quadruples": spanning,
@@ -89,7 +91,8 @@ def _sentences(body: Polyhedron, spanning: int | None) -> Iterator[str]:
     yield f"The mesh has {len(body.vertices)} vertices and {len(body.triangles)} triangles."
     yield _on_faces(body)
     yield (
-        f"It encloses a volume of {CM3 * body.volume:.4g} cm^3, and reaches "
+        f"{'It' if body.surface.closed else 'Its convex hull'} encloses a volume of "
+        f"{CM3 * body.volume:.4g} cm^3, and it reaches "
         f"{MM * body.radius:.4g} mm from its centre of mass, which is at "
         f"{vector(np.round(MM * body.center_of_mass, 3))} mm."
     )

@@ -5,6 +5,7 @@ from pathlib import Path
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.shells import SMALL
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.short_text import counted
 from grasp_core.transferring.changed_part import SURE_GROWTH, given_center, growth
@@ -80,7 +81,11 @@ def _changed_part(command: transfer_flags.Transfer, old: Polyhedron) -> Polyhedr
     return load_object(
         command.part,
         flag_groups.Mesh(
-            command.lengths, faces="planar", center_of_mass_m=center, limits=command.limits
+            command.lengths,
+            faces="planar",
+            center_of_mass_m=center,
+            largest_part=old.surface.dropped > SMALL,
+            limits=command.limits,
         ),
     )
 

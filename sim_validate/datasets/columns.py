@@ -41,6 +41,12 @@ OBJECTS = (
     Column("faces", "int", "number of planar faces or patches"),
     Column("curved", "bool", "whether the faces are patches of a curved surface"),
     Column("volume_m3", "float", "volume", "m3"),
+    Column(
+        "volume_source",
+        "text",
+        "what volume and centre of mass are of: the surface, the "
+        "capped surface (small holes were closed), or the convex hull (it is open)",
+    ),
     Column("radius_m", "float", "largest distance of a vertex from the centre of mass", "m"),
     Column("center_of_mass_m", "float", "centre of mass", "m", (3,)),
 )

@@ -1,24 +1,37 @@
 """Writes and reads the meshes of a dataset: files in metres that give exactly the same solid."""
 
+import hashlib
+import json
 from dataclasses import replace
 from pathlib import Path
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
+from grasp_core.files.complaints import record_of
 from grasp_core.mesh_files.reading import read_triangles
-from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
+from grasp_core.objects.build import DEFAULT_LIMITS, MeshChoices, content_hash
 from grasp_core.objects.face import FaceKind
-from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
+from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
+from grasp_core.records.grasps_json import surface_of_record, surface_record
+from grasp_core.records.grasps_schema import SurfaceRecord
 from sim_validate.files.paths import path_inside
 
 FOLDER = "meshes"
 
 
+SURFACE = "# surface "
+"""Beginning of the first line, a comment that says what is known of the triangles."""
+
+
 def mesh_text(body: Polyhedron) -> str:
-    """Write a solid as an OBJ file in metres, whose numbers read back unchanged."""
+    """Write a solid as an OBJ file in metres, whose numbers read back unchanged.
+
+    Its first line is a comment with what is known of its surface, as in a `grasps.json`.
+    """
+    said = SURFACE + json.dumps(surface_record(body.surface), sort_keys=True)
     points = [f"v {x!r} {y!r} {z!r}\n" for x, y, z in body.vertices.tolist()]
     triangles = [f"f {i} {j} {k}\n" for i, j, k in (body.triangles + 1).tolist()]
-    return "".join(points + triangles)
+    return "".join([said, "\n", *points, *triangles])
 
 
 def mesh_path(folder: Path, object_id: str) -> Path:
@@ -61,10 +74,16 @@ def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Pol
         InputError: The mesh is that of another object.
     """
     path = mesh_path(folder, object_id)
-    body = load_polyhedron(path, faces=faces)
+    mesh = read_triangles(path, DEFAULT_LIMITS)
+    said, known = mesh.data.partition(b"\n")[0].decode("utf-8", "replace"), None
+    if said.startswith(SURFACE):
+        text = said.removeprefix(SURFACE)
+        known = surface_of_record(record_of(SurfaceRecord, text, f"{path}, line 1"))
+    choices = MeshChoices(faces)
+    body = polyhedron_from_mesh(mesh.vertices, mesh.triangles, choices, name=name, known=known)
     if body.content_sha256 != object_id:
         raise InputError(
             f"{path}: this is the mesh of another object, whose hash is {body.content_sha256}; "
             "see `graspproof dataset verify`"
         )
-    return replace(body, name=name)
+    return replace(body, source_sha256=hashlib.sha256(mesh.data).hexdigest())

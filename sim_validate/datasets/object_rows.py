@@ -38,6 +38,7 @@ def object_row(body: Polyhedron, unit: WorkUnit) -> Mapping[str, Any]:
         "faces": len(body.faces),
         "curved": body.patches is not None,
         "volume_m3": body.volume,
+        "volume_source": body.surface.volume_source,
         "radius_m": body.radius,
         "center_of_mass_m": body.center_of_mass.tolist(),
         "unit": length,

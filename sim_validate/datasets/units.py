@@ -17,6 +17,7 @@ from types import MappingProxyType
 
 from grasp_core.errors import GraspError, InputError
 from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.objects.build import MeshChoices
 from grasp_core.objects.face import FaceKind
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron, polyhedron_from_mesh
 from grasp_core.provenance import versions
@@ -158,9 +159,12 @@ def _scaled(body: Polyhedron, scale: float, faces: FaceKind) -> Polyhedron:
     if scale == 1.0:
         return body
     return polyhedron_from_mesh(
-        body.vertices * scale, body.triangles, name=body.name, source_sha256=body.source_sha256,
-        faces=faces,
-    )  # fmt: skip
+        body.vertices * scale,
+        body.triangles,
+        MeshChoices(faces),
+        name=body.name,
+        source_sha256=body.source_sha256,
+    )
 
 
 def is_mesh_file(name: str) -> bool:

@@ -13,8 +13,10 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from grasp_core.errors import InputError
+from grasp_core.objects.build import MeshChoices
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
-from grasp_core.records.grasps_json import RECORDED
+from grasp_core.records.grasps_json import RECORDED, surface_of_record, surface_record
+from grasp_core.records.grasps_schema import SurfaceRecord
 from sim_validate.baselines.executions import STRICT
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -30,6 +32,8 @@ class RecordedPart:
     vertices_m: tuple[tuple[Finite, Finite, Finite], ...]
     """Vertices of the changed part [m]."""
     triangles: tuple[tuple[Index, Index, Index], ...]
+    surface: SurfaceRecord = SurfaceRecord()
+    """What is known of them."""
 
     def body(self, name: str, content_sha256: str) -> Polyhedron:
         """Build the part, with planar faces.
@@ -43,7 +47,11 @@ class RecordedPart:
         """
         try:
             found = polyhedron_from_mesh(
-                self.vertices_m, self.triangles, name=name, faces="planar", limits=RECORDED
+                self.vertices_m,
+                self.triangles,
+                MeshChoices(faces="planar", limits=RECORDED),
+                name=name,
+                known=surface_of_record(self.surface),
             )
         except (ValueError, InputError) as error:
             raise InputError(f"part: expected the mesh of a solid: {error}") from error
@@ -81,4 +89,5 @@ def recorded_part(planned: Polyhedron, tested: Polyhedron) -> RecordedPart | Non
         planned_sha256=planned.content_sha256,
         vertices_m=tuple((x, y, z) for x, y, z in rows),
         triangles=tuple((a, b, c) for a, b, c in tested.triangles.tolist()),
+        surface=SurfaceRecord.model_validate(surface_record(tested.surface)),
     )

@@ -31,6 +31,8 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
             scale=mesh.lengths.scale,
             faces=mesh.faces,
             patches=PatchLimits(mesh.patch_spread_deg, mesh.patch_depth, mesh.patches),
+            flatness_m=mesh.flatness_m,
+            largest_part=mesh.largest_part,
             center_of_mass=mesh.center_of_mass_m,
             limits=MeshLimits(
                 max_bytes=given.max_mesh_bytes,
@@ -47,8 +49,8 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
     if replace(mesh, limits=flag_groups.MeshLimits()) != flag_groups.Mesh():
         raise InputError(
             f"{name} is a built-in object, so leave out --unit, --scale, --faces, --patches, "
-            "--patch-spread-deg, --patch-depth and --center-of-mass-m, which say how mesh files "
-            "are read"
+            "--patch-spread-deg, --patch-depth, --flatness-m, --largest-part and "
+            "--center-of-mass-m, which say how mesh files are read"
         )
     return example_object(name)
 
