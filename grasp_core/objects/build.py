@@ -136,6 +136,7 @@ def build(
     elif found.fault:
         raise found.fault
     else:
+        found.check_bounds()
         patches = None
         faces = planar_faces(found.points, found.corners, groups, flatness)
         said = _uneven(found, groups, faces, PLANAR * extent)

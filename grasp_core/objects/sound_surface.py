@@ -35,6 +35,14 @@ class SoundSurface:
     fault: MeshError | None
     """Why the triangles do not bound a solid with planar faces; None if they do."""
 
+    def check_bounds(self) -> None:
+        """Refuse a closed surface if parts of it do not bound the solid.
+
+        Raises:
+            MeshError: Parts of the surface are inside or outside of others.
+        """
+        check_bounds(self.points, self.corners)
+
     def outward(self, *, largest_part: bool) -> "SoundSurface":
         """Return this surface with an open one oriented outwards; a closed one is so already.
 
@@ -42,6 +50,7 @@ class SoundSurface:
             MeshError: It is not certain which side is inside.
         """
         if self.surface.closed:
+            self.check_bounds()
             return self
         found = outward_sheets(self.points, self.corners, largest_part=largest_part)
         return _with_shells(self, found)
@@ -97,7 +106,6 @@ def sound_surface(
     whole = one_solid(
         points, corners, surface.caps, most=most_parts, largest_part=largest_part
     )  # fmt: skip
-    check_bounds(whole.points, whole.corners)
     return _with_shells(found, whole)
 
 

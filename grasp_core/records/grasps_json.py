@@ -101,8 +101,17 @@ def surface_of_record(record: "SurfaceRecord") -> Surface:
     Raises:
         InputError: A number is out of range.
     """
-    known = record.model_dump()
-    return Surface(**{**known, "repairs": tuple(known["repairs"])})
+    return Surface(
+        closed=record.closed,
+        caps=np.array(record.caps, dtype=np.int64),
+        holes=record.holes,
+        largest_hole_m=record.largest_hole_m,
+        volume_error=record.volume_error,
+        dropped=record.dropped,
+        flatness_m=record.flatness_m,
+        center_given=record.center_given,
+        repairs=tuple(record.repairs),
+    )
 
 
 def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:

@@ -57,7 +57,8 @@ def test_no_patch_spans_a_hole_in_the_surface():
     hole = whole.faces[0].centroid
     open_ = triangles[np.linalg.norm(middles - hole, axis=1) > 0.004]
     body = gc.Polyhedron.from_mesh(vertices, open_)
-    assert "the surface is not closed" in " ".join(body.notes)
+    assert "no finger is placed there" in " ".join(body.notes)
+    assert not any(np.isin(face.facets, body.surface.caps).any() for face in body.faces)
     rng, lines = np.random.default_rng(0), 0
     for face in body.faces:
         for point in inside(face.polygon, rng, 40):
@@ -65,7 +66,7 @@ def test_no_patch_spans_a_hole_in_the_surface():
             lines += 1
     assert lines >= 400
     away = np.linalg.norm(body.center_of_mass - whole.center_of_mass)
-    assert away < 0.05 * whole.radius  # the hull stands for the solid
+    assert away < 0.001 * whole.radius
 
 
 def test_the_centre_of_mass_can_be_given():
@@ -93,12 +94,8 @@ def test_fine_meshes_get_patches_and_coarse_ones_planar_faces_unless_told_otherw
 def test_an_open_mesh_is_refused_where_planar_faces_are_asked_for():
     vertices, triangles = bumpy_ellipsoid(subdivisions=2)
     with pytest.raises(gc.MeshError) as refused:
-        gc.Polyhedron.from_mesh(vertices, triangles[:-3], faces="planar")
+        gc.Polyhedron.from_mesh(vertices, triangles[:-60], faces="planar")
     assert refused.value.reason is MeshRefusal.OPEN
-    turned = np.vstack([triangles[:-1], triangles[-1:, ::-1]])
-    with pytest.raises(gc.MeshError) as refused:
-        gc.Polyhedron.from_mesh(vertices, turned)
-    assert refused.value.reason is MeshRefusal.WINDING
 
 
 def test_a_closed_scan_that_is_inside_out_is_turned():
@@ -108,20 +105,6 @@ def test_a_closed_scan_that_is_inside_out_is_turned():
     assert one.volume == pytest.approx(two.volume)
     for face in two.faces:
         assert face.normal @ (face.centroid - two.center_of_mass) < 0.0
-
-
-def test_of_an_open_surface_in_parts_only_the_largest_is_used_and_never_turned():
-    large, triangles = bumpy_ellipsoid()
-    small = 0.6 * large + [0.2, 0.0, 0.0]
-    both = np.vstack([triangles[3:], triangles[:-2] + len(large)])
-    body = gc.Polyhedron.from_mesh(np.vstack([large, small]), both)
-    assert "used alone" in " ".join(body.notes)
-    assert body.vertices[:, 0].max() < 0.1
-    inward = [face.normal @ (face.centroid - body.center_of_mass) for face in body.faces]
-    assert max(inward) < 0.0
-    turned = gc.Polyhedron.from_mesh(large, triangles[3:, ::-1])
-    assert "inside out" in " ".join(turned.notes)
-    assert min(face.normal @ (face.centroid - turned.center_of_mass) for face in turned.faces) > 0.0
 
 
 def test_a_coarse_torus_whose_triangles_meet_regions_in_their_corners_is_planned():
@@ -139,10 +122,9 @@ def test_a_surface_without_flat_parts_is_refused_with_advice():
     rough = gc.PatchLimits(spread_deg=0.5, depth=1e-5)
     body = gc.Polyhedron.from_mesh(0.05 * ball.vertices, ball.faces, patches=rough)
     assert len(body.faces) >= 4  # single triangles
-    corners = 0.1 * np.vstack([np.zeros(3), np.eye(3)])
-    three = [[0, 2, 1], [0, 1, 3], [0, 3, 2]]
+    lens, wide = ball.vertices * [0.05, 0.05, 0.002], gc.PatchLimits(45.0, 0.1)
     with pytest.raises(gc.MeshError, match="patch-spread-deg") as refused:
-        gc.Polyhedron.from_mesh(corners, three, faces="patches")
+        gc.Polyhedron.from_mesh(lens, ball.faces, faces="patches", patches=wide)
     assert refused.value.reason is MeshRefusal.NOT_FLAT
 
 

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from grasp_core.objects.booleans import hull
-from grasp_core.objects.planar_faces import FlatnessLimits, border_loops, coplanar_groups
+from grasp_core.objects.planar_faces import Flatness, border_loops, coplanar_groups
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.example_objects import example_object
 
@@ -33,16 +33,17 @@ def test_extra_triangles_and_border_points_do_not_change_the_faces():
 def test_a_fine_sphere_keeps_its_facets():
     """20,480 triangles with 0.6 degrees between neighbours: none may merge."""
     mesh = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
-    groups = coplanar_groups(mesh.vertices, mesh.faces, FlatnessLimits())
+    groups = coplanar_groups(mesh.vertices, mesh.faces, Flatness.of(0.1, 0.0))
     assert len(groups) == len(mesh.faces) == 20480
 
 
 @pytest.mark.parametrize(
     ("limits", "roof_faces"),
     [
-        (FlatnessLimits(angle=1e-3, distance=1e-3), 1),
-        (FlatnessLimits(angle=1e-5, distance=1e-3), 2),
-        (FlatnessLimits(angle=1e-3, distance=1e-6), 2),
+        (Flatness(angle=1e-3, distance=1e-3), 1),
+        (Flatness(angle=1e-5, distance=1e-3), 2),
+        (Flatness(angle=1e-3, distance=1e-6), 2),
+        (Flatness(angle=1e-5, distance=1e-3, blur=1e-4), 1),
     ],
 )
 def test_a_shallow_roof_is_one_face_only_within_both_limits(limits, roof_faces):
