@@ -87,7 +87,8 @@ def _vertex(words: list[bytes], where: str) -> list[float]:
         broken(where, f"a vertex needs three numbers, got {len(words)}")
     if len(values) == WEIGHTED and values[FLOATS] != 1.0:
         unsupported(f"{where}: a vertex of weight {values[FLOATS]:g}", "export weights of 1")
-    check_unused(words[FLOATS:], where)
+    if len(words) > WEIGHTED:
+        check_unused(words[FLOATS:], where)
     return values[:FLOATS]
 
 

@@ -32,7 +32,8 @@ def read(data: bytes, most: int) -> tuple[Array, Indices, int]:
             broken(f"line {number}", f"a vertex needs three numbers, got {len(words)}")
         three = words[:FLOATS]
         points.add(three, numbers(three, f"line {number}"))
-        check_unused(words[FLOATS:], f"line {number}")
+        if len(words) > FLOATS:
+            check_unused(words[FLOATS:], f"line {number}")
     for _ in range(faces):
         number, words = _next(lines, "a face")
         where = f"line {number}"

@@ -62,7 +62,7 @@ def _of_binary(data: bytes, most: int) -> Array:
 def _of_text(text: bytes, most: int) -> TextPoints:
     """Read the corners of all solids of a text STL; line breaks between words do not matter."""
     points = TextPoints()
-    lines = worded_lines(text, comments=True)
+    lines = worded_lines(text, comments=b"#" in text)
     for number, words in lines:
         _expect(number, words[0][: len(b"solid")], b"solid")  # its name may have no space before it
         inside = _until_its_end(lines)
@@ -78,7 +78,7 @@ def _until_its_end(lines: Lines) -> Words:
     """Yield the words of a solid with their line numbers; `endsolid` and its name are left out."""
     for number, words in lines:
         for word in words:
-            if word.lower().startswith(b"endsolid"):
+            if word[0] in b"eE" and word.lower().startswith(b"endsolid"):
                 return
             yield number, word
     broken("the end", "expected `endsolid`")

@@ -17,7 +17,7 @@ OTHER_ALPHABETS = bytes(range(128)) + b"?" * 128
 NUMBER = re.compile(rb"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d{1,9})?")
 """A decimal number; possessive groups (`++`) keep long wrong words from taking quadratic time."""
 WHOLE = re.compile(rb"[+-]?\d{1,18}")
-NOT_FINITE = re.compile(rb"[+-]?(nan(\([\w#]{0,40}\))?|inf(inity)?|1\.\?[a-z]+\d*)", re.IGNORECASE)
+NOT_FINITE = re.compile(rb"[+-]?(nan(\(\w{0,40}\))?|inf(inity)?|1\.\?[a-z]+\d*)", re.IGNORECASE)
 """Spellings of what is not finite: of every C library, with the `#` of some as `plain_text` has it.
 """
 Where = str

@@ -44,6 +44,8 @@ def of_obj(data: bytes) -> list[Triangle]:
 
 
 def of_stl(data: bytes) -> list[Triangle]:
+    if len(data) != 84 + 50 * int.from_bytes(data[80:84], "little"):
+        data = unmarked(data)
     count = int.from_bytes(data[80:84], "little")
     if len(data) == 84 + 50 * count:
         rows = [struct.unpack_from("<12f", data, 84 + 50 * i)[3:] for i in range(count)]
@@ -92,7 +94,7 @@ def of_ply(data: bytes) -> list[Triangle]:  # noqa: C901 - one loop, as the form
         if kind == "ascii":
             place += 1
             word = words[place - 1]
-            value = float("nan" if b"(ind)" in word else word)
+            value = float("nan" if b"nan(" in word.lower() else word)
             return struct.unpack(code, struct.pack(code, value))[0] if code in "ef" else value
         form = ("<" if kind == "binary_little_endian" else ">") + code
         place += struct.calcsize(form)

@@ -43,6 +43,8 @@ def by_trimesh(kind, data):
 def is_misread(kind, data):
     """Whether trimesh is known to take the file for another without a complaint."""
     text = tidied("obj", data)
+    if kind != "glb" and re.search(rb"[\x0b\x0c]", data):
+        return True  # they end a line there
     if kind == "obj":
         return _relative_amid_the_file(text) or _of_differing_forms(text)
     if kind == "stl":
