@@ -188,14 +188,20 @@ def _random(faces: int, seed: int) -> Solid:
     """Make a solid of random planes tangent to a random ellipsoid, each of which bounds it."""
     rng = np.random.default_rng([faces, seed])
     stretch = rng.uniform(0.7, 1.3, 3)
-    while True:
+    for _ in range(MOST_DRAWS):
         normals = rng.normal(size=(faces, 3))
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         polar = hull(normals)
         if len(polar.vertices) == faces and _least_offset(polar) > LEAST_POLAR_OFFSET:
             return hull(0.045 * stretch * _polar_corners(polar))
+    raise InputError(
+        f"random-{faces}-{seed}: {MOST_DRAWS} draws made no solid of {faces} faces without a far "
+        "corner; take another seed"
+    )
 
 
+MOST_DRAWS = 100_000
+"""Draws after which there is no such solid: one in 1,700 is one with four faces, the rarest."""
 LEAST_POLAR_OFFSET = 0.25
 """Least distance of a facet of the polar body from the origin. A nearer facet would put a corner of
 the object more than four radii away; such thin objects are drawn anew."""

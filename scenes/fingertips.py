@@ -33,6 +33,7 @@ ROOM = 0.95
 TOUCHING = 1e-6
 """Largest overlap that counts as mere touching, in fingertip radii."""
 MAX_SHRINKING = 100
+"""Steps after which a fingertip has no clear radius; up to fifteen are usual."""
 FACING = 1e-9
 """Value of 4 - |m|^2, with m the difference of two unit normals, below which the normals count as
 opposite."""
@@ -175,10 +176,10 @@ def _clear_radius(
         center = position - radius * normal
         nearest = nearest_on_surface(body.vertices, triangles, center[None])[0]
         if np.linalg.norm(nearest - center) >= _touched(body, radius):
-            break
+            return radius
         away = nearest - position
         radius = float(away @ away) / (-2.0 * float(away @ normal))
-    return radius
+    return 0.0  # nothing is shown to be clear
 
 
 def _triangles_near(body: Polyhedron, positions: Array, normals: Array, radius: float) -> Array:

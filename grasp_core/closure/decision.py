@@ -148,7 +148,7 @@ def _twist_sparing_interior_forces(
     """
     rest = np.arange(len(arms))
     twists = np.eye(WRENCH)
-    while True:
+    while True:  # each turn takes balanced contacts from the rest, or returns
         depth = depths_in_cones(forces, normals[rest], friction[rest])
         balanced = depth > INTERIOR
         if not balanced.any():

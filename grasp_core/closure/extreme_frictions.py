@@ -77,6 +77,7 @@ def rounds(arms: Array, normals: Array) -> Rounds:
     maps = grasp_map(arms).reshape(WRENCH, -1, 3)
     pushes = np.einsum("wki,ki->wk", maps, normals)
     settled, found = np.zeros(len(arms), dtype=bool), list[Array]()
+    # each turn settles a contact: weights may be scaled up until a share is one
     while not settled.all():
         free = np.flatnonzero(~settled)
         held = maps[:, settled].reshape(WRENCH, -1)

@@ -103,6 +103,7 @@ def _try_little(ends: "Ends") -> None:
     little, friction = rounds(ends.arms, ends.units), FRICTIONLESS
     if little.twist is not None:
         ends.open(little.twist)
+    # friction is doubled: ten times from `FRICTIONLESS` to `LITTLE`
     while little.forces and friction <= LITTLE and ends.forces is None:
         ends.close(little.at(friction, ends.units), friction, exactly=True)
         friction *= 2.0

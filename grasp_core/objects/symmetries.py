@@ -13,10 +13,12 @@ Two grasps are copies of each other if a symmetry maps contacts, force cones, li
 foci of one to those of the other, whatever the order of their fingers.
 """
 
+import importlib
 import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +40,9 @@ SHORTEST = 1e-3
 """Least distance of a corner from its face's centre that gives a direction, in object radii."""
 MOST_FACES = 200
 """Largest number of faces of objects whose symmetries are looked for, as for exact planning."""
+CROWDED = 300
+"""Number of vertices above which a search tree finds the nearest ones: comparing each with each
+takes a hundred megabytes at two thousand, for every candidate."""
 ORDERS = np.array(list(itertools.permutations(range(FINGERS))))
 """Ways to match the fingers of two grasps, (24, 4)."""
 
@@ -239,7 +244,11 @@ def _maps(turn: Array, marks: tuple[Array, Array]) -> bool:
 
 def _is_matched(images: Array, rows: Array) -> bool:
     """Return whether images (n, d) are each near a row (n, d), no two of them near the same."""
-    apart = np.abs(images[:, None] - rows[None]).max(axis=2)
-    nearest = apart.argmin(axis=1)
-    near = apart[np.arange(len(rows)), nearest] <= SAME_BODY
-    return bool(near.all()) and len(set(nearest.tolist())) == len(rows)
+    if len(rows) > CROWDED:
+        spatial: Any = importlib.import_module("scipy.spatial")
+        apart, nearest = spatial.KDTree(rows).query(images, p=np.inf)
+    else:
+        gaps = np.abs(images[:, None] - rows[None]).max(axis=2)
+        nearest = gaps.argmin(axis=1)
+        apart = gaps[np.arange(len(rows)), nearest]
+    return bool((apart <= SAME_BODY).all()) and len(set(nearest.tolist())) == len(rows)

@@ -200,6 +200,6 @@ class _Asked:
         """
         least, share = max(self.known, SMALLEST), 1.0 - AIMED * self.gap
         rising = [least / share if self.known >= SMALLEST else least]
-        while rising[-1] < first * share:
+        while rising[-1] < first * share:  # each is larger by `AIMED` of `SMALLEST_GAP` at least
             rising.append(rising[-1] / share)
         return [few_digits(bound, self.gap / FINER) for bound in rising[::-1] if bound < first]

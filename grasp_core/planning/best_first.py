@@ -82,7 +82,7 @@ class BestFirst:
             for place in places
         ]
         heapify(queue)
-        while queue:
+        while queue:  # each turn takes rows from finite tables, at least one
             head = heappop(queue)
             # the threshold rises while grasps are found: read it anew
             worth = least(self.construction)

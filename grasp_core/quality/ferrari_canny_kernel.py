@@ -74,7 +74,7 @@ def grow(cones: Cones, edges: Array, limits: Limits) -> tuple[int, Array, Indice
     if slack < 0.0 or not enclose(hull, points):
         return FLAT, forces[:0], hull.corners[:0], hull.normals[:0], weakest
     count = D + 1
-    while True:
+    while True:  # each turn adds a point, up to `limits.points`
         nearest = lowest(hull)
         support = _support(cones, hull.normals[nearest], forces[count])
         if support < upper:

@@ -95,7 +95,7 @@ def _inside(polygon: Array, rows: Array, limits: Array) -> Array:
         if beyond[worst] <= 0.0:
             break
         polygon = clip(polygon, rows[worst : worst + 1], limits[worst : worst + 1])
-        beyond[worst] = 0.0
+        beyond[worst] = 0.0  # whatever rounding leaves of it: each turn drops this row
         rows, limits = rows[beyond > 0.0], limits[beyond > 0.0]
     return polygon
 
@@ -135,6 +135,7 @@ def _grown(
 ) -> tuple[list[Array], TwistCover]:
     """Move polygons outwards in turn; steps are halved where no proof is found."""
     steps = np.full(len(polygons), FIRST_STEP * proved.radius)
+    # each turn halves a step, or moves edges outwards by `LAST_STEP` at least until a piece is full
     while (steps > LAST_STEP * proved.radius).any():
         for i, piece in enumerate(grounds.pieces):
             if steps[i] <= LAST_STEP * proved.radius:

@@ -166,6 +166,7 @@ class _Search:
     def widen(self, cones: int, radius: float, growth: float, fineness: float) -> None:
         """Try a radius, then radii growing by a factor, then bisect."""
         upper, radius = self.limit, min(radius, 0.5 * (self.lower + self.limit))
+        # radii grow by a factor up to the reach, or the interval is halved or quartered
         while radius >= LEAST_RADIUS and upper - self.lower > fineness * self.lower:
             radius = min(radius, self.reach)
             if radius <= self.lower:
@@ -185,6 +186,7 @@ class _Search:
     def refute(self, cones: int) -> None:
         """Search larger discs for contacts not in force closure, then bisect the radius."""
         below, radius = self.lower, (1.0 + OPEN_NEAR) * self.lower
+        # each turn halves the interval, or doubles what is searched of it, up to the reach
         while self.limit - below > OPEN_NEAR * self.lower and min(radius, self.reach) > below:
             radius = min(radius, self.reach)
             found = search_cover(self.grounds.discs(self.ys, radius), self.axes, cones)

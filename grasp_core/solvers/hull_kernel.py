@@ -174,7 +174,7 @@ def look(hull: Hull, point: Array, first: int, slack: float, now: int) -> tuple[
     if heights[first] > slack:
         seen[0] = first
         count = 1
-    while at < count:
+    while at < count:  # a simplex is listed once, as it is compared with the point only once
         for j in range(D):
             other = neighbors[seen[at], j]
             new = rounds[other] != now

@@ -5,6 +5,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
+from scenes import example_objects
 
 FACES = {
     "tetrahedron": 4, "octahedron": 8, "dodecahedron": 12, "icosahedron": 20, "wedge": 8,
@@ -46,6 +47,12 @@ def test_random_objects_have_the_asked_number_of_faces_and_repeat(faces, seed):
     assert len(one.faces) == faces
     assert one.content_sha256 == two.content_sha256
     assert one.content_sha256 != scenes.example_object(f"random-{faces}-{seed + 1}").content_sha256
+
+
+def test_a_random_object_that_no_draw_makes_is_refused(monkeypatch):
+    monkeypatch.setattr(example_objects, "MOST_DRAWS", 3)
+    with pytest.raises(gc.InputError, match="random-4-7: 3 draws made no"):
+        scenes.example_object("random-4-7")
 
 
 @pytest.mark.parametrize("name", ["hex_nut", " Hex-Nut "])

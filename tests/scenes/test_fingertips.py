@@ -7,6 +7,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.geometry.nearest_points import nearest_on_surface
+from scenes import fingertips
 from scenes.fingertips import clashes, fitting_radius
 from scenes.layout import arrange
 
@@ -48,6 +49,16 @@ def test_near_an_inner_corner_the_radius_is_the_distance_to_it():
         radius = fitting_radius(body, at[None], normal[None])
         expected = 0.1 * body.radius if distance >= 0.1 * body.radius else 0.95 * distance
         assert radius == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_fingertip_that_shrinks_too_often_is_shown_to_be_clear_nowhere(monkeypatch):
+    body = scenes.example_object("l-bracket")
+    inner, point, normal = _inner_corner(body)
+    at, radius = (point + 0.05 * body.radius * inner)[None], 0.1 * body.radius
+    assert fitting_radius(body, at, normal[None]) > 0.04 * body.radius
+    monkeypatch.setattr(fingertips, "MAX_SHRINKING", 1)
+    assert fitting_radius(body, at, normal[None]) == pytest.approx(1e-3 * body.radius)
+    assert "meets the object" in clashes(body, at, normal[None], radius)[0]
 
 
 def _inner_corner(body):

@@ -124,7 +124,7 @@ def _sparing(contacts: SoftContacts, local: Array) -> Array | None:
     again for the other contacts, until its optimum is negative or no contact is left.
     """
     rest, twists = np.arange(len(local)), np.eye(WRENCH)
-    while True:
+    while True:  # each turn takes balanced contacts from the rest, or returns
         balanced = depths(local) > INTERIOR
         if not balanced.any():
             return None

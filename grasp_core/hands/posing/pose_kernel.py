@@ -165,6 +165,7 @@ def settle(  # noqa: PLR0913, PLR0917 - a hand, an object and what is asked
         settled = sums.parts[0] <= good and sums.parts[2] <= FREE
         if settled or stalled >= PATIENCE or damping > MOST_DAMPING or steps == most_steps:
             return steps
+        # damping grows until it outweighs the rest of the matrix, which then is definite
         while not _step(hand, wanted, pose, sums, damping, A, step):
             damping *= GROWTH
         _stepped(hand, pose, sums.pivot, step, new)

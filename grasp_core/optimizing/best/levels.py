@@ -87,6 +87,7 @@ class Levels:
         try:
             for k in range(steps, -1, -1):
                 share = 1.0 - AIMED * gap * 2.0**k
+                # each turn lowers the bound to `wanted`, or raises the quality, or is the last
                 while self.best.quality.lower < share * (1.0 - SAME) * self.bound:
                     wanted = few_digits(self.best.quality.lower / share, grain)
                     if not self._refuted(wanted, grain):

@@ -17,7 +17,7 @@ from grasp_core.values import Grasp
 
 Ended: TypeAlias = Literal["gap", "time", "interrupt", "undivided"]
 """Why a search ended: the gap is reached, time is up, it was interrupted, or polygons became too
-small to be divided."""
+small, or too many, to be divided further."""
 
 
 @dataclass(frozen=True, slots=True)

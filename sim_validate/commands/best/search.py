@@ -24,7 +24,7 @@ WHY = {
     "gap": "the gap asked for is reached",
     "time": "the time limit is reached",
     "interrupt": "it was interrupted",
-    "undivided": "what is left of the faces is too small to be divided further",
+    "undivided": "what is left of the faces is too small, or too much, to be divided further",
 }
 """Why a search ended, in words."""
 ROUGH = 1e-3

@@ -1,5 +1,6 @@
 """Symmetries of objects are found by their shape, and copies of grasps by their contacts."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ import scenes
 from grasp_core.objects.symmetries import SAME_GRASP, Copies, copies_of, symmetries
 from grasp_core.values import Contact, ContactRegion, ForceCone, Witness, four
 from tests.grasp_core.curved import bumpy_ellipsoid
+from tests.grasp_core.long_shapes import shape
 from tests.grasp_core.objects.test_standard_order import isometries
 from tests.judges import random_rotation
 from tests.sim_validate.rigs import grasps
@@ -72,6 +74,20 @@ def test_symmetries_are_found_within_a_tolerance_and_of_any_size(shake, kept):
         other = gc.Polyhedron.from_mesh(size * shaken @ random_rotation(rng).T, body.triangles)
         found = symmetries(other)
         assert (len(found.rotations), len(found.reflections)) == ((60, 60) if kept else (1, 0))
+
+
+def test_thousands_of_vertices_are_not_compared_each_with_each():
+    """Comparing 1,970 vertices pair by pair takes 90 MB for each of hundreds of candidates."""
+    rod = gc.Polyhedron.from_mesh(*shape("ringed rod"))  # of 48 sides
+    alone = replace(rod, faces=rod.faces[:1])
+    symmetries(alone)  # what it imports takes memory of its own
+    tracemalloc.start()
+    found = symmetries(rod)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(rod.vertices) == 1970
+    assert (len(found.rotations), len(found.reflections)) == (96, 96)
+    assert peak < 4e6
 
 
 def test_a_curved_surface_has_only_the_identity():

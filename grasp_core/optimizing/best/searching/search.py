@@ -52,6 +52,8 @@ PART_NODES = 4000
 """Nodes after which a part leaves those that wait to parts of their own: some parts have a
 hundred times as many as most, and one thread would search them while others wait."""
 MOST_DEPTH = 10**9
+MOST_NODES = 10**11
+"""Nodes after which a search ends as undivided: weeks, where nobody sets a limit of time."""
 WAVE = 32
 """Parts that are searched from the same twists: more threads would find nothing to do, and twists
 that a part finds are of no use to the others of its wave."""
@@ -153,7 +155,8 @@ class Searching:
             while True:
                 self.nodes += sum(int(part.tree.sizes[0]) for part in wave)
                 better += [found for part in wave for found in part.found]
-                if not all(part.finished for part in wave):
+                # a wave ends, as each of its parts leaves all that waits after `PART_NODES`
+                if self.nodes > MOST_NODES or not all(part.finished for part in wave):
                     return None, better
                 for part in wave:
                     pool = self.pool if part is trunk else part.pool

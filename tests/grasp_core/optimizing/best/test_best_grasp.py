@@ -273,6 +273,14 @@ def test_parts_that_leave_nodes_to_others_prove_as_much(monkeypatch):
     assert one.verify()
 
 
+def test_a_search_of_too_many_nodes_ends_with_a_proved_bound(monkeypatch):
+    monkeypatch.setattr(search, "MOST_NODES", 100)
+    found = gc.best_grasp(example_object("tetrahedron"), FRICTION, gap=0.01, time_limit_s=120.0)
+    assert found.ended == "undivided"
+    assert 0.01 < found.gap < 1.0
+    assert found.verify()
+
+
 def test_a_time_limit_ends_the_search_with_a_proved_bound():
     found = gc.best_grasp(example_object("octahedron"), FRICTION, gap=0.001, time_limit_s=3.0)
     assert found.ended == "time"
