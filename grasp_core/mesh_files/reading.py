@@ -93,7 +93,7 @@ def mesh_of_bytes(kind: str, data: bytes, most: int) -> MeshFile:
     points, triangles, digits = READERS[kind](text, most)
     if not len(triangles):
         raise MeshError(MeshRefusal.EMPTY, "the file holds no triangles; export a surface mesh")
-    rounding = max(single_rounding(points), text_rounding(points, digits))
+    rounding = single_rounding(points, digits) + text_rounding(points, digits)
     return MeshFile(points, triangles, rounding, data)
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.booleans import triangulate
-from grasp_core.solvers.ties import graded
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +82,8 @@ def _walked(start: int, leaving: dict[int, list[int]]) -> list[list[int]]:
 
 def _cap(points: Array, loop: list[int]) -> Indices:
     """Triangulate a loop in the plane that fits it, or as a fan where that is not possible."""
-    numbers, places = np.array(loop), points[loop]
+    numbers: Indices = np.array(loop, dtype=np.int64)
+    places = points[numbers]
     fan = np.column_stack([np.zeros(len(loop) - 2, dtype=np.int64),
                            np.arange(1, len(loop) - 1), np.arange(2, len(loop))])  # fmt: skip
     spokes = places - places.mean(axis=0)
@@ -91,8 +91,8 @@ def _cap(points: Array, loop: list[int]) -> Indices:
     length, size = float(np.linalg.norm(normal)), float(np.ptp(places, axis=0).max())
     if len(loop) == 3 or length <= FLAT * size**2:  # noqa: PLR2004
         return numbers[fan]
-    flat = spokes @ plane_frame(normal / length)
-    found = triangulate([graded(flat, 12)])
+    flat: Array = spokes @ plane_frame(normal / length)
+    found = triangulate([flat])
     return numbers[found if _covers(found, len(loop)) else fan]
 
 

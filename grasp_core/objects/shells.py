@@ -137,7 +137,8 @@ def _sorted_out(
     """Give each cavity to its body; return bodies, parts that cannot be used, and the reason."""
     flat = [s for s in shells if abs(s.solid.volume) <= _thinnest(s)]
     bodies = [s for s in shells if s not in flat and s.solid.volume > 0.0]
-    bad, why = flat, None
+    bad: list[_Body] = flat
+    why: MeshError | None = None
     if flat:
         why = MeshError(
             MeshRefusal.ZERO_VOLUME,

@@ -37,7 +37,7 @@ def sampled(areas: Array) -> Indices:
         areas: Areas of all triangles, (t,), in any unit.
     """
     count = min(max(MOST_ANGLES // len(areas), FEWEST_SAMPLES), MOST_SAMPLES, len(areas))
-    upto = np.cumsum(areas)
+    upto: Array = np.cumsum(areas)
     middles = (np.arange(count) + 0.5) / count * upto[-1]
     return np.minimum(np.searchsorted(upto, middles), len(areas) - 1)
 

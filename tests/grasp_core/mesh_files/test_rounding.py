@@ -72,6 +72,25 @@ def test_a_binary_file_shows_that_of_single_precision(unit, offset):
         assert mesh.rounding <= LOOSEST * off_by, kind
 
 
+@pytest.mark.parametrize("offset", [0.0, 0.3, 2.0])
+@pytest.mark.parametrize("form", ["%.9g", "%.8g"])
+def test_a_text_of_single_precision_shows_that(form, offset):
+    points, faces = shape(12)
+    points = points + np.multiply(offset, [1.0, -0.2, 0.0])
+    for kind, text in texts(points.astype(np.float32).astype(float), faces, form).items():
+        mesh = mesh_of_bytes(kind, text.encode(), MOST)
+        off_by = np.abs(mesh.vertices[mesh.triangles] - points[faces]).max()
+        assert 0.0 < off_by <= 1.0001 * mesh.rounding, kind
+        assert mesh.rounding <= LOOSEST * off_by, kind
+
+
+def test_a_fixed_number_of_decimals_shows_on_small_objects():
+    points, faces = shape(12)
+    for kind, text in texts(0.1 * points, faces, "%.6f").items():
+        mesh = mesh_of_bytes(kind, text.encode(), MOST)
+        assert mesh.rounding == pytest.approx(0.5e-6, rel=0.05), kind
+
+
 def test_numbers_in_full_length_are_not_rounded():
     points, faces = shape(12)
     for kind, text in texts(points, faces, "%r").items():
@@ -94,7 +113,7 @@ def test_many_vertices_are_looked_at_in_part_with_the_same_result(form):
         mesh = mesh_of_bytes(kind, text.encode(), MOST)
         assert len(mesh.vertices) > 5 * BLOCK
         every = {"%g": 0.5e-4, "%.6f": 0.5e-6, "%.5e": 0.5e-4, "%.9g": 0.5e-7}
-        assert mesh.rounding == pytest.approx(every[form], rel=1e-12), kind
+        assert mesh.rounding == pytest.approx(every[form], rel=0.05), kind
 
 
 @pytest.mark.parametrize(
@@ -111,7 +130,7 @@ def test_significant_digits(words, digits):
 
 def test_few_or_all_digits_and_double_precision_show_no_rounding():
     points = np.array([[999.5, 0.0, -2.0]])
-    assert [text_rounding(points, digits) for digits in (4, 5, 16, 17)] == pytest.approx(
+    assert [text_rounding(points, digits) for digits in (0, 5, 16, 17)] == pytest.approx(
         [0.0, 0.005, 0.5e-13, 0.0], rel=1e-12, abs=0.0
     )
     assert text_rounding(np.zeros((1, 3)), 6) == 0.0

@@ -65,7 +65,7 @@ CHANGES = {
     "text for a number": (lambda d: d | {"friction": "much"}, "friction"),
     "NaN": (lambda d: d | {"friction": float("nan")}, "friction"),
     "mesh of another object": (
-        lambda d: _set(d, ["object", "mesh", "vertices_m", 0, 0], 0.07),
+        lambda d: _set(d, ["object", "content_sha256"], 64 * "0"),
         "content",
     ),
     "an approach that is no direction": (
