@@ -260,7 +260,7 @@ def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> flo
     if held(proved.radius):
         return proved.radius
     low, high = 0.0, proved.radius
-    while high - low > NARROWED * proved.radius:
+    while high - low > NARROWED * proved.radius:  # halved ten times
         middle = 0.5 * (low + high)
         low, high = (middle, high) if held(middle) else (low, middle)
     return low
