@@ -26,14 +26,14 @@ class Caps:
 
 
 def caps_of(points: Array, corners: Indices) -> Caps | None:
-    """Close the holes of a surface; None if its open edges do not form loops.
+    """Close the holes of a surface; None if it has none, or its open edges do not form loops.
 
     Args:
         points: Vertices, (n, 3) [m].
         corners: Vertex indices, (t, 3), wound alike across edges of two triangles.
     """
     loops = _loops(corners)
-    if loops is None:
+    if not loops:
         return None
     triangles = [_cap(points, loop) for loop in loops]
     widths = np.array([_width(points[loop]) for loop in loops])

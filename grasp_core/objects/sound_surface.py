@@ -135,7 +135,7 @@ def _wound(points: Array, corners: Indices) -> tuple[Indices, int]:
 def _capped(points: Array, corners: Indices, surface: Surface) -> tuple[Indices, Surface]:
     """Close the holes of a surface if they are small, and say so."""
     caps = caps_of(points, corners)
-    if caps is None or not len(caps.widths):
+    if caps is None:
         return corners, surface
     whole = np.concatenate([corners, caps.triangles])
     volume = abs(Solid(points, whole).volume)

@@ -38,7 +38,7 @@ def sampled(areas: Array) -> Indices:
     """
     count = min(max(MOST_ANGLES // len(areas), FEWEST_SAMPLES), MOST_SAMPLES, len(areas))
     upto: Array = np.cumsum(areas)
-    middles = (np.arange(count) + 0.5) / count * upto[-1]
+    middles = np.linspace(0.0, float(upto[-1]), 2 * count + 1)[1::2]
     return np.minimum(np.searchsorted(upto, middles), len(areas) - 1)
 
 

@@ -87,7 +87,7 @@ OFFS = {
     "a vertex too few counted": (off("3 4 6"), "line|export"),
     "a face too few counted": (off("4 3 6"), "more lines"),
     "no counts": ("OFF\n", "counts"),
-    "binary OFF": (b"OFF BINARY\n" + bytes(40), "control"),
+    "binary OFF": (b"OFF BINARY\n" + bytes(40), "counts"),
     "a corner beyond": (off(faces=[(0, 2, 9), *TRIANGLES[1:]]), "vertex 9"),
     "a corner before": (off(faces=[(0, 2, -1), *TRIANGLES[1:]]), "vertex -1"),
     "a face of two": (off(faces=[(0, 2), *TRIANGLES[1:]]), "three corners"),
