@@ -106,6 +106,8 @@ def _of_many(shells: list[_Body], caps: Indices, volume: float, *, largest_part:
     area = sum(shell.area for shell in shells)
     slack = OVERLAP * volume
     bodies, bad, why = _sorted_out(shells, slack, said)
+    if not bodies and why is not None:
+        raise why
     united = _united(bodies, slack, said)
     kept = max(united, key=lambda body: body.area)
     apart = [body for body in united if body is not kept]

@@ -11,6 +11,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
+from grasp_core.geometry.connectivity import components
 from grasp_core.objects.booleans import Solid
 from grasp_core.objects.holes import caps_of
 from grasp_core.objects.sheets import check_bounds, outward_sheets
@@ -78,18 +79,7 @@ def sound_surface(
     Raises:
         MeshError: The triangles are not the surface of one solid, and cannot be made one.
     """
-    points, corners, dropped = welded(vertices, triangles)
-    said = [f"dropped {dropped} triangles without area"] if dropped else []
-    fault = surface_fault(corners)
-    if fault and fault.reason is MeshRefusal.WINDING:
-        corners, turned = _wound(points, corners)
-        said.append(f"{turned} triangles that were wound against their neighbours were turned")
-        fault = surface_fault(corners)
-    if fault and fault.reason is MeshRefusal.OPEN and flatness_m:
-        closer, joined, _ = welded(points, corners, 0.5 * flatness_m)
-        if surface_fault(joined) is None:
-            points, corners, fault = closer, joined, None
-            said.append("vertices that rounding had moved apart were joined")
+    points, corners, said = _joined(vertices, triangles, flatness_m, most_parts)
     surface = Surface(flatness_m=flatness_m, repairs=tuple(said))
     if known is not None:
         surface = replace(known, repairs=(*known.repairs, *said))
@@ -97,16 +87,58 @@ def sound_surface(
             raise InputError(
                 f"caps must be numbers of triangles below {len(corners)}, got {known.caps.max()}"
             )
-    elif fault:
+    elif surface_fault(corners):
         corners, surface = _capped(points, corners, surface)
-        fault = surface_fault(corners)
-    found = SoundSurface(points, corners, replace(surface, closed=balanced(corners)), fault)
-    if not found.surface.closed:
+    surface = replace(surface, closed=balanced(corners))
+    found = SoundSurface(points, corners, surface, surface_fault(corners))
+    if not surface.closed:
         return found
-    whole = one_solid(
-        points, corners, surface.caps, most=most_parts, largest_part=largest_part
-    )  # fmt: skip
+    whole = one_solid(points, corners, surface.caps, most=most_parts, largest_part=largest_part)
     return _with_shells(found, whole)
+
+
+def _joined(
+    vertices: Array, triangles: Indices, flatness_m: float, most_parts: int
+) -> tuple[Array, Indices, list[str]]:
+    """Weld close vertices, and wind triangles like their neighbours; also say what was changed."""
+    points, corners, dropped = welded(vertices, triangles)
+    said = [f"dropped {dropped} triangles without area"] if dropped else []
+    fault = surface_fault(corners)
+    if fault and fault.reason is MeshRefusal.WINDING:
+        corners, turned = _wound(points, corners)
+        said.append(f"{turned} triangles that were wound against their neighbours were turned")
+        fault = surface_fault(corners)
+    if fault and fault.reason is MeshRefusal.NON_MANIFOLD:
+        apart = _welded_apart(vertices, triangles, most_parts)
+        if apart is not None:
+            points, corners = apart
+    elif fault and flatness_m:
+        closer, joined, _ = welded(points, corners, 0.5 * flatness_m)
+        if surface_fault(joined) is None:
+            points, corners = closer, joined
+            said.append("vertices that rounding had moved apart were joined")
+    return points, corners, said
+
+
+def _welded_apart(vertices: Array, triangles: Indices, most: int) -> tuple[Array, Indices] | None:
+    """Weld each part of a file by itself, since parts that touch are no longer apart once welded.
+
+    Parts share no vertex in the file. None if there is one part, more than `most`, or if a part
+    does not bound a solid.
+    """
+    sides = np.column_stack([triangles.ravel(), np.roll(triangles, 1, axis=1).ravel()])
+    _, label = np.unique(components(len(vertices), sides)[triangles[:, 0]], return_inverse=True)
+    if not 1 <= label.max() < most:
+        return None
+    points, corners, count = list[Array](), list[Indices](), 0
+    for part in range(int(label.max()) + 1):
+        mine, local, _ = welded(vertices, triangles[label == part])
+        if surface_fault(local) is not None:
+            return None
+        points.append(mine)
+        corners.append(local + count)
+        count += len(mine)
+    return np.concatenate(points), np.concatenate(corners)
 
 
 def _with_shells(found: SoundSurface, made: Shells) -> SoundSurface:

@@ -1,0 +1,80 @@
+"""Dirty files of a shape give the grasps of the clean one, less what was lost, or a refusal."""
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from tests.grasp_core.dirty_meshes import REFUSALS, plan, pushes_into, shapes, text_stl, ways
+
+EVERYDAY = ("dodecahedron", "ball 0", "cup 1")
+SLOW = ("cross", "mug", "ring 0", "capsule 4", "cup 5", "pipe 6")
+LONG = [name for name in shapes() if name not in EVERYDAY + SLOW]
+KNOWN = 0.02
+"""Largest error of a volume that is stated as known."""
+LEAST = {True: 0.5, False: 0.7}
+"""Least radius of the best grasp relative to the clean shape's, where triangles are missing or not:
+a hole in the best patch takes a part of it, and other triangles give other patches."""
+WAYS = 9
+
+
+def load(dirty, mesh, faces, folder):
+    """Load a dirty mesh from memory, or the text of a file where there is none."""
+    if dirty is not None:
+        return gc.Polyhedron.from_mesh(dirty.vertices, dirty.triangles, faces=faces), dirty.moved
+    path = folder / "part.stl"
+    path.write_text(text_stl(np.array(mesh.vertices), mesh.faces))
+    return gc.load_polyhedron(path, unit="mm", faces=faces), np.zeros(3)
+
+
+def check(name, folder):
+    """Check a shape that is dirty in every way; count what was read, and the fingers tried."""
+    mesh, number = shapes()[name], list(shapes()).index(name)
+    whole = gc.Polyhedron.from_mesh(mesh.vertices, mesh.faces)
+    faces, clean = "patches" if whole.patches else "planar", plan(whole, 3)
+    read, fingers, why = 0, 0, []
+    files = {**ways(mesh, number), "text of six digits": None}
+    assert len(files) == WAYS
+    for way, dirty in files.items():
+        missing = dirty is not None and dirty.missing > 0.0
+        try:
+            body, moved = load(dirty, mesh, faces, folder)
+        except gc.MeshError as refused:
+            why.append((refused.reason, missing))
+            continue
+        read += 1
+        if body.surface.closed:
+            assert body.volume == pytest.approx(mesh.volume, rel=KNOWN), way
+        found = plan(body, 3)
+        for grasp in found:
+            assert pushes_into(mesh, body, grasp, moved).all(), way
+            fingers += 4
+        if clean:
+            assert found[0].radius >= LEAST[missing] * clean[0].radius, way
+    assert all(reason in REFUSALS and missing for reason, missing in why)
+    return read, fingers
+
+
+@pytest.mark.parametrize("name", EVERYDAY)
+def test_a_dirty_shape_is_grasped_where_it_is_or_refused(name, tmp_path):
+    read, fingers = check(name, tmp_path)
+    assert read >= 5
+    assert fingers >= 4 * read
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SLOW)
+def test_more_dirty_shapes_are_grasped_where_they_are_or_refused(name, tmp_path):
+    read, fingers = check(name, tmp_path)
+    assert read >= 5
+    assert fingers >= 4 * read
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", LONG)
+def test_all_dirty_shapes_are_grasped_where_they_are_or_refused(name, tmp_path):
+    read, _ = check(name, tmp_path)
+    assert read >= 5
+
+
+def test_there_are_sixty_shapes():
+    assert len(shapes()) == 60
