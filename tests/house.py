@@ -21,8 +21,6 @@ from scipy.sparse.csgraph import connected_components
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
-MOST_MODULES = 15
-"""In one folder, not counting `__init__`."""
 MOST_FLOORS = {"grasp_core": 11, "scenes": 8, "sim_validate": 8}
 
 Edges = set[tuple[str, str]]
@@ -47,14 +45,6 @@ class House:
     def floors(self) -> int:
         """Rooms of the longest tower."""
         return tower({room_of(self.package, name) for name in self.modules}, self.rooms)
-
-    @property
-    def fullest(self) -> tuple[int, str]:
-        """Number of modules in the fullest folder, and its name."""
-        folders = [
-            name.rsplit(".", 1)[0] for name, path in self.modules.items() if not _is_init(path)
-        ]
-        return max((folders.count(folder), folder) for folder in set(folders))
 
     @property
     def circles(self) -> list[list[str]]:
@@ -161,20 +151,19 @@ def main() -> int:
     good = True
     for package in PACKAGES:
         found, layers = house(package), layers_of(package)
-        (most, folder), against = found.fullest, upward(found, layers)
+        against = upward(found, layers)
         lines = sum(len(path.read_text().splitlines()) for path in found.modules.values())
         rooms = {room_of(package, name) for name in found.modules} - {package}
         print(
             f"{package}: {len(found.modules)} modules of {lines} lines in {len(rooms)} rooms on "
             f"{found.floors} floors (at most {MOST_FLOORS[package]}), {len(found.rooms)} imports "
-            f"between rooms; the fullest folder is {folder} with {most} modules (at most "
-            f"{MOST_MODULES}); {len(found.circles)} circles, {len(against)} upward imports"
+            f"between rooms; {len(found.circles)} circles, {len(against)} upward imports"
         )
         for circle in found.circles:
             print("    circle:", ", ".join(circle))
         for line in against:
             print("    upward:", line)
-        good &= most <= MOST_MODULES and found.floors <= MOST_FLOORS[package]
+        good &= found.floors <= MOST_FLOORS[package]
         good &= not found.circles and not against
     return 0 if good else 1
 

@@ -22,7 +22,6 @@ def test_floors_are_the_longest_chain_of_rooms(tmp_path):
         high="def f():\n    from packed.room import two",
     )  # fmt: skip
     assert found.floors == 3
-    assert found.fullest == (2, "packed.room")
     assert found.circles == []
     assert upward(found, ["high", "room", "low"]) == []
     assert upward(found, ["low | high", "room"]) == ["packed.room -> packed.low"]

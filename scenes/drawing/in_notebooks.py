@@ -112,7 +112,7 @@ def _body(body: Polyhedron) -> str:
         ("faces" if body.patches is None else "patches", str(len(body.faces))),
         ("triangles", str(len(body.triangles))),
         ("radius", f"{MM * body.radius:.4g} mm"),
-        ("volume", f"{CM3 * body.volume:.4g} cm³"),
+        ("volume" if body.surface.closed else "volume of the hull", f"{CM3 * body.volume:.4g} cm³"),
     ])  # fmt: skip
 
 

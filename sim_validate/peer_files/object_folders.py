@@ -36,7 +36,7 @@ def write_dex_object(body: Polyhedron, folder: str | Path) -> Path:
     mesh = obj_text(body)
     write_text(place / "urdf" / "meshes" / "convex_piece_000.obj", mesh)
     write_text(place / "mesh" / "simplified.obj", mesh)
-    facts = {"mass": DENSITY * body.volume, "density": DENSITY, "scale": 1.0}
+    facts = {"mass": body.mass_at(DENSITY), "density": DENSITY, "scale": 1.0}
     write_text(place / "info" / "simplified.json", text_of(facts))
     return place
 

@@ -68,7 +68,7 @@ def judge_by(
     contacts = given.contacts if isinstance(given, Grasp) else given
     require_faithful(setup, friction, body.radius)
     scene = fingertip_scene(
-        body, given, found.friction, found.mass_of(body.volume), found.physics, setup.fingers
+        body, given, found.friction, found.mass_of(body), found.physics, setup.fingers
     )
     return Judgement(
         grasp=given.id if isinstance(given, Grasp) else "",
@@ -119,7 +119,7 @@ def judge_hand_by(  # noqa: PLR0913 - the hand in its grasp, and how it is judge
     seed_of(seed)
     setup = hand_setup() if setup is None else instance(setup, Setup, "setup")
     scene = hand_scene(
-        hand, body, reach, found.friction, found.mass_of(body.volume), found.physics,
+        hand, body, reach, found.friction, found.mass_of(body), found.physics,
         HandServos(found.servo_n_m_per_rad),
     )  # fmt: skip
     require_faithful(setup, friction, body.radius)

@@ -13,6 +13,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.short_text import summary
 from scenes.physics import PhysicsSettings
 
@@ -129,12 +130,16 @@ class PublishedProtocol:
         """Return the name as tables show it: imitations are called so."""
         return f"{self.name} (imitation)" if self.imitation else self.name
 
-    def mass_of(self, volume_m3: float) -> float:
-        """Return the mass that an object of a volume has in this test [kg]."""
+    def mass_of(self, body: Polyhedron) -> float:
+        """Return the mass that an object has in this test [kg].
+
+        Raises:
+            InputError: The mass is that of a density, and the object's volume is not known.
+        """
         if self.mass_kg is not None:
             return self.mass_kg
         density = ASSUMED_DENSITY if self.density_kg_per_m3 is None else self.density_kg_per_m3
-        return density * volume_m3
+        return body.mass_at(density)
 
     def forces(self, mass_kg: float) -> tuple[Array, ...]:
         """Return the different forces that act on an object of a mass, (3,) each [N]."""

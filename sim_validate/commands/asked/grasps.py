@@ -9,12 +9,16 @@ from sim_validate.records.grasps import read_grasps
 
 
 def saved_grasps(path: Path, reporter: Reporter) -> SavedGrasps | None:
-    """Read a `grasps.json`; say so and return None if it holds no grasp.
+    """Read a `grasps.json`, and warn of what was changed in its mesh.
+
+    None, with a word about it, if the file holds no grasp.
 
     Raises:
         InputError: The file is missing or invalid; the message names the field.
     """
     saved = read_grasps(path)
+    for note in saved.body.surface.notes():
+        reporter.warn(f"{saved.body.name}: {note}")
     if saved.grasps:
         return saved
     absence = f"{path} holds no grasp"

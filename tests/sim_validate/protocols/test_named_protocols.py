@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import scenes
 import sim_validate as sv
 from grasp_core.errors import InputError
 from sim_validate.cli.flag_groups import ProtocolName
@@ -98,7 +99,8 @@ def test_dexgraspnet_is_its_file():
     assert {step.seconds for run in test.runs for step in run} == {100.0 / 60.0}
     assert np.linalg.norm(test.forces(2.0), axis=1) == pytest.approx(2.0 * 9.8)
     assert (test.passing.fingers, test.passing.most_overlap_m) == (1, 0.001)
-    assert test.mass_of(2e-4) == pytest.approx(0.1)
+    box = scenes.example_object("box")
+    assert test.mass_of(box) == pytest.approx(500.0 * box.volume)
 
 
 def test_gendexgrasp_is_its_file():
@@ -106,9 +108,9 @@ def test_gendexgrasp_is_its_file():
     s in each of six directions, 0.02 m."""
     test = protocol("gendexgrasp")
     assert (test.friction, test.density_kg_per_m3) == (10.0, 10_000.0)
-    volume = 2e-4
-    mass = test.mass_of(volume)
-    assert np.linalg.norm(test.forces(mass), axis=1) == pytest.approx(5_000.0 * volume)
+    box = scenes.example_object("box")
+    forces = test.forces(test.mass_of(box))
+    assert np.linalg.norm(forces, axis=1) == pytest.approx(5_000.0 * box.volume)
     (run,) = test.runs
     assert [step.seconds for step in run] == pytest.approx([50.0 / 60.0] * 6)
     assert (test.passing.most_m, test.passing.since) == (0.02, "each step")
