@@ -270,7 +270,7 @@ class CarryingHand(ByValue):
         )
         torques = forces.reshape(len(forces), -1) @ body.motors.levers.T
         torques += gravities @ self.weights.T
-        spare = np.minimum(HELD * np.maximum(1.0, body.strongest * largest), MOST_LEFT)
-        return body.holds(local.reshape(len(local), -1), loads, slack) and body.is_strong_enough(
-            torques, spare[:, None]
-        )
+        spare = np.minimum(HELD * np.maximum(1.0, np.outer(largest, body.strongest)), MOST_LEFT)
+        return body.holds(
+            local.reshape(len(local), -1), loads, slack
+        ) and body.is_strong_enough(torques, spare)
