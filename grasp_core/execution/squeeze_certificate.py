@@ -114,7 +114,7 @@ class BestSqueeze(ByValue):
 
     def _has_numbers(self) -> bool:
         return (
-            type(self.grip) is Grip  # others have fields that nothing here checks
+            is_a(self.grip, Grip)
             and is_a(self.loads, LoadSet)
             and self.loads.sound()
             and is_number(self.max_push_n, least=0.0, most=LARGEST)
