@@ -130,6 +130,16 @@ def cross(a: Array, b: Array) -> Array:
     return ahead - a.take(AFTER_NEXT, -1) * b.take(NEXT, -1)
 
 
+def of_order_one(*arrays: Array) -> list[Array]:
+    """Multiply arrays by one power of two, exactly, so that their largest entry is from 0.5 to 1.
+
+    Proofs whose length means nothing are checked at this size: squares of very small numbers vanish
+    and the smallest ones have few digits, so that rounding could prove anything. Zeros stay zeros.
+    """
+    largest = max(float(np.abs(array).max(initial=0.0)) for array in arrays)
+    return [np.ldexp(array, -math.frexp(largest)[1]) for array in arrays]
+
+
 def to_digits(values: Array, size: float = 0.0) -> Array:
     """Round values to `DIGITS` digits of the largest of them, on a shifted grid.
 

@@ -35,7 +35,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import SMALLEST_SIZE, Array, cross, real_array
+from grasp_core.arrays import SMALLEST_SIZE, Array, cross, of_order_one, real_array
 from grasp_core.by_value import ByValue
 from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions, unit_size
 from grasp_core.closure.decision import decide
@@ -160,8 +160,8 @@ class ClosureCertificate(ByValue):
             if (normal_and_tangential(forces, normals)[1][self.friction == 0.0] > SUMMED).any():
                 return -math.inf
             return proved_margin(forces, arms, normals, self.friction, caution)
-        wrench = self.separating_wrench
-        if not is_array(wrench, 6):
+        wrench = self._direction()
+        if wrench is None:
             return math.inf
         # the twist of (4), moved from the frame's origin to the mean contact, at unit size
         turned = cross(wrench[3:], center)
@@ -180,11 +180,16 @@ class ClosureCertificate(ByValue):
             if not missed <= SUMMED:
                 return -math.inf
             return soft_proofs.proved_margin(contacts, local, caution)
-        wrench = self.separating_wrench
-        if not is_array(wrench, 6):
+        wrench = self._direction()
+        if wrench is None:
             return math.inf
         ceiling = soft_proofs.margin_ceiling(contacts, contacts.at_unit_size(wrench), caution)
         return -math.inf if ceiling <= FAR_BELOW else ceiling
+
+    def _direction(self) -> Array | None:
+        """Return the separating wrench, whose length means nothing, at order one; None if none."""
+        wrench = self.separating_wrench
+        return of_order_one(wrench)[0] if is_array(wrench, 6) else None
 
 
 def _balance(forces: Array, arms: Array, normals: Array) -> bool:

@@ -110,9 +110,11 @@ def separates(twist: Array, positions: Array, normals: Array, friction: float) -
     exact = _at_rest([Fraction(x) for x in unit.tolist()], exact_arms, resting)
     if exact is None or not any(exact):
         return False
+    # what is left of a twist that is put to rest may be short: all speeds are relative to it
+    rest = SAME * max(map(abs, exact))
     slope = None if friction == math.inf else Fraction(friction) ** 2
     return all(
-        _departs(_velocity(exact, arm), normal, slope)
+        _departs(_velocity(exact, arm), normal, slope, rest)
         for arm, normal in zip(exact_arms, _vectors(normals), strict=True)
     )
 
@@ -269,15 +271,15 @@ def _inside(force: list[int], normal: list[int], friction: float) -> bool:
     return _dot(force, normal) > 0 and across * below**2 < above**2 * along
 
 
-def _departs(velocity: Exact, normal: Exact, slope: Fraction | None) -> bool:
-    """Return whether a contact departs steeply enough, (2), or its speed is at most `SAME`.
+def _departs(velocity: Exact, normal: Exact, slope: Fraction | None, rest: Fraction) -> bool:
+    """Return whether a contact departs steeply enough, (2), or its speed is at most `rest`.
 
     `slope` is the square of the friction; with None, (2) must hold for every friction.
     """
-    if _dot(velocity, velocity) <= SAME**2:
+    if _dot(velocity, velocity) <= rest**2:
         return True
     along, across = _squares(velocity, normal)
-    steep = across <= SAME**2 if slope is None else slope * across <= along
+    steep = across <= rest**2 if slope is None else slope * across <= along
     return steep and _dot(velocity, normal) <= 0
 
 

@@ -52,6 +52,9 @@ SEARCH_DIGITS = 10
 LARGEST_RATIO = 1e6
 """Largest ratio of torque scale and contacts' extent, and its inverse: beyond it, rounding decides.
 """
+LONGEST_LEVER = 2e9
+"""Largest entry of a matrix of wrenches: coordinates up to `LARGEST_RATIO`, and a thousand times as
+much where torques are over a thousandth of the scale (see `resisted_loads`)."""
 
 
 def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
@@ -158,7 +161,7 @@ class WrenchSet(ByValue):
         return (
             bool((np.abs(square - np.eye(3)) <= SAME_FRAME).all())
             and bool((np.abs(levers + levers.transpose(0, 2, 1)) <= slack).all())
-            and float(np.abs(self.G).max()) <= LARGEST_RATIO * LARGEST_RATIO
+            and float(np.abs(self.G).max()) <= LONGEST_LEVER
             and (self.width != LOCAL or _are_torques(each[..., 3], frames[..., 0]))
         )
 

@@ -56,7 +56,7 @@ from functools import cached_property
 
 import numpy as np
 
-from grasp_core.arrays import SHIFT, Array, Indices, cross
+from grasp_core.arrays import SHIFT, Array, Indices, cross, of_order_one
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST
 from grasp_core.closure.wrench_sets import WrenchSet
@@ -234,9 +234,10 @@ class CarryingHand(ByValue):
             rounding: How often h is raised by what rounding may take of it: certificates are made
                 with more than they are checked with, so that two ways to round agree.
         """
+        # facets of any length mean the same
+        facet, multipliers = of_order_one(facet, multipliers)
         a, b = self.sides(facet, multipliers)
         h = self.body.support(facet, multipliers) + rounding * self._lost(facet, multipliers)
-        # facets of any length mean the same; squares of very short ones would vanish
         size = max(float(np.linalg.norm(a)), float(np.linalg.norm(b)), abs(h))
         if size == 0.0:
             return np.inf
@@ -270,7 +271,7 @@ class CarryingHand(ByValue):
         )
         torques = forces.reshape(len(forces), -1) @ body.motors.levers.T
         torques += gravities @ self.weights.T
-        spare = np.minimum(HELD * np.maximum(1.0, body.strongest * largest), MOST_LEFT)
+        spare = np.minimum(HELD * np.maximum(1.0, np.outer(largest, body.strongest)), MOST_LEFT)
         return body.holds(local.reshape(len(local), -1), loads, slack) and body.is_strong_enough(
-            torques, spare[:, None]
+            torques, spare
         )

@@ -106,7 +106,8 @@ class Payload(ByValue):
     def verify(self) -> bool:
         """Re-check every field in plain arithmetic; False if they are no certificate.
 
-        The free mass is about the contacts, the largest push and the motors of `fixed`. Whether the
+        The free mass is about the contacts, the largest push and the motors of `fixed`, and its
+        bounds hold to within 1e-7 of that push, the accuracy of conic programs. Whether the
         contacts are those of an object can only be checked with it.
         """
         with np.errstate(all="ignore"):

@@ -30,7 +30,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array, Indices, of_order_one
 from grasp_core.by_value import ByValue
 from grasp_core.closure.wrenches import grasp_map, in_frames
 from grasp_core.execution.grips import Grip
@@ -156,6 +156,8 @@ class Survival:
             max_push_n: The limit N on pushes.
         """
         rows = self.rows(cuts)
+        # multipliers of any length mean the same
+        multipliers, balance = of_order_one(multipliers, balance)
         taken = float(rows.c @ multipliers)
         if not taken > BOUNDING * float(np.linalg.norm(rows.c) * np.linalg.norm(multipliers)):
             return np.inf

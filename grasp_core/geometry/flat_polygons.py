@@ -12,7 +12,8 @@ from grasp_core.geometry.polygons import clip, edge_rows, plane_frame, signed_ar
 
 FEWEST_CORNERS, MOST_CORNERS = 3, 5000
 WIDTH, FINE = 1e-6, 1e-9
-"""Largest error of a claimed radius of the largest disc: relative to it, and at unit size."""
+"""Largest error of a claimed radius of the largest disc: relative to it, and to the extent of
+the polygon."""
 LEFT_OUT = 2e-3
 """Share of a polygon's area by which it may fail to cover its disc: half of it is given up to have
 fewer corners, the rest is for `SIDES`."""
@@ -60,15 +61,23 @@ def convex_polygon(corners: Array, slack: float) -> FlatPolygon | None:
         return None
     E, b = edge_rows(corners)
     found = FlatPolygon(corners, E, b)
-    turning = np.isfinite(E).all() and signed_area(corners) > 0.0
+    turning = np.isfinite(E).all() and signed_area(corners) > 0.0 and _turns_once(E)
     return found if turning and found.holds(corners, slack) else None
+
+
+def _turns_once(E: Array) -> bool:
+    """Return whether normals of a polygon's edges, (k, 2), turn around once, not more often."""
+    following = np.roll(E, -1, axis=0)
+    turns = E[:, 0] * following[:, 1] - E[:, 1] * following[:, 0]
+    return abs(float(np.arctan2(turns, (E * following).sum(axis=1)).sum())) < 3.0 * np.pi
 
 
 def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
     """Return whether a polygon shrinks to nothing when its edges move in by the radius."""
+    extent = float(np.linalg.norm(np.ptp(polygon.corners, axis=0)))
+    slack = WIDTH * radius + FINE * extent
     inner, outer = (
-        clip(polygon.corners, polygon.E, polygon.b - radius - sign * (WIDTH * radius + FINE))
-        for sign in (-1.0, 1.0)
+        clip(polygon.corners, polygon.E, polygon.b - radius - sign * slack) for sign in (-1.0, 1.0)
     )
     return radius > 0.0 and len(inner) > 0 and len(outer) == 0
 

@@ -37,13 +37,18 @@ from functools import cached_property
 
 import numpy as np
 
-from grasp_core.arrays import Array, cross
+from grasp_core.arrays import UNIT_SLACK, Array, cross
+from grasp_core.checked import LARGEST, SMALLEST
 from grasp_core.closure.wrenches import WRENCH, cross_matrix
 from grasp_core.execution.grips import Grip
+from grasp_core.fields import is_array, is_number
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import chains
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.stance import Stance
+
+STIFFEST = 1e12
+"""Condition of a finger's stiffness from which on it gives way in some direction only."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,6 +62,29 @@ class HandGrip(Grip):
     """Arms x - p_a from them to the contact, (k, m, 3) [m]."""
     servo_n_m_per_rad: float
     """Stiffness k_q of every servo."""
+
+    def sound(self) -> bool:
+        """Return whether the fields are those of contacts and of fingers that can move them."""
+        k = len(self.friction) if super().sound() else 0
+        joints = self.joint_axes.shape[1] if is_array(self.joint_axes, k, None, 3) else 0
+        if not (
+            joints > 0
+            and is_array(self.joint_arms, k, joints, 3)
+            and float(np.abs(self.joint_arms).max()) <= LARGEST
+            and is_number(self.servo_n_m_per_rad, least=SMALLEST, most=LARGEST)
+        ):
+            return False
+        lengths = np.linalg.norm(self.joint_axes, axis=2)
+        units = (lengths == 0.0) | (np.abs(lengths - 1.0) <= UNIT_SLACK)
+        return bool(units.all()) and all(map(self._gives, range(k)))
+
+    def _gives(self, k: int) -> bool:
+        """Return whether the joints of a finger let its fingertip move in all directions."""
+        stiffness, L, _ = self._turning(k)
+        if not float(np.linalg.cond(stiffness)) < STIFFEST:
+            return False
+        given = L.T @ np.asarray(np.linalg.inv(stiffness)) @ L
+        return float(np.linalg.cond(given)) < STIFFEST
 
     @cached_property
     def force_changes(self) -> Array:
@@ -76,6 +104,15 @@ class HandGrip(Grip):
 
     def _finger(self, k: int) -> tuple[Array, Array]:
         """Return df of (4), (3, 6), and the fingertip's turn v, (3, 6), per motion (d, t)."""
+        stiffness, L, B = self._turning(k)
+        S = np.asarray(np.linalg.inv(stiffness))
+        moved: Array = self._maps[k].T + L.T @ S @ B
+        df = np.asarray(-np.linalg.solve(L.T @ S @ L, moved), dtype=np.float64)
+        turn: Array = -self.joint_axes[k].T @ S @ (L @ df + B)
+        return df, turn
+
+    def _turning(self, k: int) -> tuple[Array, Array, Array]:
+        """Return k_q 1 + H, (m, m), L, (m, 3), and B, (m, 6), of a finger."""
         w, f, n = self.joint_axes[k], self.squeeze[k], self.normals[k]
         rho = float(self.tip_radius_m[k])
         L = cross(w, self.joint_arms[k])
@@ -85,11 +122,7 @@ class HandGrip(Grip):
         B = np.zeros((len(w), WRENCH))
         # f . (w x (t x n)) = (n x (f x w)) . t
         B[:, 3:] = rho * cross(n, cross(f, w))
-        S = np.asarray(np.linalg.inv(self.servo_n_m_per_rad * np.eye(len(w)) + H))
-        moved: Array = self._maps[k].T + L.T @ S @ B
-        df = np.asarray(-np.linalg.solve(L.T @ S @ L, moved), dtype=np.float64)
-        turn: Array = -w.T @ S @ (L @ df + B)
-        return df, turn
+        return self.servo_n_m_per_rad * np.eye(len(w)) + H, L, B
 
 
 def hand_grip(

@@ -27,7 +27,8 @@ from grasp_core.solvers.ties import graded
 THINNEST = 1e-6
 """Least radius of the largest disc in a piece that can hold a contact (object size one)."""
 SOUND = 1e-9
-"""Largest disagreement between fields of one piece that counts as rounding (object size one)."""
+"""Largest disagreement between fields of one piece that counts as rounding (object size one), and
+relative to a piece that is smaller."""
 
 SAME_PLACE = 6
 """Digits to which distances are compared (object size one); the order of the pieces breaks ties."""
@@ -87,12 +88,13 @@ class FacePiece(ByValue):
 
     def _is_polygon(self) -> bool:
         """Return whether `corners` and `inradius` fit the polygon {y : E y <= b}."""
-        polygon = convex_polygon(self.corners, SOUND)
+        slack = SOUND * min(1.0, float(np.linalg.norm(np.ptp(self.corners, axis=0))))
+        polygon = convex_polygon(self.corners, slack)
         if polygon is None:
             return False
         below = polygon.corners @ self.E.T - self.b
-        bordered = (np.abs(below) <= SOUND) & (np.abs(np.roll(below, -1, axis=0)) <= SOUND)
-        within = float(below.max()) <= SOUND and bool(bordered.any(axis=1).all())
+        bordered = (np.abs(below) <= slack) & (np.abs(np.roll(below, -1, axis=0)) <= slack)
+        within = float(below.max()) <= slack and bool(bordered.any(axis=1).all())
         return within and has_inscribed_radius(polygon, self.inradius)
 
     def point(self, y: Array) -> Array:

@@ -56,6 +56,8 @@ ABOVE = 1e-12
 """Height from which on a point sees a simplex, relative to the extent: some thousand roundings."""
 CHECK_SLACK = 1e-12
 """Slack of the plain-arithmetic checks, relative to the longest wrench."""
+MOST_SLACK = 1e-6
+"""Largest slack of a quality, however long wrenches are [N]."""
 KERNEL = "grasp_core.quality.ferrari_canny_kernel"
 
 
@@ -82,14 +84,14 @@ class FerrariCanny(ByValue):
         """Check every field again in plain arithmetic, without any solver.
 
         The bounds hold for the set `wrenches`, which is checked to be that of some contacts, to
-        within 1e-12 of its longest wrench.
+        within 1e-12 of its longest wrench, and 1e-6 N at most.
         """
         with np.errstate(all="ignore"):
             sound = is_a(self.wrenches, WrenchSet) and self.wrenches.sound()
             ordered = is_number(self.lower) and is_number(self.upper) and self.lower <= self.upper
             if not (sound and ordered and are_units(self.direction, WRENCH, slack=CHECK_SLACK)):
                 return False
-            slack = CHECK_SLACK * self.wrenches.size
+            slack = min(CHECK_SLACK * self.wrenches.size, MOST_SLACK)
             # (1) for the direction
             support, _ = self.wrenches.support(self.direction)
             return support <= self.upper + slack and self._proves_lower(slack)
@@ -102,15 +104,24 @@ class FerrariCanny(ByValue):
                 self.forces is None
                 and is_a(self.polytope, InnerPolytope)
                 and self.polytope.sound(width)
-                and self.wrenches.holds(self.polytope.forces, CHECK_SLACK)
+                and are_allowed(self.polytope.forces, self.wrenches)
                 and self.polytope.proved_radius(self.wrenches) >= self.lower - slack
             )
         # (3), by the wrench of allowed forces
         return (
             is_array(self.forces, width)
-            and self.wrenches.holds(self.forces[None], CHECK_SLACK)
+            and are_allowed(self.forces[None], self.wrenches)
             and float(np.linalg.norm(self.wrenches.G @ self.forces)) <= -self.lower + slack
         )
+
+
+def are_allowed(forces: Array, wrenches: WrenchSet) -> bool:
+    """Return whether wrenches of forces, one a row, are in a set, to `CHECK_SLACK` of its longest.
+
+    What all contacts together miss counts, so that more contacts do not allow more.
+    """
+    longest = 1.0 + float(wrenches.friction.max())
+    return wrenches.holds(forces, CHECK_SLACK * longest / len(wrenches.friction))
 
 
 def ferrari_canny(  # noqa: PLR0913 - the contract's arguments

@@ -43,7 +43,13 @@ from grasp_core.closure.wrench_sets import WrenchSet, into_cones
 from grasp_core.closure.wrenches import WRENCH
 from grasp_core.errors import SolverError
 from grasp_core.fields import are_units, is_a, is_array, is_number
-from grasp_core.quality.ferrari_canny import CHECK_SLACK, GAP, FerrariCanny, wrench_set_quality
+from grasp_core.quality.ferrari_canny import (
+    CHECK_SLACK,
+    GAP,
+    FerrariCanny,
+    are_allowed,
+    wrench_set_quality,
+)
 from grasp_core.quality.measures import Measure
 from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.solvers.ties import first_best
@@ -126,7 +132,7 @@ class ResistedLoads(ByValue):
         sizes = np.linalg.norm(loads, axis=1)
         shown = sizes * _without_rests(self.wrenches, loads, self.forces, self.ball)
         resisted = bool((shown >= self.lower * sizes - slack).all())
-        return resisted and self.wrenches.holds(self.forces, CHECK_SLACK)
+        return resisted and are_allowed(self.forces, self.wrenches)
 
 
 def thin(wrenches: WrenchSet) -> WrenchSet:

@@ -179,11 +179,11 @@ class WrenchBody:
         return bool((np.abs(torques) / self.motors.limits <= 1.0 + slack).all())
 
     @property
-    def strongest(self) -> float:
-        """Return how many times its limit a joint's torque is at most under unit pushes, or one."""
-        shares = np.linalg.norm(self.levers.reshape(-1, 3), axis=1).max(initial=0.0)
-        weakest = self.motors.limits.min(initial=np.inf)
-        return max(1.0, self.max_normal_force * float(shares) / float(weakest))
+    def strongest(self) -> Array:
+        """Return how many times its limit each joint's torque is at most under one push, (j,)."""
+        each = self.levers.reshape(len(self.levers), self.count, 3)
+        longest = np.linalg.norm(each, axis=2).max(axis=1)
+        return self.max_normal_force * longest / self.motors.limits
 
     def about_middle(self, wrench: Array) -> Array:
         """Move a wrench's reference point to the contacts' mean, and scale it to unit size."""

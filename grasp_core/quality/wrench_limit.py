@@ -27,13 +27,15 @@ HELD = 1e-7
 """How far forces at a limit may leave cones and balance, relative to the largest wrench of a unit
 normal force: the accuracy of conic programs."""
 FACET_SLACK = 1e-9
-"""Slack of the upper bound, relative to it, and of the facet's power, relative to the lengths of
-its factors."""
-MOST_OFF = 1e-6
-"""Largest error of the facet's power, whatever the lengths of its factors: rounding takes less even
-from facets that are a thousand million times as long as their wrench asks for."""
+"""Slack of the upper bound, relative to it."""
 LAST_DIGITS = 1e-12
-"""Slack of an upper bound near zero, relative to the largest that the facet's length allows."""
+"""Slack of an upper bound near zero, relative to the largest that the facet's length allows, and
+`HELD` of the largest force at most, however long the facet is."""
+MOST_OFF = 1e-6
+"""Largest error of the facet's power."""
+LONGEST = 1e8
+"""Most that the lengths of facet and load, or of multipliers, levers and load, may be together:
+rounding takes about `HELD` from factors that are longer."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -160,7 +162,7 @@ def attains(body: WrenchBody, found: WrenchLimit) -> bool:
     torques = body.motors.torques(found.forces)
     # rows of torques are met as all rows of the program are, by shares of the motors' limits
     balanced = body.holds(shares, load[None], HELD * body.bounded.size)
-    return balanced and body.is_strong_enough(torques[None], HELD * body.strongest)
+    return balanced and body.is_strong_enough(torques[None], HELD * np.maximum(1.0, body.strongest))
 
 
 def _shares(body: WrenchBody, found: WrenchLimit) -> Array:
@@ -178,11 +180,19 @@ def _shares(body: WrenchBody, found: WrenchLimit) -> Array:
 def bounds(body: WrenchBody, found: WrenchLimit) -> bool:
     """Return whether the facet proves that no multiple above the upper one is resisted."""
     load, twist = body.about_middle(found.wrench), body.scaled(found.facet)
-    power = float(twist @ load)
-    lengths = float(np.linalg.norm(twist) * np.linalg.norm(load))
-    # (3): h(y) is at most the upper limit, and y.w = -1, each but for rounding
+    power, length = float(twist @ load), float(np.linalg.norm(load))
+    if not (_are_short(body, found, length) and abs(power + 1.0) <= MOST_OFF):
+        return False
+    # (3): h(y) is at most the upper limit times -y.w, but for rounding
     bound = body.scaled_support(twist, found.motor_multipliers)
-    farthest = body.bounded.size * float(np.linalg.norm(twist))
-    slack = LAST_DIGITS * body.max_normal_force * farthest
-    bounded = bound <= found.upper * (1.0 + FACET_SLACK) + slack
-    return bounded and abs(power + 1.0) <= min(FACET_SLACK * lengths, MOST_OFF)
+    largest = body.max_normal_force * body.bounded.size
+    slack = largest * min(LAST_DIGITS * float(np.linalg.norm(twist)), HELD / length)
+    return bound <= found.upper * min(1.0, -power) * (1.0 + FACET_SLACK) + slack
+
+
+def _are_short(body: WrenchBody, found: WrenchLimit, load: float) -> bool:
+    """Return whether facet and multipliers are short enough for rounding, given a load's length."""
+    twist, middle = np.abs(found.facet * body.scale), float(np.linalg.norm(body.middle))
+    moved = float(np.linalg.norm(twist) + np.linalg.norm(found.facet[3:]) * middle)
+    pulled = float((np.abs(found.motor_multipliers) @ np.abs(body.levers)).max(initial=0.0))
+    return (moved + pulled) * load <= LONGEST

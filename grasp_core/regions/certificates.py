@@ -27,7 +27,8 @@ from grasp_core.values import FINGERS, ContactRegion
 
 PLACED = 1e-9
 """How far points may be off their planes and borders, and radii off their measured values, relative
-to `scale`: files that keep ten digits stay within it."""
+to `scale`, which is no longer than contacts are apart: files that keep ten digits stay within it.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -89,7 +90,13 @@ class CertifiedRegions(ByValue):
         has the object checks that `borders` are parts of its faces.
         """
         with np.errstate(all="ignore"):
-            return self._has_numbers() and self._has_discs() and self._is_open() and self._closes()
+            return (
+                self._has_numbers()
+                and self._has_fitting_scale()
+                and self._has_discs()
+                and self._is_open()
+                and self._closes()
+            )
 
     def _has_numbers(self) -> bool:
         return (
@@ -106,6 +113,16 @@ class CertifiedRegions(ByValue):
             and is_a(self.cover, TwistCover)
             and is_number(self.radius, least=0.0)
         )
+
+    def _has_fitting_scale(self) -> bool:
+        """Return whether the unit of length is no longer than contacts in the borders are apart.
+
+        What may be `PLACED` off is measured with it: twice as long as it need be, for rounding.
+        """
+        if not all(is_array(border, None, 3) for border in self.borders):
+            return False
+        apart = float(np.linalg.norm(np.ptp(np.vstack(self.borders), axis=0)))
+        return self.scale <= 2.0 * apart
 
     def _has_discs(self) -> bool:
         farthest = 0.0

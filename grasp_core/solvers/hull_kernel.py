@@ -14,7 +14,6 @@ Turning needs no look-up of ridges, and pairs the right ones where a ridge has m
 simplices. A corner is found by the sums of corners, which are exact.
 
 Functions take arrays out of the hull once: in loops that would cost more than the arithmetic.
-Numba's copy of `ferrari_canny_kernel` does not notice a change here; touch that file as well.
 """
 
 from typing import Any, NamedTuple

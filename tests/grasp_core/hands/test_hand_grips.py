@@ -1,5 +1,7 @@
 """The grip of a hand changes its forces as chains of joints on servos do, by their kinematics."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -83,3 +85,15 @@ def test_a_hand_that_executes_proves_its_squeeze():
     _, _, _, best = standing("leap")
     assert best.verify()
     assert isinstance(best.grip, gc.Grip)
+
+
+def test_a_squeeze_of_joints_that_are_none_proves_nothing():
+    """Axes that are too long, arms of no length, and servos that hold nothing."""
+    _, _, _, best = standing("leap")
+    grip = best.grip
+    for wrong in (
+        {"joint_axes": 2.0 * grip.joint_axes}, {"joint_axes": grip.joint_axes[:, :, :2]},
+        {"joint_arms": 0.0 * grip.joint_arms}, {"joint_arms": grip.joint_arms[:, :1]},
+        {"servo_n_m_per_rad": 0.0}, {"servo_n_m_per_rad": np.nan},
+    ):  # fmt: skip
+        assert not dataclasses.replace(best, grip=dataclasses.replace(grip, **wrong)).verify()

@@ -1,0 +1,366 @@
+"""False limits of wrenches, squeezes and payloads.
+
+What contacts resist is found by conic programs of the tests, and directions that they hold least in
+by many of them. Bounds hold to 1e-7 of the largest force: what is claimed is false by far more.
+"""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+import grasp_core as gc
+import grasp_core.execution.payload as payloads
+import grasp_core.quality.wrench_limit as checked
+from grasp_core.execution import carrying_hand, squeeze_certificate, squeeze_rows
+from grasp_core.execution.payload import Payload
+from grasp_core.execution.squeeze_rows import Survival
+from grasp_core.quality.wrench_limit import WrenchLimit, body_of
+from tests.attacks.searching import Attack, always, cycled, power, tiny
+from tests.tampering import table
+from tests.tampering.exact_closure import conic, locals_of, unit_arms
+from tests.tampering.hand_payloads import held
+from tests.tampering.squeezes import GRAVITY, largest_scale, ray, responding
+from tests.tampering.wrench_bounds import scaled, torques_of
+
+SEEDS = 12
+SURE = 1e-5
+"""Share of the largest force by which claims are false at least."""
+
+
+@cache
+def limit(seed):
+    """A genuine limit, the multiple by a program of the tests, and by how much claims are off."""
+    c = table.wrench_limit(seed) if seed % 2 else on_a_line(seed)
+    x, n, most = c.positions, c.normals, c.max_normal_force
+    mu = np.full(len(x), c.friction) if np.ndim(c.friction) == 0 else np.asarray(c.friction)
+    arms, size = unit_arms(x)
+    w = c.found.wrench
+    load = np.append(w[:3], (w[3:] - np.cross(x.mean(axis=0) - c.center, w[:3])) / size)
+    torques, room = torques_of(c.motors, n, most)
+    k, length = len(x), np.linalg.norm(load)
+    A = np.zeros((6 + k + len(room) + 3 * k, 3 * k + 1))
+    A[:6, :-1], A[:6, -1] = locals_of(arms, n, mu), load / length
+    A[6 + np.arange(k), 3 * np.arange(k)] = 1.0
+    A[6 + k : -3 * k, :-1] = torques @ scaled(mu)
+    A[-3 * k :, :-1] = -np.eye(3 * k)
+    b = np.r_[np.zeros(6), np.ones(k), room, np.zeros(3 * k)]
+    best = most * conic(np.append(np.zeros(3 * k), -1.0), A, b, 6, k + len(room), k).x[-1] / length
+    return c, best, SURE * most * k * np.sqrt(1.0 + mu.max() ** 2) / length
+
+
+def on_a_line(seed):
+    """Two opposite contacts, which resist no turn about their line, and a load that they resist."""
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    x, n = np.outer([-0.05, 0.05], turn[0]), np.outer([1.0, -1.0], turn[0])
+    f = 10.0 * n + 2.0 * np.outer([1.0, 1.0], turn[1])
+    load = -np.append(f.sum(axis=0), np.cross(x, f).sum(axis=0))
+    (found,) = gc.wrench_limits(x, n, 0.5, load[None], max_normal_force=10.0)
+    return table.Limited(found, x, n, 0.5, 10.0, np.zeros(3), None)
+
+
+def any_seed(rng):
+    return int(rng.integers(SEEDS))
+
+
+def facet_of(c, rng, way=None):
+    """A facet of power -1 against the load, as long as one likes in directions without power."""
+    w = c.found.wrench
+    z = rng.normal(size=6) if way is None else way
+    z -= w * (w @ z) / (w @ w)
+    y = c.found.facet * rng.choice([0.0, 1.0]) + power(rng, -6, 25) * z / np.linalg.norm(z)
+    return y - w * (y @ w + 1.0) / (w @ w)
+
+
+def weakest_ways(c):
+    """Twists by how little power contact forces have on them, (6, 6)."""
+    body = body_of(c.positions - c.center, c.normals, c.friction, c.max_normal_force, c.motors, 0.0)
+    ways = np.linalg.svd(body.G)[0].T / body.scale
+    return np.array([body.about_center(way) for way in ways])[::-1]
+
+
+def lowered(c, best, off, facet, multipliers, rng):
+    upper = max(best * (1.0 - power(rng, -3, 0)) - off, 0.0)
+    if upper >= best - 0.5 * off:
+        return None
+    low = replace(
+        c.found, limit=0.0, upper=upper, forces=0.0 * c.found.forces, facet=facet,
+        motor_multipliers=multipliers,
+    )  # fmt: skip
+    return lambda: replace(c, found=low)
+
+
+def long_facets(rng):
+    c, best, off = limit(any_seed(rng))
+    facet = facet_of(c, rng)
+    return lowered(c, best, off, facet, c.found.motor_multipliers, rng)
+
+
+def long_weak_facets(rng):
+    """Along twists on which forces have next to no power."""
+    c, best, off = limit(any_seed(rng))
+    facet = facet_of(c, rng, weakest_ways(c)[int(rng.integers(3))].copy())
+    return lowered(c, best, off, facet, c.found.motor_multipliers, rng)
+
+
+def climbed_facets(rng):
+    """The least support that a few random steps find, and the length that its slack takes then."""
+    c, best, off = limit(any_seed(rng))
+    w, step = c.found.wrench, power(rng, -6, 0)
+    body = body_of(c.positions - c.center, c.normals, c.friction, c.max_normal_force, c.motors, 0.0)
+    at, m = c.found.facet.copy(), c.found.motor_multipliers.copy()
+    for _ in range(10):
+        to = at + step * np.linalg.norm(at) * rng.normal(size=6)
+        to = to / -(to @ w) if to @ w < 0.0 else at
+        at = min(at, to, key=lambda y: body.support(y, m))
+    return lowered(c, best, off, at * (1.0 + power(rng, -9, -5)), m, rng)
+
+
+def huge_multipliers(rng):
+    c, best, off = limit(1 + 2 * int(rng.integers(SEEDS // 2)))
+    m = c.found.motor_multipliers * power(rng, 0, 40)
+    m += power(rng, 0, 40) * rng.normal(size=len(m)) * rng.choice([0.0, 1.0])
+    return lowered(c, best, off, facet_of(c, rng), m, rng)
+
+
+def higher_limits(rng):
+    """Forces grown with the claim, out of their cones, or not balanced."""
+    c, best, off = limit(any_seed(rng))
+    up = best * (1.0 + power(rng, -4, 3)) + off
+    grown = up / c.found.limit if c.found.limit > 0.0 and rng.uniform() < 0.5 else 1.0
+    forces = c.found.forces * grown
+    forces = forces + power(rng, -12, 0) * c.max_normal_force * rng.normal(size=forces.shape)
+    high = replace(c.found, limit=up, upper=max(up, c.found.upper), forces=forces)
+    return lambda: replace(c, found=high)
+
+
+def small_loads(rng):
+    """A load of almost nothing, of which forces of nothing resist any multiple."""
+    c, best, off = limit(any_seed(rng))
+    s = power(rng, -45, 0)
+    up = (best + off) / s * (1.0 + power(rng, -4, 1))
+    y = c.found.facet / s
+    high = replace(c.found, wrench=s * c.found.wrench, limit=up, upper=up, facet=y)
+    return lambda: replace(c, found=high)
+
+
+def any_slack(monkeypatch):
+    """A facet's slack grows with its length, as it once did."""
+
+    def bounds(body, found):
+        twist = body.scaled(found.facet)
+        far = body.bounded.size * float(np.linalg.norm(twist))
+        bound = body.scaled_support(twist, found.motor_multipliers)
+        return bound <= found.upper + 1e-12 * body.max_normal_force * far
+
+    monkeypatch.setattr(checked, "bounds", bounds)
+
+
+LIMIT = Attack(
+    lambda rng: cycled(rng, [long_facets, long_weak_facets, climbed_facets, huge_multipliers,
+                             higher_limits, small_loads]),
+    (any_slack,), 4000,
+)  # fmt: skip
+
+
+@cache
+def squeeze(seed):
+    """A genuine squeeze without offset or motors, and the best scale by a program of the tests."""
+    contacts, springs = table.held(seed)
+    axes = np.diag(np.repeat([0.5, 0.5 * contacts[0].radius], 3))
+    c = gc.best_squeeze(*contacts, gc.LoadSet(np.zeros(6), axes), max_push_n=10.0, **springs)
+    frames, _, offset, change = responding(c.grip, c.loads)
+    return c, largest_scale(c.grip, frames, offset, change, c)
+
+
+@cache
+def softer(seed, share):
+    """A part of a genuine squeeze, with what it survives and the load that ends it."""
+    c, best = squeeze(seed)
+    grip = c.grip.squeezed(share * c.grip.squeeze)
+    survival = Survival.of(grip, c.loads)
+    reactions = survival.reactions(grip.local_squeeze)
+    angles, scales = reactions.worst_angles()
+    first = int(scales.argmin())
+    scale = float(scales[first]) * (1.0 - 1e-7)
+    return replace(
+        c, grip=grip, scale=scale, contact=first, joint=-1,
+        direction=reactions.worst_of(first, float(angles[first])),
+        proofs=reactions.multipliers(scale),
+    ), best  # fmt: skip
+
+
+def short_multipliers(rng):
+    """Multipliers so short that their products have no digits."""
+    c, best = softer(any_seed(rng), float(rng.choice([0.3, 0.6, 0.9])))
+    upper = c.scale * (1.0 + power(rng, -6, -1))
+    if upper > 0.99 * best:
+        return None
+    y = np.abs(tiny(rng, c.multipliers.shape)) * (rng.uniform(size=c.multipliers.shape) < 0.2)
+    kept = np.ldexp(c.multipliers, -int(rng.integers(900, 1075)))
+    z = tiny(rng, 6) if rng.uniform() < 0.5 else np.zeros(6)
+    return lambda: replace(
+        c, upper=upper, multipliers=y if rng.uniform() < 0.5 else kept,
+        balance=z if rng.uniform() < 0.5 else c.balance,
+    )  # fmt: skip
+
+
+def long_multipliers(rng):
+    c, best = softer(any_seed(rng), float(rng.choice([0.3, 0.6, 0.9])))
+    upper = c.scale * (1.0 + power(rng, -6, -1))
+    if upper > 0.99 * best:
+        return None
+    y = c.multipliers * 10.0 ** rng.uniform(-30, 30, size=c.multipliers.shape)
+    return lambda: replace(c, upper=upper, multipliers=y, balance=c.balance * power(rng, -9, 30))
+
+
+def surviving_more(rng):
+    """A larger scale, with multipliers of the S-lemma, and a squeeze, that would carry it."""
+    c, best = squeeze(any_seed(rng))
+    scale = best * (1.0 + power(rng, -2.5, 3))
+    grown = 1.0 + power(rng, -6, 3) * rng.choice([0.0, 1.0])
+    one = np.zeros(c.grip.squeeze.shape)
+    i = int(rng.integers(len(one)))
+    one[i] = c.grip.normals[i] * power(rng, -7, 1) * rng.choice([0.0, 1.0])
+    grip = c.grip.squeezed(grown * c.grip.squeeze + one)
+    reactions = Survival.of(grip, c.loads).reactions(grip.local_squeeze)
+    proofs = reactions.multipliers(scale) * 10.0 ** rng.choice([0.0, 1.0, 9.0, -9.0])
+    return lambda: replace(c, grip=grip, scale=scale, upper=max(scale, c.upper), proofs=proofs)
+
+
+def kept_values(rng):
+    """What a grip has worked out once stands beside its fields, and may be anything."""
+    c, best = squeeze(any_seed(rng))
+    share = power(rng, -3, -0.5)
+    grip = replace(c.grip)
+    grip.__dict__["response"] = share * c.grip.response
+    scale = c.scale / share
+    if scale < 1.01 * best:
+        return None
+    return lambda: replace(c, grip=grip, scale=scale, upper=c.upper / share * (1.0 + 1e-8))
+
+
+def short_counts(monkeypatch):
+    """Multipliers count at the length at which they come."""
+    monkeypatch.setattr(squeeze_rows, "of_order_one", lambda *arrays: list(arrays))
+
+
+def keeping(monkeypatch):
+    """What a grip has kept counts."""
+    monkeypatch.setattr(squeeze_certificate, "replace", lambda value, **_: value)
+
+
+SQUEEZE = Attack(
+    lambda rng: cycled(
+        rng, [short_multipliers, long_multipliers, surviving_more, kept_values]
+    ),
+    (short_counts, keeping), 2500,
+)  # fmt: skip
+
+
+@cache
+def payload(seed):
+    """A genuine payload without motors, and the least mass of the tests' own rays."""
+    contacts, springs = table.held(seed)
+    c = gc.payload(*contacts, max_push_n=10.0, **springs)
+    ways = np.random.default_rng(seed).normal(size=(40, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    return c, min(ray(c.fixed.grip, None, 10.0, way) for way in ways)
+
+
+def less_mass(rng):
+    """A free mass that is too low, by one long facet."""
+    c, least = payload(any_seed(rng))
+    truth = min(least, c.free.lower)
+    upper = 0.5 * truth * (1.0 - power(rng, -3, 0))
+    d = rng.normal(size=3)
+    w = np.append(GRAVITY * d / np.linalg.norm(d), np.zeros(3))
+    z = rng.normal(size=6) * rng.choice([0.0, 1.0], size=6)
+    z -= w * (w @ z) / (w @ w)
+    y = power(rng, -3, 25) * z - w / (w @ w)
+    held_up = WrenchLimit(
+        w, 0.0, upper * rng.uniform(0.5, 1.0), np.zeros(c.fixed.grip.arms.shape), y
+    )
+    free = replace(c.free, lower=0.0, upper=upper, rays=(held_up,), triangles=c.free.triangles[:0])
+    return lambda: Payload(c.fixed, free)
+
+
+def more_mass(rng):
+    """A free mass that is too high, by longer rays or triangles that come again."""
+    c, least = payload(any_seed(rng))
+    lower = least * (1.0 + power(rng, -3, 1)) + SURE * 10.0 / GRAVITY
+    grown = lower / c.free.lower
+    rays = tuple(
+        replace(
+            r, limit=r.limit * grown, upper=max(r.upper, r.limit * grown),
+            forces=r.forces * rng.choice([1.0, grown]),
+        ) for r in c.free.rays
+    )  # fmt: skip
+    triangles = c.free.triangles
+    if rng.uniform() < 0.5:
+        rays, some = c.free.rays, rng.permutation(len(triangles))[: len(triangles) // 2]
+        triangles = np.vstack([triangles[some], triangles[some][:, ::-1]])
+    free = replace(
+        c.free, lower=lower, upper=max(lower, c.free.upper), rays=rays, triangles=triangles
+    )
+    return lambda: Payload(c.fixed, free)
+
+
+PAYLOAD = Attack(
+    lambda rng: cycled(rng, [less_mass, more_mass]),
+    (lambda monkeypatch: monkeypatch.setattr(payloads, "bounds", always(True)),), 1500,
+)  # fmt: skip
+
+
+@cache
+def hand(seed):
+    """A genuine payload of a hand, and the least mass that it holds in some orientations."""
+    c = table.hand_payload(seed)
+    ways = np.random.default_rng(seed).normal(size=(40, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    return c, min(held(c.hand, way) for way in ways)
+
+
+def hand_holds_less(rng):
+    """Facets of any length, also so short that the support of the contacts has no digits."""
+    c, least = hand(any_seed(rng))
+    upper = 0.97 * min(least, c.lower) * (1.0 - power(rng, -3, 0))
+    if upper <= 0.0:
+        return None
+    if rng.uniform() < 0.7:
+        size = rng.uniform(0.6, 9.0) / max(np.abs(c.facet).max(), np.abs(c.motor_multipliers).max())
+        last = -int(rng.choice([1074, 1073, 1072]))
+        facet = np.ldexp(np.rint(size * c.facet + rng.uniform(-0.5, 0.5, 6)), last)
+        m = np.ldexp(np.rint(size * c.motor_multipliers), last)
+    else:
+        s = power(rng, -330, 40)
+        facet = s * (c.facet + power(rng, -6, 1) * rng.normal(size=6))
+        m = s * c.motor_multipliers
+    return lambda: replace(
+        c, lower=0.0, upper=upper, facet=facet, motor_multipliers=m, gravities=c.gravities[:0],
+        forces=c.forces[:0], triangles=c.triangles[:0],
+    )  # fmt: skip
+
+
+def hand_holds_more(rng):
+    """Larger hulls, forces that grow with the claim, or triangles that come again."""
+    c, least = hand(any_seed(rng))
+    lower = least * (1.0 + power(rng, -3, 3)) + SURE * c.hand.max_push_n / GRAVITY
+    g, f = c.gravities * power(rng, -1, 3), c.forces * rng.choice([1.0, lower / c.lower])
+    f = f + power(rng, -12, 0) * rng.normal(size=f.shape)
+    t = np.vstack([c.triangles] * int(rng.integers(1, 3)))
+    return lambda: replace(
+        c, lower=lower, upper=max(lower, c.upper), gravities=g, forces=f, triangles=t
+    )
+
+
+HAND = Attack(
+    lambda rng: cycled(rng, [hand_holds_less, hand_holds_more]),
+    (
+        lambda monkeypatch: monkeypatch.setattr(
+            carrying_hand, "of_order_one", lambda *arrays: list(arrays)
+        ),
+    ),
+    2000,
+)
