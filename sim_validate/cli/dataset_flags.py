@@ -141,17 +141,6 @@ class Export:
 
 
 @dataclass(frozen=True, slots=True)
-class Merge:
-    """Merge finished datasets of the same settings; their objects and frictions may differ."""
-
-    datasets: Positional[tuple[Path, ...]]
-    """Folders of the datasets; of an object that several have, the first counts."""
-    out: Path
-    """Folder of the merged dataset; it must be empty or not exist."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
-
-
-@dataclass(frozen=True, slots=True)
 class Stats:
     """Count a dataset's rows by kind and outcome, and show how its numbers spread."""
 
@@ -209,14 +198,13 @@ class Depth:
 
 @dataclass(frozen=True, slots=True)
 class Dataset:
-    """Build a dataset of grasps of many objects; check, merge, show or export datasets."""
+    """Build a dataset of grasps of many objects; check, show or export datasets."""
 
     action: OmitArgPrefixes[
         Annotated[Build, subcommand("build", prefix_name=False)]
         | Annotated[Import, subcommand("import", prefix_name=False)]
         | Annotated[Verify, subcommand("verify", prefix_name=False)]
         | Annotated[Export, subcommand("export", prefix_name=False)]
-        | Annotated[Merge, subcommand("merge", prefix_name=False)]
         | Annotated[Stats, subcommand("stats", prefix_name=False)]
         | Annotated[SampleRows, subcommand("sample", prefix_name=False)]
         | Annotated[Depth, subcommand("depth", prefix_name=False)]
