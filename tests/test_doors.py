@@ -36,7 +36,6 @@ DOORS = {
     "matplotlib": "scenes/drawing/canvas.py",
     "jinja2": "scenes/drawing/pages.py",
     "scipy.stats": "sim_validate/validation/repeats.py",
-    "pebble": "sim_validate/parallel/processes.py",
     "ray": "sim_validate/parallel/clusters.py",
     "distributed": "sim_validate/parallel/clusters.py",
     "pyarrow": ("sim_validate/datasets/parquet.py", "sim_validate/datasets/exports/tables.py"),

@@ -125,8 +125,8 @@ def _of_others(found: Any) -> str:
     kind = known if "qpos" in first else ""
     return (
         f"expected the dictionary of one grasp, got a list of {len(several)}.{kind} Save each "
-        f"grasp as a file of its own with the fields {', '.join(WANTED)} (docs/protocols.md says what "
-        "they are)"
+        f"grasp as a file of its own with the fields {', '.join(WANTED)} (docs/protocols.md says "
+        "what they are)"
     )
 
 
