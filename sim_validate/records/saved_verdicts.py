@@ -9,10 +9,10 @@ from typing import Any
 from grasp_core.by_value import ByValue
 from grasp_core.checked import path_of
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById, frame_of
-from sim_validate.records.verdicts_schema import SCHEMA, VerdictRecord, VerdictsFile
+from sim_validate.records.consistent_verdicts import verdicts_of
+from sim_validate.records.verdicts_schema import VerdictRecord
 from sim_validate.simulation.hold_verdict import LET_GO, Outcome
 
 
@@ -100,7 +100,7 @@ def load_verdicts(path: str | Path) -> SavedVerdicts:
     path = path_of(path, "path")
     text = read_text(path)
     try:
-        record = record_of(VerdictsFile, text, "verdicts.json", schema=SCHEMA)
+        record = verdicts_of(text)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     return SavedVerdicts(

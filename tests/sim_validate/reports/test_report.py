@@ -17,6 +17,7 @@ from scenes.drawing.views import DISTANCE
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
+from sim_validate.records import consistent_verdicts
 from sim_validate.records.grasps import read_grasps
 from sim_validate.reports.agreement import said_of
 from sim_validate.reports.pages import asset
@@ -177,13 +178,7 @@ def changed(path, change):
 
 def counted(document, _=None):
     """Make the summary that of the verdicts."""
-    verdicts = document["verdicts"]
-    document["summary"].update(
-        grasps=len(verdicts),
-        grasps_held=sum(each["held"] for each in verdicts),
-        controls=sum(len(each["controls"]) for each in verdicts),
-        mismatches=sum(len(each["mismatches"]) for each in verdicts),
-    )
+    document["summary"].update(consistent_verdicts._counts(document["verdicts"]))
 
 
 def without_proofs(document):
@@ -238,10 +233,13 @@ def test_an_interrupted_run_is_called_that(copy, tmp_path):
 
 def test_of_many_grasps_those_with_bad_news_are_shown(copy, tmp_path):
     last = json.loads((copy / "verdicts.json").read_text())["verdicts"][-1]["id"]
-    slipped = {"held": False, "outcome": "slipped"}
-    changed(
-        copy / "verdicts.json", lambda each: counted(each, each["verdicts"][-1].update(slipped))
-    )
+
+    def slip(document):
+        document["verdicts"][-1].update(held=False, outcome="slipped")
+        document["verdicts"][-1]["wrenches"][0]["outcome"] = "slipped"
+        counted(document)
+
+    changed(copy / "verdicts.json", slip)
     report = write_report(copy, tmp_path / "out", jobs=1, limit=1)
     assert report.grasps == 1
     assert [path.stem for path in (tmp_path / "out" / "grasps").iterdir()] == [last]
@@ -342,7 +340,7 @@ def test_a_control_that_says_nothing_is_bad_news(small_run):
         ("verdicts.json", lambda each: each["verdicts"][0].update(contacts_sha256="0"), "contacts"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(id="c-9-9-9-9"), "in that file"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(held=False),
-         r"verdicts\[0\]: `held` is False, which contradicts `outcome` held"),
+         r"verdicts\[0\]\.held: False contradicts the outcome held"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(outcome="splendid"),
          r"verdicts\[0\]\.outcome: expected"),
         ("verdicts.json", lambda each: each["summary"].update(grasps_held=99),
