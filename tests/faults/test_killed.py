@@ -93,6 +93,8 @@ def test_what_a_killed_writer_left_goes_with_the_next_command(planned, tmp_path)
     for part in ("", "scenes", "report", "report/grasps"):
         (tmp_path / part).mkdir(exist_ok=True)
         (tmp_path / part / f".a.json{UNFINISHED}x7y.json").write_text("{")
+        (tmp_path / part / f".report{UNFINISHED}x7y").mkdir()
+        (tmp_path / part / f".report{UNFINISHED}x7y" / "index.html").write_text("half")
     shutil.copy(planned, tmp_path)
     (tmp_path / ".mine.json").write_text("{}")
     assert main(["scene", str(planned), "--out", str(tmp_path), "-q"]) == 0

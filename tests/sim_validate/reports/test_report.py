@@ -265,6 +265,28 @@ def test_several_runs_make_one_report(copy, tmp_path):
     assert len(pages_of(both / "report")) == 3
 
 
+def test_an_earlier_report_stays_until_the_new_one_is_complete(copy, tmp_path):
+    told = []
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    first = write_report(copy, tmp_path / "out", jobs=1)
+    before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
+    with pytest.raises(KeyboardInterrupt):
+        write_report(copy, tmp_path / "out", jobs=1, limit=1, progress=stop)
+    after = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
+    assert after == before
+    assert [path for path in (tmp_path / "out").iterdir() if path.name.startswith(".rep")] == []
+    second = write_report(copy, tmp_path / "out", jobs=1, limit=1, ready=lambda *_: told.append(1))
+    assert second.index == first.index
+    assert second.grasps == 1 == len(list((tmp_path / "out" / "grasps").iterdir()))
+    assert told == []
+    with pytest.raises(KeyboardInterrupt):
+        write_report(copy, tmp_path / "new", jobs=1, progress=stop)
+    assert not (tmp_path / "new").exists()
+
+
 def test_pages_of_an_earlier_report_are_removed_and_nothing_else(copy):
     write_report(copy, jobs=1, limit=1)
     old = copy / "report" / "grasps" / "c-9-9-9-9.html"
