@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, subcommand
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
-from sim_validate.cli.flag_bounds import FINITE, at_least
+from sim_validate.cli.flag_bounds import FINITE, at_least, more_than
 from sim_validate.cli.flag_groups import Count, Friction, Positive, Seed, Speech
 from sim_validate.cli.learning_flags import Learned
 from sim_validate.datasets.columns import ExportFormat, SplitName
@@ -187,7 +187,7 @@ class Depth:
     """Columns of an image [pixels]."""
     height: Annotated[int, at_least(1, up_to=4096)] = 128
     """Rows of an image [pixels]."""
-    field_deg: Annotated[float, FINITE, at_least(1.0, up_to=120.0)] = 40.0
+    field_deg: Annotated[float, FINITE, more_than(0.0, up_to=120.0)] = 40.0
     """Angle between the upper and the lower border of an image [deg]."""
     seed: Seed = 0
     """Seed of the places of cameras, and of the poses on the table."""
