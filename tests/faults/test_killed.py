@@ -118,7 +118,7 @@ def test_a_report_of_what_a_kill_has_left_says_what_is_missing(planned, tmp_path
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="children are found in /proc")
 def test_processes_end_with_the_command_that_is_killed(tmp_path):
-    words = ["run", "icosahedron", "--limit", "200", "--jobs", "2", "--out", str(tmp_path), "-q"]
+    words = ["run", "icosahedron", "--limit", "200", "--jobs", "3", "--out", str(tmp_path), "-q"]
     process = subprocess.Popen([*CLI, *words], env=os.environ | {"PYTHONPATH": str(ROOT)})
     workers = set()
     while len(workers) < 2 and process.poll() is None:
