@@ -145,6 +145,10 @@ def _kinds() -> Callable[[Callable[..., Any], Path], Any]:
         class Kept(caching.CompileResultCacheImpl):
             _locator_classes = (Here,)
 
+            def check_cachable(self, cres: Any) -> bool:
+                # as numba's own, which warns of every function: with NUMBA_OPT=0 none is kept
+                return not (cres.lifted or cres.library.has_dynamic_globals)
+
         class KeptFunctions(caching.FunctionCache):
             _impl_class = Kept
 

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 from grasp_core.arrays import frozen
-from grasp_core.checked import LARGEST, SMALLEST, number, one_of, switch, whole
+from grasp_core.checked import BOUNDS, LARGEST, SMALLEST, number, one_of, switch, whole
 from grasp_core.errors import InputError
 from grasp_core.short_text import changed
 
@@ -164,7 +164,7 @@ RANGES = {
     "viscosity": (0.0, LARGEST),
     "margin": (0.0, 1.0),
     "gap": (0.0, 1.0),
-    "torsion_m": (0.0, 1.0),
+    "torsion_m": (BOUNDS["torsion_m"]["least"], BOUNDS["torsion_m"]["most"]),
 }
 """Least and largest value of each number. Shorter time steps take hours; with longer ones the
 phases of a trial would be shorter than a step."""

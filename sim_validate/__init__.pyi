@@ -11,9 +11,6 @@ from sim_validate.hands.validate_hand import validate_hand as validate_hand
 from sim_validate.peer_files.dexgraspbench_records import DexRecord as DexRecord
 from sim_validate.peer_files.dexgraspbench_records import load_dex_record as load_dex_record
 from sim_validate.peer_files.dexgraspbench_records import write_dex_record as write_dex_record
-from sim_validate.peer_files.gripper_poses import GripperGrasp as GripperGrasp
-from sim_validate.peer_files.gripper_poses import load_acronym as load_acronym
-from sim_validate.peer_files.gripper_poses import load_graspnet as load_graspnet
 from sim_validate.peer_files.hand_records import dex_record as dex_record
 from sim_validate.peer_files.hand_records import reach_of_record as reach_of_record
 from sim_validate.peer_files.object_folders import write_dex_object as write_dex_object

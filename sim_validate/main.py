@@ -50,7 +50,6 @@ ACTIONS: dict[type[Any], str] = {
     dataset_flags.Import: "dataset:import_dataset",
     dataset_flags.Verify: "dataset:verify_dataset",
     dataset_flags.Export: "dataset:export_dataset",
-    dataset_flags.Merge: "datasets.looks:merge_datasets",
     dataset_flags.Stats: "datasets.looks:count_dataset",
     dataset_flags.SampleRows: "datasets.looks:sample_dataset",
     dataset_flags.Depth: "datasets.looks:draw_depths",

@@ -110,9 +110,9 @@ def test_the_bands_are_those_of_the_page():
         5e-3,
         0.05,
     ]
-    assert rows["displacement, rotation"] == "1e-12 | 1 um, 1e-5 rad | .2 mm, .2 deg"
+    assert rows["displacement, rotation"] == ".1 um, 1e-6 rad | 1 um, 1e-5 rad | .2 mm, .2 deg"
     assert [OTHER_PROCESSOR.displacement_m, OTHER_PROCESSOR.rotation_rad] == [1e-6, 1e-5]
-    assert [EXACT.displacement_m, EXACT.rotation_rad] == [1e-12, 1e-12]
+    assert [EXACT.displacement_m, EXACT.rotation_rad] == [1e-7, 1e-6]
     assert [OTHER_VERSIONS.displacement_m, OTHER_VERSIONS.rotation_rad] == [2e-4, math.radians(0.2)]
     assert [OTHER_PROCESSOR.grey, OTHER_VERSIONS.grey] == [1e-4, 0.02]
 

@@ -36,14 +36,10 @@ DOORS = {
     "matplotlib": "scenes/drawing/canvas.py",
     "jinja2": "scenes/drawing/pages.py",
     "scipy.stats": "sim_validate/validation/repeats.py",
-    "pebble": "sim_validate/parallel/processes.py",
     "ray": "sim_validate/parallel/clusters.py",
     "distributed": "sim_validate/parallel/clusters.py",
     "pyarrow": ("sim_validate/datasets/parquet.py", "sim_validate/datasets/exports/tables.py"),
-    "h5py": (
-        "sim_validate/datasets/exports/tables.py",
-        "sim_validate/peer_files/gripper_poses.py",
-    ),
+    "h5py": "sim_validate/datasets/exports/tables.py",
 }
 
 
@@ -150,8 +146,7 @@ def test_a_plan_that_finds_its_loops_imports_only_what_planning_needs(tmp_path):
 def test_every_command_has_its_function():
     flags = dataset_flags
     actions = {flags.Build, flags.Import, flags.Verify, flags.Export}
-    actions |= {dataset_flags.Merge, dataset_flags.Stats, dataset_flags.SampleRows}
-    actions |= {dataset_flags.Depth}
+    actions |= {flags.Stats, flags.SampleRows, flags.Depth}
     actions |= {baseline_flags.Record, baseline_flags.Check}
     named = set(get_args(Command)) - {flags.Dataset, baseline_flags.Baseline} | actions
     assert set(ACTIONS) == named

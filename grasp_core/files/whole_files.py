@@ -4,6 +4,7 @@ A new file is written under another name, and is renamed when it is complete.
 """
 
 import os
+import shutil
 import stat
 import tempfile
 from collections.abc import Generator, Iterable
@@ -59,12 +60,15 @@ def _beside(path: Path) -> Generator[Path]:
 
 
 def remove_unfinished(folder: Path) -> None:
-    """Remove the files that killed processes left unfinished in a folder.
+    """Remove the files and folders that killed processes left unfinished in a folder.
 
     Nothing else may be writing to the folder meanwhile.
     """
     for path in folder.glob(f".*{UNFINISHED}*"):
-        path.unlink(missing_ok=True)
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
 
 
 def bounded_bytes(path: Path, most: int) -> bytes:

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen, frozen_each, frozen_units
 from grasp_core.by_value import ByValue
-from grasp_core.checked import instance, number, several, text
+from grasp_core.checked import BOUNDS, instance, number, several, text
 from grasp_core.errors import InputError
 from grasp_core.short_text import counted, summary
 
@@ -106,7 +106,7 @@ class Joint(ByValue):
         number(self.lowest, "lowest", least=-MOST_TURN, most=MOST_TURN)
         number(self.highest, "highest", least=self.lowest, most=MOST_TURN)
         if self.torque_limit_n_m is not None:
-            number(self.torque_limit_n_m, "torque_limit_n_m", above=0.0, most=1e6)
+            number(self.torque_limit_n_m, "torque_limit_n_m", **BOUNDS["torque_limit_n_m"])
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

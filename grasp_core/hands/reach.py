@@ -17,7 +17,17 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices
 from grasp_core.by_value import ByValue
-from grasp_core.checked import coefficient, instance, number, one_of, seed_of, switch, text, whole
+from grasp_core.checked import (
+    BOUNDS,
+    coefficient,
+    instance,
+    number,
+    one_of,
+    seed_of,
+    switch,
+    text,
+    whole,
+)
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE
@@ -34,8 +44,6 @@ ReachReason: TypeAlias = Literal["", "limit", "collision", "not found", "no clos
 """Why no pose was found: fingertips stayed away with a joint at a limit, or touched but something
 overlapped, or neither; or, proved, no three contacts close for a hand with three fingers; empty
 where a pose was found."""
-MOST_STARTS = 10_000
-LARGEST_CLEARANCE = 0.02
 OVERLAPS = {"self": "the hand itself", "object": "the object", "table": "the table"}
 
 
@@ -87,7 +95,7 @@ class HandReach(ByValue):
             text(getattr(self, name), name)
         one_of(self.reason, get_args(ReachReason), "reason")
         whole(self.starts, "starts")
-        number(self.clearance_m, "clearance_m", least=0.0, most=LARGEST_CLEARANCE)
+        number(self.clearance_m, "clearance_m", **BOUNDS["hand_clearance_m"])
         if self.fingers is not None:
             used = range(FINGERS) if self.used is None else self.used
             kept = frozen_indices(used, (None,), "used")
@@ -153,8 +161,8 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
     switch(regions, "regions")
     asked = Asked(
         hand, body, grasp, coefficient(friction), up, height,
-        number(clearance_m, "clearance_m", least=0.0, most=LARGEST_CLEARANCE), regions,
-        seed_of(seed), whole(starts, "starts", least=1, most=MOST_STARTS),
+        number(clearance_m, "clearance_m", **BOUNDS["hand_clearance_m"]), regions,
+        seed_of(seed), whole(starts, "starts", **BOUNDS["starts"]),
     )  # fmt: skip
     choices = contact_choices(grasp, asked.friction, len(hand.fingers))
     if not choices.closed:

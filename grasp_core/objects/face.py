@@ -8,9 +8,9 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices, frozen_units
 from grasp_core.by_value import ByValue
-from grasp_core.checked import LARGEST, number, several, whole
+from grasp_core.checked import BOUNDS, LARGEST, number, several, whole
 from grasp_core.short_text import counted, summary
-from grasp_core.values import FINGERS, RIGHT_ANGLE
+from grasp_core.values import RIGHT_ANGLE
 
 FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
 """Which faces to use: exactly planar ones, nearly flat patches, or whichever suits the surface."""
@@ -74,6 +74,6 @@ class PatchLimits:
     """Keep at most this many patches: those with the largest inscribed discs."""
 
     def __post_init__(self) -> None:
-        number(self.spread_deg, "spread_deg", above=0.0, most=45.0)  # above it nothing is flat
-        number(self.depth, "depth", above=0.0, most=0.1)
-        whole(self.most, "most", least=FINGERS, most=200)  # what the planner takes
+        number(self.spread_deg, "spread_deg", **BOUNDS["patch_spread_deg"])
+        number(self.depth, "depth", **BOUNDS["patch_depth"])
+        whole(self.most, "most", **BOUNDS["patches"])

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen_each
 from grasp_core.by_value import ByValue
-from grasp_core.checked import LARGEST, coefficient, number, several, whole
+from grasp_core.checked import BOUNDS, LARGEST, coefficient, number, several, whole
 from grasp_core.errors import InputError
 from grasp_core.fields import is_a
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
@@ -46,7 +46,6 @@ from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.solvers.ties import few_digits
 from grasp_core.values import FINGERS, FaceQuadruple
 
-MOST_PARTS = 100_000_000
 SMALLEST_GAP, LARGEST_GAP = 1e-3, 0.9
 SMALLEST = 1e-5
 """Bound that is not lowered any more [N]."""
@@ -122,7 +121,7 @@ def quality_ceiling(  # noqa: PLR0913 - each is a quantity of its own
     friction = coefficient(friction)
     number(known, "known", least=0.0, most=LARGEST)
     number(gap, "gap", least=SMALLEST_GAP, most=LARGEST_GAP)
-    whole(parts, "parts", least=1, most=MOST_PARTS)
+    whole(parts, "parts", **BOUNDS["ceiling"])
     given = FINGER_RADIUS * body.radius if finger_radius is None else finger_radius
     radii = frozen_each(given, FINGERS, "finger_radius")
     if (radii < 0.0).any() or (radii > body.radius).any():

@@ -11,6 +11,9 @@ from typing import IO
 from grasp_core.processes.messages import receive, send, unpacked
 
 Messages = SimpleQueue[bytes]
+COLLECTED_AFTER = 50_000
+"""Number of new objects after which unused circles of objects are looked for: nearly all results
+are freed as soon as they are sent."""
 
 
 def main() -> None:
@@ -19,7 +22,7 @@ def main() -> None:
     Errors of a task are answers, too. The end of the pipe ends this process, whatever it does.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt ends it through its parent
-    gc.disable()  # results are freed as soon as they are sent
+    gc.set_threshold(COLLECTED_AFTER)
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what code prints is no answer
     messages = Messages()

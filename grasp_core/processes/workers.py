@@ -1,25 +1,19 @@
 """Has other processes do tasks beside this one, and puts the results in the order of the tasks.
 
 Whoever is free takes the next task, and this process works with the others; a task depends on
-nothing but itself, so it makes no difference who does it. A thread for each process sends tasks and
-waits for answers. If a process cannot start or ends early, this one does its task.
-
-The processes are programs of their own and not copies of the caller's, as those of the module
-`multiprocessing` are: a script that plans needs no guard against being run again.
+nothing but itself, so it makes no difference who does it. A thread for each process starts it,
+sends tasks and waits for answers. If a process cannot start or ends early, this one does its task.
 """
 
-import os
-import subprocess
-import sys
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path
 from threading import Condition, Thread
-from typing import IO, Any, TypeVar
+from typing import Any, TypeVar
 
-from grasp_core.processes.messages import receive, send, unpacked
+from grasp_core.processes.messages import unpacked
+from grasp_core.processes.process import Process, can_start
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -51,36 +45,18 @@ class _Place:
         return result
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Process:
-    """A process with the pipes to it and from it."""
-
-    program: "subprocess.Popen[bytes]"
-    tasks: IO[bytes]
-    answers: IO[bytes]
-
-    def end(self) -> None:
-        """End the process, whatever it does."""
-        self.program.kill()
-        self.program.wait()
-
-    def close(self) -> None:
-        """Close the pipes; what was not sent is lost."""
-        for pipe in (self.tasks, self.answers):
-            with suppress(OSError):
-                pipe.close()
-
-
 class Workers:
     """Processes of this machine that do tasks beside this one; see `working`."""
 
-    def __init__(self, processes: Sequence[_Process], start: Any) -> None:
-        self._processes = processes
+    def __init__(self, count: int, start: Callable[[], Process], patience_s: float) -> None:
+        self._processes = list[Process]()
+        self._start, self._patience_s = start, patience_s
         self._changed = Condition()
         self._open = deque[_Place]()
         self._closed = False
+        self._done = 0
         self._threads = [
-            Thread(target=self._serve, args=(process, start), daemon=True) for process in processes
+            Thread(target=self._serve, args=(number,), daemon=True) for number in range(count)
         ]
         self._serving = list[Thread]()
 
@@ -91,28 +67,31 @@ class Workers:
                 thread.start()
                 self._serving.append(thread)
 
-    def in_order(self, tasks: Iterable[Task], here: Callable[[Task], Result]) -> Generator[Result]:
+    def in_order(
+        self, tasks: Iterable[Task], here: Callable[[Task], Result], ahead: int = AHEAD
+    ) -> Generator[Result]:
         """Yield the result of each task, in their order.
 
         Args:
             tasks: Tasks that can be pickled.
             here: Does a task in this process, with the result that the others would give.
+            ahead: Number of tasks per process that are handed out before the first is done.
 
         Raises:
             Exception: What the first task that fails raises, in the place of its result.
         """
         coming, line = iter(tasks), deque[_Place]()
         try:
-            while self._line_up(coming, line):
+            while self._line_up(coming, line, ahead):
                 self._finish(line[0], here)
                 yield line.popleft().result()
         finally:
             with self._changed:
                 self._open.clear()
 
-    def _line_up(self, coming: Iterator[Any], line: deque[_Place]) -> bool:
+    def _line_up(self, coming: Iterator[Any], line: deque[_Place], ahead: int) -> bool:
         """Hand out the next tasks; return whether any are left."""
-        while len(line) < AHEAD * (1 + len(self._processes)):
+        while len(line) < ahead * (1 + len(self._threads)):
             try:
                 place = _Place(next(coming))
             except StopIteration:
@@ -136,15 +115,15 @@ class Workers:
                 mine.ended = here(mine.task), None
             except Exception as error:
                 mine.ended = None, error
+            self._done += 1
 
-    def _serve(self, process: _Process, start: Any) -> None:
-        """Send tasks to a process and keep its answers, until no more are asked for."""
+    def _serve(self, number: int) -> None:
+        """Start a process, send it tasks and keep its answers, until no more are asked for."""
         place = None
         try:
-            send(process.tasks, start)
-            while place := self._next():
-                send(process.tasks, place.task)
-                answer = receive(process.answers)
+            process = self._started(number)
+            while process and (place := self._next()):
+                answer = process.ask(place.task)
                 with self._changed:
                     place.answer = answer
                     self._changed.notify_all()
@@ -153,6 +132,21 @@ class Workers:
                 if place is not None:
                     self._open.appendleft(place)
                 self._changed.notify_all()
+
+    def _started(self, number: int) -> Process | None:
+        """Start a process if it is worth it; None if not, or if nothing is asked for any more."""
+        with self._changed:
+            if self._patience_s > 0.0:
+                self._changed.wait_for(lambda: self._closed, self._patience_s)
+                # each process needs as many tasks as this one has done in the time of a start
+                if len(self._open) < (number + 1) * max(1, self._done):
+                    return None
+        process = self._start()
+        with self._changed:
+            self._processes.append(process)
+            if self._closed:
+                process.end()
+        return process
 
     def _next(self) -> _Place | None:
         with self._changed:
@@ -166,8 +160,8 @@ class Workers:
             self._closed = True
             self._open.clear()
             self._changed.notify_all()
-        for process in self._processes:
-            process.end()
+            for process in self._processes:
+                process.end()
         for thread in self._serving:
             thread.join()
         for process in self._processes:
@@ -176,41 +170,23 @@ class Workers:
 
 @contextmanager
 def working(
-    count: int, make: Callable[..., Callable[[Any], Any]], *arguments: Any
+    count: int, make: Callable[..., Callable[[Any], Any]], *arguments: Any, patience_s: float = 0.0
 ) -> Generator[Workers | None]:
-    """Start processes for a `with` block; None if there are none.
+    """Let processes work beside this one during a `with` block; None if there are none.
 
     Args:
-        count: Number of processes beside this one.
+        count: Largest number of processes beside this one.
         make: A function that can be imported by name; it returns the function that does a task.
         arguments: Arguments of `make`, which can be pickled.
+        patience_s: How long this process works alone before others are started, and then only as
+            many as have work for that long [s].
     """
-    processes = _started(count)
-    if not processes:
+    if count < 1 or not can_start():
         yield None
         return
-    workers = Workers(processes, (make, arguments))
+    workers = Workers(count, lambda: Process(make, *arguments), patience_s)
     try:
         workers.begin()
         yield workers
     finally:
         workers.close()
-
-
-def _started(count: int) -> list[_Process]:
-    """Start processes, as many as the system allows; none where Python is part of a program."""
-    if not sys.executable or getattr(sys, "frozen", False):
-        return []
-    # not -m alone: the current folder must not come before the installed packages
-    command = [sys.executable, "-P", "-m", "grasp_core.processes.worker"]
-    processes = list[_Process]()
-    with suppress(OSError):
-        paths = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)
-        for _ in range(count):
-            program = subprocess.Popen(  # noqa: S603 - our own program
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": paths},
-            )  # fmt: skip
-            if program.stdin and program.stdout:
-                processes.append(_Process(program, program.stdin, program.stdout))
-    return processes

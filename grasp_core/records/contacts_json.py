@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from grasp_core.arrays import Array, frozen, frozen_units
-from grasp_core.checked import LARGEST_FRICTION, positive
+from grasp_core.checked import LARGEST, LARGEST_FRICTION, SMALLEST, positive
 from grasp_core.closure.contact_arrays import contact_frictions
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
@@ -193,6 +193,11 @@ def _contact_set(
         (file.torque_scale_m, "file"),
         (farthest, "farthest contact"),
     )
+    if not SMALLEST <= scale <= LARGEST:
+        raise InputError(
+            f"{where}: the contacts are {scale:.2g} m from the point about which torques are "
+            f"taken, expected {SMALLEST:g} to {LARGEST:g} m; give torque_scale_m, or other units"
+        )
     inward = -1.0 if overrides.outward else 1.0
     return ContactSet(
         id=name,

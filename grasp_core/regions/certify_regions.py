@@ -18,6 +18,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.checked import (
+    BOUNDS,
     coefficient,
     number,
     one_of,
@@ -50,9 +51,6 @@ from grasp_core.values import ContactRegion, Grasp, four
 
 Balance: TypeAlias = Literal["radius", "area"]
 """What regions are made large for: the smallest inscribed disc, or the total area."""
-FEWEST = 64
-"""Least number of cones that a caller may ask for: every search begins with the 64 orthants."""
-MOST_CONES = 1_000_000
 CONES = 10_000
 """Default for the largest number of cones in one proof, which takes half a second."""
 UNIT_DIGITS, PLACE_DIGITS = 6, 8
@@ -86,7 +84,7 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
             then be outside of their regions.
         clearance: Distance of regions from the edges of their faces [m]. The region of a contact
             nearer to an edge is centred at the nearest place that keeps it.
-        max_cones: Most cones of one attempt at a proof, at least `FEWEST`. With more, radii grow by
+        max_cones: Most cones of one attempt at a proof, at least 64. With more, radii grow by
             some hundredths, or not at all where they are as large as can be.
         cones: The former name of `max_cones`, which is refused.
 
@@ -100,13 +98,13 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
         SolverError: A proof failed its check.
     """
     check_on_faces(body, grasp)
-    number(reserve, "reserve", least=0.0, below=1.0)
+    number(reserve, "reserve", **BOUNDS["reserve"])
     one_of(balance, get_args(Balance), "balance")
     switch(recenter, "recenter")
     number(clearance, "clearance", least=0.0, below=body.radius, where=", the object's radius in m")
     if cones is not None:
         raise InputError(f"cones is now called max_cones: pass max_cones={shown(cones)}")
-    whole(max_cones, "max_cones", least=FEWEST, most=MOST_CONES)
+    whole(max_cones, "max_cones", **BOUNDS["max_cones"])
     left = coefficient(friction) * (1.0 - reserve)
     positions, normals = stacked(grasp.contacts)
     if not force_closure(positions, normals, left).closed:

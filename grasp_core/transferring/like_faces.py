@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from grasp_core.arrays import Array
-from grasp_core.checked import instance, number
+from grasp_core.checked import BOUNDS, instance, number
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import FlatPart, Nearest, flat_parts, nearest_like
@@ -33,7 +33,7 @@ SHARE_OF_SIZE = 0.05
 """Default for how far a contact may move, relative to the old part's radius."""
 ANGLE_DEG = 5.0
 """Default for the largest angle between the normals of like faces [deg]."""
-WIDEST_DEG = 45.0
+WIDEST_DEG = BOUNDS["changed_by_deg"]["most"]
 """Largest such angle that is accepted [deg]: beyond it, a face of a box and its chamfer would be
 like each other."""
 SAME = 1e-9
@@ -69,7 +69,7 @@ def likeness(old: Polyhedron, distance: float | None, angle_deg: float) -> Liken
     most = usual if distance is None else distance
     return Likeness(
         number(most, "distance", least=0.0, most=old.radius, where=where),
-        math.radians(number(angle_deg, "angle_deg", least=0.0, most=WIDEST_DEG)),
+        math.radians(number(angle_deg, "angle_deg", **BOUNDS["changed_by_deg"])),
         SAME * old.radius,
     )
 

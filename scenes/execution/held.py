@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, frozen, to_digits
-from grasp_core.checked import LARGEST, SMALLEST, instance, number, positive
+from grasp_core.checked import BOUNDS, LARGEST, SMALLEST, instance, number, positive
 from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip, check_grip
@@ -50,7 +50,7 @@ class HeldSettings:
 
     def __post_init__(self) -> None:
         positive(self.tip_mass_kg, "tip_mass_kg")
-        number(self.damping_ratio, "damping_ratio", least=0.01, most=10.0)
+        number(self.damping_ratio, "damping_ratio", **BOUNDS["damping_ratio"])
         down = frozen(self.down, (3,), "down")
         if not SMALLEST <= float(np.linalg.norm(down)) <= LARGEST:
             raise InputError(

@@ -16,7 +16,7 @@ from sim_validate.baselines.parts.changed_part import Present
 from sim_validate.baselines.settings import How, settings_of
 from sim_validate.execution.asked import AskedExecution
 from sim_validate.execution.jobs import ExecutedGrasp, ExecutionJob
-from sim_validate.parallel.processes import each
+from sim_validate.parallel.processes import each, processes
 from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.validation.grasp_verdict import Verdict
 from sim_validate.validation.jobs import Job, prepared, verdict_of
@@ -63,8 +63,9 @@ def measured(
     executing = _executing(saved, chosen, how.execution)
     total = len(jobs) + len(executing)
     verdicts, refused = dict[str, Verdict](), dict[str, str]()
+    count = processes(len(jobs), processors)
     for grasp, answer in zip(
-        chosen, each(_try, prepared(jobs, processors), jobs=processors), strict=True
+        chosen, each(_try, prepared(jobs, processors), jobs=count), strict=True
     ):
         if isinstance(answer, Verdict):
             verdicts[grasp.id] = answer

@@ -11,7 +11,7 @@ from grasp_core.checked import MOST_COUNT
 from sim_validate.cli.baseline_flags import Baseline
 from sim_validate.cli.dataset_flags import Dataset
 from sim_validate.cli.execution_flags import UPRIGHT, Execute, Executing, Mass, Tips, Trials
-from sim_validate.cli.flag_bounds import at_least, ends_in
+from sim_validate.cli.flag_bounds import at_least, ends_in, within
 from sim_validate.cli.flag_groups import (
     Count,
     Direction,
@@ -22,7 +22,6 @@ from sim_validate.cli.flag_groups import (
     Mesh,
     NotNegative,
     Planning,
-    Positive,
     ProtocolName,
     Seed,
     Speech,
@@ -78,7 +77,7 @@ class Plan:
     where that is less; a twentieth of the object's radius if not given."""
     gap: Gap = 0.05
     """With --best: share of the proved bound that the quality may be below it."""
-    time_limit_s: Positive | None = None
+    time_limit_s: Annotated[float, within("time_limit_s")] | None = None
     """With --best: time after which the search ends with the gap reached [s]."""
     measure: Literal["ferrari-canny", "weight", "task"] = "ferrari-canny"
     """With --best: what is largest. The Ferrari-Canny quality; the weight that is held in every
@@ -175,7 +174,7 @@ class Regions:
     """Compute regions for only this many grasps, from the first."""
     friction: Friction | None = None
     """Coulomb coefficient of the proof; if not given, the one planned for."""
-    reserve: Annotated[float, at_least(0.0, up_to=0.99)] = 0.0
+    reserve: Annotated[float, within("reserve")] = 0.0
     """Share of the friction that the proof does not count on."""
     balance: Literal["radius", "area"] = "radius"
     """Prefer large discs for all fingers (radius), or large regions in total (area), whose discs
@@ -185,7 +184,7 @@ class Regions:
     outside their regions."""
     edge_clearance_m: NotNegative = 0.0
     """How far regions stay from the edges of their faces [m]."""
-    max_cones: Annotated[int, at_least(64, up_to=1_000_000)] = 10_000
+    max_cones: Annotated[int, within("max_cones")] = 10_000
     """Number of cones that one attempt at a proof may use. More cones take longer and enlarge radii
     by some hundredths, or not at all where they are as large as possible."""
     jobs: Count = field(default_factory=available_cores)
@@ -225,7 +224,7 @@ class Analyze:
 
     contacts: Positional[Path]
     """A contacts file (see docs/files.md), or a grasps.json."""
-    friction: Friction | None = None
+    friction: Annotated[float, within("friction_or_zero")] | None = None
     """Coulomb coefficient of contacts that have none of their own; if not given, the one in the
     file."""
     torque_scale_m: Usual | None = None

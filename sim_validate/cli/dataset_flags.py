@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, subcommand
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
-from sim_validate.cli.flag_bounds import FINITE, at_least
+from sim_validate.cli.flag_bounds import FINITE, at_least, more_than
 from sim_validate.cli.flag_groups import Count, Friction, Lengths, Positive, Seed, Speech
 from sim_validate.cli.learning_flags import Learned
 from sim_validate.datasets.columns import ExportFormat, SplitName
@@ -140,17 +140,6 @@ class Export:
 
 
 @dataclass(frozen=True, slots=True)
-class Merge:
-    """Merge finished datasets of the same settings; their objects and frictions may differ."""
-
-    datasets: Positional[tuple[Path, ...]]
-    """Folders of the datasets; of an object that several have, the first counts."""
-    out: Path
-    """Folder of the merged dataset; it must be empty or not exist."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
-
-
-@dataclass(frozen=True, slots=True)
 class Stats:
     """Count a dataset's rows by kind and outcome, and show how its numbers spread."""
 
@@ -197,7 +186,7 @@ class Depth:
     """Columns of an image [pixels]."""
     height: Annotated[int, at_least(1, up_to=4096)] = 128
     """Rows of an image [pixels]."""
-    field_deg: Annotated[float, FINITE, at_least(1.0, up_to=120.0)] = 40.0
+    field_deg: Annotated[float, FINITE, more_than(0.0, up_to=120.0)] = 40.0
     """Angle between the upper and the lower border of an image [deg]."""
     seed: Seed = 0
     """Seed of the places of cameras, and of the poses on the table."""
@@ -208,14 +197,13 @@ class Depth:
 
 @dataclass(frozen=True, slots=True)
 class Dataset:
-    """Build a dataset of grasps of many objects; check, merge, show or export datasets."""
+    """Build a dataset of grasps of many objects; check, show or export datasets."""
 
     action: OmitArgPrefixes[
         Annotated[Build, subcommand("build", prefix_name=False)]
         | Annotated[Import, subcommand("import", prefix_name=False)]
         | Annotated[Verify, subcommand("verify", prefix_name=False)]
         | Annotated[Export, subcommand("export", prefix_name=False)]
-        | Annotated[Merge, subcommand("merge", prefix_name=False)]
         | Annotated[Stats, subcommand("stats", prefix_name=False)]
         | Annotated[SampleRows, subcommand("sample", prefix_name=False)]
         | Annotated[Depth, subcommand("depth", prefix_name=False)]

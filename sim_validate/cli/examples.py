@@ -76,7 +76,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "dataset import": ("dataset import contacts.npz mug.obj --out judged",),
     "dataset verify": ("dataset verify ds",),
-    "dataset merge": ("dataset merge ds-a ds-b --out ds",),
     "dataset stats": ("dataset stats ds --out ds-stats",),
     "dataset sample": ("dataset sample ds --count 50 --out ds-rows",),
     "dataset depth": (

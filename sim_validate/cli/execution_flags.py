@@ -10,7 +10,7 @@ from typing import Annotated
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from grasp_core.checked import LARGEST
-from sim_validate.cli.flag_bounds import Bound, at_least
+from sim_validate.cli.flag_bounds import Bound, at_least, within
 from sim_validate.cli.flag_groups import Count, Direction, Friction, Seed, Speech, Usual
 from sim_validate.parallel.processes import available_cores
 
@@ -31,7 +31,6 @@ KNOWN_TRIALS = Bound(
 )
 Trials = UseAppendAction[tuple[Annotated[str, KNOWN_TRIALS], ...]]
 Length = Annotated[float, at_least(0.0, up_to=LARGEST)]
-Degrees = Annotated[float, at_least(0.0, up_to=180.0)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +57,7 @@ class Tips:
     plan, or a tenth of the object's radius, or less where that would overlap something."""
     tip_mass_kg: Usual = 0.05
     """Mass of a fingertip with the part of its finger that moves with it [kg]."""
-    damping_ratio: Annotated[float, at_least(0.01, up_to=10.0)] = 0.5
+    damping_ratio: Annotated[float, within("damping_ratio")] = 0.5
     """Damping ratio of the object between the springs."""
 
 
@@ -70,11 +69,11 @@ class Executing:
     tips: OmitArgPrefixes[Tips] = Tips()
     lift_m: Usual = 0.2
     """Height by which the object is lifted off its table [m]."""
-    lift_s: Annotated[float, at_least(0.05, up_to=100.0)] = 0.6
+    lift_s: Annotated[float, within("lift_s")] = 0.6
     """Duration of the lift [s]."""
     shake_g: Length = 1.0
     """Largest acceleration of a shake [9.80665 m/s^2]; 0 for no shakes."""
-    shake_hz: Annotated[float, at_least(0.1, up_to=25.0)] = 5.0
+    shake_hz: Annotated[float, within("shake_hz")] = 5.0
     """Frequency of a shake [Hz]."""
     stop_m_per_s2: Usual = 10.0
     """Deceleration of a stop [m/s^2]."""
@@ -85,9 +84,9 @@ class Executing:
     object would get [m/s]. 0 for no knocks."""
     off_mm: Length = 2.0
     """Distance of a misplaced object from where the fingers expect it [mm]."""
-    off_deg: Degrees = 2.0
+    off_deg: Annotated[float, within("off_deg")] = 2.0
     """Angle by which a misplaced object is turned [deg]."""
-    misplacements: Annotated[int, at_least(1, up_to=1000)] = 5
+    misplacements: Annotated[int, within("misplacements")] = 5
     """Number of times that the object is misplaced, each time in a random direction."""
     max_mm: Usual = 5.0
     """Displacement against the palm up to which an object counts as held [mm]."""

@@ -1,11 +1,12 @@
 """Bounds on the values of command-line flags, written into their types, and checks of them."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, is_dataclass
 from itertools import repeat
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
+from grasp_core.checked import BOUNDS, number
 from grasp_core.errors import InputError
 
 
@@ -38,6 +39,14 @@ def at_least(least: float, *, up_to: float = math.inf) -> Bound:
     return Bound(f"must be at least {least:g}{_end(up_to)}", lambda value: least <= value <= up_to)
 
 
+def within(name: str) -> Bound:
+    """Make the bound of a setting that Python takes as well, from `grasp_core.checked.BOUNDS`."""
+    ends = BOUNDS[name]
+    words = {"above": "more than", "least": "at least", "below": "less than", "most": "at most"}
+    says = ", ".join(f"{words[end]} {value:g}" for end, value in ends.items())
+    return Bound(f"must be {says}", lambda value: _inside(value, ends))
+
+
 def ends_in(*endings: str) -> Bound:
     """Make a bound for paths that end in one of `endings`, in upper or lower case."""
     says = f"must end in {', '.join(endings[:-1])} or {endings[-1]}"
@@ -48,6 +57,14 @@ def not_zero(least: float, most: float) -> Bound:
     """Make a bound for vectors: the largest component in size is from `least` to `most`."""
     says = f"must not be zero: the largest part is from {least:g} to {most:g}"
     return Bound(says, lambda vector: least <= max(abs(part) for part in vector) <= most)
+
+
+def _inside(value: Any, ends: Mapping[str, Any]) -> bool:
+    try:
+        number(value, "", **ends)
+    except InputError:
+        return False
+    return True
 
 
 def _end(up_to: float) -> str:

@@ -20,7 +20,7 @@ from grasp_core.checked import (
     SMALLEST,
 )
 from grasp_core.mesh_files import limits as mesh_limits
-from sim_validate.cli.flag_bounds import FINITE, at_least, more_than, not_zero
+from sim_validate.cli.flag_bounds import FINITE, at_least, more_than, not_zero, within
 from sim_validate.parallel.processes import available_cores
 
 USUAL_MESH = mesh_limits.MeshLimits()
@@ -28,7 +28,7 @@ Finite = Annotated[float, FINITE]
 Positive = Annotated[float, FINITE, more_than(0.0)]
 NotNegative = Annotated[float, FINITE, at_least(0.0)]
 Usual = Annotated[float, at_least(SMALLEST, up_to=LARGEST)]
-Gap = Annotated[float, at_least(1e-4, up_to=0.9)]
+Gap = Annotated[float, within("gap")]
 Friction = Annotated[float, at_least(SMALLEST, up_to=LARGEST_FRICTION)]
 Count = Annotated[int, at_least(1, up_to=MOST_COUNT)]
 Seed = Annotated[int, at_least(0, up_to=MOST_SEED)]
@@ -102,12 +102,12 @@ class Mesh:
     faces: Literal["auto", "planar", "patches"] = "auto"
     """Faces to plan on: exact planar faces, or nearly flat patches of a curved or scanned surface,
     which may have holes; auto takes patches where there are more than 200 planar faces."""
-    patches: Annotated[int, at_least(4, up_to=200)] = 20
+    patches: Annotated[int, within("patches")] = 20
     """Keep at most this many patches, those with the largest inscribed discs."""
-    patch_spread_deg: Annotated[float, more_than(0.0, up_to=45.0)] = 10.0
+    patch_spread_deg: Annotated[float, within("patch_spread_deg")] = 10.0
     """Largest angle between the surface and a patch's plane [deg]; the friction angle to plan with
     shrinks by as much."""
-    patch_depth: Annotated[float, more_than(0.0, up_to=0.1)] = 0.01
+    patch_depth: Annotated[float, within("patch_depth")] = 0.01
     """Largest distance of the surface from a patch's plane, relative to the object's extent."""
     center_of_mass_m: Annotated[Point | None, arg(metavar="X Y Z")] = None
     """Centre of mass in the file's frame, in metres. If not given, it is that of uniform density,
@@ -173,7 +173,7 @@ class Planning:
     contacts stay this far from edges, or half the radius of the largest disc in a face if that is
     less. If not given, they stay a twentieth of the object's radius from edges, or as far as
     planned."""
-    ceiling: Count | None = None
+    ceiling: Annotated[int, within("ceiling")] | None = None
     """With --optimize: also prove an upper bound of the quality that contacts on the same faces can
     reach, as far from edges, within 5 % of what they are known to reach if that takes no more cases
     than this number; 100000 are enough for most grasps."""
@@ -195,7 +195,7 @@ class Fingers:
     stiffness_n_per_m: Usual | None = None
     """Stiffness of the servos that drive a fingertip [N/m]; if not given, it is chosen so that
     similar grasps behave alike."""
-    torsion_m: Annotated[float, at_least(0.0, up_to=1.0)] = 0.0
+    torsion_m: Annotated[float, within("torsion_m")] = 0.0
     """Torsional coefficient of the fingertips [m]: the largest torque about the normal of a contact
     over its normal force. Zero is a hard fingertip; a soft one has a fraction of the size of the
     area that it touches."""
@@ -210,15 +210,15 @@ class Repeats:
 
     trials: Annotated[int, at_least(0, up_to=MOST_TRIALS)] = 0
     """Number of times to repeat all holds with noise, to see how often the grasp holds."""
-    noise_shift: Annotated[float, at_least(0.0, up_to=1.0)] = 0.01
+    noise_shift: Annotated[float, within("noise_shift")] = 0.01
     """Standard deviation of the object's position along each axis, in object radii."""
-    noise_turn_deg: Annotated[float, at_least(0.0, up_to=45.0)] = 1.0
+    noise_turn_deg: Annotated[float, within("noise_turn_deg")] = 1.0
     """Standard deviation of the object's orientation about each axis [deg]."""
-    noise_normal_deg: Annotated[float, at_least(0.0, up_to=45.0)] = 1.0
+    noise_normal_deg: Annotated[float, within("noise_normal_deg")] = 1.0
     """Standard deviation of the direction of the surface normal at each contact [deg]."""
-    noise_friction: Annotated[float, at_least(0.0, up_to=1.0)] = 0.05
+    noise_friction: Annotated[float, within("noise_friction")] = 0.05
     """Standard deviation of the friction coefficient, relative to the coefficient."""
-    noise_mass: Annotated[float, at_least(0.0, up_to=1.0)] = 0.05
+    noise_mass: Annotated[float, within("noise_mass")] = 0.05
     """Standard deviation of the mass and of every load, relative to the planned values."""
 
 

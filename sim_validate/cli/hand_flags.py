@@ -9,12 +9,17 @@ from typing import Annotated
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
-from sim_validate.cli.flag_bounds import at_least
-from sim_validate.cli.flag_groups import Count, Direction, Friction, ProtocolName, Seed, Speech
+from sim_validate.cli.flag_bounds import within
+from sim_validate.cli.flag_groups import (
+    Count,
+    Direction,
+    Friction,
+    ProtocolName,
+    Seed,
+    Speech,
+    Usual,
+)
 from sim_validate.parallel.processes import available_cores
-
-MOST_STARTS = 10_000
-
 
 Fingertips = Annotated[str, arg(metavar="NAME,NAME,...")]
 """Names of a hand's fingertips in its file."""
@@ -52,16 +57,16 @@ class Reach:
     stays above the table."""
     contacts_only: bool = False
     """Touch the planned contacts themselves, not anywhere in the grasps' regions."""
-    clearance_m: Annotated[float, at_least(0.0, up_to=0.02)] = 5e-4
+    clearance_m: Annotated[float, within("hand_clearance_m")] = 5e-4
     """Least distance between all that must not touch [m]."""
-    starts: Annotated[int, at_least(1, up_to=MOST_STARTS)] = 100
+    starts: Annotated[int, within("starts")] = 100
     """Largest number of starts for each grasp."""
-    torque_limit_n_m: Annotated[float | None, at_least(1e-6, up_to=1e6)] = None
+    torque_limit_n_m: Annotated[float | None, within("torque_limit_n_m")] = None
     """Torque limit of every joint [N m], instead of those of the hand."""
     simulate: bool = False
     """Hold test wrenches in simulation with the hand's links and motors, and try negative controls;
     every joint needs a torque limit."""
-    mass_kg: Annotated[float | None, at_least(1e-6, up_to=1e6)] = None
+    mass_kg: Usual | None = None
     """Mass of the object [kg], with which the hand also executes each grasp that it reaches, as
     `execute` does with fingertips on springs; every joint needs a torque limit."""
     protocol: UseAppendAction[tuple[ProtocolName, ...]] = ()

@@ -9,6 +9,7 @@ from typing import Annotated
 
 from tyro.conf import OmitArgPrefixes, Positional
 
+from grasp_core.checked import MOST_COUNT
 from sim_validate.cli.flag_bounds import at_least, ends_in
 from sim_validate.cli.flag_groups import Count, Friction, Speech
 from sim_validate.parallel.processes import available_cores
@@ -51,7 +52,7 @@ class Report:
     every_copy: bool = False
     """Draw every grasp. If not given, grasps that a symmetry of the object makes from one another
     share a card and one set of pictures."""
-    clips: Annotated[int, at_least(0)] = 0
+    clips: Annotated[int, at_least(0, up_to=MOST_COUNT)] = 0
     """Number of grasps per run of which clips of trials are made, those with problems first, if
     graphics are available."""
     jobs: Count = field(default_factory=available_cores)

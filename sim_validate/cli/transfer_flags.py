@@ -9,7 +9,7 @@ from typing import Annotated
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
-from sim_validate.cli.flag_bounds import at_least
+from sim_validate.cli.flag_bounds import within
 from sim_validate.cli.flag_groups import (
     Friction,
     Lengths,
@@ -27,7 +27,7 @@ class Carrying:
     distance_m: NotNegative | None = None
     """Largest distance by which a contact may move to the surface of the changed part [m]; if not
     given, a twentieth of the old part's radius."""
-    angle_deg: Annotated[float, at_least(0.0, up_to=45.0)] = 5.0
+    angle_deg: Annotated[float, within("changed_by_deg")] = 5.0
     """Largest angle between the normals of a face before and after [deg]."""
 
 

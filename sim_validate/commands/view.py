@@ -82,7 +82,8 @@ def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
     reporter.say(f"{grasp.id} in MuJoCo's viewer; load the keyframe `approach` to see it close")
     with tempfile.TemporaryDirectory() as folder:
         path = write_text(Path(folder) / f"{grasp.id}.xml", scene.xml)
-        command = [sys.executable, "-m", "mujoco.viewer", f"--mjcf={path}"]
+        # -P: modules of the working folder are not run
+        command = [sys.executable, "-P", "-m", "mujoco.viewer", f"--mjcf={path}"]
         ended = subprocess.run(command, check=False).returncode  # noqa: S603 - MuJoCo's own
     if ended:
         raise GraphicsError(

@@ -90,14 +90,16 @@ def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ..
     sets = contact_sets_from_json(text, Overrides(NO_FRICTION, outward=outward))
     stated = value_of(text)
     planned = "schema" in stated  # graspproof planned these, and they may be judged at any friction
-    own = any((each.friction != NO_FRICTION).any() for each in sets)
-    if not planned and ("friction" in stated or own):
-        raise InputError(
-            "friction: remove it from the contacts file, because a dataset has its own frictions"
-        )
-    for each in sets:
+    remedy = "friction: remove it from the contacts file, because a dataset has its own frictions"
+    if not planned and "friction" in stated:
+        raise InputError(remedy)
+    for row, each in enumerate(sets):
+        if not planned and (each.friction != NO_FRICTION).any():
+            raise InputError(f"grasps[{row}] ({each.id}): {remedy}")
         if len(each.positions) != FINGERS:
-            raise InputError(f"grasp {each.id}: expected 4 contacts, got {len(each.positions)}")
+            raise InputError(
+                f"grasps[{row}] ({each.id}): expected 4 contacts, got {len(each.positions)}"
+            )
     return tuple(
         GivenGrasp(f"given-{i:06}", each.id, _rows(each.positions), _rows(each.normals))
         for i, each in enumerate(sets)
@@ -130,8 +132,13 @@ def contacts_text(data: bytes) -> str:
             f"{POINTS}, {NORMALS} and {NAMES}: expected arrays of equal length, got shapes "
             f"{points.shape}, {normals.shape} and {names.shape}"
         )
-    if not (np.isfinite(points).all() and np.isfinite(normals).all()):
-        raise InputError(f"{POINTS} and {NORMALS}: expected finite numbers, got NaN or infinity")
+    for name, array in ((POINTS, points), (NORMALS, normals)):
+        if not (good := np.isfinite(array).all(axis=(1, 2))).all():
+            row = int(good.argmin())
+            raise InputError(
+                f"{name}[{row}]: expected finite numbers, got NaN or infinity; leave out the "
+                f"{np.sum(~good)} rows that have some"
+            )
     return given_text(
         [GivenGrasp("", str(name), _rows(p), _rows(n))
          for name, p, n in zip(names, points, normals, strict=True)]

@@ -51,16 +51,8 @@ class TableFiles:
         Raises:
             InputError: A file is damaged, or two rows have the same key.
         """
-        every = [read_table(path, name, self._tables) for path in paths]
-        self.add_table(name, split, pyarrow().concat_tables(every))
-
-    def add_table(self, name: Name, split: str, table: Any) -> None:
-        """Add the rows of an Arrow table; their keys must come after all that were added before.
-
-        Raises:
-            InputError: Two rows have the same key.
-        """
         arrow, keys = pyarrow(), list(KEYS[name])
+        table = arrow.concat_tables([read_table(path, name, self._tables) for path in paths])
         table = table.sort_by([(key, "ascending") for key in keys])
         if table.group_by(keys).aggregate([]).num_rows < table.num_rows:
             raise InputError(

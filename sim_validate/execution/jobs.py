@@ -89,8 +89,9 @@ def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[Executed
         InputError: A grasp or a setting is refused.
         UnfaithfulError: The simulator failed in a trial, or fails its checks.
     """
-    threads = max(1, processors // processes(len(jobs), processors))
-    return each(executed_grasp, [replace(job, threads=threads) for job in jobs], jobs=processors)
+    count = processes(len(jobs), processors)
+    threads = max(1, processors // count)
+    return each(executed_grasp, [replace(job, threads=threads) for job in jobs], jobs=count)
 
 
 def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:

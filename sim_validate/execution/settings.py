@@ -4,7 +4,17 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
 
-from grasp_core.checked import LARGEST, instance, number, one_of, positive, seed_of, several, whole
+from grasp_core.checked import (
+    BOUNDS,
+    LARGEST,
+    instance,
+    number,
+    one_of,
+    positive,
+    seed_of,
+    several,
+    whole,
+)
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import STIFFNESS_N_PER_M
 from grasp_core.short_text import changed
@@ -15,8 +25,6 @@ TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misp
 or stops the palm, strikes the object, or closes fingers on an object that is not where it should
 be."""
 KINDS: tuple[TrialKind, ...] = get_args(TrialKind)
-MOST_MISPLACEMENTS = 1000
-"""Largest number of misplaced objects, which bounds the time that a file can ask for."""
 LONGEST_S = 100.0
 """Longest duration of a lift or a stop [s]."""
 
@@ -85,15 +93,15 @@ class ExecutionSettings:
         if not kinds:
             raise InputError(f"trials must name at least one of {', '.join(KINDS)}, got none")
         object.__setattr__(self, "trials", tuple(kind for kind in KINDS if kind in kinds))
-        for name, (least, most) in RANGES.items():
-            number(getattr(self, name), name, least=least, most=most)
+        for name in RANGES:
+            number(getattr(self, name), name, **BOUNDS[name])
         stopping = self.stop_from_m_per_s / self.stop_m_per_s2
         if stopping > LONGEST_S:
             raise InputError(
                 f"stop_from_m_per_s over stop_m_per_s2 is the duration of a stop, at most "
                 f"{LONGEST_S:g} s, got {stopping:.3g} s; start slower, or stop harder"
             )
-        whole(self.misplacements, "misplacements", least=1, most=MOST_MISPLACEMENTS)
+        whole(self.misplacements, "misplacements", **BOUNDS["misplacements"])
         seed_of(self.seed)
 
     @property
@@ -117,5 +125,4 @@ POSITIVE = (
     "most_mm", "most_deg",
 )  # fmt: skip
 NOT_NEGATIVE = ("shake_g", "knock_n_s", "off_mm")
-RANGES = {"lift_s": (0.05, LONGEST_S), "shake_hz": (0.1, 25.0), "off_deg": (0.0, 180.0)}
-"""A lift takes ten samples at least, and a cycle of a shake eight."""
+RANGES = ("lift_s", "shake_hz", "off_deg")

@@ -5,11 +5,16 @@ whatever ends a command. Files of other names are left alone.
 """
 
 import re
-from collections.abc import Iterable
+import shutil
+import tempfile
+from collections.abc import Generator, Iterable
+from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 
 from grasp_core.errors import InputError
+from grasp_core.files.text_files import write_text
+from grasp_core.files.whole_files import UNFINISHED
 
 REPORT, INDEX, GRASPS = "report", "index.html", "grasps"
 STYLE = "style.css"
@@ -22,8 +27,9 @@ REACHES = "reaches.json"
 JUDGEMENTS = "judgements.json"
 PICTURES, CHARTS, CLIPS = "pictures", "charts", "clips"
 MARK = ".graspproof-report"
+MARKED = "The pages here were written by graspproof, which may replace them.\n"
 ID = re.compile(r"[bcprf](-\d+){4}[\w-]*", re.ASCII)
-"""Pattern of a grasp's id, as plans name grasps."""
+"""Pattern of a grasp's id, as plans name grasps; people give other ids to contacts of their own."""
 
 
 def remove_results(folder: Path) -> None:
@@ -34,20 +40,23 @@ def remove_results(folder: Path) -> None:
     remove_reaches(folder)
     remove_judgements(folder)
     _remove(
-        [*_of_grasps(folder / "scenes", ".xml"), *(folder / name for name in (*OF_GRASPS, *BEST))]
+        [
+            *_of_grasps(folder / "scenes", ".xml", b"`graspproof scene "),
+            *(folder / name for name in (*OF_GRASPS, *BEST)),
+        ]
     )
 
 
 def remove_verdicts(folder: Path) -> None:
     """Remove verdicts, their traces, and pages that show them."""
     remove_report(folder / REPORT)
-    _remove([folder / "verdicts.json", *_of_grasps(folder / "traces", ".npz")])
+    _remove([folder / "verdicts.json", *_of_grasps(folder / "traces", ".npz", b".times_s.npy")])
 
 
 def remove_regions(folder: Path) -> None:
     """Remove certified regions, their proofs, and pages that show them."""
     remove_report(folder / REPORT)
-    _remove([folder / "regions.json", *_of_grasps(folder / "proofs", ".npz")])
+    _remove([folder / "regions.json", *_of_grasps(folder / "proofs", ".npz", b"object_sha256.npy")])
 
 
 def remove_executions(folder: Path) -> None:
@@ -68,9 +77,18 @@ def remove_judgements(folder: Path) -> None:
     _remove([folder / JUDGEMENTS])
 
 
-def _of_grasps(folder: Path, suffix: str) -> list[Path]:
-    """List the files in a folder that are named after grasps."""
-    return [path for path in folder.glob(f"*{suffix}") if ID.fullmatch(path.stem)]
+def _of_grasps(folder: Path, suffix: str, mark: bytes) -> list[Path]:
+    """List the files in a folder that are about grasps.
+
+    Args:
+        folder: The folder.
+        suffix: Ending of the files.
+        mark: What each of them holds, by which one with an id of people's own is known.
+    """
+    return [
+        path for path in folder.glob(f"*{suffix}")
+        if ID.fullmatch(path.stem) or (path.is_file() and mark in path.read_bytes())
+    ]  # fmt: skip
 
 
 def _remove(paths: Iterable[Path]) -> None:
@@ -88,6 +106,37 @@ def require_report_folder(folder: Path) -> None:
         raise InputError(
             f"{folder}: this folder holds other files than a report; give another --out"
         )
+
+
+@contextmanager
+def new_pages(folder: Path) -> Generator[Path]:
+    """Yield the folder to write the pages of a report to.
+
+    That is the report's own folder if it has no pages. Otherwise it is one inside it, whose files
+    replace the old pages at the end, so that these stay if the new ones are not finished.
+    """
+    earlier = (folder / INDEX).is_file()
+    if not earlier:
+        remove_pages(folder)
+    write_text(folder / MARK, MARKED)
+    if not earlier:
+        try:
+            yield folder
+        except BaseException:
+            remove_report(folder)
+            raise
+        return
+    aside = Path(tempfile.mkdtemp(dir=folder, prefix=f".{REPORT}{UNFINISHED}"))
+    try:
+        yield aside
+        remove_pages(folder)
+        files = [path for path in aside.rglob("*") if path.is_file()]
+        for path in sorted(files, key=lambda each: each.name == INDEX):
+            place = folder / path.relative_to(aside)
+            place.parent.mkdir(exist_ok=True)
+            path.replace(place)
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
 
 
 def remove_report(folder: Path) -> None:

@@ -1,11 +1,13 @@
 """Writes files and folders so that they are complete or absent."""
 
+import fcntl
 import io
+import os
 import shutil
 import tempfile
 import zipfile
 from collections.abc import Generator, Iterable, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.whole_files import SHOWN, UNFINISHED, write_parts
 
 
 def write_bytes(path: Path, data: bytes) -> Path:
@@ -49,11 +51,33 @@ def whole_folder(folder: Path) -> Generator[Path]:
         raise InputError(f"{folder}: exists and is not an empty folder; give another --out")
     named = folder.resolve()
     named.parent.mkdir(parents=True, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(dir=named.parent, prefix=".unfinished-"))
+    prefix = f".{named.name[:SHOWN]}{UNFINISHED}"
+    for path in named.parent.iterdir():
+        if path.name.startswith(prefix):
+            with suppress(OSError), _locked(path) as abandoned:
+                if abandoned:
+                    shutil.rmtree(path)
+    temporary = Path(tempfile.mkdtemp(dir=named.parent, prefix=prefix))
     try:
-        yield temporary
-        temporary.chmod(0o755)
-        temporary.replace(named)
+        with _locked(temporary):
+            yield temporary
+            temporary.chmod(0o755)
+            temporary.replace(named)
     except BaseException:
         shutil.rmtree(temporary, ignore_errors=True)
         raise
+
+
+@contextmanager
+def _locked(folder: Path) -> Generator[bool]:
+    """Lock a folder until the end of the block, or of the process; yield whether that worked."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            locked = True
+        except OSError:  # another process has locked it, or the file system has no locks
+            locked = False
+        yield locked
+    finally:
+        os.close(handle)

@@ -7,7 +7,7 @@ on a unit. Without `address`, Ray and Dask start workers on this machine and sto
 import importlib
 import os
 import socket
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
@@ -73,7 +73,11 @@ def ray_workers(workers: int, address: str | None) -> Generator[RayCluster]:
     Raises:
         InputError: Ray is not installed, or no cluster answers.
     """
-    os.environ.update(dict(RAY_SETTINGS) | dict(os.environ))  # Ray reads these when it is imported
+    with _environment(RAY_SETTINGS):  # read when Ray is imported, and by the programs it starts
+        yield from _ray(workers, address)
+
+
+def _ray(workers: int, address: str | None) -> Generator[RayCluster]:
     ray = _imported("ray", "ray")
     quiet = {"log_to_driver": False, "configure_logging": False}
     here = {
@@ -92,6 +96,18 @@ def ray_workers(workers: int, address: str | None) -> Generator[RayCluster]:
         yield RayCluster(ray, int(ray.cluster_resources().get("CPU", workers)))
     finally:
         ray.shutdown()
+
+
+@contextmanager
+def _environment(settings: Mapping[str, str]) -> Generator[None]:
+    """Set variables of the environment that are not set, until the end of the block."""
+    new = {name: value for name, value in settings.items() if name not in os.environ}
+    os.environ.update(new)
+    try:
+        yield
+    finally:
+        for name in new:
+            os.environ.pop(name, None)
 
 
 def _require_listener(address: str) -> None:

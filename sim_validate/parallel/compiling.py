@@ -5,12 +5,11 @@ loops than the proofs of its grasps, and comes to the last family at the end. So
 an installation compiles on two cores.
 """
 
-import importlib
-import signal
 from collections.abc import Callable, Generator, Mapping
+from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from functools import partial
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -24,11 +23,13 @@ from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.quality.wrench_limits import many_limits
 from grasp_core.solvers.nearest_point import least_distance
 from scenes.example_objects import example_object
+from sim_validate.parallel.processes import local_processes
 
 OUTWARD = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 """Outward directions of a tetrahedron's faces, (4, 3); a third of each is its face's middle [m]."""
 FRICTION = 0.5
-Calls: TypeAlias = Mapping[str, Callable[[Array, Array], object]]
+Call: TypeAlias = Callable[[Array, Array], object]
+Calls: TypeAlias = Mapping[str, Call]
 """For each kernel a function that compiles it, given four contacts and their normals."""
 
 
@@ -87,33 +88,20 @@ def compiled_beside(jobs: int, calls: Calls | None = None) -> Generator[int]:
     if not missing:
         yield jobs
         return
-    context: Any = importlib.import_module("multiprocessing").get_context("spawn")
-    ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=_compile, args=(theirs, missing), daemon=True)
-    process.start()
-    theirs.close()
-    done = set[str]()
-    wait_for({name: partial(_wait, ours, name, done) for name in missing})
-    try:
-        yield 1
-    finally:
-        wait_for({})
-        process.terminate()  # what it has written is whole
-        process.join()
-        ours.close()
+    with local_processes(1) as other:
+        ready = {name: other.submit(_compile, call) for name, call in missing.items()}
+        wait_for({name: partial(_wait, future) for name, future in ready.items()})
+        try:
+            yield 1
+        finally:
+            wait_for({})  # what the process has written is whole, so that it may end at any time
 
 
-def _wait(pipe: Any, name: str, done: set[str]) -> None:
-    """Wait until a kernel is compiled; the end of the other process ends the wait, too."""
-    with suppress(EOFError, OSError):
-        while name not in done:
-            done.add(pipe.recv())
+def _wait(ready: "Future[None]") -> None:
+    """Wait until a kernel is compiled; where the other process fails, this one compiles it."""
+    with suppress(Exception):
+        ready.result()
 
 
-def _compile(pipe: Any, calls: Calls) -> None:
-    """Compile kernels one after the other, and send the name of each that is ready."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt ends it through its parent
-    with suppress(BrokenPipeError):
-        for name, call in calls.items():
-            call(OUTWARD / 3.0, -OUTWARD / np.sqrt(3.0))
-            pipe.send(name)
+def _compile(call: Call) -> None:
+    call(OUTWARD / 3.0, -OUTWARD / np.sqrt(3.0))

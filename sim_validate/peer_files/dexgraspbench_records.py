@@ -10,26 +10,28 @@ src/task/eval_func/base.py, src/util/hand_util.py.
 """
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import Array, frozen, real_array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import instance, path_of, positive, text
 from grasp_core.errors import InputError
 from grasp_core.files.whole_files import write_parts
 from grasp_core.short_text import summary
-from sim_validate.peer_files.npy_files import read_npy
+from sim_validate.peer_files.pickled_records import Numbers, read_pickled
 
 FREE = 7
 """Numbers of a pose: position and quaternion."""
 UNIT = 1e-3
 """How far the length of a quaternion may be from 1: records have numbers of single precision."""
 CONFIGURATIONS = ("pregrasp_qpos", "grasp_qpos", "squeeze_qpos")
+WANTED = ("obj_path", "obj_scale", "obj_pose", *CONFIGURATIONS)
+"""Fields that a record must have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -86,29 +88,56 @@ def load_dex_record(path: str | Path) -> DexRecord:
         InputError: The file cannot be read, or lacks a field.
     """
     place = path_of(path, "path")
-    found = read_npy(place)
+    found = read_pickled(place)
     try:
-        return record_of_fields(found)
+        return _record(found)
     except InputError as error:
         raise InputError(f"{place}: {error}") from error
 
 
-def record_of_fields(found: Any) -> DexRecord:
+def _record(found: Any) -> DexRecord:
     """Make a record of the fields of a dictionary; those that are not known are left alone."""
     if not isinstance(found, dict):
-        raise InputError("expected a dictionary that was saved with numpy.save")
+        raise InputError(_of_others(found))
     fields = cast("Mapping[str, Any]", found)
-    wanted = ("obj_path", "obj_scale", "obj_pose", *CONFIGURATIONS)
-    for name in wanted:
+    for name in WANTED:
         if name not in fields:
             raise InputError(
-                f"the dictionary has no {name}; records have {', '.join(wanted)}. Records of arms "
+                f"the dictionary has no {name}; records have {', '.join(WANTED)}. Records of arms "
                 "(approach_qpos alone), and batches, are not read"
             )
+    scale = _numbers(fields, "obj_scale")
+    if scale.size != 1:
+        raise InputError(f"obj_scale: expected one number, got {scale.size}")
     return DexRecord(
-        fields["obj_path"], float(np.asarray(fields["obj_scale"], np.float64).reshape(())),
-        *(np.asarray(fields[name], np.float64) for name in ("obj_pose", *CONFIGURATIONS)),
+        fields["obj_path"], float(scale.item()),
+        *(_numbers(fields, name) for name in ("obj_pose", *CONFIGURATIONS)),
     )  # fmt: skip
+
+
+def _of_others(found: Any) -> str:
+    """Say what a file holds that holds no record, and what to do."""
+    several = cast("list[Any]", found if isinstance(found, list) else [])
+    first: Any = several[0] if several else None
+    if not isinstance(first, dict):
+        return "expected a dictionary that was saved with numpy.save"
+    known = " DexGraspNet's files are such lists, of one pose (qpos) each and none to squeeze with."
+    kind = known if "qpos" in first else ""
+    return (
+        f"expected the dictionary of one grasp, got a list of {len(several)}.{kind} Save each "
+        f"grasp as a file of its own with the fields {', '.join(WANTED)} (docs/protocols.md says "
+        "what they are)"
+    )
+
+
+def _numbers(fields: Mapping[str, Any], name: str) -> Array:
+    """Return a field's numbers: an array, one number, or a list of numbers."""
+    found: Any = fields[name]
+    found = found.values if isinstance(found, Numbers) else found
+    every = cast("Sequence[Any]", found if isinstance(found, list | tuple) else [found])
+    if not (isinstance(found, np.ndarray) or all(isinstance(each, int | float) for each in every)):
+        raise InputError(f"{name}: expected an array of numbers, got something else")
+    return real_array(cast("Any", found), name)
 
 
 def write_dex_record(record: DexRecord, path: str | Path) -> Path:

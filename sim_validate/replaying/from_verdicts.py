@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.settings import noise_from_table
 from sim_validate.records.grasps import grasp_with_id, some
+from sim_validate.records.saved_verdicts import verdicts_of
 from sim_validate.records.setup_toml import OF_USERS, setup_from_tables
-from sim_validate.records.verdicts_schema import SCHEMA, VerdictsFile
 from sim_validate.replaying.from_grasps import (
     grasps_behind,
     of_grasp,
@@ -38,7 +37,7 @@ def from_verdicts(path: Path, text: str, wanted: Wanted) -> Recorded:
         InputError: The file is not as `validate` writes it, or lacks the wanted contact set.
     """
     try:
-        record = record_of(VerdictsFile, text, "verdicts.json", schema=SCHEMA)
+        record = verdicts_of(text)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     grasps = wanted.grasps or path.parent / GRASPS

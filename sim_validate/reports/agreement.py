@@ -18,6 +18,7 @@ from sim_validate.simulation.hold_verdict import LET_GO, Outcome
 from sim_validate.validation.wrench_verdict import AGREEMENT
 
 Record = Mapping[str, Any]
+"""An object of a JSON file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +113,6 @@ def _place(trial: Record, wanted: bool | None) -> str:
     return f"{'resisted' if wanted else 'not_resisted'}_{held}"
 
 
-"""Type of an object of a JSON file."""
 HELD = Outcome.HELD.value
 GONE = tuple(outcome.value for outcome in LET_GO)
 GOOD, BAD, QUIET = "good", "bad", "quiet"

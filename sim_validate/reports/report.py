@@ -1,7 +1,7 @@
 """Turns the folder of a run into a folder of pages that open from disk and need no network."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import TypeAlias
@@ -12,12 +12,10 @@ from scenes.drawing.turntable import as_text, object_data
 from sim_validate.files.stale_results import (
     GRASPS,
     INDEX,
-    MARK,
     REPORT,
     STATIC,
     STYLE,
-    remove_pages,
-    remove_report,
+    new_pages,
     require_report_folder,
 )  # fmt: skip
 from sim_validate.parallel.processes import available_cores, each
@@ -38,14 +36,9 @@ from sim_validate.reports.index_page import (
 from sim_validate.reports.pages import asset, style
 from sim_validate.reports.run_folder import RunFolder, folder_of, runs_in
 
-MARKED = "The pages here were written by graspproof, which may replace them.\n"
 FIRST = 4
 """Number of cards that are drawn before the first page is written for the first time; it is written
 again whenever twice as many are drawn, and at the end."""
-
-CARDS_PER_PROCESS = 24
-"""Number of cards for which one more process is worth starting: a process that draws takes as long
-to start as a dozen cards take to draw."""
 
 Runs: TypeAlias = tuple[RunFolder, ...]
 
@@ -105,7 +98,7 @@ def write_report(  # noqa: PLR0913 - what a user may choose
         every_copy: Whether every grasp gets a card and pictures of its own.
         progress: Called with (drawn, total) after each card.
         ready: Called with (first page, drawn, total) when the first page can be opened while more
-            cards are drawn.
+            cards are drawn; not where an earlier report stays until the new one is complete.
 
     Returns:
         The paths of the report, and why clips are missing.
@@ -125,14 +118,11 @@ def write_report(  # noqa: PLR0913 - what a user may choose
     function(ready, "ready")
     runs = tuple(run.first(limit) for run in runs_in(folder))
     require_report_folder(out)
-    remove_pages(out)
-    write_text(out / MARK, MARKED)
-    try:
-        cards = list(_cards(runs, out, clips, every_copy=every_copy))
-        return _written(cards, runs, out, jobs or available_cores(), Steps(progress, ready))
-    except BaseException:
-        remove_report(out)
-        raise
+    with new_pages(out) as place:
+        steps = Steps(progress, ready if place == out else _nothing)
+        cards = list(_cards(runs, place, clips, every_copy=every_copy))
+        report = _written(cards, runs, place, jobs or available_cores(), steps)
+    return replace(report, index=out / INDEX)
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +147,6 @@ def _written(cards: Sequence[_Card], runs: Runs, out: Path, jobs: int, steps: St
     tasks = [card.task for card in cards]
     shown = list[Shown]()
     no_clip, next_index = "", min(FIRST, len(cards))
-    jobs = min(jobs, max(1, len(tasks) // CARDS_PER_PROCESS))
     results = chain(each(draw, tasks[:FIRST], jobs=1), each(draw, tasks[FIRST:], jobs=jobs))
     for card, drawn in zip(cards, results, strict=True):
         around = _neighbours(cards, len(shown))

@@ -1,9 +1,9 @@
 """Reads the folder of a run: its grasps, verdicts, executions, regions, and a hand's poses."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import InputError
@@ -18,17 +18,16 @@ from sim_validate.records.grasps import read_grasps
 from sim_validate.records.regions import REGIONS
 from sim_validate.records.regions import SCHEMA as REGIONS_SCHEMA
 from sim_validate.records.regions_schema import RegionsFile
-from sim_validate.records.verdicts_schema import SCHEMA as VERDICTS_SCHEMA
+from sim_validate.records.saved_verdicts import verdicts_of
 from sim_validate.records.verdicts_schema import VerdictsFile
 from sim_validate.reports.agreement import BAD, Record, said_of
 from sim_validate.reports.best_possible import Possible, read_possible
-from sim_validate.simulation.hold_verdict import Outcome
 
 if TYPE_CHECKING:
     from sim_validate.records.saved_reaches import SavedReaches
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"
-SCHEMAS = {VERDICTS: VERDICTS_SCHEMA, REGIONS: REGIONS_SCHEMA, JUDGEMENTS: 1}
+Read = TypeVar("Read", VerdictsFile, RegionsFile, JudgementsFile)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,11 +120,9 @@ def runs_in(folder: Path) -> tuple[RunFolder, ...]:
 
 def _run(path: Path) -> RunFolder:
     saved = read_grasps(path / GRASPS)
-    tried = _read(path / VERDICTS, VerdictsFile, saved)
-    certified = _read(path / REGIONS, RegionsFile, saved)
+    tried = _read(path / VERDICTS, verdicts_of, saved)
+    certified = _read(path / REGIONS, _regions, saved)
     verdicts: Sequence[Record] = [] if tried is None else tried["verdicts"]
-    if tried is not None:
-        _check_summary(path / VERDICTS, tried["summary"], verdicts)
     regions: Sequence[Record] = [] if certified is None else certified["grasps"]
     return RunFolder(
         path=path,
@@ -137,7 +134,7 @@ def _run(path: Path) -> RunFolder:
         regions_friction=None if certified is None else certified["friction"],
         executions=_executions(path / EXECUTIONS, saved),
         reaches=reaches_beside(path / GRASPS, saved),
-        judgements=_read(path / JUDGEMENTS, JudgementsFile, saved),
+        judgements=_read(path / JUDGEMENTS, _judgements, saved),
         possible=_possible(path / BEST[0], saved),
     )
 
@@ -224,44 +221,24 @@ def _executions(path: Path, saved: SavedGrasps) -> Executions | None:
     return found
 
 
-def _check_summary(path: Path, summary: Record, verdicts: Sequence[Record]) -> None:
-    """Refuse verdicts that contradict themselves.
-
-    Raises:
-        InputError: A verdict or the summary contradicts another part of the file.
-    """
-    for number, each in enumerate(verdicts):
-        if each["held"] != (each["outcome"] == Outcome.HELD):
-            raise InputError(
-                f"{path}: verdicts[{number}]: `held` is {each['held']}, which contradicts "
-                f"`outcome` {each['outcome'].value}; write the file again, or remove it"
-            )
-    counted = {
-        "grasps": len(verdicts),
-        "grasps_held": sum(each["held"] for each in verdicts),
-        "controls": sum(len(each["controls"]) for each in verdicts),
-        "mismatches": sum(len(each["mismatches"]) for each in verdicts),
-    }
-    for name, count in counted.items():
-        if summary[name] != count:
-            raise InputError(
-                f"{path}: summary.{name}: expected {count}, as the verdicts say, got "
-                f"{summary[name]}; write the file again, or remove it"
-            )
-
-
-def _read(path: Path, kind: type[Record], saved: SavedGrasps) -> Record | None:
+def _read(path: Path, read: Callable[[str], Read], saved: SavedGrasps) -> Read | None:
     """Read a file about the same object; return None if the file does not exist."""
     if not path.is_file():
         return None
-    schema = SCHEMAS[path.name]
     try:
-        text = read_text(path)
-        found = record_of(kind, text, path.name, schema=schema)
+        found = read(read_text(path))
     except InputError as error:
         raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
     _check_object(path, found["object"]["content_sha256"], saved)
     return found
+
+
+def _regions(text: str) -> RegionsFile:
+    return record_of(RegionsFile, text, REGIONS, schema=REGIONS_SCHEMA)
+
+
+def _judgements(text: str) -> JudgementsFile:
+    return record_of(JudgementsFile, text, JUDGEMENTS, schema=1)
 
 
 def _check_object(path: Path, sha256: str, saved: SavedGrasps) -> None:

@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import number
+from grasp_core.checked import BOUNDS, number
 from grasp_core.closure.wrenches import contact_frames
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
@@ -26,7 +26,6 @@ from sim_validate.simulation.traces import rotated
 STREAM = 1
 """Number of the random stream that noise is drawn from, apart from other draws with the same
 seed."""
-LARGEST = {"shift": 1.0, "turn_deg": 45.0, "normal_deg": 45.0, "friction": 1.0, "mass": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +49,7 @@ class Noise:
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
-            number(value, name, least=0.0, most=LARGEST[name])
+            number(value, name, **BOUNDS[f"noise_{name}"])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

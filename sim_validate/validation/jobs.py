@@ -54,7 +54,8 @@ def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
         InputError: A grasp is refused.
         UnfaithfulError: The simulator fails its checks on cases with known answers.
     """
-    return each(verdict_of, prepared(jobs, processors), jobs=processors)
+    count = processes(len(jobs), processors)
+    return each(verdict_of, prepared(jobs, processors), jobs=count)
 
 
 def prepared(jobs: Sequence[Job], processors: int) -> list[Job]:
@@ -100,7 +101,7 @@ def validate_all(  # noqa: PLR0913 - what `validate` takes, and two more
         agenda: Which trials to run; the default agenda if None.
         setup: How trials are simulated; the default setup if None.
         jobs: Largest number of processors to use; results do not depend on it. From 16 grasps on
-            they are used as processes, and a script then needs `if __name__ == "__main__":`.
+            they are used as processes.
         progress: Called after each grasp, in order, with the number of grasps done, the number of
             all, and the verdict. What it raises ends the loop.
 

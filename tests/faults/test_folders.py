@@ -1,6 +1,7 @@
 """Folders that are none, are taken, have strange names, or hold results of something else."""
 
 import fcntl
+import json
 import os
 import shutil
 import time
@@ -74,6 +75,25 @@ def test_a_new_plan_removes_what_was_told_of_another(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     assert main([*PLAN, "--friction", "0.4", "--out", out]) == 0
     assert set(contents(tmp_path)) == {"grasps.json", "notes.txt"}
+
+
+def test_results_about_ids_of_peoples_own_are_removed_as_well(tmp_path):
+    """Other files stay, even where they end as results do."""
+    out, grasps = str(tmp_path), tmp_path / "grasps.json"
+    assert main([*PLAN, "--limit", "1", "--out", out]) == 0
+    document = json.loads(grasps.read_text())
+    document["grasps"][0]["id"] = "mine-1"
+    grasps.write_text(json.dumps(document))
+    assert main(["validate", str(grasps), "--traces", "-q", "--out", out]) == 0
+    assert main(["regions", str(grasps), "-q", "--out", out]) == 0
+    assert main(["scene", str(grasps), "-q", "--out", str(tmp_path / "scenes")]) == 0
+    results = {"traces/mine-1.npz", "proofs/mine-1.npz", "scenes/mine-1.xml"}
+    own = {"traces/own.npz", "proofs/own.npz", "scenes/own.xml"}
+    for name in own:
+        (tmp_path / name).write_bytes(b"own")
+    assert own | results < set(contents(tmp_path))
+    assert main([*PLAN, "--out", out]) == 0
+    assert set(contents(tmp_path)) == own | {"grasps.json"}
 
 
 @pytest.mark.slow

@@ -93,6 +93,8 @@ def test_what_a_killed_writer_left_goes_with_the_next_command(planned, tmp_path)
     for part in ("", "scenes", "report", "report/grasps"):
         (tmp_path / part).mkdir(exist_ok=True)
         (tmp_path / part / f".a.json{UNFINISHED}x7y.json").write_text("{")
+        (tmp_path / part / f".report{UNFINISHED}x7y").mkdir()
+        (tmp_path / part / f".report{UNFINISHED}x7y" / "index.html").write_text("half")
     shutil.copy(planned, tmp_path)
     (tmp_path / ".mine.json").write_text("{}")
     assert main(["scene", str(planned), "--out", str(tmp_path), "-q"]) == 0
@@ -116,7 +118,7 @@ def test_a_report_of_what_a_kill_has_left_says_what_is_missing(planned, tmp_path
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="children are found in /proc")
 def test_processes_end_with_the_command_that_is_killed(tmp_path):
-    words = ["run", "icosahedron", "--limit", "200", "--jobs", "2", "--out", str(tmp_path), "-q"]
+    words = ["run", "icosahedron", "--limit", "200", "--jobs", "3", "--out", str(tmp_path), "-q"]
     process = subprocess.Popen([*CLI, *words], env=os.environ | {"PYTHONPATH": str(ROOT)})
     workers = set()
     while len(workers) < 2 and process.poll() is None:

@@ -11,6 +11,7 @@ import pytest
 
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
+from sim_validate.parallel import compiling
 from sim_validate.parallel import processes as engines
 from tests.faults.conftest import CLI, KEPT, ROOT, contents
 from tests.marks import more
@@ -140,12 +141,17 @@ def test_a_stream_that_is_closed_does_not_stop_the_work(redirected, tmp_path):
 
 
 def test_a_working_folder_that_is_gone_matters_only_to_paths_in_it(tmp_path, monkeypatch, capsys):
+    """Also where processes are started: to compile what is not kept, and for `--jobs`."""
+    monkeypatch.setattr(compiling, "is_kept", lambda _: False)
+    monkeypatch.setattr(engines, "START_S", 0.0, raising=False)
     gone = tmp_path / "gone"
     gone.mkdir()
     monkeypatch.chdir(gone)
     gone.rmdir()
     plan = ["plan", "tetrahedron", "--family", "concurrent", "-q"]
-    assert main([*plan, "--out", str(tmp_path / "a")]) == 0
+    assert main([*plan, "--jobs", "2", "--out", str(tmp_path / "a")]) == 0
+    regions = ["regions", str(tmp_path / "a" / "grasps.json"), "--limit", "9", "-q"]
+    assert main([*regions, "--jobs", "2", "--out", str(tmp_path / "c")]) == 0
     assert main([*plan, "--out", "b"]) == 4
     assert "b: no file can be written there (No such file or directory)" in capsys.readouterr().err
 

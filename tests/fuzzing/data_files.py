@@ -27,10 +27,10 @@ from sim_validate.files.toml_tables import tables_of_toml
 from sim_validate.records.executions_json import executions_from_json, executions_to_json
 from sim_validate.records.regions_schema import RegionsFile
 from sim_validate.records.saved_reaches import reaches_from_json
+from sim_validate.records.saved_verdicts import verdicts_of
 from sim_validate.records.setup_toml import setup_from_tables, tables_of
 from sim_validate.records.transfers.saved_transfer import transfer_from_json
 from sim_validate.records.transfers.transfer_json import transfer_to_json
-from sim_validate.records.verdicts_schema import VerdictsFile
 from sim_validate.records.wrenches import wrenches_from_json
 from sim_validate.simulation.setup import Setup
 from tests.fuzzing.targets import Target
@@ -113,7 +113,8 @@ VERDICTS = {
         "id": "c-0-1-2-3", "contacts_sha256": HASH, "outcome": "held", "held": True,
         "mismatches": [], "critical_friction": {"predicted": 0.3, "simulated": None},
         "wrenches": [_trial(predicted_limit=2.0, simulated_limit=None, required_friction=0.2)],
-        "controls": {"low_friction": {"held": False, "friction": 0.1, "wrenches": [_trial()]}},
+        "controls": {"low_friction": {"held": False, "friction": 0.1,
+                                      "wrenches": [_trial(outcome="slipped")]}},
         "robustness": {"trials": 3, "held": 2, "pass_rate_interval": [0.1, 0.9],
                        "noise": {"shift": 0.01},
                        "not_held": [{"trial": 1, "wrench": "a", "outcome": "slipped"}]},
@@ -335,7 +336,7 @@ TARGETS = (
     Target("given", lambda data: given_from_json(text_of(data)), lambda: [_json(GIVEN)],
            _same_given, "json"),
     Target("verdicts",
-           lambda data: record_of(VerdictsFile, text_of(data), "verdicts.json", schema=1),
+           lambda data: verdicts_of(text_of(data)),
            lambda: [_json(VERDICTS)], _same_record, "json"),
     Target("executions", lambda data: executions_from_json(text_of(data)),
            lambda: [executions_text().encode()], _same_executions, "json"),

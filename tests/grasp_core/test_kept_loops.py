@@ -21,6 +21,11 @@ cross(np.zeros(3), np.zeros(3), np.zeros(3))
 print(sum(cross.stats.cache_hits.values()))
 print(compiled("{CALLER}").half_angles.stats.cache_path)
 """
+UNKEPT = """
+import numpy as np
+from grasp_core.solvers.nearest_point import least_distance
+print(least_distance(np.eye(3), -np.ones((1, 3))))
+"""
 
 
 def compiled_in(folder, kept):
@@ -64,6 +69,16 @@ def test_a_change_of_what_a_kernel_calls_gives_it_another_folder(copies, tmp_pat
     assert hits == 0
     assert Path(other).name != Path(path).name
     assert Path(other).name.startswith("tilting_kernel-")
+
+
+def test_code_that_numba_does_not_keep_runs_without_a_word(tmp_path):
+    """Without optimization it holds addresses of this process."""
+    environment = {
+        **os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_OPT": "0",
+    }  # fmt: skip
+    done = subprocess.run([sys.executable, "-c", UNKEPT], env=environment, capture_output=True,
+                          text=True, check=False)  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (0, "[[-1. -1. -1.]]\n", "")
 
 
 @pytest.mark.parametrize("home", [NOWHERE, "/proc"])

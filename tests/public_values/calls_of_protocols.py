@@ -81,14 +81,4 @@ CALLS = [
     Call("sv.write_dex_object", lambda: {"body": body(), "folder": "no/such"}, {
         "body": VALUE, "folder": PATH,
     }, succeeds_in="tests/sim_validate/peer_files/test_dexgraspbench_records.py"),
-    Call("sv.GripperGrasp", lambda: {"pose": np.eye(4), "opening_m": 0.08, "score": 1.0}, {
-        "pose": POSE, "opening_m": POSITIVE, "score": NOT_NUMBERS,
-    }),
-    Call("sv.load_graspnet", lambda: {"path": "no/such/grasps.npy"}, {
-        "path": PATH | {"nowhere": "no/such/grasps.npy"}, "object_number": OF_NUMBER,
-        "object_pose": optional(POSE), "pad_m": NOT_NEGATIVE,
-    }, succeeds_in="tests/sim_validate/peer_files/test_gripper_poses.py"),
-    Call("sv.load_acronym", lambda: {"path": "no/such/grasps.h5"}, {
-        "path": PATH | {"nowhere": "no/such/grasps.h5"}, "pad_m": NOT_NEGATIVE,
-    }, succeeds_in="tests/sim_validate/peer_files/test_gripper_poses.py"),
 ]  # fmt: skip

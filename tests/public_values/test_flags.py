@@ -14,10 +14,12 @@ RUN = "from sim_validate.main import run_and_exit; run_and_exit()"
 FRICTIONS = ["0", "-1", "nan", "inf", "1e9", "1e-300", "1e300", f"{LARGEST_FRICTION + 1.0}"]
 WITH_FRICTION = [
     ["plan", "tetrahedron"], ["run", "tetrahedron"], ["validate", "no.json"], ["scene", "no.json"],
-    ["execute", "no.json"], ["regions", "no.json"], ["view", "no.json"], ["analyze", "no.json"],
+    ["execute", "no.json"], ["regions", "no.json"], ["view", "no.json"],
     ["dataset", "build", "tetrahedron", "--out", "no"],
 ]  # fmt: skip
 OTHERS = [
+    ["analyze", "no.json", "--friction", "-1"],
+    ["analyze", "no.json", "--friction", "1e9"],
     ["plan", "tetrahedron", "--seed", "-1"],
     ["plan", "tetrahedron", "--seed", f"{MOST_SEED + 1}"],
     ["plan", "tetrahedron", "--limit", "0"],

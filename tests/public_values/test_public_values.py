@@ -87,8 +87,6 @@ NAMED_OTHERWISE = {
     ("gc.load_grasps", "path"): "path|no/such",
     ("sv.load_dataset", "folder"): "folder|no/such",
     ("sv.load_dex_record", "path"): "path|no/such",
-    ("sv.load_graspnet", "path"): "path|no/such",
-    ("sv.load_acronym", "path"): "path|no/such",
     ("sv.write_report", "folder"): "folder|no/such",
     ("sv.Agenda", "rules"): "rule",
 }

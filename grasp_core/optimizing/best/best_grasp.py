@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from numpy.typing import ArrayLike
 
-from grasp_core.checked import coefficient, function, number, seed_of, whole
+from grasp_core.checked import BOUNDS, coefficient, function, number, seed_of, whole
 from grasp_core.errors import InputError
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
@@ -18,11 +18,6 @@ from grasp_core.optimizing.best.searching.stop import stopping
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
 from grasp_core.quality.measures import Measure, MeasureName
 
-SMALLEST_GAP, LARGEST_GAP = 1e-4, 0.9
-"""Gaps that may be asked for: smaller ones come near to what is left for rounding, and larger ones
-are proved by the first twist."""
-MOST_SECONDS = 1e7
-"""Longest time limit, some months: more is a mistake."""
 MOST_JOBS = 256
 """Most threads: no machine that is known has more use for them."""
 
@@ -78,13 +73,13 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
             "take a mesh with fewer, planar faces"
         )
     friction, seed = coefficient(friction), seed_of(seed)
-    number(gap, "gap", least=SMALLEST_GAP, most=LARGEST_GAP)
+    number(gap, "gap", **BOUNDS["gap"])
     loads = Measure.of(measure, wrenches, body.radius)
-    whole(jobs, "jobs", least=1, most=MOST_JOBS)
+    jobs = min(whole(jobs, "jobs", least=1), MOST_JOBS)
     if progress is not None:
         function(progress, "progress")
     if time_limit_s is not None:
-        number(time_limit_s, "time_limit_s", least=0.0, most=MOST_SECONDS)
+        number(time_limit_s, "time_limit_s", **BOUNDS["time_limit_s"])
     if clearance is None:
         clearance = FINGER_RADIUS * body.radius
     number(clearance, "clearance", least=0.0, most=body.radius, where=", the object's radius in m")

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, cast
 
-from grasp_core.checked import number, one_of, positive, switch
+from grasp_core.checked import BOUNDS, number, one_of, positive, switch
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import settings_of
 from grasp_core.files.strict_json import shown
 from grasp_core.objects.polyhedron import UNITS_M
-from grasp_core.transferring.like_faces import ANGLE_DEG, WIDEST_DEG
+from grasp_core.transferring.like_faces import ANGLE_DEG
 
 NOTE, FAIL = "note", "fail"
 TABLE = "changed_part"
@@ -50,7 +50,7 @@ class IfChanged:
             positive(self.scale, "scale")
         if self.distance_m is not None:
             number(self.distance_m, "distance_m", least=0.0)
-        number(self.angle_deg, "angle_deg", least=0.0, most=WIDEST_DEG)
+        number(self.angle_deg, "angle_deg", **BOUNDS["changed_by_deg"])
 
     def with_scale(self, recorded: float | None) -> "IfChanged":
         """Return these settings with the scale that a baseline holds, if none is given."""

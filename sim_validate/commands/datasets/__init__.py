@@ -1,1 +1,1 @@
-"""Runs the commands that merge datasets and that show what they hold."""
+"""Runs the commands that show what datasets hold."""

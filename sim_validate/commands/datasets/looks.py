@@ -1,4 +1,4 @@
-"""Runs the commands that merge datasets, count what one holds, show rows, and draw depths."""
+"""Runs the commands that count what a dataset holds, show its rows, and draw depths."""
 
 import math
 from pathlib import Path
@@ -9,22 +9,11 @@ from scenes.drawing.depth.cameras import Lens
 from sim_validate.cli import dataset_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.datasets.building.merge import merge
 from sim_validate.datasets.describing.stats import Stats, stats_of
 from sim_validate.datasets.exports.depths import AskedDepths, write_depths
-from sim_validate.datasets.open_dataset import Selection, select, splits_in_words
+from sim_validate.datasets.open_dataset import Selection, select
 from sim_validate.reports.datasets.sample_page import write_sample
 from sim_validate.reports.datasets.stats_page import write_stats
-
-
-def merge_datasets(command: dataset_flags.Merge, reporter: Reporter) -> int:
-    """Merge finished datasets into a new one."""
-    manifest = merge(command.datasets, command.out)
-    counts = ", ".join(f"{count} {name}" for name, count in manifest.rows().items())
-    reporter.say(f"{command.out}: {len(command.datasets)} datasets merged; {counts}")
-    reporter.say(splits_in_words(manifest))
-    reporter.document({"out": str(command.out), "rows": manifest.rows()})
-    return Exit.GOOD
 
 
 def count_dataset(command: dataset_flags.Stats, reporter: Reporter) -> int:

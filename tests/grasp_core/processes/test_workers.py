@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.processes import workers
+from grasp_core.processes import process, workers
 from grasp_core.processes.messages import receive, send, unpacked
 from tests.grasp_core.processes.tasks_to_do import doing
 from tests.patience import HANGING_S
@@ -67,15 +67,40 @@ def test_a_task_that_cannot_be_sent_is_done_here(two):
 
 
 def test_a_program_that_holds_python_is_not_started_again(monkeypatch):
-    monkeypatch.setattr(workers.sys, "frozen", True, raising=False)
+    monkeypatch.setattr(process.sys, "frozen", True, raising=False)
     with workers.working(2, doing, os.getpid()) as found:
         assert found is None
 
 
-def test_where_no_process_starts_there_are_no_workers(monkeypatch):
-    monkeypatch.setattr(workers.sys, "executable", "/no/such/program")
+def test_where_no_process_starts_all_is_done_here(monkeypatch):
+    monkeypatch.setattr(process.sys, "executable", "/no/such/program")
     with workers.working(2, doing, os.getpid()) as found:
-        assert found is None
+        assert list(found.in_order([("end",)] * 30, doing(os.getpid()))) == ["done here"] * 30
+
+
+@pytest.mark.parametrize(("tasks", "started"), [(1, 0), (3, 2), (30, 3)])
+def test_as_many_start_as_have_work_for_longer_than_a_start(tasks, started):
+    """This process does one task until others have started, so that it has done none by then."""
+    found = list[int]()
+    with workers.working(3, doing, os.getpid(), patience_s=0.1) as team:
+
+        def until_all_have_decided(_):
+            while sum(thread.is_alive() for thread in team._serving) > started:
+                time.sleep(0.01)
+            while len(team._processes) < started:
+                time.sleep(0.01)
+            found.append(len(team._processes))
+
+        done = team.in_order([("square", 2)] * tasks, until_all_have_decided, ahead=tasks)
+        list(done)
+    assert found[0] == started
+
+
+@pytest.mark.timeout(HANGING_S)
+def test_work_that_is_short_starts_no_process():
+    with workers.working(2, doing, os.getpid(), patience_s=HANGING_S) as team:
+        assert len(list(team.in_order([("square", 2)] * 30, doing(os.getpid())))) == 30
+    assert team._processes == []
 
 
 def test_the_end_of_the_block_ends_processes_and_threads():
@@ -91,7 +116,6 @@ def test_the_end_of_the_block_ends_processes_and_threads():
 def test_a_process_ends_with_the_one_that_asks_whatever_it_does(tmp_path):
     """It waits for another that never comes; the end of its input ends it all the same."""
     with workers.working(1, doing, os.getpid()) as found:
-        (process,) = found._processes
         alone = str(tmp_path / "alone")
         place = workers._Place(("meet", alone, str(tmp_path / "never")))
         with found._changed:
@@ -99,8 +123,9 @@ def test_a_process_ends_with_the_one_that_asks_whatever_it_does(tmp_path):
             found._changed.notify_all()
         while not (tmp_path / "alone").exists():
             time.sleep(0.01)
-        process.tasks.close()
-        assert process.program.wait(HANGING_S) == 0
+        (other,) = found._processes
+        other.tasks.close()
+        assert other.program.wait(HANGING_S) == 0
 
 
 def test_arrays_keep_their_bits_and_stay_read_only():

@@ -140,7 +140,7 @@ def test_what_rounding_does_counts_on_processors_that_round_alike_only(changed):
 
 
 def test_the_last_digits_do_not_count():
-    close = now(critical_friction=0.2 * (1.0 + 5e-10), displacement_m=1e-5 + 5e-13)
+    close = now(critical_friction=0.2 * (1.0 + 5e-10), displacement_m=1e-5 + 5e-8)
     assert found(close).status is Status.WITHIN
 
 

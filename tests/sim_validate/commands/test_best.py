@@ -96,7 +96,7 @@ def test_measures_without_best_are_usage_errors():
     assert main(["plan", "tetrahedron", "--measure", "weight"]) == 2
 
 
-@pytest.mark.parametrize("flags", [["--gap", "0"], ["--gap", "1"], ["--time-limit-s", "0"]])
+@pytest.mark.parametrize("flags", [["--gap", "0"], ["--gap", "1"], ["--time-limit-s", "-1"]])
 def test_values_out_of_range_are_usage_errors(flags):
     assert main([*ASKED, *flags]) == 2
 

@@ -136,11 +136,12 @@ def test_a_driver_killed_at_random_moments_loses_nothing(times, large_dataset, t
 def test_a_worker_that_is_killed_costs_nothing_but_time(large_dataset, tmp_path):
     folder = tmp_path / "ds"
     process = subprocess.Popen(command(folder, 2))
-    children, killed = Path(f"/proc/{process.pid}/task/{process.pid}/children"), 0
+    tasks, killed = Path(f"/proc/{process.pid}/task"), 0
     while process.poll() is None and not killed:
         time.sleep(0.1)
         if any((folder / "staging").glob("[!.]*")):
-            for child in children.read_text().split()[-1:]:
+            listed = " ".join(task.read_text() for task in tasks.glob("*/children"))
+            for child in listed.split()[-1:]:
                 os.kill(int(child), signal.SIGKILL)
                 killed += 1
     assert killed

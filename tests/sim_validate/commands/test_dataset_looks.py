@@ -1,4 +1,4 @@
-"""Commands that merge datasets, count what one holds, and show some of its rows."""
+"""Commands that count what a dataset holds, and show some of its rows."""
 
 import json
 import re
@@ -84,14 +84,3 @@ def test_a_page_is_not_written_into_its_dataset(ds, capsys, action):
     out = str(ds / "page")
     assert main(["dataset", action, str(ds), "--out", out]) == Exit.INPUT
     assert "is in the dataset" in capsys.readouterr().err
-
-
-def test_the_command_merges(ds, tmp_path, capsys):
-    other = ["prism", "--limit", "1", "--family", "concurrent", "--seed", "6"]
-    assert main(["dataset", "build", *other, "--friction", "0.4", "--out",
-                 str(tmp_path / "b"), "--jobs", "1", "-q"]) == Exit.GOOD  # fmt: skip
-    capsys.readouterr()
-    command = ["dataset", "merge", str(ds), str(tmp_path / "b"), "--out", str(tmp_path / "c")]
-    assert main(command) == Exit.GOOD
-    assert "2 datasets merged; 3 objects" in capsys.readouterr().out
-    assert main(["dataset", "verify", str(tmp_path / "c"), "--share", "0"]) == Exit.GOOD

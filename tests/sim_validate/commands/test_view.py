@@ -59,7 +59,7 @@ def test_with_a_display_the_viewer_is_opened(planned, monkeypatch):
     def run(command, **_):
         path = command[-1].partition("=")[2]
         with open(path, encoding="utf-8") as scene:  # noqa: PTH123 - while it is there
-            opened.append((command[1:3], scene.read()))
+            opened.append((command[1:4], scene.read()))
         return subprocess.CompletedProcess(command, len(opened) - 1)
 
     monkeypatch.setenv("DISPLAY", ":0")
@@ -67,9 +67,19 @@ def test_with_a_display_the_viewer_is_opened(planned, monkeypatch):
     second = json.loads(planned.read_text())["grasps"][1]["id"]
     assert main(["view", str(planned), "--grasp", second, "--friction", "0.7"]) == Exit.GOOD
     ((module, text),) = opened
-    assert module == ["-m", "mujoco.viewer"]
+    assert module == ["-P", "-m", "mujoco.viewer"]
     assert '0.7 0.0 0.0"' in text
     assert main(["view", str(planned)]) == Exit.INPUT  # the viewer ends with 1
+
+
+def test_the_viewer_runs_no_modules_of_the_working_folder(planned, tmp_path, monkeypatch):
+    """The display is none that answers, so that the viewer ends at once."""
+    for name in ("mujoco", "numpy"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w').close()")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("DISPLAY", ":64999")
+    assert main(["view", str(planned)]) == Exit.INPUT
+    assert not (tmp_path / "ran").exists()
 
 
 @pytest.mark.parametrize(

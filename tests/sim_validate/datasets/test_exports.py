@@ -6,7 +6,9 @@ import json
 import math
 import re
 import shutil
+import subprocess
 import sys
+from pathlib import Path
 from typing import get_args
 
 import mujoco
@@ -29,6 +31,8 @@ from sim_validate.files.writing import whole_folder
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, silent
 from tests.sim_validate.datasets.verifying.test_verify import forged
+
+ROOT = Path(__file__).parents[3]
 
 pytest.importorskip("pyarrow")
 FORMATS = tuple(EXPORTERS)
@@ -441,6 +445,26 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path):
         (place / "all").write_text("a")
         assert not (tmp_path / "deep" / "out").exists()
     assert (tmp_path / "deep" / "out" / "all").read_text() == "a"
+
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from sim_validate.files.writing import whole_folder
+with whole_folder(Path(sys.argv[1])) as place:
+    (place / "half").write_text("a")
+    os._exit(9)
+"""
+
+
+def test_what_a_killed_writer_of_a_folder_left_goes_when_it_is_written_again(tmp_path):
+    subprocess.run([sys.executable, "-c", KILLED, tmp_path / "out"], cwd=ROOT, check=False)
+    (left,) = tmp_path.iterdir()
+    with whole_folder(tmp_path / "out") as other:
+        assert not left.exists()
+        with whole_folder(tmp_path / "out"):  # another command; the first one is still at work
+            assert other.is_dir()
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
 @pytest.mark.parametrize(("package", "extra"), [("h5py", "hdf5"), ("pyarrow", "dataset")])

@@ -178,6 +178,40 @@ def test_three_contacts_and_files_of_something_else_are_refused(tmp_path):
         dataclasses.replace(config, objects=("wedge", "prism"))
 
 
+def test_a_bad_row_is_named_by_its_file_and_its_number(planned, tmp_path):
+    points = np.array([grasp.positions for grasp in planned])
+    normals = np.array([grasp.normals for grasp in planned])
+    wrong = normals.copy()
+    wrong[[1, 2], 0] = np.nan
+    path = tmp_path / "g.npz"
+    np.savez(path, contact_points_m=points, contact_normals=wrong)
+    with pytest.raises(gc.InputError, match=r"g.npz: contact_normals\[1\]: .*leave out the 2 rows"):
+        read_given(path)
+    np.savez(
+        path,
+        contact_points_m=points,
+        contact_normals=normals * np.array([1, 2, 1, 1])[:, None, None],
+    )
+    with pytest.raises(
+        gc.InputError, match=r"g.npz: grasps\[1\].contacts\[\d\].normal: its length"
+    ):
+        read_given(path)
+    rows = [("a", points[0], normals[0]), ("b", points[1][:3], normals[1][:3])]
+    with pytest.raises(
+        gc.InputError, match=r"g.json: grasps\[1\] \(b\): expected 4 contacts, got 3"
+    ):
+        read_given(contacts_file(tmp_path / "g.json", rows))
+    rows = [("a", points[0], normals[0]), ("b", 1e-12 * points[1], normals[1])]
+    with pytest.raises(gc.InputError, match=r"g.json: grasps\[1\].contacts: the contacts are .* m"):
+        read_given(contacts_file(tmp_path / "g.json", rows))
+    document = json.loads(contacts_file(tmp_path / "g.json", rows[:1] * 2).read_text())
+    document["grasps"][1].update(id="c")
+    document["grasps"][1]["contacts"][2]["friction"] = 0.3
+    (tmp_path / "g.json").write_text(json.dumps(document))
+    with pytest.raises(gc.InputError, match=r"g.json: grasps\[1\] \(c\): friction: remove it"):
+        read_given(tmp_path / "g.json")
+
+
 def test_judged_grasps_are_exported_with_what_could_not_be_tried(planned, tmp_path):
     good = planned[0]
     off = good.positions + 1.0

@@ -7,6 +7,7 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
+from grasp_core.checked import BOUNDS
 from sim_validate.execution.settings import KINDS, RANGES, TrialKind
 
 
@@ -23,7 +24,7 @@ def test_thresholds_are_turned_into_metres_and_radians():
 
 @pytest.mark.parametrize("name", RANGES)
 def test_ranges_hold_their_ends(name):
-    for end in RANGES[name]:
+    for end in BOUNDS[name].values():
         assert getattr(sv.ExecutionSettings(0.1, **{name: end}), name) == end
 
 

@@ -3,12 +3,16 @@
 import os
 import subprocess
 import sys
+from concurrent.futures import Future
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from grasp_core import compiled as loops
 from sim_validate.parallel import compiling
+from sim_validate.parallel.processes import ProcessEndedError
 
 ROOT = Path(__file__).parents[3]
 FIRST = "grasp_core.solvers.nearest_point_kernel"
@@ -17,11 +21,10 @@ import sys
 from grasp_core import compiled as loops
 from sim_validate.parallel import compiling
 
-if __name__ == "__main__":
-    with compiling.compiled_beside(int(sys.argv[1]), {"%s": compiling.BESIDE["%s"]}):
-        compiling.BESIDE["%s"](compiling.OUTWARD, compiling.OUTWARD)
-    stats = loops.compiled("%s").solve.stats
-    print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+with compiling.compiled_beside(int(sys.argv[1]), {"%s": compiling.BESIDE["%s"]}):
+    compiling.BESIDE["%s"](compiling.OUTWARD, compiling.OUTWARD)
+stats = loops.compiled("%s").solve.stats
+print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 """.replace("%s", FIRST)
 
 
@@ -49,7 +52,7 @@ def test_what_another_process_compiles_is_waited_for_and_found(jobs, found, tmp_
 
 def test_where_all_is_kept_no_process_is_begun(monkeypatch):
     monkeypatch.setattr(compiling, "is_kept", lambda _: True)
-    monkeypatch.setattr("multiprocessing.get_context", lambda _: pytest.fail("a process is begun"))
+    monkeypatch.setattr(compiling, "local_processes", lambda _: pytest.fail("a process is begun"))
     with compiling.compiled_beside(8):
         pass
 
@@ -64,22 +67,28 @@ def test_every_kernel_has_a_call_that_uses_it(waiting):
 
 
 def test_the_end_of_the_other_process_ends_the_wait():
-    class Broken:
-        def recv(self):
-            raise EOFError
-
-    compiling._wait(Broken(), FIRST, set())
+    failed = Future()
+    failed.set_exception(ProcessEndedError())
+    compiling._wait(failed)
 
 
-def test_each_kernel_is_waited_for_alone():
-    names = iter([FIRST, "another", "a third"])
+def test_each_kernel_is_waited_for_alone(monkeypatch):
+    done, waits = [], {}
+    monkeypatch.setattr(compiling, "is_kept", lambda _: False)
+    monkeypatch.setattr(compiling, "wait_for", lambda given: waits.update(given))
+    monkeypatch.setattr(compiling, "local_processes", lambda _: nullcontext(Later(done)))
+    with compiling.compiled_beside(2, {"one": abs, "two": abs}) as jobs:
+        assert jobs == 1
+        waits["one"]()
+        assert done == [0]
 
-    class Pipe:
-        def recv(self):
-            return next(names)
 
-    done = set()
-    compiling._wait(Pipe(), "another", done)
-    assert done == {FIRST, "another"}
-    compiling._wait(Pipe(), FIRST, done)
-    assert next(names) == "a third"
+class Later:
+    """An engine whose tasks are done when their results are asked for, and noted then."""
+
+    def __init__(self, done):
+        self.done, self.count = done, 0
+
+    def submit(self, *_):
+        number, self.count = self.count, self.count + 1
+        return SimpleNamespace(result=lambda: self.done.append(number))

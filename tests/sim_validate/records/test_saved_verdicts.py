@@ -1,4 +1,5 @@
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -6,6 +7,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
+from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 
 
@@ -62,11 +64,56 @@ def test_verdicts_are_a_table(folder):
 
 def test_a_control_that_holds_is_told(folder, tmp_path):
     document = json.loads((folder / "verdicts.json").read_text())
-    controls = document["verdicts"][0]["controls"]
-    next(iter(controls.values()))["wrenches"][0]["outcome"] = "held"
+    control = next(iter(document["verdicts"][0]["controls"].values()))
+    control["held"], control["wrenches"][0]["outcome"] = True, "held"
+    document["summary"].update(
+        controls_held=1, controls_let_go=document["summary"]["controls_let_go"] - 1
+    )
     path = tmp_path / "verdicts.json"
     path.write_text(json.dumps(document))
     assert [verdict.controls_let_go for verdict in sv.load_verdicts(path)] == [False, True]
+
+
+def _slipped(document):
+    document["verdicts"][0]["wrenches"][2]["outcome"] = "slipped"
+
+
+def _repeated(document):
+    document["verdicts"][0]["robustness"] = {
+        "trials": 3, "held": 3, "pass_rate_interval": [0, 1], "noise": {},
+        "not_held": [{"trial": 1, "outcome": "slipped", "wrench": "+force_x"}],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda each: each["verdicts"][0].update(held=False), "held: False contradicts the outc"),
+        (lambda each: each["verdicts"][0].update(outcome="slipped"), "outcome: slipped contradict"),
+        (_slipped, "outcome: held contradicts the trials, which say slipped"),
+        (lambda each: next(iter(each["verdicts"][0]["controls"].values())).update(held=True),
+         r"controls.\w+.held: True contradicts the trials of this control"),
+        (_repeated, "robustness.held: 3 contradicts the number of repeats"),
+        (lambda each: each["summary"].update(controls_let_go=0), "summary.controls_let_go: expec"),
+        (lambda each: each["verdicts"].pop(), "summary.grasps: expected 1, as the verdicts say"),
+    ],
+    ids=["held", "outcome", "trial", "control", "repeats", "summary", "one fewer"],
+)  # fmt: skip
+def test_verdicts_that_contradict_themselves_are_refused_by_all_who_read_them(
+    change, said, folder, tmp_path, capsys
+):
+    document = json.loads((folder / "verdicts.json").read_text())
+    change(document)
+    for name in ("grasps.json", "verdicts.json"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    path = tmp_path / "verdicts.json"
+    path.write_text(json.dumps(document))
+    with pytest.raises(gc.InputError, match=rf"verdicts.json: .*{said}"):
+        sv.load_verdicts(path)
+    with pytest.raises(gc.InputError, match=said):
+        sv.write_report(tmp_path, jobs=1)
+    assert main(["replay", str(path), "--grasp", document["verdicts"][0]["id"]]) == Exit.INPUT
+    assert re.search(said, " ".join(capsys.readouterr().err.split()))
 
 
 def test_other_files_are_refused(folder, tmp_path):

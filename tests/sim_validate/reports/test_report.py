@@ -17,6 +17,7 @@ from scenes.drawing.views import DISTANCE
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
+from sim_validate.records import saved_verdicts
 from sim_validate.records.grasps import read_grasps
 from sim_validate.reports.agreement import said_of
 from sim_validate.reports.pages import asset
@@ -177,13 +178,7 @@ def changed(path, change):
 
 def counted(document, _=None):
     """Make the summary that of the verdicts."""
-    verdicts = document["verdicts"]
-    document["summary"].update(
-        grasps=len(verdicts),
-        grasps_held=sum(each["held"] for each in verdicts),
-        controls=sum(len(each["controls"]) for each in verdicts),
-        mismatches=sum(len(each["mismatches"]) for each in verdicts),
-    )
+    document["summary"].update(saved_verdicts._counts(document["verdicts"]))
 
 
 def without_proofs(document):
@@ -238,10 +233,13 @@ def test_an_interrupted_run_is_called_that(copy, tmp_path):
 
 def test_of_many_grasps_those_with_bad_news_are_shown(copy, tmp_path):
     last = json.loads((copy / "verdicts.json").read_text())["verdicts"][-1]["id"]
-    slipped = {"held": False, "outcome": "slipped"}
-    changed(
-        copy / "verdicts.json", lambda each: counted(each, each["verdicts"][-1].update(slipped))
-    )
+
+    def slip(document):
+        document["verdicts"][-1].update(held=False, outcome="slipped")
+        document["verdicts"][-1]["wrenches"][0]["outcome"] = "slipped"
+        counted(document)
+
+    changed(copy / "verdicts.json", slip)
     report = write_report(copy, tmp_path / "out", jobs=1, limit=1)
     assert report.grasps == 1
     assert [path.stem for path in (tmp_path / "out" / "grasps").iterdir()] == [last]
@@ -265,6 +263,28 @@ def test_several_runs_make_one_report(copy, tmp_path):
     shown = [known["data-object"] for tag, known in index.tags if known.get("class") == "card"]
     assert shown == ["wedge", "other"]
     assert len(pages_of(both / "report")) == 3
+
+
+def test_an_earlier_report_stays_until_the_new_one_is_complete(copy, tmp_path):
+    told = []
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    first = write_report(copy, tmp_path / "out", jobs=1)
+    before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
+    with pytest.raises(KeyboardInterrupt):
+        write_report(copy, tmp_path / "out", jobs=1, limit=1, progress=stop)
+    after = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
+    assert after == before
+    assert [path for path in (tmp_path / "out").iterdir() if path.name.startswith(".rep")] == []
+    second = write_report(copy, tmp_path / "out", jobs=1, limit=1, ready=lambda *_: told.append(1))
+    assert second.index == first.index
+    assert second.grasps == 1 == len(list((tmp_path / "out" / "grasps").iterdir()))
+    assert told == []
+    with pytest.raises(KeyboardInterrupt):
+        write_report(copy, tmp_path / "new", jobs=1, progress=stop)
+    assert not (tmp_path / "new").exists()
 
 
 def test_pages_of_an_earlier_report_are_removed_and_nothing_else(copy):
@@ -342,7 +362,7 @@ def test_a_control_that_says_nothing_is_bad_news(small_run):
         ("verdicts.json", lambda each: each["verdicts"][0].update(contacts_sha256="0"), "contacts"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(id="c-9-9-9-9"), "in that file"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(held=False),
-         r"verdicts\[0\]: `held` is False, which contradicts `outcome` held"),
+         r"verdicts\[0\]\.held: False contradicts the outcome held"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(outcome="splendid"),
          r"verdicts\[0\]\.outcome: expected"),
         ("verdicts.json", lambda each: each["summary"].update(grasps_held=99),

@@ -44,15 +44,8 @@ def test_a_box_has_its_own_sides_and_proportions():
     assert shape_class(box(0.1, 0.1, 0.1)) == "convex compact planar"
     assert shape_class(box(0.1, 0.1, 0.4)) == "convex long planar"
     assert shape_class(box(0.1, 0.4, 0.4)) == "convex flat planar"
-    concave = [name for name in ("l_shape", "star", "cross") if name in example_names()]
-    for name in concave:
+    for name in ("l-bracket", "cross", "hex-nut"):
         assert shape_class(example_object(name)).startswith("concave")
-
-
-def example_names():
-    from scenes.example_objects import example_names as names
-
-    return names()
 
 
 def test_points_lie_on_the_surface_with_its_normals_and_fill_it_evenly():

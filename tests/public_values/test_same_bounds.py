@@ -1,0 +1,180 @@
+"""A setting has the same bounds as a flag and in Python: each refuses what the other refuses."""
+
+import math
+from dataclasses import replace
+from typing import Annotated, get_args, get_origin, get_type_hints
+
+import pytest
+
+import grasp_core as gc
+import sim_validate as sv
+from grasp_core.checked import BOUNDS
+from grasp_core.hands.reach import HandReach
+from grasp_core.objects.face import PatchLimits
+from scenes.example_objects import example_object
+from scenes.execution.held import HeldSettings
+from scenes.fingertips import FingerSettings
+from scenes.physics import PhysicsSettings
+from sim_validate.baselines.parts.if_changed import IfChanged
+from sim_validate.cli import (
+    command_flags,
+    execution_flags,
+    flag_groups,
+    hand_flags,
+    learning_flags,
+    transfer_flags,
+)
+from sim_validate.cli.flag_bounds import Bound
+from sim_validate.datasets.learning.settings import Learning
+from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.simulation.noise import Noise
+from tests.sim_validate.rigs import grasps
+
+ENDS = {end for ends in BOUNDS.values() for end in ends.values()}
+PROBES = sorted(
+    {-1.0, 1e-12, 1e-10, 1e-9, 2e-9, 1e-6, 1e9, 2e9, 1e12, math.inf}
+    | {near for end in ENDS for near in (end, math.nextafter(end, 9e99), math.nextafter(end, -1))}
+    | {end + step for end in ENDS for step in (-1.0, 1.0)}
+)
+EXECUTION = (
+    "lift_m", "lift_s", "shake_g", "shake_hz", "stop_m_per_s2", "knock_n_s", "off_mm", "off_deg",
+    "misplacements",
+)  # fmt: skip
+NOISE = ("shift", "turn_deg", "normal_deg", "friction", "mass")
+
+
+def executing(name):
+    # a stop of any deceleration is short enough from a crawl
+    return lambda value: ExecutionSettings(
+        **{"mass_kg": 1.0, "stop_from_m_per_s": 1e-9, name: value}
+    )
+
+
+def stops_at(name, call):
+    """Let a call refuse the setting or, if it takes that, a later argument that is always wrong."""
+
+    def tried(value):
+        with pytest.raises(gc.InputError) as raised:
+            call(value)
+        if str(raised.value).startswith(name):
+            raise raised.value
+
+    return tried
+
+
+def regions(**settings):
+    body, (grasp,) = grasps("tetrahedron", 0.5, 1)
+    return gc.certify_regions(body, grasp, -1.0, **settings)
+
+
+def closure(friction):
+    (grasp,) = grasps("tetrahedron", 0.5, 1)[1]
+    gc.force_closure(grasp.contacts, friction=friction)
+
+
+def best(**settings):
+    return gc.best_grasp(example_object("tetrahedron"), 0.5, clearance=-1.0, **settings)
+
+
+def ceiling(parts):
+    body = example_object("tetrahedron")
+    return gc.quality_ceiling(body, (0, 1, 2, 3), 0.5, parts=parts, finger_radius=-1.0)
+
+
+Settings = {
+    "reach --mass-kg": (hand_flags.Reach, "mass_kg", executing("mass_kg")),
+    "reach --torque-limit-n-m": (
+        hand_flags.Reach, "torque_limit_n_m",
+        lambda value: gc.load_hand("allegro").with_torque_limits(value, "a test"),
+    ),
+    "reach --clearance-m": (
+        hand_flags.Reach, "clearance_m", lambda value: HandReach("a", "b", "limit", "", 1, value),
+    ),
+    "analyze --friction": (
+        command_flags.Analyze, "friction", closure,
+    ),
+    "regions --reserve": (
+        command_flags.Regions, "reserve", stops_at("reserve", lambda v: regions(reserve=v)),
+    ),
+    "regions --max-cones": (
+        command_flags.Regions, "max_cones", stops_at("max_cones", lambda v: regions(max_cones=v)),
+    ),
+    "plan --gap": (command_flags.Plan, "gap", stops_at("gap", lambda v: best(gap=v))),
+    "plan --time-limit-s": (
+        command_flags.Plan, "time_limit_s",
+        stops_at("time_limit_s", lambda v: best(time_limit_s=v)),
+    ),
+    "plan --jobs": (command_flags.Plan, "jobs", stops_at("jobs", lambda v: best(jobs=v))),
+    "plan --ceiling": (flag_groups.Planning, "ceiling", stops_at("parts", ceiling)),
+    "execute --mass-kg": (execution_flags.Mass, "mass_kg", executing("mass_kg")),
+    "execute --damping-ratio": (
+        execution_flags.Tips, "damping_ratio", lambda value: HeldSettings(damping_ratio=value),
+    ),
+    "patches": (flag_groups.Mesh, "patches", lambda value: PatchLimits(most=value)),
+    "patch spread": (
+        flag_groups.Mesh, "patch_spread_deg", lambda value: PatchLimits(spread_deg=value),
+    ),
+    "patch depth": (flag_groups.Mesh, "patch_depth", lambda value: PatchLimits(depth=value)),
+    "max normal force": (
+        flag_groups.Fingers, "max_normal_force",
+        lambda value: FingerSettings(max_normal_force_n=value),
+    ),
+    "transfer --angle-deg": (
+        transfer_flags.Carrying, "angle_deg", lambda value: IfChanged(angle_deg=value),
+    ),
+    "random wrenches": (
+        flag_groups.Testing, "random_wrenches", lambda value: sv.Agenda(random_wrenches=value),
+    ),
+    "points": (learning_flags.Learned, "points", lambda value: Learning(points=value)),
+    "synthetic": (learning_flags.Learned, "synthetic", lambda value: Learning(synthetic=value)),
+    **{
+        f"execute {name}": (execution_flags.Executing, name, executing(name)) for name in EXECUTION
+    },
+    **{
+        f"noise of {name}": (
+            flag_groups.Repeats, f"noise_{name}", lambda v, name=name: replace(Noise(), **{name: v})
+        )
+        for name in NOISE
+    },
+}  # fmt: skip
+
+
+def bound_of(kind):
+    """The first bound in the type of a flag, and whether the flag is a whole number."""
+    if get_origin(kind) is Annotated:
+        inner, *notes = get_args(kind)
+        bounds = [note for note in notes if isinstance(note, Bound)]
+        return lambda value: all(bound.holds(value) for bound in bounds), int in (
+            inner,
+            *get_args(inner),
+        )
+    return next(found for part in get_args(kind) if (found := bound_of(part)))
+
+
+@pytest.mark.parametrize("name", Settings)
+def test_a_flag_and_python_refuse_the_same_values(name):
+    flags, field, taken = Settings[name]
+    holds, counts = bound_of(get_type_hints(flags, include_extras=True)[field])
+    refused = set[bool]()
+    for value in PROBES:
+        if counts and not float(value).is_integer():
+            continue
+        given = int(value) if counts else value
+        try:
+            taken(given)
+            python = True
+        except gc.InputError:
+            python = False
+        refused.add(python)
+        assert holds(given) == python, (name, given)
+    assert refused == {True, False}
+
+
+def test_torsion_has_one_range_and_no_values_that_mujoco_would_raise():
+    for value in (-1e-3, 0.0, 1e-5, 1.0, 1.1):
+        holds, _ = bound_of(get_type_hints(flag_groups.Fingers, include_extras=True)["torsion_m"])
+        if holds(value):
+            assert PhysicsSettings(torsion_m=value).torsion_m == value
+        else:
+            with pytest.raises(gc.InputError):
+                PhysicsSettings(torsion_m=value)
