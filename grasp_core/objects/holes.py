@@ -11,6 +11,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.booleans import triangulate
+from grasp_core.objects.solid_checks import edges_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,12 +49,9 @@ def _loops(corners: Indices) -> list[list[int]] | None:
     as many open edges end in each vertex as begin there, so that every walk returns.
     """
     tails, heads = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-    edges, place = np.unique(
-        np.sort(np.column_stack([tails, heads]), axis=1), axis=0, return_inverse=True
-    )
-    place = place.ravel()
-    uses = np.bincount(place, minlength=len(edges))
-    balance = np.bincount(place, weights=np.where(tails < heads, 1.0, -1.0), minlength=len(edges))
+    place, forward = edges_of(corners)
+    uses = np.bincount(place)
+    balance = np.bincount(place, weights=np.where(forward, 1.0, -1.0))
     if ((uses > 1) & (balance != 0)).any():
         return None
     leaving: dict[int, list[int]] = {}

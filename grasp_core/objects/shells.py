@@ -16,7 +16,12 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.geometry.connectivity import components
 from grasp_core.objects.booleans import Solid, intersection_volume, union
-from grasp_core.objects.solid_checks import THINNEST, check_volume, triangle_areas
+from grasp_core.objects.solid_checks import (
+    THINNEST,
+    check_volume,
+    edges_of,
+    triangle_areas,
+)
 
 OVERLAP = 1e-6
 """Volume shared by two parts, relative to the whole, above which they overlap; parts that only
@@ -256,11 +261,9 @@ def _split(body: _Body, label: Indices) -> list[_Body]:
 
 def _labels(corners: Indices) -> Indices:
     """Number the part that each triangle belongs to; parts share no edge, (t,)."""
-    edges = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2), axis=2)
-    _, place = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
-    place = place.reshape(-1, 3)
-    first = np.full(place.max() + 1, -1, dtype=np.int64)
-    first[place.ravel()[::-1]] = np.repeat(np.arange(len(corners)), 3)[::-1]
-    links = np.column_stack([np.repeat(np.arange(len(corners)), 3), first[place.ravel()]])
+    place, _ = edges_of(corners)
+    here, first = np.repeat(np.arange(len(corners)), 3), np.empty(len(place), dtype=np.int64)
+    first[place[::-1]] = here[::-1]
+    links = np.column_stack([here, first[place]])
     _, label = np.unique(components(len(corners), links), return_inverse=True)
     return label

@@ -1,6 +1,7 @@
 """Welds the vertices of triangles, and checks that their edges close around a volume."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
@@ -47,6 +48,17 @@ def _links(points: Array, reach: float) -> Indices:
         raise MeshError(MeshRefusal.LIMIT, str(error)) from error
 
 
+def edges_of(corners: Indices) -> tuple[Indices, NDArray[np.bool_]]:
+    """Number the edges of triangles, and tell which run from the lower vertex to the higher.
+
+    Returns:
+        The number of the edge (k, k+1) of each triangle, and its direction, (3 t,) each.
+    """
+    tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    names = np.minimum(tail, head) * (int(corners.max()) + 1) + np.maximum(tail, head)
+    return np.unique(names, return_inverse=True)[1].ravel(), tail < head
+
+
 def surface_fault(corners: Indices) -> MeshError | None:
     """Return the fault by which triangles do not bound a solid, or None if they do.
 
@@ -54,13 +66,9 @@ def surface_fault(corners: Indices) -> MeshError | None:
     directions. Inconsistent orientation is reported first, since a surface with any other fault may
     have usable parts.
     """
-    tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-    edges, where, uses = np.unique(
-        np.sort(np.column_stack([tail, head]), axis=1), axis=0, return_inverse=True,
-        return_counts=True,
-    )  # fmt: skip
-    forward = np.bincount(where.ravel(), weights=tail < head)
-    same_side = int(((uses == SIDES) & (forward != 1)).sum())
+    place, forward = edges_of(corners)
+    uses, ahead = np.bincount(place), np.bincount(place, weights=forward)
+    same_side = int(((uses == SIDES) & (ahead != 1)).sum())
     if same_side:
         message = (
             f"{same_side} edges have triangles of opposite orientation; wind all "
@@ -74,8 +82,11 @@ def surface_fault(corners: Indices) -> MeshError | None:
         )
         return MeshError(MeshRefusal.OPEN, message)
     if (uses != SIDES).any():
+        edge = int(np.argmax(uses != SIDES))
+        row, side = divmod(int(np.argmax(place == edge)), 3)
+        ends = sorted((int(corners[row, side]), int(corners[row, (side + 1) % 3])))
         message = (
-            f"edge {edges[uses != SIDES][0].tolist()} belongs to {uses[uses != SIDES][0]} triangles"
+            f"edge {ends} belongs to {uses[edge]} triangles"
             ", expected two; separate the parts there, or use sound parts (--faces patches)"
         )
         return MeshError(MeshRefusal.NON_MANIFOLD, message)
@@ -87,10 +98,8 @@ def balanced(corners: Indices) -> bool:
 
     Such triangles have a whole winding number everywhere, so that they enclose a volume.
     """
-    tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-    edges = np.sort(np.column_stack([tail, head]), axis=1)
-    _, place = np.unique(edges, axis=0, return_inverse=True)
-    return not np.bincount(place.ravel(), weights=np.where(tail < head, 1.0, -1.0)).any()
+    place, forward = edges_of(corners)
+    return not np.bincount(place, weights=np.where(forward, 1.0, -1.0)).any()
 
 
 def triangle_areas(points: Array, corners: Indices) -> Array:

@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.objects.planar_faces import triangle_neighbours
 
-MOST_ANGLES = 4_000_000
+MOST_ANGLES = 2_000_000
 """Largest number of solid angles that are computed for one mesh."""
 FEWEST_SAMPLES, MOST_SAMPLES = 32, 256
-BLOCK = 200_000
-"""Number of solid angles computed at a time, which needs some twenty megabytes."""
+BLOCK = 20_000
+"""Number of solid angles computed at a time, which stays in the processor's cache."""
 
 
 def sampled(areas: Array) -> Indices:
@@ -51,25 +51,33 @@ def winding_on(corners: Array, places: Indices) -> Array:
     """
     found = np.zeros(len(places))
     step = max(BLOCK // len(corners), 1)
+    axes = np.ascontiguousarray(corners.transpose(2, 1, 0))
     for start in range(0, len(places), step):
         asked = places[start : start + step]
-        away = corners[None] - corners[asked].mean(axis=1)[:, None, None]
-        angles = _solid_angles(away)
+        angles = _solid_angles(axes, corners[asked].mean(axis=1))
         angles[np.arange(len(asked)), asked] = 0.0
         found[start : start + step] = angles.sum(axis=1) / (4.0 * math.pi)
     return found
 
 
-def _solid_angles(away: Array) -> Array:
-    """Compute the solid angles of triangles, (..., 3, 3), as seen from the origin."""
-    a, b, c = (away[..., corner, :] for corner in range(3))
-    la, lb, lc = (np.linalg.norm(side, axis=-1) for side in (a, b, c))
-    volume = (a * np.cross(b, c)).sum(axis=-1)
+def _solid_angles(axes: Array, points: Array) -> Array:
+    """Compute the solid angles of triangles as seen from points, (p, t).
+
+    Args:
+        axes: The three coordinates of the three corners of each triangle, (3, 3, t).
+        points: Points, (p, 3).
+    """
+    x, y, z = (axes[k] - points[:, k, None, None] for k in range(3))
+    lengths = np.sqrt(x * x + y * y + z * z)
+    (ax, bx, cx), (ay, by, cy), (az, bz, cz), (a, b, c) = (
+        each.transpose(1, 0, 2) for each in (x, y, z, lengths)
+    )
+    volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
     spread = (
-        la * lb * lc
-        + (a * b).sum(axis=-1) * lc
-        + (b * c).sum(axis=-1) * la
-        + (c * a).sum(axis=-1) * lb
+        a * b * c
+        + (ax * bx + ay * by + az * bz) * c
+        + (bx * cx + by * cy + bz * cz) * a
+        + (cx * ax + cy * ay + cz * az) * b
     )
     return 2.0 * np.arctan2(volume, spread)
 

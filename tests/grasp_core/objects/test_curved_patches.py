@@ -122,9 +122,11 @@ def test_a_surface_without_flat_parts_is_refused_with_advice():
     rough = gc.PatchLimits(spread_deg=0.5, depth=1e-5)
     body = gc.Polyhedron.from_mesh(0.05 * ball.vertices, ball.faces, patches=rough)
     assert len(body.faces) >= 4  # single triangles
-    lens, wide = ball.vertices * [0.05, 0.05, 0.002], gc.PatchLimits(45.0, 0.1)
-    with pytest.raises(gc.MeshError, match="patch-spread-deg") as refused:
-        gc.Polyhedron.from_mesh(lens, ball.faces, faces="patches", patches=wide)
+    turns = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    ring = 0.05 * np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])
+    lens = trimesh.convex.convex_hull(np.vstack([ring, [[0, 0, 0.004], [0, 0, -0.004]]]))
+    with pytest.raises(gc.MeshError, match="only 2 patches.*patch-spread-deg") as refused:
+        gc.Polyhedron.from_mesh(lens.vertices, lens.faces, faces="patches")
     assert refused.value.reason is MeshRefusal.NOT_FLAT
 
 
