@@ -80,7 +80,7 @@ def test_planar_faces_need_a_closed_surface():
 
 def test_a_part_of_an_open_surface_that_is_inside_out_is_turned():
     one, (points, faces) = ball(0.042), ball(0.042)
-    body = gc.Polyhedron.from_mesh(*together(one, (points + [0.1, 0, 0], faces[:, ::-1])))
+    body = gc.Polyhedron.from_mesh(*together(one, (points + np.array([0.1, 0, 0]), faces[:, ::-1])))
     assert any(note.startswith("1 of 2 parts of the open surface") for note in body.notes)
     for face in body.faces:
         middle = np.array([0.1 * (face.centroid[0] > 0.05), 0.0, 0.0])

@@ -1,4 +1,5 @@
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -27,8 +28,7 @@ def moebius(count):
     reach = 1.0 + width * np.cos(0.5 * turn)
     points = np.stack([reach * np.cos(turn), reach * np.sin(turn), width * np.sin(0.5 * turn)], 2)
     rim = [(2 * k, 2 * k + 1) for k in range(count)] + [(1, 0)]
-    pairs = zip(rim[:-1], rim[1:], strict=True)
-    faces = [t for (a, b), (c, d) in pairs for t in ((a, b, c), (b, d, c))]
+    faces = [t for (a, b), (c, d) in pairwise(rim) for t in ((a, b, c), (b, d, c))]
     return points.reshape(-1, 3), np.array(faces)
 
 
