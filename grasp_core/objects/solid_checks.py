@@ -23,7 +23,8 @@ def welded(
     Args:
         points: Vertices, (n, 3) [m].
         corners: Vertex indices, (t, 3).
-        reach: Distance within which vertices are joined [m]; `WELD` of the extent if not given.
+        reach: Distance within which vertices are joined [m]; `WELD` of the extent if not given, and
+            below zero none are joined.
 
     Returns:
         Vertices, triangles, and the number of triangles that were dropped.
@@ -41,6 +42,8 @@ def welded(
 
 
 def _links(points: Array, reach: float) -> Indices:
+    if reach < 0.0:
+        return np.empty((0, 2), dtype=np.int64)
     try:
         return close_pairs(points, reach)
     except InputError as error:
