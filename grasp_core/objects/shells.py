@@ -16,13 +16,21 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.geometry.connectivity import components
 from grasp_core.objects.booleans import Solid, intersection_volume, union
-from grasp_core.objects.solid_checks import THINNEST, check_volume, triangle_areas
+from grasp_core.objects.solid_checks import (
+    THINNEST,
+    check_volume,
+    thin_share,
+    triangle_areas,
+)
 
 OVERLAP = 1e-6
 """Volume shared by two parts, relative to the whole, above which they overlap; parts that only
 touch share what rounding leaves."""
 SMALL = 0.01
 """Largest share of the surface that is left out without being asked for."""
+CLEAN = 1e-4
+"""Largest share of the surface of a union that may be beside slits as thin as rounding; edges of
+sound unions show some 1e-6."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -200,13 +208,23 @@ def _boxes_meet(one: Solid, two: Solid) -> bool:
 
 
 def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
-    """Unite bodies that overlap or touch; those that do not are returned as they are."""
+    """Unite bodies that overlap or touch; those that do not are returned as they are.
+
+    Raises:
+        MeshError: Slits as thin as rounding remain, on whose walls fingers would be placed.
+    """
     if len(bodies) == 1:
         return bodies
     solid, marks = union([(body.solid, body.marks) for body in bodies])
     found = _with_cavities(_parts(_Body(solid, marks)), slack)
     if len(found) == len(bodies):
         return bodies
+    if max(thin_share(body.solid) for body in found) > CLEAN:
+        raise MeshError(
+            MeshRefusal.OVERLAP,
+            "parts touch, but rounding leaves thin slits between them; let them overlap, or unite "
+            "them in a modelling program",
+        )
     said.append(f"{len(bodies)} parts that overlap or touch were united")
     return found
 
