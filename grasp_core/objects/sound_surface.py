@@ -183,10 +183,13 @@ def _capped(points: Array, corners: Indices, surface: Surface) -> tuple[Indices,
     longest = np.linalg.norm(sides, axis=2).max(axis=1)
     crack = 1e-6 * float(np.ptp(points, axis=0).max())
     wide = 2.0 * areas > max(crack, surface.flatness_m) * longest
+    holes = np.unique(caps.hole_of[wide])
+    cracks = ("cracks between triangles that meet were closed",) * (len(holes) < len(caps.widths))
     return whole, replace(
         surface,
         caps=len(corners) + np.flatnonzero(wide),
-        holes=len(caps.widths),
-        largest_hole_m=float(caps.widths.max()),
+        holes=len(holes),
+        largest_hole_m=float(caps.widths[holes].max(initial=0.0)),
         volume_error=caps.hidden / volume,
+        repairs=(*surface.repairs, *cracks),
     )

@@ -188,8 +188,9 @@ def test_a_vertex_on_the_edge_of_a_neighbour_costs_no_face_a_place(off):
     body, whole = (
         gc.Polyhedron.from_mesh(points, faces), gc.Polyhedron.from_mesh(mesh.vertices, mesh.faces)
     )  # fmt: skip
-    assert body.surface.closed
-    assert len(body.surface.caps) == 0
+    assert body.surface.volume_source == "surface"
+    assert body.surface.holes == len(body.surface.caps) == 0
+    assert body.notes == ("cracks between triangles that meet were closed",)
     assert len(body.faces) == 6
     assert body.volume == pytest.approx(0.006, rel=1e-6)
     key = [tuple(np.round(face.normal).astype(int)) for face in whole.faces]
@@ -225,3 +226,17 @@ def test_no_finger_stands_on_a_cap(kind):
     assert len(fingers) == 40
     assert not np.isin(nearest(body, fingers), body.surface.caps).any()
     assert np.isin(nearest(body, contacts(whole)), body.surface.caps).any()
+
+
+def test_a_crack_is_not_counted_as_a_hole_beside_one():
+    mesh = grid(2)
+    a, b, c = mesh.faces[0]
+    points = np.vstack([mesh.vertices, 0.5 * (mesh.vertices[a] + mesh.vertices[b])])
+    middle = len(mesh.vertices)
+    left = np.vstack([mesh.faces[1:-1], [a, middle, c], [middle, b, c]])
+    body = gc.Polyhedron.from_mesh(points, left)
+    assert body.surface.holes == len(body.surface.caps) == 1
+    cap = body.vertices[body.triangles[body.surface.caps[0]]]
+    np.testing.assert_allclose(sorted(cap.tolist()), sorted(mesh.triangles[-1].tolist()))
+    assert body.volume == pytest.approx(0.006, rel=1e-12)
+    assert len(body.notes) == 2
