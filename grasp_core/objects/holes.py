@@ -22,6 +22,8 @@ class Caps:
     """Vertex indices, wound like the surface around them, (c, 3)."""
     widths: Array
     """Largest distance between two corners of each hole, (h,) [m]."""
+    hole_of: Indices
+    """Number of the hole that each triangle closes, (c,)."""
     hidden: float
     """Largest volume by which the caps may differ from the true surface [m^3]."""
 
@@ -39,7 +41,8 @@ def caps_of(points: Array, corners: Indices) -> Caps | None:
     triangles = [_cap(points, loop) for loop in loops]
     widths = np.array([_width(points[loop]) for loop in loops])
     areas = np.array([_area(points[each]) for each in triangles])
-    return Caps(np.concatenate(triangles), widths, float(areas @ widths) / 3.0)
+    hole_of = np.repeat(np.arange(len(loops)), [len(each) for each in triangles])
+    return Caps(np.concatenate(triangles), widths, hole_of, float(areas @ widths) / 3.0)
 
 
 def _loops(corners: Indices) -> list[list[int]] | None:

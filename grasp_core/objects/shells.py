@@ -20,6 +20,7 @@ from grasp_core.objects.solid_checks import (
     THINNEST,
     check_volume,
     edges_of,
+    thin_share,
     triangle_areas,
 )
 
@@ -28,6 +29,9 @@ OVERLAP = 1e-6
 touch share what rounding leaves."""
 SMALL = 0.01
 """Largest share of the surface that is left out without being asked for."""
+CLEAN = 1e-4
+"""Largest share of the surface of a union that may be beside slits as thin as rounding; edges of
+sound unions show some 1e-6."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -205,13 +209,23 @@ def _boxes_meet(one: Solid, two: Solid) -> bool:
 
 
 def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
-    """Unite bodies that overlap or touch; those that do not are returned as they are."""
+    """Unite bodies that overlap or touch; those that do not are returned as they are.
+
+    Raises:
+        MeshError: Slits as thin as rounding remain, on whose walls fingers would be placed.
+    """
     if len(bodies) == 1:
         return bodies
     solid, marks = union([(body.solid, body.marks) for body in bodies])
     found = _with_cavities(_parts(_Body(solid, marks)), slack)
     if len(found) == len(bodies):
         return bodies
+    if max(thin_share(body.solid) for body in found) > CLEAN:
+        raise MeshError(
+            MeshRefusal.OVERLAP,
+            "parts touch, but rounding leaves thin slits between them; let them overlap, or unite "
+            "them in a modelling program",
+        )
     said.append(f"{len(bodies)} parts that overlap or touch were united")
     return found
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.geometry.connectivity import close_pairs, components
-from grasp_core.objects.booleans import Solid
+from grasp_core.objects.booleans import Solid, intersection_volume
 from grasp_core.objects.planar_faces import SIDES
 
 WELD = 1e-8
@@ -14,6 +14,8 @@ WELD = 1e-8
 keeps 6e-8, and vertices that were equal before are equal to the last bit."""
 THINNEST = 1e-9
 """Least volume of a solid, relative to the cube of the extent."""
+THIN = 4e-6
+"""Width of a slit, relative to the extent, which rounding in single precision may leave."""
 
 
 def welded(
@@ -24,7 +26,8 @@ def welded(
     Args:
         points: Vertices, (n, 3) [m].
         corners: Vertex indices, (t, 3).
-        reach: Distance within which vertices are joined [m]; `WELD` of the extent if not given.
+        reach: Distance within which vertices are joined [m]; `WELD` of the extent if not given, and
+            below zero none are joined.
 
     Returns:
         Vertices, triangles, and the number of triangles that were dropped.
@@ -42,6 +45,8 @@ def welded(
 
 
 def _links(points: Array, reach: float) -> Indices:
+    if reach < 0.0:
+        return np.empty((0, 2), dtype=np.int64)
     try:
         return close_pairs(points, reach)
     except InputError as error:
@@ -118,3 +123,20 @@ def check_volume(solid: Solid) -> None:
     if abs(solid.volume) < THINNEST * extent**3:
         message = f"the mesh encloses only {solid.volume:.3g} m^3; close it around a solid"
         raise MeshError(MeshRefusal.ZERO_VOLUME, message)
+
+
+def thin_share(solid: Solid) -> float:
+    """Return the share of the surface that is beside slits or walls thinner than `THIN`.
+
+    Solved: a solid that is moved by a step along an axis leaves a volume of the step times the area
+    that it shows along the axis, each wall counted, less what slits and walls thinner than the step
+    hide. The largest share of the three axes is returned.
+    """
+    step = THIN * float(np.ptp(solid.vertices, axis=0).max())
+    corners = solid.vertices[solid.triangles]
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    seen = 0.25 * np.abs(crosses).sum(axis=0)
+    left = [
+        solid.volume - intersection_volume(solid, solid.moved(step * axis)) for axis in np.eye(3)
+    ]
+    return float(np.abs(seen - np.array(left) / step).max() / seen.max())

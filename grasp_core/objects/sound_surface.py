@@ -22,6 +22,8 @@ from grasp_core.objects.winding import wound_alike
 
 KNOWN = 0.02
 """Largest share of the volume that closed holes may hide, for the volume to count as known."""
+NONE = -1.0
+"""Distance within which no two vertices are."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,16 +81,18 @@ def sound_surface(
     Raises:
         MeshError: The triangles are not the surface of one solid, and cannot be made one.
     """
-    points, corners, said = _joined(vertices, triangles, flatness_m, most_parts)
-    surface = Surface(flatness_m=flatness_m, repairs=tuple(said))
-    if known is not None:
-        surface = replace(known, repairs=(*known.repairs, *said))
+    if known is None:
+        points, corners, said = _joined(vertices, triangles, flatness_m, most_parts)
+        surface = Surface(flatness_m=flatness_m, repairs=tuple(said))
+        if surface_fault(corners):
+            corners, surface = _capped(points, corners, surface)
+    else:  # vertices that were kept apart may be equal, where a united solid touches itself
+        points, corners, _ = welded(vertices, triangles, NONE)
+        surface = known
         if len(known.caps) and known.caps.max() >= len(corners):
             raise InputError(
                 f"caps must be numbers of triangles below {len(corners)}, got {known.caps.max()}"
             )
-    elif surface_fault(corners):
-        corners, surface = _capped(points, corners, surface)
     surface = replace(surface, closed=balanced(corners))
     found = SoundSurface(points, corners, surface, surface_fault(corners))
     if not surface.closed:
@@ -179,10 +183,13 @@ def _capped(points: Array, corners: Indices, surface: Surface) -> tuple[Indices,
     longest = np.linalg.norm(sides, axis=2).max(axis=1)
     crack = 1e-6 * float(np.ptp(points, axis=0).max())
     wide = 2.0 * areas > max(crack, surface.flatness_m) * longest
+    holes = np.unique(caps.hole_of[wide])
+    cracks = ("cracks between triangles that meet were closed",) * (len(holes) < len(caps.widths))
     return whole, replace(
         surface,
         caps=len(corners) + np.flatnonzero(wide),
-        holes=len(caps.widths),
-        largest_hole_m=float(caps.widths.max()),
+        holes=len(holes),
+        largest_hole_m=float(caps.widths[holes].max(initial=0.0)),
         volume_error=caps.hidden / volume,
+        repairs=(*surface.repairs, *cracks),
     )

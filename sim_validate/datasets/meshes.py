@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, MeshError
 from grasp_core.files.complaints import record_of
 from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, MeshChoices, content_hash
@@ -71,16 +71,22 @@ def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Pol
 
     Raises:
         MeshError: The mesh is missing or is not a solid.
-        InputError: The mesh is that of another object.
+        InputError: The mesh is that of another object, or what it says of its surface is wrong.
     """
     path = mesh_path(folder, object_id)
     mesh = read_triangles(path, DEFAULT_LIMITS)
     said, known = mesh.data.partition(b"\n")[0].decode("utf-8", "replace"), None
-    if said.startswith(SURFACE):
-        text = said.removeprefix(SURFACE)
-        known = surface_of_record(record_of(SurfaceRecord, text, f"{path}, line 1"))
-    choices = MeshChoices(faces)
-    body = polyhedron_from_mesh(mesh.vertices, mesh.triangles, choices, name=name, known=known)
+    try:
+        if said.startswith(SURFACE):
+            record = record_of(SurfaceRecord, said.removeprefix(SURFACE), "surface")
+            known = surface_of_record(record)
+        body = polyhedron_from_mesh(
+            mesh.vertices, mesh.triangles, MeshChoices(faces), name=name, known=known
+        )
+    except MeshError as error:
+        raise MeshError(error.reason, f"{path}: {error.message}") from error
+    except InputError as error:
+        raise InputError(f"{path}, first line: {error}") from error
     if body.content_sha256 != object_id:
         raise InputError(
             f"{path}: this is the mesh of another object, whose hash is {body.content_sha256}; "

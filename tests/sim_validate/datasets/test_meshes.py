@@ -6,6 +6,7 @@ import pytest
 import grasp_core as gc
 from scenes.example_objects import example_names, example_object
 from sim_validate.datasets.meshes import mesh_path, mesh_text, stored_body, stored_surface
+from tests.grasp_core.records import test_recorded_surfaces as recorded
 
 SCANS = Path(__file__).parents[4] / "shared" / "objects" / "ycb"
 NAMES = [*(name for name in example_names() if "FACES" not in name), "random-30-1"]
@@ -39,6 +40,30 @@ def test_a_stored_object_comes_back_to_the_last_bit(name, tmp_path):
     vertices, triangles = stored_surface(tmp_path, body.content_sha256)
     np.testing.assert_array_equal(vertices, body.vertices)
     np.testing.assert_array_equal(triangles, body.triangles)
+
+
+@pytest.mark.parametrize("make", recorded.BODIES)
+def test_what_is_known_of_a_stored_surface_comes_back(make, tmp_path):
+    body = make()
+    found = stored(body, tmp_path)
+    assert same(body, found)
+    assert found.surface == body.surface
+    assert found.notes == body.notes
+
+
+def test_a_stored_surface_whose_first_line_is_no_record_is_refused_by_field(tmp_path):
+    body = recorded.capped()
+    path = mesh_path(tmp_path, body.content_sha256)
+    path.parent.mkdir()
+    text = mesh_text(body)
+    path.write_text(text.replace('"caps": [190, 191]', '"caps": [190, 192]'))
+    with pytest.raises(
+        gc.InputError, match="obj, first line: caps must be numbers of triangles below 192"
+    ):
+        stored_body(tmp_path, body.content_sha256, "capped", "auto")
+    path.write_text(text.replace('"holes": 2', '"holes": "two"'))
+    with pytest.raises(gc.InputError, match=r"obj, first line: holes: expected a whole"):
+        stored_body(tmp_path, body.content_sha256, "capped", "auto")
 
 
 @pytest.mark.slow
