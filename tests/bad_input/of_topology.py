@@ -81,10 +81,8 @@ BAD = {
     "two solids": (TWO, "GP-MESH-SEPARATE|one solid"),
     "a solid inside a solid": (
         boxes(((0, 0, 0), 0.1), ((0.02, 0.02, 0.02), 0.05)), "GP-MESH-OVERLAP|unite"),
-    "solids that share a face": (
-        boxes(((0, 0, 0), 0.1), ((0.1, 0, 0), 0.1)), "GP-MESH-NON-MANIFOLD|edge"),
     "solids that share an edge": (
-        boxes(((0, 0, 0), 0.1), ((0.1, 0.1, 0), 0.1)), "GP-MESH-NON-MANIFOLD|edge"),
+        boxes(((0, 0, 0), 0.1), ((0.1, 0.1, 0), 0.1)), "GP-MESH-SEPARATE"),
     "solids that share a corner": (
         boxes(((0, 0, 0), 0.1), ((0.1, 0.1, 0.1), 0.1)), "GP-MESH-SEPARATE"),
     "a part inside out beside another": (
@@ -120,6 +118,7 @@ GOOD = {
     "one face turned": (CORNERS, [TRIANGLES[0][::-1], *TRIANGLES[1:]]),
     "half of a box turned": (BOX[0], [*BOX[1][:3], *turned(BOX[1][3:])]),
     "solids that overlap": boxes(((0, 0, 0), 0.1), ((0.05, 0.03, 0.02), 0.1)),
+    "solids that share a face": boxes(((0, 0, 0), 0.1), ((0.1, 0, 0), 0.1)),
     "inside out": (CORNERS, turned(TRIANGLES)),
     "a triangle without area": (CORNERS, [*TRIANGLES, (0, 1, 1)]),
     "a cavity": (
