@@ -171,7 +171,7 @@ def _capped(points: Array, corners: Indices, surface: Surface) -> tuple[Indices,
         return corners, surface
     whole = np.concatenate([corners, caps.triangles])
     volume = abs(Solid(points, whole).volume)
-    if not caps.hidden <= KNOWN * volume:
+    if not (volume > 0.0 and caps.hidden <= KNOWN * volume):
         return corners, surface
     # a cap that is thinner than rounding is a crack between triangles that meet, not a hole
     areas = triangle_areas(points, caps.triangles)
