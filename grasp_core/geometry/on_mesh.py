@@ -10,7 +10,7 @@ from grasp_core.geometry.nearest_points import nearest_on_triangles
 
 LEAN = math.cos(3e-3)
 """Cosine of the largest angle at which a normal and a triangle's normal agree: planar faces are
-flat to within `FlatnessLimits`, and files keep six digits."""
+flat to within `Flatness`, and files keep six digits."""
 
 
 class Surface:

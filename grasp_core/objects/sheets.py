@@ -71,7 +71,7 @@ def outward_sheets(points: Array, corners: Indices, *, largest_part: bool) -> Sh
             f"{CERTAIN}; close the surface, or leave out all but its largest part (--largest-part)",
         )
     corners = corners[sound[label]]
-    dropped = 1.0 - float(sizes[sound].sum()) / whole
+    dropped = unsound + 1.0 - float(sizes.sum()) / whole if largest_part else unsound
     if (apart := count - int(sound.sum())) > 0:
         said.append(left_out(apart, dropped))
     used, local = np.unique(corners, return_inverse=True)

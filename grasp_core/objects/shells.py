@@ -153,7 +153,8 @@ def _sorted_out(
     if flat:
         why = MeshError(
             MeshRefusal.ZERO_VOLUME,
-            f"{len(flat)} parts enclose almost no volume; delete them, or close them around solids",
+            f"parts that enclose almost no volume: {len(flat)}; delete them, or close them around "
+            "solids",
         )
     for shell in shells:
         if shell.solid.volume > 0.0 or shell in flat:
@@ -178,9 +179,9 @@ def _sorted_out(
     if inner:
         why = MeshError(
             MeshRefusal.OVERLAP,
-            f"{len(inner)} closed parts lie inside the material of another and are wound like it; "
-            "if they are cavities, turn their triangles, and if they are not, delete them or unite "
-            "the parts in a modelling program",
+            f"closed parts inside the material of another, wound like it: {len(inner)}; turn the "
+            "triangles of those that are cavities, and delete the others or unite them with the "
+            "rest, or use the largest part alone (--largest-part)",
         )
     outer = [body for body in bodies if body not in inner]
     return outer, [*bad, *inner], why

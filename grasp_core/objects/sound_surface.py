@@ -110,7 +110,7 @@ def _joined(
     fault = surface_fault(corners)
     if fault and fault.reason is MeshRefusal.WINDING:
         corners, turned = _wound(points, corners)
-        said.append(f"{turned} triangles that were wound against their neighbours were turned")
+        said.append(f"triangles wound against their neighbours were turned, {turned} in all")
         fault = surface_fault(corners)
     if fault and fault.reason is MeshRefusal.NON_MANIFOLD:
         apart = _welded_apart(vertices, triangles, most_parts)
@@ -175,7 +175,7 @@ def _capped(points: Array, corners: Indices, surface: Surface) -> tuple[Indices,
         return corners, surface
     whole = np.concatenate([corners, caps.triangles])
     volume = abs(Solid(points, whole).volume)
-    if not caps.hidden <= KNOWN * volume:
+    if not (volume > 0.0 and caps.hidden <= KNOWN * volume):
         return corners, surface
     # a cap that is thinner than rounding is a crack between triangles that meet, not a hole
     areas = triangle_areas(points, caps.triangles)
