@@ -42,6 +42,7 @@ from grasp_core.objects.face import PatchLimits as PatchLimits
 from grasp_core.objects.polyhedron import Polyhedron as Polyhedron
 from grasp_core.objects.polyhedron import from_trimesh as from_trimesh
 from grasp_core.objects.polyhedron import load_polyhedron as load_polyhedron
+from grasp_core.objects.surface import Surface as Surface
 from grasp_core.optimizing.best.best_grasp import best_grasp as best_grasp
 from grasp_core.optimizing.best.result import BestGrasp as BestGrasp
 from grasp_core.optimizing.better_contacts import Improvement as Improvement
