@@ -15,7 +15,7 @@ import numpy as np
 
 from grasp_core.arrays import Indices, frozen_indices
 from grasp_core.by_value import ByValue
-from grasp_core.checked import LARGEST, number, several, text, whole
+from grasp_core.checked import LARGEST, number, several, switch, text, whole
 
 VolumeSource: TypeAlias = Literal["surface", "capped surface", "convex hull"]
 """What volume, inertia and the centre of mass of uniform density are computed from."""
@@ -50,6 +50,8 @@ class Surface(ByValue):
     def __post_init__(self) -> None:
         object.__setattr__(self, "caps", frozen_indices(self.caps, (None,), "caps"))
         whole(self.holes, "holes", least=0)
+        for name in ("closed", "center_given"):
+            switch(getattr(self, name), name)
         for name in ("largest_hole_m", "volume_error", "flatness_m"):
             number(getattr(self, name), name, least=0.0, most=LARGEST)
         number(self.dropped, "dropped", least=0.0, most=1.0)

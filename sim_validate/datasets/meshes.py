@@ -2,13 +2,11 @@
 
 import hashlib
 import json
-from dataclasses import replace
 from pathlib import Path
 
-from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError
 from grasp_core.files.complaints import record_of
-from grasp_core.mesh_files.reading import read_triangles
+from grasp_core.mesh_files.reading import MeshFile, read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, MeshChoices, content_hash
 from grasp_core.objects.face import FaceKind
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
@@ -43,8 +41,8 @@ def mesh_path(folder: Path, object_id: str) -> Path:
     return path_inside(folder, f"{FOLDER}/{object_id}.obj")
 
 
-def stored_surface(folder: Path, object_id: str) -> tuple[Array, Indices]:
-    """Read the vertices (n, 3) [m] and triangles (t, 3) of an object of a dataset.
+def stored_surface(folder: Path, object_id: str) -> MeshFile:
+    """Read the triangles of an object of a dataset [m].
 
     Raises:
         MeshError: The mesh is missing or cannot be read.
@@ -57,7 +55,7 @@ def stored_surface(folder: Path, object_id: str) -> tuple[Array, Indices]:
             f"{path}: this is the mesh of another object, whose hash is {found}; see `graspproof "
             "dataset verify`"
         )
-    return mesh.vertices, mesh.triangles
+    return mesh
 
 
 def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Polyhedron:
@@ -73,23 +71,21 @@ def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Pol
         MeshError: The mesh is missing or is not a solid.
         InputError: The mesh is that of another object, or what it says of its surface is wrong.
     """
-    path = mesh_path(folder, object_id)
-    mesh = read_triangles(path, DEFAULT_LIMITS)
+    path, mesh = mesh_path(folder, object_id), stored_surface(folder, object_id)
     said, known = mesh.data.partition(b"\n")[0].decode("utf-8", "replace"), None
     try:
         if said.startswith(SURFACE):
             record = record_of(SurfaceRecord, said.removeprefix(SURFACE), "surface")
             known = surface_of_record(record)
-        body = polyhedron_from_mesh(
-            mesh.vertices, mesh.triangles, MeshChoices(faces), name=name, known=known
+        return polyhedron_from_mesh(
+            mesh.vertices,
+            mesh.triangles,
+            MeshChoices(faces),
+            name=name,
+            source_sha256=hashlib.sha256(mesh.data).hexdigest(),
+            known=known,
         )
     except MeshError as error:
         raise MeshError(error.reason, f"{path}: {error.message}") from error
     except InputError as error:
         raise InputError(f"{path}, first line: {error}") from error
-    if body.content_sha256 != object_id:
-        raise InputError(
-            f"{path}: this is the mesh of another object, whose hash is {body.content_sha256}; "
-            "see `graspproof dataset verify`"
-        )
-    return replace(body, source_sha256=hashlib.sha256(mesh.data).hexdigest())

@@ -6,6 +6,7 @@ import grasp_core as gc
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 from tests.public_values.bad_values import (
     AT_LEAST_ONE,
+    COUNT,
     NOT_NEGATIVE,
     NOT_NUMBERS,
     PATH,
@@ -112,6 +113,17 @@ CALLS = [
         "spread_deg": unless(POSITIVE, "tiny") | {"wide": 60.0},
         "depth": unless(POSITIVE, "tiny") | {"all": 1.0},
         "most": AT_LEAST_ONE | {"three": 3, "many": 201},
+    }),
+    Call("gc.Surface", dict, {
+        "closed": SWITCH,
+        "caps": SEVERAL | {"negative": [-1], "fraction": [0.5], "wide": [[1]]},
+        "holes": COUNT,
+        "largest_hole_m": NOT_NEGATIVE,
+        "volume_error": NOT_NEGATIVE,
+        "dropped": NOT_NEGATIVE | {"more than all": 1.5},
+        "flatness_m": NOT_NEGATIVE,
+        "center_given": SWITCH,
+        "repairs": SEVERAL,
     }),
     Call("gc.Polyhedron", lambda: fields_of(gc.Polyhedron, body()), {
         "name": TEXT,

@@ -210,11 +210,11 @@ def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
                 of_object.append((np.array(point), None, NEAR_SURFACE))
     for row in rows["objects"]:
         try:
-            vertices, triangles = stored_surface(folder, row["object_id"])
+            mesh = stored_surface(folder, row["object_id"])
         except InputError as error:
             yield str(error)
             continue
-        surface = Surface(vertices, triangles)
+        surface = Surface(mesh.vertices, mesh.triangles)
         on_it = [
             surface.holds(point, normal, slack * row["radius_m"])
             for point, normal, slack in claimed[row["object_id"]]

@@ -37,7 +37,8 @@ def same(one, other):
 def test_a_stored_object_comes_back_to_the_last_bit(name, tmp_path):
     body = example_object(name)
     assert same(body, stored(body, tmp_path))
-    vertices, triangles = stored_surface(tmp_path, body.content_sha256)
+    mesh = stored_surface(tmp_path, body.content_sha256)
+    vertices, triangles = mesh.vertices, mesh.triangles
     np.testing.assert_array_equal(vertices, body.vertices)
     np.testing.assert_array_equal(triangles, body.triangles)
 
