@@ -78,22 +78,30 @@ def test_where_no_process_starts_all_is_done_here(monkeypatch):
         assert list(found.in_order([("end",)] * 30, doing(os.getpid()))) == ["done here"] * 30
 
 
-@pytest.mark.parametrize(("tasks", "started"), [(1, 0), (3, 2), (30, 3)])
-def test_as_many_start_as_have_work_for_longer_than_a_start(tasks, started):
-    """This process does one task until others have started, so that it has done none by then."""
-    found = list[int]()
+@pytest.mark.timeout(HANGING_S)
+def test_no_process_starts_for_the_task_that_is_done_here():
+    """This process does its only task until all threads have decided to start nothing."""
     with workers.working(3, doing, os.getpid(), patience_s=0.1) as team:
 
         def until_all_have_decided(_):
-            while sum(thread.is_alive() for thread in team._serving) > started:
+            while any(thread.is_alive() for thread in team._serving):
                 time.sleep(0.01)
-            while len(team._processes) < started:
-                time.sleep(0.01)
-            found.append(len(team._processes))
 
-        done = team.in_order([("square", 2)] * tasks, until_all_have_decided, ahead=tasks)
-        list(done)
-    assert found[0] == started
+        list(team.in_order([("square", 2)], until_all_have_decided))
+        assert team._processes == []
+
+
+@pytest.mark.timeout(HANGING_S)
+def test_a_process_starts_where_tasks_are_left():
+    """The first thread that looks sees all other tasks open, whenever it looks."""
+    with workers.working(3, doing, os.getpid(), patience_s=0.1) as team:
+
+        def until_one_has_started(_):
+            while not team._processes:
+                time.sleep(0.01)
+
+        list(team.in_order([("square", 2)] * 30, until_one_has_started, ahead=30))
+        assert len(team._processes) >= 1
 
 
 @pytest.mark.timeout(HANGING_S)
