@@ -144,14 +144,16 @@ def test_a_part_in_a_cavity_is_apart():
 
 def test_a_part_inside_the_material_is_refused_with_advice_on_cavities():
     inner = box((2, 2, 2), (4, 4, 4))
-    refused(MeshRefusal.OVERLAP, "cavities, turn their triangles", box(*WHOLE), inner)
+    refused(
+        MeshRefusal.OVERLAP, "turn the triangles of those that are cavities", box(*WHOLE), inner
+    )
     body = load(box(*WHOLE), inner, largest_part=True)
     assert body.volume == pytest.approx(216 * UNIT**3)
     assert body.surface.dropped == pytest.approx(24 / (216 + 24))
 
 
 def test_the_same_part_twice_is_refused_and_its_opposite_encloses_nothing():
-    refused(MeshRefusal.OVERLAP, "lie inside the material", box(*WHOLE), box(*WHOLE))
+    refused(MeshRefusal.OVERLAP, "inside the material of another", box(*WHOLE), box(*WHOLE))
     refused(MeshRefusal.ZERO_VOLUME, "encloses only", box(*WHOLE), turned(box(*WHOLE)))
 
 
