@@ -69,13 +69,15 @@ def _loops(corners: Indices) -> list[list[int]] | None:
 
 def _walked(start: int, leaving: dict[int, list[int]]) -> list[list[int]]:
     """Walk until the start is reached; where a vertex is met again, a loop is complete."""
-    loops, walk = list[list[int]](), [start]
+    loops, walk, place = list[list[int]](), [start], {start: 0}
     while True:  # each step uses up an edge
         vertex = leaving[walk[-1]].pop()
-        if vertex in walk:
-            first = walk.index(vertex)
-            loops.append(walk[first:])
-            walk = walk[:first]
+        if vertex in place:
+            loops.append(walk[place[vertex] :])
+            del walk[place[vertex] :]
+            for passed in loops[-1]:
+                del place[passed]
+        place[vertex] = len(walk)
         walk.append(vertex)
         if vertex == start:
             return loops

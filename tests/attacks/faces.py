@@ -86,7 +86,7 @@ COVER = Attack(
 
 
 def with_scale(r, rng, **changed):
-    """The same with another unit of length, and the proof's axes with it."""
+    """Return regions whose unit of length is another, with the axes of their proof scaled alike."""
     s = power(rng, -2, 8.5) if rng.uniform() < 0.8 else 1.0
     axes = r.cover.axes * np.repeat([1.0, s], 3)
     axes = axes / np.linalg.norm(axes, axis=1).max()

@@ -196,7 +196,7 @@ def upper_too_low(rng):
 
 
 def far_levers(rng):
-    """The same with one contact more, so far away that a slack relative to it covers all."""
+    """Add one contact to a set, so far away that a slack relative to it covers all others."""
     seed = int(rng.integers(8))
     w, least = closed_set(seed)
     lever = power(rng, 3, 13)

@@ -72,7 +72,7 @@ def prism(outline, height):
 
 
 def finely(mesh, longest):
-    """The same solid of triangles whose edges are at most so long [mm]."""
+    """Divide the triangles of a solid until no edge is longer than a length [mm]."""
     return trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, longest))
 
 

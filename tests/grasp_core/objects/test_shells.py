@@ -108,7 +108,7 @@ def turned_about(seed, precision, *parts):
 
 @pytest.mark.parametrize("precision", [np.float64, np.float32])
 def test_slits_that_rounding_leaves_between_touching_parts_are_no_faces(precision):
-    """Of an arm that stands on a box, rounding may sink a part of the end and lift the rest."""
+    """Rounding may sink a part of an arm into the box that it stands on, and lift the rest."""
     united = 0
     for seed in range(12):
         parts = turned_about(seed, precision, box(*WHOLE), box((6, 1, 2), (9, 4, 5)))
