@@ -67,6 +67,11 @@ ROUNDING = 1e-6
 CONTACT_STEPS = 2.0
 """Time constant of contacts, in steps; the simulator takes no less. With twice as much, contacts
 that slide go half as far again beyond what they would with short steps."""
+CONTACT_GIVE = 2e-3
+"""Largest give of contacts at rest, relative to that of the springs behind them. Lightly pressed
+contacts of light objects give the most, and their pushes would be off by as much."""
+LEAST_GIVE = 1e-4
+"""Least part of a contact's impedance that gives: the simulator takes no less."""
 FLAGS = {"midphase": "disable", "island": "disable"}
 """MuJoCo's search for pairs within two bodies misses contacts that are less deep than a
 ten-thousandth of the object, as all are here: objects on tables would fall, touch, and chatter. Its
@@ -95,9 +100,13 @@ def held_physics(layout: HeldLayout) -> PhysicsSettings:
     steps = math.ceil(SAMPLE_S * rate - ROUNDING)
     steps = min(max(steps, FEWEST_STEPS), MOST_STEPS)
     step = SAMPLE_S / steps
+    settling = CONTACT_STEPS * step
+    moved = 1.0 / (1.0 / layout.tip_mass_kg + 3.0 / layout.mass_kg)
+    give = max(CONTACT_GIVE * moved / (layout.stiffest * settling**2), LEAST_GIVE)
     return PhysicsSettings(
         timestep=step, integrator="Euler", impratio=300.0, gravity=(x, y, z),
-        solimp=(0.995, 0.9995, 2e-6, 0.5, 1.0), solref=(CONTACT_STEPS * step, 1.0),
+        solimp=(1.0 - min(0.005, give), 1.0 - min(0.0005, give), 2e-6, 0.5, 1.0),
+        solref=(settling, 1.0),
     )  # fmt: skip
 
 

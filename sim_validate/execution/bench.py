@@ -51,6 +51,8 @@ class HeldMotion:
     """Contact forces on the object along the axes of the springs, (n, k, 3) [N]."""
     table: Array
     """Force of the table on the object, (n, 3) [N]; other loads are taken away."""
+    states: Array
+    """Complete state of the simulator, from which a trial can go on, (n, size)."""
     faults: tuple[str, ...]
     """What went wrong in the simulator, in words; empty if nothing did."""
 
@@ -60,14 +62,34 @@ class HeldMotion:
         return np.concatenate([self.moved, self.turned, self.palm, self.fingers], axis=1)
 
 
+SERIES = ("moved", "turned", "palm", "fingers", "tips", "forces", "table", "states")
+"""Fields of a motion that have a row for each sample."""
+
+
 def motions_joined(first: HeldMotion, second: HeldMotion) -> HeldMotion:
     """Return one motion after another, with the faults of both."""
-    names = ("moved", "turned", "palm", "fingers", "tips", "forces", "table")
-    both = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names}
+    both = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in SERIES}
     turns = None
     if first.tip_turns is not None and second.tip_turns is not None:
         turns = np.concatenate([first.tip_turns, second.tip_turns])
     return HeldMotion(**both, tip_turns=turns, faults=first.faults + second.faults)
+
+
+def begun_motion(motion: HeldMotion, count: int) -> HeldMotion:
+    """Return the first samples of a motion, as if nothing had gone wrong after them."""
+    first = {name: getattr(motion, name)[:count] for name in SERIES}
+    turns = None if motion.tip_turns is None else motion.tip_turns[:count]
+    return HeldMotion(**first, tip_turns=turns, faults=())
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """How far from its planned place in the hand an object is lost, where its trial ends."""
+
+    away_m: float
+    """Distance of its centre of mass [m]."""
+    turned_rad: float = math.inf
+    """Angle by which it is turned [rad]."""
 
 
 class HeldBench:
@@ -75,7 +97,7 @@ class HeldBench:
 
     def __init__(
         self, scene: HeldScene, *, threads: int = 1, sample_s: float = SAMPLE_S,
-        lost_m: float = math.inf,
+        lost_m: float = math.inf, step_s: float | None = None,
     ) -> None:  # fmt: skip
         """Compile a scene.
 
@@ -85,13 +107,17 @@ class HeldBench:
             sample_s: Duration of a sample, rounded to whole steps [s].
             lost_m: Distance of the object from its place in the hand at which it is lost and its
                 trial ends: it stays there, and nothing touches it [m].
+            step_s: Length of a step; None for that of the scene [s].
 
         Raises:
             InputError: The simulator refuses the scene, or a sample is not a number of its steps.
         """
         self.scene, self.threads, self.lost_m = scene, threads, lost_m
         self.model = compiled(scene.xml)
-        step_s = float(self.model.opt.timestep)
+        if step_s is None:
+            step_s = float(self.model.opt.timestep)
+        self.model.opt.timestep = step_s
+        self.step_s = step_s
         self.chunk = max(1, round(sample_s / step_s))
         self.sample_s = self.chunk * step_s
         if sample_s == SAMPLE_S and abs(self.sample_s - SAMPLE_S) > WHOLE * SAMPLE_S:
@@ -103,37 +129,28 @@ class HeldBench:
         self.tips = [self.model.geom(name).id for name in scene.layout.tip_names]
 
     def run(
-        self, drives: Sequence[Drive], start: Array | None = None, friction: Array | None = None
-    ) -> tuple[HeldMotion, ...]:
+        self, drives: Sequence[Drive], start: Array | None = None, friction: Array | None = None,
+        lost: Sequence["Lost"] | None = None,
+    ) -> tuple[HeldMotion, ...]:  # fmt: skip
         """Simulate trials, all from the same state or from their own start.
 
         Args:
             drives: What is applied in each trial.
-            start: State at the end of an earlier motion (see `settled`); None for fingertips at
-                their contacts that do not push yet.
+            start: State in a sample of an earlier motion, (size,) for all trials or (n, size); None
+                for fingertips at their contacts, or where the drive says, that do not push yet.
             friction: Coulomb coefficient of each contact, (k,) for all trials or (n, k); None for
                 those of the scene.
+            lost: Where the object of each trial is lost; None for the distance of the bench.
         """
         trials = self._begun(drives, start, friction)
-        lengths = np.array([len(drive) for drive in drives])
-        moved, forces = self._recorded(trials, lengths)
-        errors = self._stepped(trials, drives, lengths, moved, forces)
-        return tuple(
-            self._motion(
-                moved[place, : len(drive)], forces[place, : len(drive)],
-                _faults(trials, place, errors.get(place, "")),
-            )
-            for place, drive in enumerate(drives)
-        )  # fmt: skip
+        if lost is None:
+            lost = [Lost(self.lost_m)] * len(drives)
+        return self._stepped(trials, drives, lost)
 
     def settled(self, drive: Drive, start: Array | None = None) -> tuple[HeldMotion, Array]:
         """Simulate one trial; return its motion and the simulator's complete state at its end."""
-        trials = self._begun([drive], start, None)
-        lengths = np.array([len(drive)])
-        moved, forces = self._recorded(trials, lengths)
-        errors = self._stepped(trials, [drive], lengths, moved, forces)
-        faults = _faults(trials, 0, errors.get(0, ""))
-        return self._motion(moved[0], forces[0], faults), trials.state[0].copy()
+        (motion,) = self.run([drive], start)
+        return motion, motion.states[-1]
 
     def touched(self, reached: Array) -> tuple[Array, Array]:
         """Find what each fingertip touches before anything moves.
@@ -149,10 +166,6 @@ class HeldBench:
         data.qpos[PALM + 1 :] = self.scene.layout.joints(reached)
         return touched(self.model, data, self.tips)
 
-    def _recorded(self, trials: batch.Batch, lengths: Array) -> tuple[Array, Array]:
-        count, most = trials.nsim, int(lengths.max())
-        return np.zeros((count, most, self.model.nq)), np.zeros((count, most, self.model.nv))
-
     def _begun(
         self, drives: Sequence[Drive], start: Array | None, friction: Array | None
     ) -> batch.Batch:
@@ -163,10 +176,10 @@ class HeldBench:
             trials.state[:] = start
         joints, speeds = trials.bind("qpos"), trials.bind("qvel")
         for place, drive in enumerate(drives):
-            if drive.pose is not None:
+            if drive.pose is not None and start is None:
                 joints[place, :3] = drive.pose.moved
                 joints[place, 3:7] = drive.pose.quaternion
-            if drive.reached is not None:
+            if drive.reached is not None and start is None:
                 joints[place, PALM + 1 :] = self.scene.layout.joints(drive.reached)
             speeds[place, :3] += drive.velocity
             speeds[place, FREE : FREE + 3] += drive.velocity
@@ -186,18 +199,24 @@ class HeldBench:
                 turn[trial, 0] = quaternion(facing(drive.table))
 
     def _stepped(
-        self, trials: batch.Batch, drives: Sequence[Drive], lengths: Array,
-        moved: Array, forces: Array,
-    ) -> dict[int, str]:  # fmt: skip
-        """Step all trials to their ends, filling in joints and contact forces; return errors."""
-        loads, motors, commands = self._applied(drives, int(lengths.max()))
+        self, trials: batch.Batch, drives: Sequence[Drive], limits: Sequence["Lost"]
+    ) -> tuple[HeldMotion, ...]:
+        """Step all trials to their ends and return their motions."""
+        lengths = np.array([len(drive) for drive in drives])
+        most = int(lengths.max())
+        loads, motors, commands = self._applied(drives, most)
         applied, palm = trials.bind("xfrc_applied"), trials.bind("qfrc_applied")
         servos, pushed = trials.bind("ctrl"), trials.bind("qfrc_constraint")
         joints = trials.bind("qpos")
+        moved, forces, states = (
+            np.zeros((len(drives), most, each.shape[1])) for each in (joints, pushed, trials.state)
+        )
         errors: dict[int, str] = {}
         lost = np.zeros(len(drives), dtype=bool)
+        most_m = np.array([each.away_m for each in limits])
+        least_cosine = np.cos([min(each.turned_rad, math.pi) for each in limits])
         with unlogged():
-            for sample in range(len(loads)):
+            for sample in range(most):
                 going = np.flatnonzero((lengths > sample) & ~lost)
                 if not len(going):
                     break
@@ -207,13 +226,21 @@ class HeldBench:
                 step(trials, errors, self.chunk, going)
                 moved[going, sample] = joints[going]
                 forces[going, sample] = pushed[going]
+                states[going, sample] = trials.state[going]
                 with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
                     away = np.linalg.norm(joints[going, :3] - joints[going, 7:10], axis=1)
-                for trial in going[away > self.lost_m]:
+                    gone = (away > most_m[going]) | (_cosines(joints[going]) < least_cosine[going])
+                for trial in going[gone]:
                     lost[trial] = True
                     moved[trial, sample:] = joints[trial]
                     forces[trial, sample:] = 0.0
-        return errors
+        return tuple(
+            self._motion(
+                moved[trial, :length], forces[trial, :length], states[trial, :length],
+                _faults(trials, trial, errors.get(trial, "")),
+            )
+            for trial, length in enumerate(lengths)
+        )  # fmt: skip
 
     def _applied(self, drives: Sequence[Drive], most: int) -> tuple[Array, Array, Array]:
         """Return loads, forces of the palm and commands, by sample and trial; zero after an end."""
@@ -229,7 +256,9 @@ class HeldBench:
             commands[:n, place] = layout.commands(drive.grasping.reshape(n, -1), drive.reached)
         return loads, motors, commands
 
-    def _motion(self, joints: Array, forces: Array, faults: tuple[str, ...]) -> HeldMotion:
+    def _motion(
+        self, joints: Array, forces: Array, states: Array, faults: tuple[str, ...]
+    ) -> HeldMotion:
         # what has no end is no number either: angles beyond all bounds have no cosine
         joints = np.where(np.isfinite(joints), joints, np.nan)
         layout = self.scene.layout
@@ -247,8 +276,15 @@ class HeldBench:
             tip_turns=found.turns,
             forces=found.forces,
             table=forces[:, :3] - finger_forces,
+            states=states,
             faults=faults,
         )
+
+
+def _cosines(joints: Array) -> Array:
+    """Return the cosines of the object's turns against the palm, (n,)."""
+    turned = hinged(joints[:, 10 : PALM + 1]).transpose(0, 2, 1) @ rotations(joints[:, 3:7])
+    return 0.5 * (np.einsum("nii->n", turned) - 1.0)
 
 
 def facing(table: Table) -> Array:

@@ -1,8 +1,9 @@
 """Executes a grasp: chooses its squeeze, runs all trials in one batch, and judges each.
 
 The squeeze is chosen once: the one that carries the most of the object's weight in any direction
-with the largest push allowed. Every trial then runs with it. Before, the simulator is checked on
-cases whose answers are known (see `gate`).
+with the largest push allowed. Every trial then runs with it. A trial that is lost is run again with
+short steps (see `confirming`). Before, the simulator is checked on cases whose answers are known
+(see `gate`).
 """
 
 import math
@@ -16,31 +17,33 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array
 from grasp_core.checked import instance, several, whole
 from grasp_core.closure.contact_arrays import FEWEST, contact_arrays, stacked
-from grasp_core.errors import InputError, NoForcesError, UnfaithfulError
+from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.best_squeeze import BestSqueeze, best_squeeze
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import any_direction
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.execution.held import HeldLayout
 from scenes.execution.held_mjcf import HeldScene, build_held_scene
 from scenes.fingertips import fitting_radius
 from scenes.physics import PhysicsSettings
 from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench, HeldMotion, motions_joined
+from sim_validate.execution.confirming import confirming_bench, run_again
 from sim_validate.execution.controls import run_controls
 from sim_validate.execution.drives import parted
 from sim_validate.execution.gate.gate import require_faithful_execution
 from sim_validate.execution.predictions import held_dynamics, predicted_losses
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.execution.slips import outcome
+from sim_validate.execution.slips import Outcome, outcome
 from sim_validate.execution.trials import Trial, trials_of
 from sim_validate.execution.verdict import Execution, ExecutionTrial
 from sim_validate.simulation.setup import MOST_THREADS
 
 LOST = 3.0
 """How far an object is from its place when its trial ends, in its radii: no finger reaches it."""
+DIVERGED = Outcome(math.inf, math.inf, math.inf, dropped=True, slipped=True, first_slip=0.0)
+"""What is known of an object that the simulator cannot follow."""
 SPARE = 0.05
 """How much farther a curved surface is there than fingertips come, in object radii."""
 
@@ -70,7 +73,7 @@ def execute(  # noqa: PLR0913 - `mass_kg` is the one setting that has no default
     Raises:
         InputError: A number is out of range.
         NoForcesError: No squeeze carries the weight, or the grip is unstable under the best one.
-        UnfaithfulError: The simulator fails on a case with a known answer, or failed in a trial.
+        UnfaithfulError: The simulator fails on a case with a known answer.
     """
     settings = _settings(settings, mass_kg)
     whole(threads, "threads", least=1, most=MOST_THREADS)
@@ -84,7 +87,7 @@ def executed(
     """Simulate the trials of a scene with the squeeze that was chosen for it, and judge each.
 
     Raises:
-        UnfaithfulError: The simulator fails on a case with a known answer, or failed in a trial.
+        UnfaithfulError: The simulator fails on a case with a known answer.
     """
     require_faithful_execution(scene.layout, scene.physics, settings.hand, settings.push_n)
     lost_m = max(LOST * body.radius, 2.0 * settings.most_m)
@@ -95,16 +98,12 @@ def executed(
         dynamics, [trial.expected or trial.drive for trial in trials],
         [trial.turning for trial in trials], settings.most_m, settings.most_rad,
     )  # fmt: skip
-    motions = run_trials(bench, trials)
-    judged = tuple(
-        _judged(trial, motion, (float(slip), float(loss)), scene.layout, best.grip, settings)
-        for trial, motion, slip, loss in zip(trials, motions, slips, losses, strict=True)
-    )
+    predicted = [(float(slip), float(loss)) for slip, loss in zip(slips, losses, strict=True)]
     return Execution(
         mass_kg=settings.mass_kg,
         squeeze=best.grip.squeeze,
         load_multiple=best.scale,
-        trials=judged,
+        trials=tuple(_judged_trials(bench, trials, predicted, settings)),
         controls=run_controls(bench, best, dynamics.lowest_frequency),
         skipped=skipped,
         physics=scene.physics,
@@ -215,25 +214,56 @@ def _weighed(
         yield motions_joined(weight, motion)
 
 
+def _judged_trials(
+    bench: HeldBench, trials: Sequence[Trial], predicted: Sequence[tuple[float, float]],
+    settings: ExecutionSettings,
+) -> list[ExecutionTrial]:  # fmt: skip
+    """Simulate trials and judge them, those that are lost where a contact slips a second time."""
+    motions = run_trials(bench, trials)
+    judged = [
+        _judged(trial, motion, each, bench, settings)
+        for trial, motion, each in zip(trials, motions, predicted, strict=True)
+    ]
+    again = [
+        place for place, each in enumerate(judged) if not each.survived and each.fate != "stuck"
+    ]
+    short = confirming_bench(bench) if again else None
+    if short is None:
+        return judged
+    second = run_again(
+        short, [trials[place] for place in again], [motions[place] for place in again],
+        settings,
+    )  # fmt: skip
+    for place, motion in zip(again, second, strict=True):
+        found = _judged(trials[place], motion, predicted[place], short, settings)
+        confirmed = not found.survived and judged[place].fate != "diverged"
+        judged[place] = replace(judged[place], step_s=short.step_s) if confirmed else found
+    return judged
+
+
 def _judged(
-    trial: Trial, motion: HeldMotion, predicted: tuple[float, float], layout: HeldLayout,
-    grip: Grip, settings: ExecutionSettings,
+    trial: Trial, motion: HeldMotion, predicted: tuple[float, float], bench: HeldBench,
+    settings: ExecutionSettings,
 ) -> ExecutionTrial:  # fmt: skip
     """Judge a trial beside its predicted multiples of first slip and of loss."""
     if motion.faults:
-        raise UnfaithfulError(f"{trial.name}: {'; '.join(motion.faults)}")
-    found = outcome(motion, layout, trial.drive, grip.friction, trial.begun)
+        found = DIVERGED
+    else:
+        layout = bench.scene.layout
+        found = outcome(motion, layout, trial.drive, layout.friction, trial.begun)
     kept = found.displacement_m <= settings.most_m and found.turn_rad <= settings.most_rad
     held = "slipped" if found.slipped else "stuck"
+    lost = "diverged" if motion.faults else "dropped"
     return ExecutionTrial(
         kind=trial.kind,
         name=trial.name,
         survived=kept and not found.dropped,
-        fate="dropped" if found.dropped else held,
+        fate=lost if found.dropped else held,
         slip_m=found.slip_m,
         displacement_m=found.displacement_m,
         turn_rad=found.turn_rad,
         predicted_first_slip=predicted[0],
         predicted_loss=predicted[1],
         simulated_first_slip=found.first_slip,
+        step_s=bench.step_s,
     )

@@ -150,6 +150,31 @@ def _slid(found: Seen, layout: HeldLayout, begun: int) -> Array:
     return np.concatenate([np.zeros((1, *slid.shape[1:])), np.cumsum(slid, axis=0)])
 
 
+def first_trouble(motion: HeldMotion, layout: HeldLayout, friction: Array, begun: int) -> int:
+    """Return the first sample in which a contact slips or opens, or the simulator fails.
+
+    It is the number of samples where there is none. Fingertips that hardly push at rest do not
+    count.
+    """
+    found = seen(motion, layout)
+    on_cone = _on_cone(found, friction, begun)[1].any(axis=1)
+    troubled = np.flatnonzero(on_cone | ~np.isfinite(motion.joints).all(axis=1))
+    return int(troubled[0]) if len(troubled) else len(motion.moved)
+
+
+def _on_cone(
+    found: Seen, friction: Array, begun: int
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which contacts push at rest, (k,), and when those slip or are open, (n, pushing)."""
+    rest_n = found.forces[begun, :, 0]
+    pushing = rest_n > IDLE * rest_n.max()  # a fingertip that pushes at nothing cannot slip
+    forces = found.forces[:, pushing]
+    across = np.linalg.norm(forces[..., 1:], axis=2)
+    on_cone = across >= ON_CONE * friction[pushing] * forces[..., 0]
+    on_cone[: begun + 1] = False
+    return pushing, on_cone
+
+
 def _first_slip(
     found: Seen, shares: Array, friction: Array, begun: int, leaving: Array | None = None
 ) -> float:
@@ -163,14 +188,10 @@ def _first_slip(
         leaving: Displacements of the points of contact since then, in object radii, where the
             object leaves a table, (n - begun, k, 3); None for other trials.
     """
-    rest_n = found.forces[begun, :, 0]
-    pushing = rest_n > IDLE * rest_n.max()  # a fingertip that pushes at nothing cannot slip
+    pushing, on_cone = _on_cone(found, friction, begun)
     if not pushing.any():
         return 0.0
     found, friction = replace(found, forces=found.forces[:, pushing]), friction[pushing]
-    n, across = found.forces[..., 0], np.linalg.norm(found.forces[..., 1:], axis=2)
-    on_cone = across >= ON_CONE * friction * n
-    on_cone[: begun + 1] = False
     if leaving is not None:
         on_cone[begun:] &= ~_touches(on_cone[begun:], shares[begun:], leaving[:, pushing])
     slipping = on_cone.any(axis=1)

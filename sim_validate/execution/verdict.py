@@ -10,8 +10,9 @@ from scenes.physics import PhysicsSettings
 from sim_validate.execution.settings import ExecutionSettings, TrialKind
 from sim_validate.execution.trials import Skipped
 
-Fate: TypeAlias = Literal["stuck", "slipped", "dropped"]
-"""What became of the object: no contact slipped, one did and it was kept, or it was lost."""
+Fate: TypeAlias = Literal["stuck", "slipped", "dropped", "diverged"]
+"""What became of the object: no contact slipped, one did and it was kept, it was lost, or the
+simulator could not follow it."""
 CLEAR_OF_SLIP = 1.05
 """Predicted first slip from which on no contact slips, however processors round."""
 
@@ -28,7 +29,8 @@ class ExecutionTrial:
     """Whether the object was kept, and moved no farther than the settings allow."""
     fate: Fate
     slip_m: float
-    """Farthest that a point of contact slid on the object [m]."""
+    """Farthest that a point of contact slid on the object [m]; infinite where the simulator
+    diverged, as the next two are."""
     displacement_m: float
     """Largest displacement of the centre of mass against the palm [m]."""
     turn_rad: float
@@ -43,6 +45,9 @@ class ExecutionTrial:
     simulated_first_slip: float
     """Multiple of the trial's load at which the first contact slips, from the simulated contact
     forces: one or less if a contact slipped, else how far away slip stayed."""
+    step_s: float
+    """Length of the shortest steps that the simulator took: a loss with steps of the usual length
+    counts only if short steps find it as well [s]."""
 
     @property
     def dropped(self) -> bool:
@@ -119,7 +124,7 @@ def ended(trial: ExecutionTrial, settings: ExecutionSettings | None = None) -> s
         trial: The trial.
         settings: How far an object may move and turn; if None, it is left open which it was.
     """
-    if trial.survived or trial.dropped:
+    if trial.survived or trial.fate in ("dropped", "diverged"):
         return trial.fate
     ways = list[str]()
     if settings is not None:
@@ -131,6 +136,12 @@ def ended(trial: ExecutionTrial, settings: ExecutionSettings | None = None) -> s
 
 def trial_in_words(trial: ExecutionTrial, settings: ExecutionSettings | None = None) -> str:
     """Say how a trial of an execution ended, and what was predicted."""
+    if trial.fate == "diverged":
+        return (
+            f"{trial.name}: the simulator could not follow the motion, even in steps of "
+            f"{1e3 * trial.step_s:.3g} ms, so the object counts as lost; the load may be too large "
+            "for its mass"
+        )
     return (
         f"{trial.name}: {ended(trial, settings)}, moved {1e3 * trial.displacement_m:.3g} mm and "
         f"turned {math.degrees(trial.turn_rad):.3g} degrees; first slip predicted at "

@@ -161,6 +161,7 @@ def _trial_record(trial: ExecutionTrial) -> ExecutionTrialRecord:
         "predicted_first_slip": trial.predicted_first_slip,
         "predicted_loss": trial.predicted_loss,
         "simulated_first_slip": trial.simulated_first_slip,
+        "step_s": trial.step_s,
     }
 
 
@@ -273,12 +274,13 @@ def _execution(record: ExecutionRecord, settings: ExecutionSettings, where: Wher
                 name=each["name"],
                 survived=each["survived"],
                 fate=each["fate"],
-                slip_m=each["slip_m"],
-                displacement_m=each["displacement_m"],
-                turn_rad=each["turn_rad"],
+                slip_m=_or_infinite(each["slip_m"]),
+                displacement_m=_or_infinite(each["displacement_m"]),
+                turn_rad=_or_infinite(each["turn_rad"]),
                 predicted_first_slip=_or_infinite(each["predicted_first_slip"]),
                 predicted_loss=_or_infinite(each["predicted_loss"]),
                 simulated_first_slip=_or_infinite(each["simulated_first_slip"]),
+                step_s=each["step_s"],
             )
             for each in record["trials"]
         ),

@@ -15,18 +15,22 @@ Force = tuple[Finite, Finite, Finite]
 
 
 class ExecutionTrialRecord(TypedDict):
-    """Fields about one trial; slips and losses are multiples of its load, null where none comes."""
+    """Fields about one trial; slips and losses are multiples of its load, null where none comes.
+
+    Motions are null where the simulator diverged.
+    """
 
     kind: TrialKind
     name: str
     survived: bool
     fate: Fate
-    slip_m: Finite
-    displacement_m: Finite
-    turn_rad: Finite
+    slip_m: Finite | None
+    displacement_m: Finite | None
+    turn_rad: Finite | None
     predicted_first_slip: Finite | None
     predicted_loss: Finite | None
     simulated_first_slip: Finite | None
+    step_s: Positive
 
 
 class ExecutionControlRecord(TypedDict):

@@ -20,7 +20,7 @@ FRICTION = 0.5
 
 
 def trial(kind, name, simulated=2.0, *, survived=True, fate="stuck", slip_m=0.0):
-    return ExecutionTrial(kind, name, survived, fate, slip_m, 0.0, 0.0, 2.0, 3.0, simulated)
+    return ExecutionTrial(kind, name, survived, fate, slip_m, 0.0, 0.0, 2.0, 3.0, simulated, 1e-3)
 
 
 def chosen(*trials):

@@ -42,6 +42,7 @@ def motion_of(moved=None, turned=None, palm=None, centers=None, forces=None):
         tip_turns=None,
         forces=forces,
         table=np.zeros((COUNT, 3)),
+        states=np.zeros((COUNT, 0)),
         faults=(),
     )
 
@@ -200,6 +201,7 @@ def test_what_is_seen_does_not_depend_on_where_the_palm_is():
         tip_turns=None,
         forces=here.forces,
         table=here.table,
+        states=np.zeros((COUNT, 0)),
         faults=(),
     )
     one, other = judged(here), judged(there)

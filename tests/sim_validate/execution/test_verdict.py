@@ -20,7 +20,7 @@ from sim_validate.execution.verdict import (
 
 
 def trial(kind, survived, fate="stuck"):
-    return ExecutionTrial(kind, kind, survived, fate, 0.0, 0.0, 0.0, 2.0, 3.0, 2.0)
+    return ExecutionTrial(kind, kind, survived, fate, 0.0, 0.0, 0.0, 2.0, 3.0, 2.0, 1e-3)
 
 
 def execution(*trials, controls=()):
@@ -58,7 +58,7 @@ def test_only_a_dropped_object_is_dropped():
 
 def test_losses_are_told_in_millimetres_and_degrees_as_limits_are_given():
     lost = ExecutionTrial(
-        "knock", "knock -y", False, "slipped", 2e-3, 0.123, math.radians(107.5), 0.8, 0.9, 0.75
+        "knock", "knock -y", False, "slipped", 2e-3, 0.123, math.radians(107.5), 0.8, 0.9, 0.75, 1e-3
     )
     assert losses_in_words(execution(trial("weight", True), lost)) == [trial_in_words(lost)]
     assert trial_in_words(lost) == (
@@ -81,7 +81,7 @@ def test_an_object_that_was_kept_and_failed_is_said_to_have_left_its_place(
     survived, fate, moved_mm, turned_deg, said
 ):
     found = ExecutionTrial("knock", "knock -y", survived, fate, 0.0, 1e-3 * moved_mm,
-                           math.radians(turned_deg), 2.0, 3.0, 2.0)  # fmt: skip
+                           math.radians(turned_deg), 2.0, 3.0, 2.0, 1e-3)  # fmt: skip
     assert ended(found, ExecutionSettings(0.3)) == said
 
 

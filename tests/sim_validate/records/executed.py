@@ -15,9 +15,9 @@ SETTINGS = sv.ExecutionSettings(
     mass_kg=0.3, trials=("shake", "lift"), tip_radius_m=0.004, seed=7, shake_g=0.0,
     hand=scenes.HeldSettings(tip_mass_kg=0.02, damping_ratio=0.7, down=(1.0, 0.0, -1.0)),
 )  # fmt: skip
-LOST = ExecutionTrial("lift", "lift", False, "dropped", 0.01, 0.2, 1.0 / 3.0, 0.4, 0.45, 0.41)
+LOST = ExecutionTrial("lift", "lift", False, "dropped", 0.01, 0.2, 1.0 / 3.0, 0.4, 0.45, 0.41, 0.00125)
 KEPT = ExecutionTrial(
-    "shake", "shake along x", True, "stuck", 0.0, 1e-4, 0.1, math.inf, 3.0, math.inf
+    "shake", "shake along x", True, "stuck", 0.0, 1e-4, 0.1, math.inf, 3.0, math.inf, 0.00125
 )
 FOUND = Execution(
     mass_kg=0.3, squeeze=np.arange(12.0).reshape(4, 3) / 7.0, load_multiple=2.5,

@@ -48,7 +48,7 @@ SETTINGS = ExecutionSettings(0.3, shake_g=0.5, stop_m_per_s2=2.0 * GRAVITY_M_PER
 
 def trial(kind, name, *, predicted=2.0, simulated=2.0, survived=True, fate="stuck"):
     return ExecutionTrial(kind, name, survived, fate, 1.25e-3, 2.5e-3, math.radians(3.5),
-                          predicted, 1.25 * predicted, simulated)  # fmt: skip
+                          predicted, 1.25 * predicted, simulated, 0.00125)  # fmt: skip
 
 
 TRIALS = (
