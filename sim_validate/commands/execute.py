@@ -171,11 +171,11 @@ def _say_totals(
 
 
 def knock_in_words(settings: ExecutionSettings) -> str:
-    """Say which speed a knock gives the object, since its impulse does not depend on the mass."""
+    """Say which speed a knock gives the object."""
     return (
-        f"a knock of {settings.knock_n_s:g} N s would give a free object of "
-        f"{settings.mass_kg:g} kg {settings.knock_n_s / settings.mass_kg:.3g} m/s; the impulse is "
-        "not scaled to the mass, so choose it with --knock-n-s"
+        f"a knock of {settings.impulse_n_s:g} N s would give a free object of "
+        f"{settings.mass_kg:g} kg {settings.impulse_n_s / settings.mass_kg:.3g} m/s; choose it "
+        "with --knock-n-s"
     )
 
 

@@ -102,7 +102,7 @@ def executions_to_json(
         "object": object_record(body),
         "friction": friction,
         "complete": complete,
-        "settings": asdict(settings),
+        "settings": asdict(settings.used),
         "summary": executions_summary(listed),
         "executions": [_record(grasp) for grasp in listed],
         "versions": {**versions()},

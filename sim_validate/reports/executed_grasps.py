@@ -163,7 +163,7 @@ def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
     """
     words = ["graspproof", "execute", path, "--grasp", grasp_id]
     words += ["--friction", repr(executions.friction)]
-    usual = ExecutionSettings(executions.settings.mass_kg)
+    usual = ExecutionSettings(executions.settings.mass_kg).used
     for name, flag in FLAGS.items():
         value = attrgetter(name)(executions.settings)
         if name in ALWAYS or value != attrgetter(name)(usual):

@@ -135,7 +135,7 @@ def accelerations_g(settings: ExecutionSettings) -> dict[str, float]:
     gravity, way = settings.hand.gravity, np.array([1.0, 0.0, 0.0])
     stop = paths.stop(gravity, way, settings.stop_m_per_s2, settings.stop_from_m_per_s)
     lift, _ = paths.lift(way, settings.lift_m, settings.lift_s)
-    knock = paths.knock(gravity, settings.knock_n_s * way, np.zeros(3))
+    knock = paths.knock(gravity, settings.impulse_n_s * way, np.zeros(3))
     return {
         "weight": 0.0,
         "misplaced": 0.0,

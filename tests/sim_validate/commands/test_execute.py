@@ -97,7 +97,7 @@ def test_where_knocks_fail_the_speed_that_they_give_is_told(capsys):
     words = ["execute", "grasps.json", "--mass-kg", "0.01", "--limit", "1", *QUICK]
     assert main([*words, "--knock-n-s", "0.4"]) == Exit.NEGATIVE
     said = capsys.readouterr().err
-    assert "a knock of 0.4 N s would give a free object of 0.01 kg 40 m/s; the impulse is" in said
+    assert "a knock of 0.4 N s would give a free object of 0.01 kg 40 m/s; choose" in said
     assert re.search("knock [+-][xyz]: (.* too far after a slip|dropped), moved", said)
 
 

@@ -12,7 +12,7 @@ from sim_validate.execution.verdict import Execution, ExecutionControl, Executio
 from sim_validate.records.executions_json import executions_to_json
 
 SETTINGS = sv.ExecutionSettings(
-    mass_kg=0.3, trials=("shake", "lift"), tip_radius_m=0.004, seed=7, shake_g=0.0,
+    mass_kg=0.3, trials=("shake", "lift"), tip_radius_m=0.004, seed=7, shake_g=0.0, knock_n_s=0.02,
     hand=scenes.HeldSettings(tip_mass_kg=0.02, damping_ratio=0.7, down=(1.0, 0.0, -1.0)),
 )  # fmt: skip
 LOST = ExecutionTrial("lift", "lift", False, "dropped", 0.01, 0.2, 1.0 / 3.0, 0.4, 0.45, 0.41)

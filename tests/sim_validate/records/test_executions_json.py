@@ -80,6 +80,13 @@ def test_the_file_is_strict_json_with_all_settings():
     }  # fmt: skip
 
 
+def test_the_file_holds_the_impulse_that_was_used():
+    usual = replace(SETTINGS, knock_n_s=None)
+    text = executions_to_json(BODY, 0.5, usual, GRASPS, complete=True)
+    assert json.loads(text)["settings"]["knock_n_s"] == 0.05
+    assert executions_from_json(text).settings == usual.used
+
+
 def of_trial(**changes):
     return lambda document: document["executions"][0]["trials"][0].update(changes)
 
