@@ -36,12 +36,8 @@ NEAR = 1.05
 """Ratio of a stiffness that is enough to one that is not, at which the search for it ends."""
 FIRM = 1e4
 """Stiffness at which no squeeze makes a grip unstable, in loads over the object's radius."""
-DOUBLINGS = 24
-"""Most times that a stiffness is doubled."""
-DIGITS = 3
-"""Digits to which pushes and stiffnesses are rounded, upwards."""
-ROUNDING = 1e-9
-"""Share of the last digit that is rounding."""
+UP = 1.005
+"""Factor by which numbers are at least what they were when they are rounded to three digits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,13 +57,11 @@ class Enough:
     """Why no push was found, where none was."""
 
     def __post_init__(self) -> None:
-        found = (self.push_n, self.stiffness_n_per_m, self.predicted_loss)
-        missing = found.count(None)
-        if missing != (0 if self.reason is None else len(found)):
+        missing = (self.push_n, self.stiffness_n_per_m, self.predicted_loss).count(None)
+        if missing != (0 if self.reason is None else 3):
             raise InputError(
                 "expected a push with its stiffness and predicted loss, or a reason why there is "
-                f"none, got {self.push_n}, {self.stiffness_n_per_m}, {self.predicted_loss} and "
-                f"{self.reason!r}"
+                f"none, got {self!r}"
             )
 
     def __str__(self) -> str:
@@ -85,9 +79,9 @@ class Enough:
 class NoSqueezeError(NoForcesError):
     """Raised where no squeeze executes a grasp; it knows what would be enough."""
 
-    def __init__(self, reason: str, enough: Enough) -> None:
-        """Say why there is no squeeze, and what would be enough."""
-        super().__init__(f"{reason}; {enough}")
+    def __init__(self, reason: str, enough: Enough | None = None) -> None:
+        """Say why there is no squeeze, and what would be enough, where it was sought."""
+        super().__init__(reason if enough is None else f"{reason}; {enough}")
         self.enough = enough
 
 
@@ -101,17 +95,19 @@ def found_enough(
     body: Polyhedron, settings: ExecutionSettings, choose: Choose, scene_of: SceneOf
 ) -> Enough:
     """Find the least push, and stiffness, that is enough for the trials of an execution."""
-    multiple = 1.0 + max(accelerations_g(settings)[each] for each in _motions(settings))
-    firm = FIRM * multiple * settings.mass_kg * GRAVITY_M_PER_S2 / body.radius
+    kinds = ("shake along" if kind == "shake" else kind for kind in settings.trials)
+    multiple = 1.0 + max(accelerations_g(settings)[kind] for kind in kinds)
+    stiffness = settings.stiffness_n_per_m
+    firm = FIRM * multiple * settings.mass_kg * GRAVITY_M_PER_S2 / body.radius + stiffness
     try:  # what no push on firm fingertips survives, no push survives
-        _least(settings, max(firm, settings.stiffness_n_per_m), multiple, choose)
+        _least(settings, firm, multiple, choose)
     except NoForcesError as error:
         return Enough(multiple, reason=f"it is proved that {error}")
     except (InputError, SolverError) as error:
         return Enough(multiple, reason=str(error))
-    found, stiffness = None, settings.stiffness_n_per_m
+    found = None
     for _ in range(ROUNDS):
-        own = _stiff_enough(settings, stiffness, multiple, choose)
+        own = _stiff_enough(settings, (stiffness, firm), multiple, choose)
         if own is None:
             break
         best = choose(own, None)
@@ -125,11 +121,6 @@ def found_enough(
         else:
             multiple *= more
     return found or Enough(multiple, reason="no stiffness of the fingertips is enough")
-
-
-def _motions(settings: ExecutionSettings) -> list[str]:
-    """Return the keys of `accelerations_g` for the trials that are asked for."""
-    return ["shake along" if kind == "shake" else kind for kind in settings.trials]
 
 
 def accelerations_g(settings: ExecutionSettings) -> dict[str, float]:
@@ -160,32 +151,31 @@ def _largest(values: Array) -> float:
 
 def _least(
     settings: ExecutionSettings, stiffness: float, multiple: float, choose: Choose
-) -> BestSqueeze:
-    """Find the squeeze of least push that survives a multiple of the weight in any direction."""
-    loads = any_direction(settings.mass_kg, (multiple - 1.0) * GRAVITY_M_PER_S2)
-    return choose(replace(settings, stiffness_n_per_m=stiffness), loads)
+) -> tuple[ExecutionSettings, BestSqueeze]:
+    """Find the squeeze of least push for a multiple of the weight, and settings with that push."""
+    given = stiffness == settings.stiffness_n_per_m
+    own = replace(settings, stiffness_n_per_m=stiffness if given else _rounded_up(stiffness))
+    best = choose(own, any_direction(own.mass_kg, (multiple - 1.0) * GRAVITY_M_PER_S2))
+    return replace(own, push_n=_rounded_up(best.max_push_n)), best
 
 
 def _stiff_enough(
-    settings: ExecutionSettings, least: float, multiple: float, choose: Choose
+    settings: ExecutionSettings, ends: tuple[float, float], multiple: float, choose: Choose
 ) -> ExecutionSettings | None:
-    """Return the settings with the least stiffness from `least` on that is enough, and its push."""
+    """Return the settings with the least stiffness between two that is enough, and its push."""
 
     def tried(stiffness: float) -> ExecutionSettings | None:
-        own = replace(settings, stiffness_n_per_m=_rounded_up(stiffness))
         try:
-            best = _least(own, own.stiffness_n_per_m, multiple, choose)
-            own = replace(own, push_n=_rounded_up(best.max_push_n))
+            own, best = _least(settings, stiffness, multiple, choose)
             choose(own, None)  # refused where rounding makes the grip unstable
         except (InputError, NoForcesError, SolverError):
             return None
         return own if _stays(best, own) else None
 
-    found, low, high = tried(least), least, least
-    for _ in range(DOUBLINGS if found is None else 0):
-        low, high = high, 2.0 * high
-        if (found := tried(high)) is not None:
-            break
+    low, high = ends
+    if (found := tried(low)) is not None:
+        return found
+    found = tried(high)
     while found is not None and high > NEAR * low:
         middle = math.sqrt(low * high)
         if (better := tried(middle)) is None:
@@ -220,6 +210,5 @@ def _predicted(
 
 
 def _rounded_up(value: float) -> float:
-    """Round up to `DIGITS` digits."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - DIGITS + 1)
-    return float(f"{math.ceil(value / unit - ROUNDING) * unit:.{DIGITS}g}")
+    """Round up to three digits."""
+    return float(f"{UP * value:.3g}")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
-from grasp_core.checked import instance, several, whole
+from grasp_core.checked import instance, several, switch, whole
 from grasp_core.closure.contact_arrays import FEWEST, contact_arrays, stacked
 from grasp_core.errors import InputError, NoForcesError, UnfaithfulError
 from grasp_core.execution.best_squeeze import BestSqueeze, best_squeeze
@@ -78,7 +78,8 @@ def execute(  # noqa: PLR0913 - `mass_kg` is the one setting that has no default
     """
     settings = _settings(settings, mass_kg)
     whole(threads, "threads", least=1, most=MOST_THREADS)
-    held = grasp if isinstance(grasp, Grasp) else tuple(grasp)
+    switch(enough, "enough")
+    held = _contacts(body, grasp)
     return executed(
         body, settings,
         lambda own, loads: chosen_squeeze(body, held, friction, own, loads),
@@ -165,14 +166,7 @@ def chosen_squeeze(
         InputError: A number is out of range.
         NoForcesError: No squeeze carries any weight, or the grip is unstable under the best one.
     """
-    check_body(body)
-    if isinstance(grasp, Grasp):
-        check_on_faces(body, grasp)
-    listed = grasp.contacts if isinstance(grasp, Grasp) else grasp
-    each = partial(instance, kind=Contact, name="grasp", remedy="or give a Grasp")
-    contacts = several(listed, each, "grasp", "Contact values")
-    if len(contacts) < FEWEST:
-        raise InputError(f"grasp: at least two contacts are needed, got {len(contacts)}")
+    contacts = _contacts(body, grasp)
     radius = tip_radius(body, contacts, settings)
     best = best_squeeze(
         body, contacts, friction, loads or any_direction(settings.mass_kg),
@@ -185,6 +179,23 @@ def chosen_squeeze(
             "more friction"
         )
     return best
+
+
+def _contacts(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> tuple[Contact, ...]:
+    """Return the contacts of a grasp, or those that are given.
+
+    Raises:
+        InputError: They are no contacts, fewer than two, or those of another object.
+    """
+    check_body(body)
+    if isinstance(grasp, Grasp):
+        check_on_faces(body, grasp)
+    listed = grasp.contacts if isinstance(grasp, Grasp) else grasp
+    each = partial(instance, kind=Contact, name="grasp", remedy="or give a Grasp")
+    contacts = several(listed, each, "grasp", "Contact values")
+    if len(contacts) < FEWEST:
+        raise InputError(f"grasp: at least two contacts are needed, got {len(contacts)}")
+    return contacts
 
 
 def tip_radius(body: Polyhedron, contacts: Sequence[Contact], settings: ExecutionSettings) -> float:

@@ -7,7 +7,7 @@ is replanned. Palm and links touch the object where it comes to them.
 
 from dataclasses import replace
 
-from grasp_core.checked import instance, whole
+from grasp_core.checked import instance, switch, whole
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.best_squeeze import BestSqueeze, searched
@@ -73,6 +73,7 @@ def execute_hand(  # noqa: PLR0913 - `mass_kg` is the one setting that has no de
             "execute_hand: expected mass_kg or settings, got neither; give mass_kg=0.3"
         )
     whole(threads, "threads", least=1, most=MOST_THREADS)
+    switch(enough, "enough")
 
     def scene_of(own: ExecutionSettings, best: BestSqueeze) -> HeldScene:
         near = surface_reach(body, best.grip, own)
