@@ -1,8 +1,8 @@
 """Do lost grasps survive with the push, and stiffness, that are said to be enough?
 
-Usage: python -m tests.benchmarks.enough_pushes [GRASPS_PER_OBJECT]. Grasps of built-in objects are
-executed with masses, pushes and stiffnesses drawn at random. Those that are lost, or have no
-squeeze, are executed once more with what is said to be enough, in the same trials.
+Usage: python -m tests.benchmarks.enough_pushes [GRASPS_PER_OBJECT [SEED]]. Grasps of built-in
+objects are executed with masses, pushes and stiffnesses drawn at random. Those that are lost, or
+have no squeeze, are executed once more with what is said to be enough, in the same trials.
 """
 
 import sys
@@ -44,9 +44,9 @@ def executed(body, grasp, settings):
     return found.enough, [trial.name for trial in found.trials if not trial.survived]
 
 
-def main(count):
+def main(count=8, seed=0):
     """Execute grasps twice, and print those that are lost again."""
-    rng, ends, begun = np.random.default_rng(0), Counter(), time.perf_counter()
+    rng, ends, begun = np.random.default_rng(seed), Counter(), time.perf_counter()
     for name in OBJECTS:
         body = scenes.example_object(name)
         for grasp in gc.plan(body, FRICTION, limit=count, rank_by="diverse").grasps:
@@ -71,4 +71,4 @@ def main(count):
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 8)
+    main(*map(int, sys.argv[1:]))
