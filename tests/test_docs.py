@@ -245,7 +245,7 @@ def test_the_page_of_executions_names_every_trial_fate_and_flag():
         assert f"`--{name.replace('_', '-')}" in page, name
     trials = page.partition("### The trials")[2].partition("The fingers and the object")[0]
     shown = re.findall(r"`--([\w-]+) ([\d.]+)`", trials)
-    assert len(shown) == 10
+    assert len(shown) == 9
     for name, value in shown:
         assert getattr(Executing(), name.replace("-", "_")) == float(value)
 

@@ -96,7 +96,9 @@ def _executing(
     if asked is None:
         return []
     settings = asked.settings_for(saved.body)
-    return [ExecutionJob(saved.body, grasp, saved.friction, settings) for grasp in chosen]
+    return [
+        ExecutionJob(saved.body, grasp, saved.friction, settings, enough=False) for grasp in chosen
+    ]
 
 
 def _kept(

@@ -79,9 +79,9 @@ class Executing:
     """Deceleration of a stop [m/s^2]."""
     stop_from_m_per_s: Usual = 0.5
     """Speed before a stop [m/s]."""
-    knock_n_s: Length = 0.05
-    """Impulse of a knock [N s], whatever the mass: over the mass [kg] it is the speed that a free
-    object would get [m/s]. 0 for no knocks."""
+    knock_n_s: Length | None = None
+    """Impulse of a knock [N s], 0 for no knocks. If not given, the one that gives a free object of
+    that mass 1/6 m/s: 0.05 N s for 0.3 kg."""
     off_mm: Length = 2.0
     """Distance of a misplaced object from where the fingers expect it [mm]."""
     off_deg: Annotated[float, within("off_deg")] = 2.0

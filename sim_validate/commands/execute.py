@@ -43,6 +43,10 @@ LOSS_MEANS = (
 )
 LOAD_MEANS = "load: multiple of the weight, in any direction, that the squeeze is certified for"
 PAYLOAD_MEANS = "payload kg: that multiple of the mass, for loads that grow slowly"
+ENOUGH_MEANS = (
+    "enough: the least --push-n, with the --tip-stiffness-n-per-m that was used or the least that "
+    "it takes; docs/execution.md says what it does not promise"
+)
 SLIPS = "first slips, predicted/simulated"
 SLIPS_MEAN = (
     "first slip: least multiple of the trials' loads at which a contact slips; above one none "
@@ -141,6 +145,8 @@ def _show(found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter:
         reporter.warn(
             f"and {len(lines) - TABLE_ROWS} more: {EXECUTIONS} (--out DIR) has all of them"
         )
+    if any(each.enough for each in found):
+        reporter.say(ENOUGH_MEANS)
     if any(not trial.survived for each in found if each.execution
            for trial in each.execution.of_kind("knock")):  # fmt: skip
         reporter.warn(knock_in_words(settings))
@@ -171,11 +177,11 @@ def _say_totals(
 
 
 def knock_in_words(settings: ExecutionSettings) -> str:
-    """Say which speed a knock gives the object, since its impulse does not depend on the mass."""
+    """Say which speed a knock gives the object."""
     return (
-        f"a knock of {settings.knock_n_s:g} N s would give a free object of "
-        f"{settings.mass_kg:g} kg {settings.knock_n_s / settings.mass_kg:.3g} m/s; the impulse is "
-        "not scaled to the mass, so choose it with --knock-n-s"
+        f"a knock of {settings.impulse_n_s:g} N s would give a free object of "
+        f"{settings.mass_kg:g} kg {settings.impulse_n_s / settings.mass_kg:.3g} m/s; choose it "
+        "with --knock-n-s"
     )
 
 

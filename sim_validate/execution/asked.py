@@ -92,9 +92,8 @@ def _check_names(given: Mapping[str, Any], known: tuple[str, ...], where: str) -
 
 def execution_table(asked: AskedExecution) -> dict[str, Any]:
     """Return every setting as the table that gives the same settings when it is read."""
-    table = asdict(asked.settings)
-    if table["tip_radius_m"] is None:
-        del table["tip_radius_m"]  # TOML has no null
+    given = asdict(asked.settings).items()
+    table = {name: value for name, value in given if value is not None}  # TOML has no null
     if asked.density_kg_m3 is None:
         return table
     del table[MASS]

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
-from grasp_core.checked import instance, several, whole
+from grasp_core.checked import instance, several, switch, whole
 from grasp_core.closure.contact_arrays import FEWEST, contact_arrays, stacked
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.best_squeeze import BestSqueeze, best_squeeze
 from grasp_core.execution.grips import Grip
-from grasp_core.execution.loads import any_direction
+from grasp_core.execution.loads import LoadSet, any_direction
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
@@ -32,6 +32,7 @@ from sim_validate.execution.bench import HeldBench, HeldMotion, motions_joined
 from sim_validate.execution.confirming import confirming_bench, run_again
 from sim_validate.execution.controls import run_controls
 from sim_validate.execution.drives import parted
+from sim_validate.execution.enough import Choose, NoSqueezeError, SceneOf, found_enough
 from sim_validate.execution.gate.gate import require_faithful_execution
 from sim_validate.execution.predictions import held_dynamics, predicted_losses
 from sim_validate.execution.settings import ExecutionSettings
@@ -57,6 +58,7 @@ def execute(  # noqa: PLR0913 - `mass_kg` is the one setting that has no default
     mass_kg: float | None = None,
     threads: int = 1,
     physics: PhysicsSettings | None = None,
+    enough: bool = True,
 ) -> Execution:
     """Simulate a grasp as a robot would execute it, and predict the outcome.
 
@@ -69,6 +71,8 @@ def execute(  # noqa: PLR0913 - `mass_kg` is the one setting that has no default
         threads: Number of the simulator's threads; results do not depend on it.
         physics: Settings of the simulator; None for those that suit springs and masses. Gravity
             must be that of the settings.
+        enough: Whether to find the push that would be enough where the object is lost or has no
+            squeeze (see `Execution.enough`), which takes up to a second.
 
     Raises:
         InputError: A number is out of range.
@@ -77,11 +81,40 @@ def execute(  # noqa: PLR0913 - `mass_kg` is the one setting that has no default
     """
     settings = _settings(settings, mass_kg)
     whole(threads, "threads", least=1, most=MOST_THREADS)
-    best = chosen_squeeze(body, grasp, friction, settings)
-    return executed(body, best, held_scene(body, best.grip, settings, physics), settings, threads)
+    switch(enough, "enough")
+    held = _contacts(body, grasp)
+    return executed(
+        body, settings,
+        lambda own, loads: chosen_squeeze(body, held, friction, own, loads),
+        lambda own, best: held_scene(body, best.grip, own, physics),
+        threads=threads, enough=enough,
+    )  # fmt: skip
 
 
 def executed(
+    body: Polyhedron, settings: ExecutionSettings, choose: Choose, scene_of: SceneOf, *,
+    threads: int, enough: bool,
+) -> Execution:  # fmt: skip
+    """Choose the squeeze, simulate its trials, and find what would be enough where they are lost.
+
+    Raises:
+        NoForcesError: No squeeze carries the weight, or the grip is unstable under the best one.
+        UnfaithfulError: The simulator fails on a case with a known answer, or failed in a trial.
+    """
+    try:
+        best = choose(settings, None)
+    except NoForcesError as error:
+        if not enough:
+            raise
+        answer = found_enough(body, settings, choose, scene_of)
+        raise NoSqueezeError(str(error), answer) from error
+    found = simulated(body, best, scene_of(settings, best), settings, threads)
+    if found.survived or not found.trials or not enough:
+        return found
+    return replace(found, enough=found_enough(body, settings, choose, scene_of))
+
+
+def simulated(
     body: Polyhedron, best: BestSqueeze, scene: HeldScene, settings: ExecutionSettings, threads: int
 ) -> Execution:
     """Simulate the trials of a scene with the squeeze that was chosen for it, and judge each.
@@ -107,6 +140,7 @@ def executed(
         controls=run_controls(bench, best, dynamics.lowest_frequency),
         skipped=skipped,
         physics=scene.physics,
+        tip_radius_m=best.grip.tip_radius_m,
     )
 
 
@@ -121,13 +155,36 @@ def _settings(settings: ExecutionSettings | None, mass_kg: float | None) -> Exec
 
 def chosen_squeeze(
     body: Polyhedron, grasp: Grasp | Iterable[Contact], friction: ArrayLike,
-    settings: ExecutionSettings,
+    settings: ExecutionSettings, loads: LoadSet | None = None,
 ) -> BestSqueeze:  # fmt: skip
     """Choose the squeeze that carries the most of the weight in any direction.
+
+    With loads it is the one of the least push that survives them, however hard fingers may push.
 
     Raises:
         InputError: A number is out of range.
         NoForcesError: No squeeze carries any weight, or the grip is unstable under the best one.
+    """
+    contacts = _contacts(body, grasp)
+    radius = tip_radius(body, contacts, settings)
+    best = best_squeeze(
+        body, contacts, friction, loads or any_direction(settings.mass_kg),
+        max_push_n=settings.push_n if loads is None else None,
+        stiffness=settings.stiffness_n_per_m, tip_radius_m=radius,
+    )  # fmt: skip
+    if best.scale == 0.0:
+        raise NoForcesError(
+            "no squeeze carries any part of the weight in every direction; use other contacts or "
+            "more friction"
+        )
+    return best
+
+
+def _contacts(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> tuple[Contact, ...]:
+    """Return the contacts of a grasp, or those that are given.
+
+    Raises:
+        InputError: They are no contacts, fewer than two, or those of another object.
     """
     check_body(body)
     if isinstance(grasp, Grasp):
@@ -137,17 +194,7 @@ def chosen_squeeze(
     contacts = several(listed, each, "grasp", "Contact values")
     if len(contacts) < FEWEST:
         raise InputError(f"grasp: at least two contacts are needed, got {len(contacts)}")
-    radius = tip_radius(body, contacts, settings)
-    best = best_squeeze(
-        body, contacts, friction, any_direction(settings.mass_kg), max_push_n=settings.push_n,
-        stiffness=settings.stiffness_n_per_m, tip_radius_m=radius,
-    )  # fmt: skip
-    if best.scale == 0.0:
-        raise NoForcesError(
-            "no squeeze carries any part of the weight in every direction; use other contacts or "
-            "more friction"
-        )
-    return best
+    return contacts
 
 
 def tip_radius(body: Polyhedron, contacts: Sequence[Contact], settings: ExecutionSettings) -> float:

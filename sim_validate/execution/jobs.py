@@ -10,6 +10,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Grasp
 from scenes.physics import PhysicsSettings
+from sim_validate.execution.enough import Enough, NoSqueezeError
 from sim_validate.execution.execute import chosen_squeeze, execute, held_scene
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import Execution, ExecutionTrial
@@ -27,6 +28,8 @@ class ExecutionJob:
     physics: Mapping[str, object] = field(default_factory=dict[str, object])
     """Settings of the simulator that differ from the usual ones, by name."""
     threads: int = 1
+    enough: bool = True
+    """Whether to find the push that would be enough where the object is lost."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -41,6 +44,8 @@ class ExecutedGrasp(ByValue):
     """Trials and negative controls; None where no squeeze carries the weight."""
     reason: str | None = None
     """Why there is no execution: no squeeze carries the weight, or the best one is unstable."""
+    enough: Enough | None = None
+    """The push, and stiffness, that would be enough for the trials, as in `Execution.enough`."""
 
     @property
     def survived(self) -> bool:
@@ -102,7 +107,7 @@ def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
         UnfaithfulError: The simulator failed in a trial, or fails its checks.
     """
     grasp = job.grasp
-    found, reason = None, None
+    about = grasp.id, grasp.family, contacts_sha256(grasp.contacts)
     try:
         found = execute(
             job.body,
@@ -111,23 +116,28 @@ def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
             job.settings,
             physics=physics_of(job),
             threads=job.threads,
+            enough=job.enough,
         )
     except NoForcesError as error:
-        reason = str(error)
-    return ExecutedGrasp(grasp.id, grasp.family, contacts_sha256(grasp.contacts), found, reason)
+        answer = error.enough if isinstance(error, NoSqueezeError) else None
+        return ExecutedGrasp(*about, None, str(error), answer)
+    return ExecutedGrasp(*about, found, None, found.enough)
 
 
 def physics_of(job: ExecutionJob) -> PhysicsSettings | None:
     """Return the usual settings for the grasp's springs and masses with the job's changes.
 
     Returns:
-        The settings; None where the job changes nothing, and the usual ones are taken.
+        The settings; None where the job changes nothing, and the usual ones are taken, or where no
+        squeeze carries the weight.
 
     Raises:
         InputError: The grasp or a setting is refused.
-        NoForcesError: No squeeze carries the weight.
     """
     if not job.physics:
         return None
-    best = chosen_squeeze(job.body, job.grasp, job.friction, job.settings)
+    try:
+        best = chosen_squeeze(job.body, job.grasp, job.friction, job.settings)
+    except NoForcesError:
+        return None
     return replace(held_scene(job.body, best.grip, job.settings).physics, **job.physics)

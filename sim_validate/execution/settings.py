@@ -1,7 +1,7 @@
 """What users choose for executions: mass, springs, trials, and what counts as survival."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias, get_args
 
 from grasp_core.checked import (
@@ -25,6 +25,11 @@ TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misp
 or stops the palm, strikes the object, or closes fingers on an object that is not where it should
 be."""
 KINDS: tuple[TrialKind, ...] = get_args(TrialKind)
+KNOCK_M_PER_S = 1.0 / 6.0
+"""Speed that the usual knock gives a free object [m/s], 0.05 N s for 0.3 kg. So its load grows with
+the mass, as those of all other trials do, and a screw is not shot away."""
+KNOCK_DIGITS = 12
+"""Digits of the usual impulse."""
 LONGEST_S = 100.0
 """Longest duration of a lift or a stop [s]."""
 
@@ -62,8 +67,8 @@ class ExecutionSettings:
     """Deceleration of a stop [m/s^2]."""
     stop_from_m_per_s: float = 0.5
     """Speed before a stop [m/s]."""
-    knock_n_s: float = 0.05
-    """Impulse of a knock [N s]."""
+    knock_n_s: float | None = None
+    """Impulse of a knock [N s]; None for the mass times a sixth of a metre per second."""
     off_mm: float = 2.0
     """Distance of a misplaced object from where the fingers expect it [mm]."""
     off_deg: float = 2.0
@@ -88,6 +93,8 @@ class ExecutionSettings:
             number(getattr(self, name), name, least=0.0, most=LARGEST)
         if self.tip_radius_m is not None:
             positive(self.tip_radius_m, "tip_radius_m")
+        if self.knock_n_s is not None:
+            number(self.knock_n_s, "knock_n_s", least=0.0, most=LARGEST)
         instance(self.hand, HeldSettings, "hand")
         kinds = several(self.trials, _trial_kind, "trials", "names of trials")
         if not kinds:
@@ -103,6 +110,18 @@ class ExecutionSettings:
             )
         whole(self.misplacements, "misplacements", **BOUNDS["misplacements"])
         seed_of(self.seed)
+
+    @property
+    def impulse_n_s(self) -> float:
+        """Impulse of a knock: as given, or the usual one for the mass [N s]."""
+        if self.knock_n_s is not None:
+            return self.knock_n_s
+        return float(f"{KNOCK_M_PER_S * self.mass_kg:.{KNOCK_DIGITS}g}")
+
+    @property
+    def used(self) -> "ExecutionSettings":
+        """The same settings with the impulse that is used, as files keep them."""
+        return replace(self, knock_n_s=self.impulse_n_s)
 
     @property
     def most_m(self) -> float:
@@ -124,5 +143,5 @@ POSITIVE = (
     "mass_kg", "push_n", "stiffness_n_per_m", "lift_m", "stop_m_per_s2", "stop_from_m_per_s",
     "most_mm", "most_deg",
 )  # fmt: skip
-NOT_NEGATIVE = ("shake_g", "knock_n_s", "off_mm")
+NOT_NEGATIVE = ("shake_g", "off_mm")
 RANGES = ("lift_s", "shake_hz", "off_deg")

@@ -123,7 +123,7 @@ def _knocks(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     """Yield knocks along both sides of each axis, half the object's radius beside its middle."""
     for sign, axis in SIDES:
         point = 0.5 * layout.radius_m * np.eye(3)[(axis + 1) % 3]
-        drive = paths.knock(layout.gravity, sign * settings.knock_n_s * np.eye(3)[axis], point)
+        drive = paths.knock(layout.gravity, sign * settings.impulse_n_s * np.eye(3)[axis], point)
         yield Trial("knock", f"knock {_side(sign, axis)}", drive, 0, weighing=paths.WEIGHING)
 
 

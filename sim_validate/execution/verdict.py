@@ -7,6 +7,7 @@ from typing import Literal, TypeAlias
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from scenes.physics import PhysicsSettings
+from sim_validate.execution.enough import Enough
 from sim_validate.execution.settings import ExecutionSettings, TrialKind
 from sim_validate.execution.trials import Skipped
 
@@ -82,6 +83,11 @@ class Execution(ByValue):
     """Kinds of trials that were asked for and left out, with the reasons."""
     physics: PhysicsSettings | None = None
     """Settings of the simulator, where they are known."""
+    tip_radius_m: Array | None = None
+    """Radii of the fingertips that were used, (k,) [m], where they are known."""
+    enough: Enough | None = None
+    """The push, and stiffness, that would be enough for the trials; None where all were survived,
+    or it was not asked for."""
 
     @property
     def survived(self) -> bool:
@@ -154,7 +160,17 @@ def losses_in_words(found: Execution, settings: ExecutionSettings | None = None)
     """Say which trials were not survived, or that there was none to survive."""
     if not found.trials:
         return ["no trial is possible, so nothing was survived"]
-    return [trial_in_words(trial, settings) for trial in found.trials if not trial.survived]
+    said = [] if found.enough is None else [loss_in_words(found)]
+    return said + [trial_in_words(each, settings) for each in found.trials if not each.survived]
+
+
+def loss_in_words(found: Execution) -> str:
+    """Say how many trials were lost, and which push would be enough, where that was asked for."""
+    lost = sum(not trial.survived for trial in found.trials)
+    said = f"lost in {lost} of {len(found.trials)} trials"
+    if found.least_predicted_loss >= 1.0:
+        said += ", none of which was predicted, so it may not be for want of push"
+    return said if found.enough is None else f"{said}; {found.enough}"
 
 
 def held_controls_in_words(found: Execution) -> list[str]:

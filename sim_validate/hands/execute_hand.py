@@ -7,18 +7,19 @@ is replanned. Palm and links touch the object where it comes to them.
 
 from dataclasses import replace
 
-from grasp_core.checked import instance, whole
+from grasp_core.checked import instance, switch, whole
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.best_squeeze import BestSqueeze, searched
 from grasp_core.execution.grips import unsqueezed
-from grasp_core.execution.loads import any_direction
+from grasp_core.execution.loads import LoadSet, any_direction
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_grips import hand_grip
 from grasp_core.hands.reach import HandReach
 from grasp_core.hands.stance import stance_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
+from scenes.execution.held_mjcf import HeldScene
 from scenes.hands.held_hand import finger_springs, servo_stiffness, strong_motors
 from scenes.hands.held_hand_mjcf import held_hand_scene
 from sim_validate.execution.execute import executed, surface_reach
@@ -37,6 +38,7 @@ def execute_hand(  # noqa: PLR0913 - `mass_kg` is the one setting that has no de
     *,
     mass_kg: float | None = None,
     threads: int = 1,
+    enough: bool = True,
 ) -> Execution:
     """Simulate a grasp as a hand would execute it, and predict the outcome.
 
@@ -51,6 +53,8 @@ def execute_hand(  # noqa: PLR0913 - `mass_kg` is the one setting that has no de
             those of the hand.
         mass_kg: Mass of the object, in place of that of the settings [kg].
         threads: Number of the simulator's threads; results do not depend on it.
+        enough: Whether to find the push within the motors' torques that would be enough where the
+            object is lost or has no squeeze (see `Execution.enough`), which takes up to a second.
 
     Raises:
         InputError: Hand, object and pose do not belong together, a finger cannot give in all
@@ -69,12 +73,17 @@ def execute_hand(  # noqa: PLR0913 - `mass_kg` is the one setting that has no de
             "execute_hand: expected mass_kg or settings, got neither; give mass_kg=0.3"
         )
     whole(threads, "threads", least=1, most=MOST_THREADS)
-    best = hand_squeeze(hand, body, reach, friction, settings)
-    scene = held_hand_scene(
-        hand, body, reach, best.grip, settings.mass_kg, settings.hand,
-        surface_reach(body, best.grip, settings),
+    switch(enough, "enough")
+
+    def scene_of(own: ExecutionSettings, best: BestSqueeze) -> HeldScene:
+        near = surface_reach(body, best.grip, own)
+        return held_hand_scene(hand, body, reach, best.grip, own.mass_kg, own.hand, near)
+
+    return executed(
+        body, settings,
+        lambda own, loads: hand_squeeze(hand, body, reach, friction, own, loads),
+        scene_of, threads=threads, enough=enough,
     )  # fmt: skip
-    return executed(body, best, scene, settings, threads)
 
 
 def hand_execution_settings(mass_kg: float) -> ExecutionSettings:
@@ -90,9 +99,12 @@ def hand_execution_settings(mass_kg: float) -> ExecutionSettings:
 
 
 def hand_squeeze(
-    hand: Hand, body: Polyhedron, reach: HandReach, friction: float, settings: ExecutionSettings
-) -> BestSqueeze:
+    hand: Hand, body: Polyhedron, reach: HandReach, friction: float, settings: ExecutionSettings,
+    loads: LoadSet | None = None,
+) -> BestSqueeze:  # fmt: skip
     """Choose the squeeze within the motors' torques that carries most of the weight.
+
+    With loads it is the one of the least push within these torques that survives them.
 
     Raises:
         InputError: Hand, object and pose do not belong together, or a number is out of range.
@@ -110,7 +122,8 @@ def hand_squeeze(
         stiffness=finger_springs(motors, settings.stiffness_n_per_m),
     )  # fmt: skip
     start = hand_grip(hand, stance, loose, servo_stiffness(motors, settings.stiffness_n_per_m))
-    best = searched(start, any_direction(settings.mass_kg), settings.push_n, motors)
+    most = settings.push_n if loads is None else None
+    best = searched(start, loads or any_direction(settings.mass_kg), most, motors)
     if best.scale == 0.0:
         raise NoForcesError(
             "no squeeze within the motors' torques carries any part of the weight in every "

@@ -7,6 +7,7 @@ from grasp_core.errors import InputError, NoForcesError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
+from sim_validate.execution.enough import Enough, NoSqueezeError
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import Execution
 from sim_validate.hands.execute_hand import execute_hand
@@ -37,6 +38,8 @@ class ExecutedHand:
     """The trials; None where the grasp cannot be executed."""
     refused: str = ""
     """Why the grasp cannot be executed; empty if it was."""
+    enough: Enough | None = None
+    """The push, and stiffness, that would be enough for the trials, as in `Execution.enough`."""
 
     @property
     def survived(self) -> bool:
@@ -78,5 +81,6 @@ def executed_by_hand(job: HandJob) -> ExecutedHand:
     try:
         found = execute_hand(job.hand, job.body, job.reach, job.friction, job.settings)
     except (InputError, NoForcesError) as error:
-        return ExecutedHand(job.reach.grasp, None, str(error))
-    return ExecutedHand(job.reach.grasp, found)
+        answer = error.enough if isinstance(error, NoSqueezeError) else None
+        return ExecutedHand(job.reach.grasp, None, str(error), answer)
+    return ExecutedHand(job.reach.grasp, found, enough=found.enough)

@@ -5,9 +5,9 @@ Numbers that JSON lacks are null: a first slip that never comes is infinite.
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from grasp_core.arrays import frozen
 from grasp_core.by_value import ByValue
@@ -21,12 +21,14 @@ from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from scenes.physics import PhysicsSettings
+from sim_validate.execution.enough import Enough
 from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import Skipped
 from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
 from sim_validate.records.executions_schema import (
     SCHEMA,
+    EnoughRecord,
     ExecutionRecord,
     ExecutionsFile,
     ExecutionsSummary,
@@ -102,7 +104,7 @@ def executions_to_json(
         "object": object_record(body),
         "friction": friction,
         "complete": complete,
-        "settings": asdict(settings),
+        "settings": asdict(settings.used),
         "summary": executions_summary(listed),
         "executions": [_record(grasp) for grasp in listed],
         "versions": {**versions()},
@@ -137,6 +139,8 @@ def _record(grasp: ExecutedGrasp) -> ExecutionRecord:
         "reason": grasp.reason,
         "load_multiple": None if found is None else found.load_multiple,
         "squeeze_n": None if found is None else found.squeeze.tolist(),
+        "tip_radius_m": tip_radii(found),
+        "enough": enough_record(grasp.enough),
         "trials": [] if found is None else [_trial_record(trial) for trial in found.trials],
         "controls": [] if found is None else [
             {"name": each.name, "let_go": each.let_go, "first_slip": each.first_slip}
@@ -147,6 +151,19 @@ def _record(grasp: ExecutedGrasp) -> ExecutionRecord:
         ],
         "physics": None if found is None or found.physics is None else found.physics.record(),
     }  # fmt: skip
+
+
+def tip_radii(found: Execution | None) -> list[float] | None:
+    """Return the radii of the fingertips that were used [m]; None where they are not known."""
+    radii = None if found is None else found.tip_radius_m
+    return None if radii is None else radii.tolist()
+
+
+def enough_record(found: Enough | None) -> EnoughRecord | None:
+    """Write the push that would be enough; a loss that never comes is null."""
+    if found is None:
+        return None
+    return cast("EnoughRecord", finite(asdict(found)))
 
 
 def _trial_record(trial: ExecutionTrial) -> ExecutionTrialRecord:
@@ -235,21 +252,43 @@ def _grasp(record: ExecutionRecord, settings: ExecutionSettings, where: Where) -
     else:
         found = None
         _require_nothing(record, where)
+    enough = enough_of(record["enough"], (*where, "enough"))
+    found = None if found is None else replace(found, enough=enough)
     grasp = ExecutedGrasp(
-        record["id"], record["family"], record["contacts_sha256"], found, record["reason"]
+        record["id"], record["family"], record["contacts_sha256"], found, record["reason"], enough
     )
     if grasp.survived != record["survived"]:
         said = "true" if grasp.survived else "false"
         raise InputError(
             f"{place([*where, 'survived'])}: expected {said}, by the trials, got the opposite"
         )
+    if grasp.survived and enough is not None:
+        raise InputError(f"{place([*where, 'enough'])}: expected null, as every trial was survived")
     return grasp
+
+
+def enough_of(record: EnoughRecord | None, where: Where) -> Enough | None:
+    """Make the push that would be enough from its record.
+
+    Raises:
+        InputError: The fields contradict each other.
+    """
+    if record is None:
+        return None
+    push, loss = record["push_n"], record["predicted_loss"]
+    try:
+        return Enough(
+            record["load_multiple"], push, record["stiffness_n_per_m"],
+            loss if push is None else _or_infinite(loss), record["reason"],
+        )  # fmt: skip
+    except InputError as error:
+        raise InputError(f"{place(where)}: {error}") from error
 
 
 def _require_nothing(record: ExecutionRecord, where: Where) -> None:
     """Refuse results of a grasp that was not executed."""
     results = {name: record[name] for name in (
-        "load_multiple", "squeeze_n", "physics", "trials", "controls", "skipped",
+        "load_multiple", "squeeze_n", "tip_radius_m", "physics", "trials", "controls", "skipped",
     )}  # fmt: skip
     for name, result in results.items():
         if result not in (None, []):
@@ -263,7 +302,9 @@ def _execution(record: ExecutionRecord, settings: ExecutionSettings, where: Wher
     if multiple is None or squeeze is None:
         name = "load_multiple" if multiple is None else "squeeze_n"
         raise InputError(f"{place([*where, name])}: null is not allowed where reason is null")
-    physics = record["physics"]
+    physics, radii = record["physics"], record["tip_radius_m"]
+    if radii is not None:
+        radii = frozen(radii, (len(squeeze),), place([*where, "tip_radius_m"]))
     return Execution(
         mass_kg=settings.mass_kg,
         squeeze=frozen(squeeze, (None, 3), place([*where, "squeeze_n"])),
@@ -290,6 +331,7 @@ def _execution(record: ExecutionRecord, settings: ExecutionSettings, where: Wher
         ),
         skipped=tuple(Skipped(each["kind"], each["reason"]) for each in record["skipped"]),
         physics=None if physics is None else _filled(PhysicsSettings, physics, (*where, "physics")),
+        tip_radius_m=radii,
     )
 
 

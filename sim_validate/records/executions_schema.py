@@ -48,6 +48,16 @@ class SkippedRecord(TypedDict):
     reason: str
 
 
+class EnoughRecord(TypedDict):
+    """Fields about the push that would be enough for the trials; null where none was found."""
+
+    load_multiple: Finite
+    push_n: Positive | None
+    stiffness_n_per_m: Positive | None
+    predicted_loss: Finite | None
+    reason: str | None
+
+
 class ExecutionRecord(TypedDict):
     """Fields about the execution of one grasp, or the reason why no squeeze holds the object."""
 
@@ -58,6 +68,8 @@ class ExecutionRecord(TypedDict):
     reason: str | None
     load_multiple: Finite | None
     squeeze_n: Annotated[list[Force], Field(min_length=FEWEST_CONTACTS)] | None
+    tip_radius_m: Annotated[list[Positive], Field(min_length=FEWEST_CONTACTS)] | None
+    enough: EnoughRecord | None
     trials: list[ExecutionTrialRecord]
     controls: list[ExecutionControlRecord]
     skipped: list[SkippedRecord]

@@ -16,6 +16,7 @@ from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from sim_validate.hands.hand_verdict import HandVerdict
 from sim_validate.hands.jobs import ExecutedHand
+from sim_validate.records.executions_json import enough_record, tip_radii
 from sim_validate.records.hand_model import model_record
 from sim_validate.records.reaches_schema import (
     AskedRecord,
@@ -125,10 +126,13 @@ def _record(hand: Hand, found: HandReach, planned: str, tried: HandTrials) -> Re
 def _executed(found: ExecutedHand) -> ExecutedHandRecord:
     execution = found.execution
     if execution is None:
-        return {"refused": found.refused, "execution": None}
+        return {
+            "refused": found.refused, "enough": enough_record(found.enough), "execution": None,
+        }  # fmt: skip
     losses = [trial.predicted_loss for trial in execution.trials]
     return {
         "refused": "",
+        "enough": enough_record(found.enough),
         "execution": {
             "mass_kg": execution.mass_kg,
             "survived": execution.survived,
@@ -138,6 +142,7 @@ def _executed(found: ExecutedHand) -> ExecutedHandRecord:
             "least_predicted_loss": min(losses) if losses else None,
             "payload_kg": execution.payload_kg,
             "squeeze_n": [_triple(force) for force in execution.squeeze],
+            "tip_radius_m": tip_radii(execution),
             "controls_held": [each.name for each in execution.controls if not each.let_go],
         },
     }

@@ -1,6 +1,6 @@
 """The fields of `reaches.json` with their types, for its writer and for whoever reads it."""
 
-from typing import Annotated, Literal, NotRequired
+from typing import Annotated, Any, Literal, NotRequired
 
 from pydantic import ConfigDict, Field, with_config
 from typing_extensions import TypedDict
@@ -8,6 +8,7 @@ from typing_extensions import TypedDict
 from grasp_core.hands.hand import FEWEST_FINGERS
 from grasp_core.hands.reach import ReachReason
 from grasp_core.values import FINGERS
+from sim_validate.records.executions_schema import EnoughRecord
 from sim_validate.records.hand_model import ModelRecord
 from sim_validate.records.verdicts_schema import Count, Finite, ObjectRecord, Positive
 
@@ -93,6 +94,8 @@ class HandExecutionRecord(TypedDict):
     """Largest mass that the squeeze is certified to carry slowly, in any direction."""
     squeeze_n: list[Triple]
     """Contact forces at rest, on the object."""
+    tip_radius_m: list[Positive] | None
+    """Radii of the fingertips, one for each force."""
     controls_held: list[str]
     """Names of negative controls that did not slip, though they must; empty if all did."""
 
@@ -102,6 +105,8 @@ class ExecutedHandRecord(TypedDict):
 
     refused: str
     """Why the grasp cannot be executed; empty if it was."""
+    enough: EnoughRecord | None
+    """The push within the motors' torques that would be enough; null where all was survived."""
     execution: HandExecutionRecord | None
 
 
@@ -157,6 +162,8 @@ class AskedRecord(TypedDict):
     clearance_m: NotNegative
     starts: Count
     seed: Count
+    execution: NotRequired[dict[str, Any]]
+    """Settings of the executions, as in `executions.json`; absent where none were asked for."""
 
 
 @with_config(ConfigDict(strict=True, extra="forbid"))

@@ -163,7 +163,7 @@ def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
     """
     words = ["graspproof", "execute", path, "--grasp", grasp_id]
     words += ["--friction", repr(executions.friction)]
-    usual = ExecutionSettings(executions.settings.mass_kg)
+    usual = ExecutionSettings(executions.settings.mass_kg).used
     for name, flag in FLAGS.items():
         value = attrgetter(name)(executions.settings)
         if name in ALWAYS or value != attrgetter(name)(usual):
@@ -186,7 +186,7 @@ def _facts(executions: Executions, found: Execution | None) -> Iterable[tuple[st
     settings = executions.settings
     yield "Mass", f"{settings.mass_kg:.4g} kg, at friction {executions.friction:g}"
     yield "Push of a finger", f"at most {settings.push_n:.4g} N"
-    yield "Springs", _springs(settings)
+    yield "Springs", _springs(settings, found)
     yield "Counts as held", f"up to {settings.most_mm:g} mm and {settings.most_deg:g} deg"
     if found is not None:
         sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(found.squeeze, axis=1))
@@ -199,12 +199,14 @@ def _facts(executions: Executions, found: Execution | None) -> Iterable[tuple[st
         if found.load_multiple >= 1.0:
             spare = f"{found.load_multiple - 1.0:.3g} g in any direction, if it grows slowly"
             yield "So the palm may accelerate by", spare
+        if found.enough is not None:
+            yield "What would be enough", str(found.enough)
 
 
-def _springs(settings: ExecutionSettings) -> str:
+def _springs(settings: ExecutionSettings, found: Execution | None) -> str:
     tips = f"fingertips of {MILLI * settings.hand.tip_mass_kg:.4g} g"
-    if settings.tip_radius_m is not None:
-        tips += f" and {MILLI * settings.tip_radius_m:.4g} mm radius"
+    if found is not None and found.tip_radius_m is not None:
+        tips += f" and {MILLI * float(found.tip_radius_m.max()):.4g} mm radius"
     return f"{settings.stiffness_n_per_m:.5g} N/m, {tips}"
 
 

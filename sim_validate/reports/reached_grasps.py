@@ -9,6 +9,7 @@ from grasp_core.short_text import counted
 from grasp_core.values import Grasp
 from scenes.drawing.hands.posed_hands import PosedHand, posed_hand
 from scenes.drawing.pages import number
+from sim_validate.records.executions_json import enough_of
 from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record
 
 if TYPE_CHECKING:
@@ -181,6 +182,8 @@ def _executed(tried: "ExecutedHandRecord") -> Iterable[tuple[str, str, str]]:
     loss = found["least_predicted_loss"]
     yield "Least predicted loss", "none" if loss is None else number(loss), LOSS
     yield "Payload of the squeeze", f"{number(found['payload_kg'])} kg", PAYLOAD
+    if (enough := enough_of(tried["enough"], ("executed", "enough"))) is not None:
+        yield "What would be enough", str(enough), ""
 
 
 def _found(value: object) -> str:

@@ -97,7 +97,7 @@ def measure(unit):
     body, settings = held.body_of(case.source), settings_of(mass_kg)
     begun = time.process_time()
     try:
-        done = sv.execute(body, case.grasp, held.FRICTION, settings)
+        done = sv.execute(body, case.grasp, held.FRICTION, settings, enough=False)
     except gc.NoForcesError:
         return None
     seconds = time.process_time() - begun
@@ -111,7 +111,8 @@ def measure(unit):
     kept, closed = {}, np.zeros(2, dtype=int)
     for off in OFFS_MM:
         other = replace(settings, trials=("misplaced",), off_mm=off, off_deg=0.0)
-        kept[off] = sv.execute(body, case.grasp, held.FRICTION, other).survival("misplaced")
+        done = sv.execute(body, case.grasp, held.FRICTION, other, enough=False)
+        kept[off] = done.survival("misplaced")
         closed += inside_regions(body, case.grasp, other)
     return replace(found, kept=kept, closed=(int(closed[0]), int(closed[1])))
 

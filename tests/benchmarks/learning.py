@@ -40,6 +40,7 @@ limit = 1
 [execution]
 mass_kg = 0.5
 trials = ["weight", "knock"]
+knock_n_s = 0.05
 [learning]
 friction_near = 1
 friction_above = 1

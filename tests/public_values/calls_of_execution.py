@@ -16,6 +16,7 @@ from tests.public_values.bad_values import (
     POSITIVE,
     SEED,
     SEVERAL,
+    SWITCH,
     VALUE,
     WORD,
     array,
@@ -120,7 +121,7 @@ CALLS = [
         "shake_hz": POSITIVE | {"a minute's cycle": 1.0 / 60.0, "two samples": 100.0},
         "stop_m_per_s2": POSITIVE | {"for ages": 1e-6},
         "stop_from_m_per_s": POSITIVE | {"for ages": 1e6},
-        "knock_n_s": NOT_NEGATIVE,
+        "knock_n_s": optional(NOT_NEGATIVE),
         "off_mm": NOT_NEGATIVE,
         "off_deg": NOT_NEGATIVE | {"a whole turn": 360.0},
         "misplacements": AT_LEAST_ONE,
@@ -138,5 +139,6 @@ CALLS = [
         "mass_kg": optional(POSITIVE),
         "threads": AT_LEAST_ONE,
         "physics": optional(VALUE) | {"other gravity": tilted()},
+        "enough": SWITCH,
     }),
 ]  # fmt: skip

@@ -78,6 +78,7 @@ CALLS = [
     Call("sv.execute_hand", lambda: standing() | {"mass_kg": 0.1}, {
         "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": FRICTION,
         "settings": optional(VALUE), "mass_kg": POSITIVE, "threads": AT_LEAST_ONE,
+        "enough": SWITCH,
     }, succeeds_in="tests/sim_validate/hands/test_execute_hand.py"),
     Call("gc.load_hand", lambda: {"name": "leap"}, {"name": WORD}),
     Call("gc.reach_with", reaching, {

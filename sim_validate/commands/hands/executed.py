@@ -7,7 +7,11 @@ from grasp_core.hands.reach import HandReach
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
-from sim_validate.execution.verdict import Execution, held_controls_in_words
+from sim_validate.execution.verdict import (
+    Execution,
+    held_controls_in_words,
+    loss_in_words,
+)
 from sim_validate.hands.execute_hand import hand_execution_settings
 from sim_validate.hands.jobs import ExecutedHand, HandJob, executed_by_hands
 
@@ -52,6 +56,8 @@ def show_executed(results: Mapping[str, ExecutedHand], reporter: Reporter) -> No
             continue
         for sentence in held_controls_in_words(each.execution):
             reporter.warn(f"{each.grasp}: {sentence}")
+        if each.enough is not None:
+            reporter.warn(f"{each.grasp}: {loss_in_words(each.execution)}")
 
 
 def _row(grasp: str, found: Execution | None) -> tuple[str, ...]:

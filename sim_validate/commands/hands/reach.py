@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 from grasp_core.execution.carrying_hand import HandPayload
 from grasp_core.files.text_files import write_text
@@ -26,6 +26,7 @@ from sim_validate.commands.hands.simulated import (
 from sim_validate.commands.judging.by_protocols import judge_hands
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import REACHES, remove_reaches
+from sim_validate.hands.execute_hand import hand_execution_settings
 from sim_validate.parallel.compiling_hands import compile_for_hands, must_compile
 from sim_validate.parallel.reaching import ReachJob, reached
 from sim_validate.records.grasps import grasp_with_id
@@ -86,6 +87,8 @@ def _reach(
         "starts": command.starts,
         "seed": command.seed,
     }
+    if command.mass_kg is not None:
+        asked["execution"] = asdict(hand_execution_settings(command.mass_kg).used)
     found: list[HandReach] = []
     tried = HandTrials()
     if jobs and must_compile():

@@ -148,7 +148,7 @@ class _Making:
             return None
         try:
             settings, learning = asked.settings_for(body), self.unit.config.learning
-            job = ExecutionJob(body, grasp, self.unit.friction, settings)
+            job = ExecutionJob(body, grasp, self.unit.friction, settings, enough=False)
             return executed_by(
                 lambda each: executed_grasp(replace(job, settings=each)), settings,
                 () if learning is None else learning.seeds,

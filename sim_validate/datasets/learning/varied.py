@@ -122,7 +122,7 @@ def _executed_with(variant: Variant, settings: ExecutionSettings) -> ExecutedGra
     contacts = variant.seated.contacts
     found, reason = None, None
     try:
-        found = execute(variant.seated.body, contacts, variant.friction, settings)
+        found = execute(variant.seated.body, contacts, variant.friction, settings, enough=False)
     except NoForcesError as error:
         reason = str(error)
     family = variant.proved.family if isinstance(variant.proved, Grasp) else ""

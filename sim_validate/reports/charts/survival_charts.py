@@ -17,15 +17,13 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from scenes.drawing.canvas import figure_of
 from scenes.drawing.flat.colours import BAD, FINGERS, GOOD, INK, NEUTRAL
 from scenes.drawing.flat.panels import ROW, SMALL, Entry, Panel, Shape, keyed, marker
 from scenes.drawing.flat.scales import Scale
 from scenes.drawing.flat.sheets import Area, Line, Mark, Sheet, Words
-from sim_validate.execution import paths
+from sim_validate.execution.enough import accelerations_g
 from sim_validate.execution.jobs import ExecutedGrasp
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutionTrial
 from sim_validate.records.executions_json import Executions
 
@@ -123,32 +121,6 @@ def _by_kind(trials: Iterable[ExecutionTrial]) -> dict[str, list[ExecutionTrial]
         about = "about" if trial.name.startswith("shake about") else "along"
         found[f"shake {about}" if trial.kind == "shake" else trial.kind].append(trial)
     return found
-
-
-def accelerations_g(settings: ExecutionSettings) -> dict[str, float]:
-    """Compute the largest acceleration of each kind of trial [9.80665 m/s^2].
-
-    It is the palm's, at the object's radius where the palm turns. That of shakes is the one asked
-    for, which samples of the sinusoid miss by up to some per cent. For a knock it is that of the
-    object if nothing held it.
-    """
-    gravity, way = settings.hand.gravity, np.array([1.0, 0.0, 0.0])
-    stop = paths.stop(gravity, way, settings.stop_m_per_s2, settings.stop_from_m_per_s)
-    lift, _ = paths.lift(way, settings.lift_m, settings.lift_s)
-    knock = paths.knock(gravity, settings.knock_n_s * way, np.zeros(3))
-    return {
-        "weight": 0.0,
-        "misplaced": 0.0,
-        "lift": _largest(lift.accelerations),
-        "shake along": settings.shake_g,
-        "shake about": settings.shake_g,
-        "stop": _largest(stop.accelerations),
-        "knock": _largest(knock.wrenches) / settings.mass_kg,
-    }
-
-
-def _largest(values: Array) -> float:
-    return float(np.linalg.norm(values[:, :3], axis=1).max()) / GRAVITY_M_PER_S2
 
 
 def survival_sentence(executed: Sequence[Executions]) -> str:

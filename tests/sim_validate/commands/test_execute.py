@@ -5,12 +5,15 @@ import re
 from dataclasses import MISSING, fields, replace
 from typing import get_args
 
+import numpy as np
 import pytest
 
+import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.errors import UnfaithfulError
 from scenes.execution.held import HeldSettings
+from scenes.fingertips import fitting_radius
 from sim_validate.cli import execution_flags
 from sim_validate.cli.execution_flags import DENSITY_KG_M3, TRIALS, UPRIGHT, Executing, Tips
 from sim_validate.cli.exit_codes import Exit
@@ -85,8 +88,19 @@ def test_a_grasp_that_does_not_survive_is_a_result(capsys):
     assert re.search(
         r"^c-0-1-2-7: weight: (.*too far after a slip|dropped), moved [\d.e+]+ mm", said.err, re.M
     )
-    (grasp,) = sv.load_executions("executions.json").grasps
+    found = sv.load_executions("executions.json")
+    (grasp,) = found.grasps
     assert not grasp.survived
+    assert f"c-0-1-2-7: lost in 1 of 1 trials; {grasp.enough}\n" in said.err
+    assert "enough: the least --push-n, with the --tip-stiffness" in said.out
+    assert grasp.execution.enough == grasp.enough
+    planned = gc.load_grasps("grasps.json").grasps[0]
+    usual = fitting_radius(scenes.example_object("wedge"), planned.positions, planned.normals)
+    assert found.settings.tip_radius_m is None
+    assert grasp.execution.tip_radius_m == pytest.approx(np.full(4, usual))
+    again = [*words, "--push-n", repr(grasp.enough.push_n)]
+    again += ["--tip-stiffness-n-per-m", repr(grasp.enough.stiffness_n_per_m)]
+    assert main([*again, "--out", "again"]) == Exit.GOOD
     (trial,) = grasp.execution.trials
     assert trial.fate in {"slipped", "dropped"}
     assert trial.predicted_first_slip == pytest.approx(grasp.execution.load_multiple, rel=0.05)
@@ -97,7 +111,7 @@ def test_where_knocks_fail_the_speed_that_they_give_is_told(capsys):
     words = ["execute", "grasps.json", "--mass-kg", "0.01", "--limit", "1", *QUICK]
     assert main([*words, "--knock-n-s", "0.4"]) == Exit.NEGATIVE
     said = capsys.readouterr().err
-    assert "a knock of 0.4 N s would give a free object of 0.01 kg 40 m/s; the impulse is" in said
+    assert "a knock of 0.4 N s would give a free object of 0.01 kg 40 m/s; choose" in said
     assert re.search("knock [+-][xyz]: (.* too far after a slip|dropped), moved", said)
 
 
@@ -109,6 +123,8 @@ def test_a_grasp_without_a_squeeze_is_a_result_with_its_reason(capsys):
     first, second = found.grasps
     assert found.friction == 0.03
     assert first.execution is None
+    assert first.enough.push_n is None
+    assert str(first.enough) in first.reason
     assert first.reason.startswith("no squeeze carries any part of the weight")
     assert not first.survived
     assert second.execution is not None

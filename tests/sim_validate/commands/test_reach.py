@@ -258,6 +258,10 @@ def test_a_hand_executes_the_grasps_that_it_reaches(grasps, tmp_path, capsys):
         assert found["survived"] == (not found["lost"])
         assert found["controls_held"] == []
         assert found["payload_kg"] > 0.05
+        assert found["tip_radius_m"] == [0.012] * len(found["squeeze_n"])
+        assert (each["executed"]["enough"] is None) == found["survived"]
+    assert record["asked"]["execution"]["knock_n_s"] == pytest.approx(0.05 / 6.0)
+    assert record["asked"]["execution"]["mass_kg"] == 0.05
     survived = [each for each in reached if each["executed"]["execution"]["survived"]]
     assert f"{len(survived)} of {len(reached)} grasps survived every trial with the hand" in said
     assert main(["report", str(tmp_path), "-q"]) == Exit.GOOD
@@ -269,6 +273,32 @@ def test_a_hand_executes_the_grasps_that_it_reaches(grasps, tmp_path, capsys):
     first = (tmp_path / "report" / "index.html").read_text()
     assert said in first
     assert "hand resists most" not in first  # nothing was simulated for it
+
+
+def test_where_a_hand_loses_the_object_what_would_be_enough_is_said(grasps, tmp_path, capsys):
+    shutil.copy(grasps, tmp_path / "grasps.json")
+    words = ["reach", str(tmp_path / "grasps.json"), "--hand", "allegro", "--limit", "1"]
+    words += ["--mass-kg", "2", "--torque-limit-n-m", "0.5", "--out", str(tmp_path)]
+    assert main(words) == Exit.NEGATIVE
+    record = record_of(ReachesFile, (tmp_path / REACHES).read_text(), REACHES, schema=1)
+    (one,) = record["reaches"]
+    enough = one["executed"]["enough"]
+    assert enough["push_n"] is None
+    assert enough["reason"].startswith("it is proved that no balanced squeeze within the torques")
+    assert enough["reason"] in capsys.readouterr().err
+    assert main(["report", str(tmp_path), "-q"]) == Exit.GOOD
+    page = (tmp_path / "report" / "grasps" / f"{one['id']}.html").read_text()
+    assert "What would be enough" in page
+
+
+def test_a_hand_and_fingertips_take_the_same_masses(grasps, capsys):
+    """Both refuse the same values in the same words."""
+    for value in ("0", "1e-10", "2e9", "nan"):
+        said = []
+        for command in ("reach", "execute"):
+            assert main([command, str(grasps), "--mass-kg", value]) == Exit.USAGE
+            said.append(capsys.readouterr().err.replace(command, ""))
+        assert said[0] == said[1]
 
 
 def test_a_hand_too_weak_for_an_object_says_so(grasps, tmp_path, capsys):

@@ -1,5 +1,6 @@
 """Settings of executions; `tests/public_values` tries bad values of each."""
 
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
@@ -32,3 +33,13 @@ def test_the_duration_of_a_stop_is_limited():
     assert sv.ExecutionSettings(0.1, stop_m_per_s2=0.01, stop_from_m_per_s=1.0).seed == 0
     with pytest.raises(gc.InputError, match=r"stop_from_m_per_s .* at most 100 s, got 200 s"):
         sv.ExecutionSettings(0.1, stop_m_per_s2=0.01, stop_from_m_per_s=2.0)
+
+
+@pytest.mark.parametrize(("mass_kg", "impulse"), [(0.3, 0.05), (0.0003, 5e-5), (6.0, 1.0)])
+def test_the_usual_knock_gives_every_mass_the_same_speed(mass_kg, impulse):
+    usual = sv.ExecutionSettings(mass_kg)
+    assert usual.impulse_n_s == usual.used.knock_n_s == impulse
+    assert replace(usual, mass_kg=0.3).impulse_n_s == 0.05
+    given = sv.ExecutionSettings(mass_kg, knock_n_s=0.2)
+    assert given.impulse_n_s == given.used.knock_n_s == 0.2
+    assert sv.ExecutionSettings(mass_kg, knock_n_s=0.0).impulse_n_s == 0.0

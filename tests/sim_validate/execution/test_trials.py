@@ -80,7 +80,7 @@ def test_stops_and_knocks_come_from_every_side():
             ).sum(axis=0)
             ways.append(sums)
         sizes = np.linalg.norm(ways, axis=1)
-        expected = SETTINGS.stop_from_m_per_s if kind == "stop" else SETTINGS.knock_n_s
+        expected = SETTINGS.stop_from_m_per_s if kind == "stop" else SETTINGS.impulse_n_s
         assert sizes == pytest.approx(expected)
         assert np.linalg.matrix_rank(np.array(ways)) == 3
         assert np.sum(ways, axis=0) == pytest.approx(np.zeros(3), abs=1e-12)

@@ -69,6 +69,13 @@ def test_the_file_is_strict_json_with_all_settings():
     assert document["settings"] == json.loads(json.dumps(asdict(SETTINGS)))
     assert document["versions"]["mujoco"]
     first, second, third = document["executions"]
+    assert first["tip_radius_m"] == [0.004, 0.004, 0.004, 0.005]
+    assert first["enough"] == {
+        "load_multiple": 1.5, "push_n": 12.5, "stiffness_n_per_m": 4000.0, "predicted_loss": None,
+        "reason": None,
+    }  # fmt: skip
+    assert second["enough"] is None
+    assert third["enough"]["reason"] == "it is proved"
     assert first["physics"]["timestep"] == 0.00125
     assert first["controls"][1]["first_slip"] is None
     assert second["trials"][0]["simulated_first_slip"] is None
@@ -78,6 +85,13 @@ def test_the_file_is_strict_json_with_all_settings():
         "grasps": 3, "grasps_survived": 1, "grasps_without_squeeze": 1, "trials": 3,
         "trials_survived": 2, "controls": 4, "controls_let_go": 2,
     }  # fmt: skip
+
+
+def test_the_file_holds_the_impulse_that_was_used():
+    usual = replace(SETTINGS, knock_n_s=None)
+    text = executions_to_json(BODY, 0.5, usual, GRASPS, complete=True)
+    assert json.loads(text)["settings"]["knock_n_s"] == 0.05
+    assert executions_from_json(text).settings == usual.used
 
 
 def of_trial(**changes):
@@ -111,6 +125,24 @@ BAD = {
     "physics": (of_first(physics={"timestep": 1}), r"executions\[0\]\.physics: timestep must be"),
     "unknown": (of_first(physics={"speed": 1}), r"executions\[0\]\.physics\.speed: unknown key"),
     "reason": (of_first(reason="heavy"), r"executions\[0\]\.load_multiple: expected nothing"),
+    "radii": (of_first(tip_radius_m=[0.004] * 3), r"executions\[0\]\.tip_radius_m must have"),
+    "radius": (of_first(tip_radius_m=[0, 1, 1, 1]), r"tip_radius_m\[0\]: expected more than 0"),
+    "half": (
+        of_first(
+            enough={
+                "load_multiple": 2,
+                "push_n": 1,
+                "stiffness_n_per_m": None,
+                "predicted_loss": 1,
+                "reason": None,
+            }
+        ),
+        r"executions\[0\]\.enough: expected a push with its stiffness",
+    ),
+    "needless": (
+        lambda d: d["executions"][1].update(enough=d["executions"][0]["enough"]),
+        r"executions\[1\]\.enough: expected null, as every trial was survived",
+    ),
     "other": (lambda d: d.update(executions=d["versions"]), "executions: expected a list"),
 }
 
