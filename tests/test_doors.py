@@ -27,9 +27,8 @@ DOORS = {
     "qpsolvers": "grasp_core/solvers/qp.py",
     "scipy.optimize": "grasp_core/solvers/nearest_point.py",
     "mujoco": (
-        "sim_validate/simulation/engine.py",
+        "scenes/silent_mujoco.py",
         "scenes/drawing/frames.py",
-        "scenes/hand_files/model.py",
     ),
     "mujoco_menagerie": "scenes/hand_files/menagerie.py",
     "PIL": "scenes/drawing/frames.py",

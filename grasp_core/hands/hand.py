@@ -21,6 +21,7 @@ from grasp_core.arrays import Array, frozen, frozen_each, frozen_units
 from grasp_core.by_value import ByValue
 from grasp_core.checked import BOUNDS, instance, number, several, text
 from grasp_core.errors import InputError
+from grasp_core.hands.couplings import Coupling, Drives, drives
 from grasp_core.short_text import counted, summary
 
 LARGEST_SIZE = 2.0
@@ -179,11 +180,18 @@ class Hand(ByValue):
     """Where the torque limits come from."""
     ignored_pairs: tuple[tuple[str, str], ...] = ()
     """Names of links that may overlap, besides neighbours in a chain; `palm` is the palm."""
+    couplings: tuple[Coupling, ...] = ()
+    """Joints that follow others."""
+    notes: tuple[str, ...] = ()
+    """How the hand differs from the file that it was read from, a sentence each."""
 
     def __post_init__(self) -> None:
         text(self.name, "name")
         text(self.torque_source, "torque_source")
-        for name, kind in (("palm", LinkShape), ("fingers", HandFinger), ("sources", str)):
+        for name, kind in (
+            ("palm", LinkShape), ("fingers", HandFinger), ("sources", str),
+            ("couplings", Coupling), ("notes", str),
+        ):  # fmt: skip
             each: Any = partial(instance, kind=kind, name=name)
             kept = several(getattr(self, name), each, name, f"{kind.__name__} values")
             object.__setattr__(self, name, kept)
@@ -201,6 +209,7 @@ class Hand(ByValue):
         if len(set(names)) < len(names):
             raise InputError("names of links must differ from each other and from 'palm'")
         object.__setattr__(self, "ignored_pairs", _pairs(self.ignored_pairs, set(names)))
+        _ = self.drives  # refuses couplings that cannot be
 
     @property
     def links(self) -> tuple[Link, ...]:
@@ -213,9 +222,25 @@ class Hand(ByValue):
         return tuple(link.joint for link in self.links)
 
     @property
+    def drives(self) -> Drives:
+        """Return which joints follow which, and the angles that all of them can have."""
+        joints = self.joints
+        ranges = np.array([[joint.lowest, joint.highest] for joint in joints])
+        return drives([joint.name for joint in joints], ranges, self.couplings)
+
+    @property
+    def free_joints(self) -> tuple[Joint, ...]:
+        """Return the joints that follow no other, in the order of `joints`."""
+        followers = {coupling.joint for coupling in self.couplings}
+        return tuple(joint for joint in self.joints if joint.name not in followers)
+
+    @property
     def ranges(self) -> Array:
-        """Return the lowest and highest angle of each joint, (joints, 2) [rad]."""
-        return np.array([[joint.lowest, joint.highest] for joint in self.joints])
+        """Return the lowest and highest angle of each joint, (joints, 2) [rad].
+
+        They are those of the joint itself, as far as all joints that are coupled with it allow.
+        """
+        return self.drives.ranges
 
     def with_torque_limits(self, limits_n_m: ArrayLike, source: str) -> "Hand":
         """Return the hand with other torque limits.

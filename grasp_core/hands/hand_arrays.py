@@ -37,7 +37,7 @@ class _Part:
 @lru_cache(maxsize=16)
 def hand_arrays(hand: Hand) -> HandArrays:
     """Lay a hand out as arrays; equal hands share them."""
-    links = hand.links
+    links, drives = hand.links, hand.drives
     parts = [_Part(-1, shape) for shape in hand.palm]
     parts += [_Part(i, shape) for i, link in enumerate(links) for shape in link.shapes]
     lengths = [len(finger.links) for finger in hand.fingers]
@@ -55,7 +55,10 @@ def hand_arrays(hand: Hand) -> HandArrays:
         positions=np.array([link.joint.position for link in links]),
         rotations=np.array([link.joint.rotation for link in links]),
         axes=np.array([link.joint.axis for link in links]),
-        ranges=hand.ranges,
+        ranges=drives.ranges,
+        drivers=drives.drivers,
+        ratios=drives.ratios,
+        offsets=drives.offsets,
         starts=starts,
         tip_centers=np.array([finger.tip.center for finger in hand.fingers]),
         tip_radii=np.array([finger.tip.radius for finger in hand.fingers]),

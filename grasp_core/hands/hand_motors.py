@@ -8,6 +8,10 @@ motor of a hand at rest applies
 
 under the acceleration a of gravity: the principle of virtual work. The first factors are the rows
 of the levers L of `Motors`, the second sum its gravity.
+
+Where joints follow others, the motor of the joint that they follow carries their torques too, by
+(2) of `couplings`: `Motors` has one row for each joint that follows none, and what joints that
+follow state as their limits does not count.
 """
 
 from itertools import pairwise
@@ -33,7 +37,7 @@ def hand_motors(
     """Derive how the contact forces of a grasp load the joints of a hand that stands in it.
 
     Args:
-        hand: The hand, with a torque limit for each joint.
+        hand: The hand, with a torque limit for each joint that follows no other.
         reach: The pose in which it stands (see `reach_with`).
         down: Direction of gravity in the object's frame, (3,), under which motors carry the links;
             None for links without weight.
@@ -41,7 +45,7 @@ def hand_motors(
             (see `Motors.in_any_orientation`).
 
     Returns:
-        Motors for the contacts of `reach`, in their order.
+        Motors for the contacts of `reach`, in their order, of the joints that follow no other.
 
     Raises:
         InputError: The hand is another one or not in a pose, a joint has no torque limit, a link
@@ -79,7 +83,8 @@ def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
     """Return where the hand's links are, the levers of its contacts and the torque limits."""
     found = places(hand, stance.joints, stance.palm_pose)
     points = np.array([contact.position for contact in stance.contacts])
-    return found, _levers(hand, found, points, stance.fingers), _limits(hand)
+    levers = hand.drives.carried(_levers(hand, found, points, stance.fingers))
+    return found, levers, _limits(hand)
 
 
 def direction(down: ArrayLike) -> Array:
@@ -96,13 +101,13 @@ def direction(down: ArrayLike) -> Array:
 
 
 def _limits(hand: Hand) -> Array:
-    missing = [joint.name for joint in hand.joints if joint.torque_limit_n_m is None]
+    missing = [joint.name for joint in hand.free_joints if joint.torque_limit_n_m is None]
     if missing:
         raise InputError(
             f"hand must have a torque limit for each joint, got none for {missing[0]}: "
             f"{hand.torque_source}; give your own with hand.with_torque_limits(limits, source)"
         )
-    return np.array([joint.torque_limit_n_m for joint in hand.joints])
+    return np.array([joint.torque_limit_n_m for joint in hand.free_joints])
 
 
 def chains(hand: Hand) -> list[range]:
@@ -123,7 +128,7 @@ def _levers(hand: Hand, found: HandPlaces, points: Array, fingers: tuple[int, ..
 
 
 def _weights(hand: Hand, found: HandPlaces) -> Array:
-    """Return what (1) multiplies with the acceleration, (joints, 3) [kg m].
+    """Return what (1) multiplies with the acceleration, for each motor, (joints, 3) [kg m].
 
     Raises:
         InputError: A link has no mass or centre of mass.
@@ -143,4 +148,4 @@ def _weights(hand: Hand, found: HandPlaces) -> Array:
             before = list(range(chain.start, number + 1))
             arms = center - found.link_positions[0, before]
             weights[before] -= link.mass_kg * cross(found.joint_axes[0, before], arms)
-    return weights
+    return hand.drives.carried(weights)

@@ -20,6 +20,12 @@ class HandArrays(NamedTuple):
     """Axes of the joints, (j, 3)."""
     ranges: Array
     """Lowest and highest angles, (j, 2) [rad]."""
+    drivers: Indices
+    """Joint that each joint follows, or its own number: see `couplings`, as for the next, (j,)."""
+    ratios: Array
+    """(j,)."""
+    offsets: Array
+    """(j,) [rad]."""
     starts: Indices
     """First link of each finger, and the number of links at the end, (f + 1,)."""
     tip_centers: Array

@@ -11,6 +11,9 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.values import Contact
 
+OBEYED = 1e-6
+"""By how much a joint may be off the angle that follows from another: rounding of a file [rad]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stance:
@@ -56,7 +59,29 @@ def stance_of(hand: Hand, reach: HandReach) -> Stance:
         raise InputError(
             f"reach must have a pose, got none for grasp {reach.grasp}: {reach.explanation}"
         )
+    off = float(np.abs(hand.drives.obeyed(reach.joints[None])[0] - reach.joints).max())
+    if hand.couplings and off > OBEYED:
+        raise InputError(
+            f"reach must have the joints that follow others where they follow them, got one off by "
+            f"{off:.3g} rad for grasp {reach.grasp}"
+        )
     return Stance(
         hand, reach.joints, reach.palm_pose, reach.contacts, tuple(reach.fingers.tolist()),
         reach.certificate.forces,
     )  # fmt: skip
+
+
+def uncoupled(hand: Hand, doing: str) -> Hand:
+    """Return a hand in which no joint follows another.
+
+    Raises:
+        InputError: Some do; what is done needs a motor at every joint.
+    """
+    instance(hand, Hand, "hand", "load_hand makes one")
+    if hand.couplings:
+        listed = ", ".join(f"{each.joint} follows {each.driver}" for each in hand.couplings)
+        raise InputError(
+            f"{doing} needs a hand with a motor at each joint, got {hand.name}, where {listed}; "
+            "reach_with, hand_motors and hand_payload take such hands"
+        )
+    return hand

@@ -127,4 +127,7 @@ def _captioned(pixels: np.ndarray, caption: str) -> Image.Image:
 
 
 if __name__ == "__main__":
+    quiet = mujoco.MjLogConfig.get()
+    quiet.logto_file = False  # MUJOCO_LOG.TXT in the working folder
+    mujoco.MjLogConfig.set(quiet)
     main(*sys.argv[1:]) if sys.argv[1:] else try_out()

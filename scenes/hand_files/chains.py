@@ -6,7 +6,6 @@ stays where the model's reference pose has it, fixed to the link or palm that ca
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -37,7 +36,8 @@ class Chains:
     """The palm's body."""
     tips: tuple[Tip, ...]
     joints: tuple[tuple[int, ...], ...]
-    """For each finger its joints, from the palm outwards."""
+    """For each finger its joints, from the palm outwards; fingers may have the first ones in
+    common."""
     owners: tuple[int, ...]
     """For each body, the joint that moves it, -1 for the palm's, -2 where it is no part of it."""
 
@@ -54,7 +54,7 @@ def chains(model: HandModel, fingertips: tuple[str, ...], name: str) -> Chains:
         InputError: A name is unknown, or the fingers are no chains of hinges of their own.
     """
     tips = tuple(_tip(model, each, name) for each in fingertips)
-    paths = [_path(model, tip.body) for tip in tips]
+    paths = [path_of_body(model, tip.body) for tip in tips]
     shared = 0
     while all(len(p) > shared for p in paths) and len({p[shared] for p in paths}) == 1:
         shared += 1
@@ -73,12 +73,13 @@ def chains(model: HandModel, fingertips: tuple[str, ...], name: str) -> Chains:
                     f"{name}: joint {model.joint_names[joint]} of the finger to {tip.name} must be "
                     f"a hinge, got {model.joint_kinds[joint]}"
                 )
-    used = [joint for chain in joints for joint in chain]
-    if len(set(used)) < len(used):
-        raise InputError(
-            f"{name}: fingers must have joints of their own; two fingertips share some"
-        )
-    return Chains(palm, tips, joints, _owners(model, palm, set(used)))
+    for tip, chain in zip(tips, joints, strict=True):
+        if sum(chain[-1] in other for other in joints) > 1:
+            raise InputError(
+                f"{name}: fingers may share some joints, but must end with one of their own; "
+                f"{model.joint_names[chain[-1]]} moves {tip.name} and another fingertip"
+            )
+    return Chains(palm, tips, joints, _owners(model, palm, {j for each in joints for j in each}))
 
 
 def _tip(model: HandModel, name: str, file: str) -> Tip:
@@ -92,15 +93,37 @@ def _tip(model: HandModel, name: str, file: str) -> Tip:
     if name and name in model.body_names:
         body = model.body_names.index(name)
         own = [g for g in _solid(model) if model.geom_bodies[g] == body]
-        if not own:
-            raise InputError(f"{file}: body {shown(name)} has no geom that collides; name a site")
         balls = [g for g in own if model.geom_kinds[g] in {"sphere", "capsule"}]
-        return Tip(name, body, (balls or own)[-1], None)
+        geom = (balls or own)[-1] if own else _nearest(model, body, name, file)
+        return Tip(name, int(model.geom_bodies[geom]), geom, None)
     known = [each for each in (*model.site_names, *model.geom_names, *model.body_names) if each]
     raise InputError(
         f"{file}: there is no site, geom or body {shown(name)}; fingertips are named by these, "
         f"such as {', '.join(known[-12:])}"
     )
+
+
+def _nearest(model: HandModel, body: int, name: str, file: str) -> int:
+    """Return the geom of a link whose box is nearest to a body of the link that has no geom.
+
+    Raises:
+        InputError: The link has none either.
+    """
+    links = _owners(model, WORLD, set(range(len(model.joint_bodies))))
+    own = [g for g in _solid(model) if links[int(model.geom_bodies[g])] == links[body]]
+    if not own:
+        raise InputError(
+            f"{file}: fingertip {shown(name)} and the link that it is on have no shape; give it "
+            "one, such as a sphere of the fingertip's radius"
+        )
+
+    def away(g: int) -> float:
+        R, p = model.rotations[model.geom_bodies[g]], model.positions[model.geom_bodies[g]]
+        local = R.T @ (model.positions[body] - p) - model.geom_positions[g]
+        off = np.abs(model.geom_rotations[g].T @ local - model.geom_boxes[g, :3])
+        return float(np.linalg.norm(np.maximum(off - model.geom_boxes[g, 3:], 0.0)))
+
+    return min(own, key=away)
 
 
 def _solid(model: HandModel) -> list[int]:
@@ -111,7 +134,7 @@ def _solid(model: HandModel) -> list[int]:
     ]  # fmt: skip
 
 
-def _path(model: HandModel, body: int) -> list[int]:
+def path_of_body(model: HandModel, body: int) -> list[int]:
     """Return the bodies from the world to one."""
     path = [body]
     while path[-1] != WORLD:
@@ -127,7 +150,7 @@ def _owners(model: HandModel, palm: int, used: set[int]) -> tuple[int, ...]:
     """Find which joint of a finger moves each body."""
     found = list[int]()
     for body in range(len(model.parents)):
-        moving = [j for b in _path(model, body) for j in _joints_of(model, b) if j in used]
+        moving = [j for b in path_of_body(model, body) for j in _joints_of(model, b) if j in used]
         apart = body == WORLD and palm != WORLD  # the floor is no part of a hand
         found.append(-2 if apart else moving[-1] if moving else -1)
     return tuple(found)
@@ -145,8 +168,3 @@ def frames(model: HandModel, found: Chains) -> dict[int, tuple[Array, Array]]:
         R = model.rotations[body]
         placed[joint] = R, model.positions[body] + R @ model.joint_positions[joint]
     return placed
-
-
-def neighbours(found: Chains) -> set[tuple[int, int]]:
-    """Return pairs of neighbouring links in the chains."""
-    return {pair for chain in found.joints for pair in pairwise((-1, *chain))}

@@ -2,6 +2,7 @@
 
 import importlib
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 from itertools import combinations
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.checked import path_of, several, text
 from grasp_core.errors import InputError
+from grasp_core.hands.couplings import Coupling
 from grasp_core.hands.distances.collisions import overlapping_pairs
 from grasp_core.hands.hand import (
     FEWEST_FINGERS,
@@ -30,11 +32,14 @@ from scenes.hand_files.model_text import model_text
 
 if TYPE_CHECKING:
     from scenes.hand_files.chains import Chains
+    from scenes.hand_files.couplings import Followers
     from scenes.hand_files.model import HandModel
+    from scenes.hand_files.shared_links import OwnChains
     from scenes.hand_files.tips import TipBall
 
 ENDINGS = (".xml", ".mjcf", ".urdf")
 MENAGERIE = "menagerie:"
+AS_BOXES = "shapes other than boxes, capsules and spheres are taken as their boxes"
 CLOSE_BY = 2
 """Number of joints between links that may be built into each other, at most."""
 FULL_TURN = np.pi
@@ -80,29 +85,55 @@ def load_hand(hand: str | Path, fingertips: Iterable[str] = ()) -> Hand:
 def _from_file(path: Path, fingertips: tuple[str, ...]) -> Hand:
     model_module: Any = importlib.import_module("scenes.hand_files.model")
     chain_module: Any = importlib.import_module("scenes.hand_files.chains")
-    model: HandModel = model_module.compiled_hand(model_text(path), str(path))
+    read = model_text(path)
+    model: HandModel = model_module.compiled_hand(read, str(path))
     found: Chains = chain_module.chains(model, fingertips, str(path))
     frames: dict[int, tuple[Array, Array]] = chain_module.frames(model, found)
     balls = _balls(model, found, frames, str(path))
     shapes = _shapes(model, found, frames, balls)
-    fingers = tuple(
-        HandFinger(tip.name, _links(model, found, frames, shapes, chain), ball)
+    coupled: Followers = importlib.import_module("scenes.hand_files.couplings").followers(
+        model, found, str(path)
+    )
+    fingers = [
+        HandFinger(tip.name, _links(model, found, frames, shapes, chain, coupled.ranges), ball)
         for tip, chain, (ball, _) in zip(found.tips, found.joints, balls, strict=True)
+    ]
+    own: OwnChains = importlib.import_module("scenes.hand_files.shared_links").own_chains(
+        fingers, _couplings(model, coupled)
     )
     palm = tuple(shapes.get(-1, ()))
     hand = Hand(
-        path.stem, palm, fingers, (f"{path.name}; shapes other than boxes, capsules and spheres "
-                                   "are taken as their boxes",),
+        path.stem, palm, own.fingers, (f"{path.name}; {AS_BOXES}",),
         f"{path.name}; None where it states none",
+        couplings=own.couplings,
+        notes=(
+            *read.notes, *model.notes, *coupled.notes, *own.notes, *_tips_elsewhere(model, found)
+        ),
     )  # fmt: skip
     middle = overlapping_pairs(hand, 0.5 * hand.ranges.sum(axis=1))
-    pairs = _excluded(model, found) | (middle & _close_by(hand))
-    return Hand(
-        hand.name, hand.palm, hand.fingers, hand.sources, hand.torque_source, tuple(sorted(pairs))
+    pairs = _excluded(model, found) | (middle & _close_by(hand, own.originals))
+    return replace(hand, ignored_pairs=tuple(sorted(pairs)))
+
+
+def _tips_elsewhere(model: "HandModel", found: "Chains") -> tuple[str, ...]:
+    """Say which fingertips are bodies without shapes of their own."""
+    names = [
+        tip.name for tip in found.tips
+        if tip.name not in (model.body_names[tip.body], *model.geom_names, *model.site_names)
+    ]  # fmt: skip
+    if not names:
+        return ()
+    return (f"fingertips without shapes are the nearest shape of their link: {', '.join(names)}",)
+
+
+def _couplings(model: "HandModel", coupled: "Followers") -> tuple[Coupling, ...]:
+    return tuple(
+        Coupling(_joint_name(model, joint), _joint_name(model, line.root), line.ratio, line.offset)
+        for joint, line in sorted(coupled.lines.items())
     )
 
 
-def _close_by(hand: Hand) -> set[tuple[str, str]]:
+def _close_by(hand: Hand, originals: dict[str, str]) -> set[tuple[str, str]]:
     """Return the names of links that overlap where they are built into each other.
 
     They are two joints apart at most, in one finger or from the palm. Links of different fingers
@@ -110,7 +141,7 @@ def _close_by(hand: Hand) -> set[tuple[str, str]]:
     """
     pairs = set[tuple[str, str]]()
     for finger in hand.fingers:
-        chain = [PALM, *(link.name for link in finger.links)]
+        chain = [PALM, *(originals.get(link.name, link.name) for link in finger.links)]
         for apart in range(1, CLOSE_BY + 1):
             pairs |= {(min(p), max(p)) for p in zip(chain, chain[apart:], strict=False)}
     return pairs
@@ -181,6 +212,7 @@ def _shape(model: "HandModel", g: int) -> LinkShape:
 def _links(
     model: "HandModel", found: "Chains", frames: dict[int, tuple[Array, Array]],
     shapes: dict[int, list[LinkShape]], chain: tuple[int, ...],
+    ranges: dict[int, tuple[float, float]],
 ) -> tuple[Link, ...]:  # fmt: skip
     """Make the links of a finger."""
     links, before = list[Link](), -1
@@ -188,10 +220,12 @@ def _links(
         turned, origin = frames[joint]
         old, start = frames[before]
         mass, center = _mass(model, found, joint, turned, origin)
+        low, high = model.joint_ranges[joint].tolist()
+        ends = ranges.get(joint, (low, high))
         links.append(
             Link(
                 _link_name(model, joint),
-                _joint(model, joint, old.T @ (origin - start), old.T @ turned),
+                _joint(model, joint, old.T @ (origin - start), old.T @ turned, ends),
                 tuple(shapes.get(joint, ())),
                 mass,
                 center,
@@ -209,17 +243,25 @@ def _link_name(model: "HandModel", joint: int) -> str:
     return name if name and name != PALM else f"link{joint}"
 
 
-def _joint(model: "HandModel", joint: int, position: Array, rotation: Array) -> Joint:
+def _joint_name(model: "HandModel", joint: int) -> str:
+    return model.joint_names[joint] or f"joint{joint}"
+
+
+def _joint(
+    model: "HandModel",
+    joint: int,
+    position: Array,
+    rotation: Array,
+    ends: tuple[float, float],
+) -> Joint:
     """Make a joint whose angle zero is the file's zero, not the pose in which the file draws it."""
     axis = model.joint_axes[joint]
-    low, high = model.joint_ranges[joint].tolist()
-    if np.isnan(low):
-        low, high = -FULL_TURN, FULL_TURN
+    low, high = np.where(np.isnan(ends), (-FULL_TURN, FULL_TURN), ends).tolist()
     # the frames are those at the reference angle; the same axis turns them to the angle zero
     back = _turn(axis, -float(model.references[joint]))
     torque = float(model.torques[joint])
     return Joint(
-        model.joint_names[joint] or f"joint{joint}", position, _squared(rotation @ back),
+        _joint_name(model, joint), position, _squared(rotation @ back),
         axis / np.linalg.norm(axis), low, high, None if np.isnan(torque) else torque,
     )  # fmt: skip
 

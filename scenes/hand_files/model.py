@@ -1,23 +1,56 @@
-"""Compiles the text of a hand with MuJoCo and hands out plain arrays: one of MuJoCo's doors."""
+"""Compiles the text of a hand with MuJoCo and hands out plain arrays.
+
+Links on fixed joints are kept, because their names are those of fingertips. Inertias that no body
+can have are balanced: of a link only its mass and centre of mass are used.
+"""
 
 # pyright: basic, reportAttributeAccessIssue=false
 # MuJoCo ships no types for its core.
 
+import math
+import warnings
 from typing import NamedTuple
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
-from scenes.hand_files.model_text import ModelText
+from scenes.hand_files.model_text import ModelText, listed
+from scenes.silent_mujoco import mujoco, unlogged
 
-try:
-    import mujoco  # noqa: TID251 - this is a door
-except (ImportError, RuntimeError, AttributeError, OSError) as error:
-    raise InputError(
-        f"MuJoCo cannot be imported ({error}). If MUJOCO_GL names graphics that are missing, "
-        "unset it; otherwise reinstall the package"
-    ) from error
+EVERY_BIT = 2**31 - 1
+"""Bits of geoms that are made to collide with all others."""
+POWERS = 5
+"""Coefficients of the polynomials that hold joints: the constant, and the powers one to four."""
+
+
+class JointRule(NamedTuple):
+    """A joint that is held at the angle `offset + ratio * angle of the leader`."""
+
+    joint: int
+    leader: int
+    """The other joint; -1 for a constant angle."""
+    offset: float
+    ratio: float
+    is_linear: bool
+    """False where the rule has further powers of the leader's angle."""
+
+
+class Loop(NamedTuple):
+    """Two bodies that are held together, which closes a loop of links."""
+
+    kind: str
+    bodies: tuple[int, int]
+
+
+class Tendon(NamedTuple):
+    """A tendon: a sum of joint angles, or a cable."""
+
+    name: str
+    joints: tuple[int, ...]
+    """Joints of the sum; none for a cable."""
+    is_held: bool
+    """Whether the model holds its length at a constant or a function of another's."""
 
 
 class HandModel(NamedTuple):
@@ -66,6 +99,13 @@ class HandModel(NamedTuple):
     site_radii: Array
     excluded: Indices
     """Pairs of bodies that the model lets overlap, (e, 2)."""
+    joint_rules: tuple[JointRule, ...]
+    """What holds joints at functions of others."""
+    loops: tuple[Loop, ...]
+    """What holds bodies together besides joints."""
+    tendons: tuple[Tendon, ...]
+    notes: tuple[str, ...]
+    """What was compiled otherwise than it is written, a sentence each."""
 
 
 def compiled_hand(text: ModelText, name: str) -> HandModel:
@@ -79,16 +119,25 @@ def compiled_hand(text: ModelText, name: str) -> HandModel:
         InputError: MuJoCo refuses it.
     """
     try:
-        model = mujoco.MjModel.from_xml_string(text.xml, dict(text.files))
+        with unlogged(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about textures and the like
+            spec = mujoco.MjSpec.from_string(text.xml, assets=dict(text.files))
+            odd = _impossible(spec)
+            spec.compiler.fusestatic, spec.compiler.balanceinertia = False, True
+            model = spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         said = " ".join(str(error).split())[:300]
         raise InputError(f"{name}: MuJoCo cannot compile the file: {said}") from error
     data = mujoco.MjData(model)
     data.qpos[:] = model.qpos0
     mujoco.mj_kinematics(model, data)
+    bits = np.column_stack([model.geom_contype, model.geom_conaffinity]).astype(np.int64)
+    lent = _lent(model, bits)
+    bits[np.isin(model.geom_bodyid, lent)] = EVERY_BIT
     kinds = tuple(mujoco.mjtJoint(int(kind)).name[6:].lower() for kind in model.jnt_type)
     hinges = np.array([kind == "hinge" for kind in kinds], bool)
-    limited = hinges & model.jnt_limited.astype(bool)
+    slides = np.array([kind == "slide" for kind in kinds], bool)
+    limited = (hinges | slides) & model.jnt_limited.astype(bool)
     return HandModel(
         body_names=_names(model, mujoco.mjtObj.mjOBJ_BODY, model.nbody),
         geom_names=_names(model, mujoco.mjtObj.mjOBJ_GEOM, model.ngeom),
@@ -112,14 +161,93 @@ def compiled_hand(text: ModelText, name: str) -> HandModel:
         geom_boxes=np.array(model.geom_aabb),
         geom_positions=np.array(model.geom_pos),
         geom_rotations=_turns(model.geom_quat),
-        geom_bits=np.column_stack([model.geom_contype, model.geom_conaffinity]).astype(np.int64),
+        geom_bits=bits,
         site_bodies=model.site_bodyid.astype(np.int64),
         site_positions=np.array(model.site_pos),
         site_radii=np.array(model.site_size)[:, 0] if model.nsite else np.empty(0),
         excluded=np.array(
             [(int(each) >> 16, int(each) & 0xFFFF) for each in model.exclude_signature], np.int64
         ).reshape(-1, 2),
+        joint_rules=_joint_rules(model),
+        loops=_loops(model),
+        tendons=_tendons(model),
+        notes=_notes(odd, [model.body(body).name for body in lent]),
     )
+
+
+def _lent(model: mujoco.MjModel, bits: Indices) -> list[int]:
+    """Return the bodies of which no geom collides with anything, though they have some."""
+    moving = set(model.geom_bodyid[bits.any(axis=1)].tolist())
+    shown = model.geom_bodyid[model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE]
+    marks = np.flatnonzero(model.body_mocapid >= 0).tolist()
+    return sorted(set(shown.tolist()) - moving - {0, *marks})
+
+
+def _notes(odd: list[str], lent: list[str]) -> tuple[str, ...]:
+    notes = list[str]()
+    if odd:
+        notes.append(f"inertias that no body can have count by their masses alone: {listed(odd)}")
+    if lent:
+        notes.append(f"bodies without shapes that collide do so with all they have: {listed(lent)}")
+    return tuple(notes)
+
+
+def _impossible(spec: mujoco.MjSpec) -> list[str]:
+    """Return the names of the bodies whose principal inertias violate A + B >= C."""
+    found = list[str]()
+    for body in spec.bodies:
+        xx, yy, zz, xy, xz, yz = body.fullinertia.tolist()
+        if math.isfinite(xx):
+            own = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        else:
+            own = np.sort(body.inertia)
+        if own[0] + own[1] < own[2]:
+            found.append(body.name or "?")
+    return found
+
+
+def _joint_rules(model: mujoco.MjModel) -> tuple[JointRule, ...]:
+    """Return the active rules that hold joints at polynomials of others."""
+    rules, start = list[JointRule](), model.qpos0[model.jnt_qposadr]
+    for i in _active(model, mujoco.mjtEq.mjEQ_JOINT):
+        joint, leader = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
+        constant, ratio, *others = model.eq_data[i, :POWERS].tolist()
+        if leader < 0:
+            ratio, others = 0.0, []
+        offset = float(start[joint]) + constant - ratio * float(start[leader])
+        rules.append(JointRule(joint, leader, offset, ratio, not any(others)))
+    return tuple(rules)
+
+
+def _loops(model: mujoco.MjModel) -> tuple[Loop, ...]:
+    """Return the active rules that hold bodies together."""
+    found = list[Loop]()
+    kinds = {"connect": mujoco.mjtEq.mjEQ_CONNECT, "weld": mujoco.mjtEq.mjEQ_WELD}
+    for name, kind in kinds.items():
+        for i in _active(model, kind):
+            ends = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
+            if model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE:
+                ends = int(model.site_bodyid[ends[0]]), int(model.site_bodyid[ends[1]])
+            found.append(Loop(name, ends))
+    return tuple(found)
+
+
+def _tendons(model: mujoco.MjModel) -> tuple[Tendon, ...]:
+    names = _names(model, mujoco.mjtObj.mjOBJ_TENDON, model.ntendon)
+    rules = _active(model, mujoco.mjtEq.mjEQ_TENDON)
+    held = {int(each[i]) for i in rules for each in (model.eq_obj1id, model.eq_obj2id)}
+    found = list[Tendon]()
+    for i, name in enumerate(names):
+        parts = slice(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i])
+        sums = model.wrap_type[parts] == mujoco.mjtWrap.mjWRAP_JOINT
+        joints = tuple(model.wrap_objid[parts][sums].tolist())
+        found.append(Tendon(name or f"tendon{i}", joints, i in held))
+    return tuple(found)
+
+
+def _active(model: mujoco.MjModel, kind: mujoco.mjtEq) -> list[int]:
+    """Return the numbers of the active rules of a kind."""
+    return np.flatnonzero((model.eq_type == kind) & model.eq_active0.astype(bool)).tolist()
 
 
 def _names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> tuple[str, ...]:

@@ -1,11 +1,13 @@
 """Reads the text of a hand's file and the files that it names, within bounds, for MuJoCo.
 
-MuJoCo's compiler reads any file that a model names. Here the model's files are read first, only
-from its own folder and up to a size, and handed over in memory; the text that is compiled names
-nothing on disk. Elements that read other models, run code or copy parts are refused.
+MuJoCo's compiler reads any file that a model names. Here the model's files are read first, up to a
+size and only from its own folder and the package that it is in, and handed over in memory; the text
+that is compiled names nothing on disk. Elements that read other models, run code or copy parts are
+refused.
 """
 
 import importlib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from grasp_core.errors import InputError
 
 LARGEST_TEXT, LARGEST_FILES = 4 * 2**20, 64 * 2**20
 """Largest size of the text, and of all files that it names together [bytes]."""
+LARGEST_MANIFEST = 2**16
 MOST_FILES, MOST_ELEMENTS = 500, 20_000
 REFUSED = (
     "include",
@@ -28,13 +31,26 @@ REFUSED = (
 """Elements that read other models, run code or make copies in any number."""
 MOST_PIXELS = 4096
 """Largest value of the attributes that say how large pictures and fields of heights are."""
-COUNTS = ("width", "height", "nrow", "ncol")
+COUNTED, COUNTS = ("texture", "hfield"), ("width", "height", "nrow", "ncol")
 FOLDERS = {"meshdir", "texturedir", "assetdir", "strippath"}
 """Attributes that say where files are."""
 NAMED = ("mesh", "texture", "hfield")
 """Elements that are called like their files where they have no name."""
-PACKAGE = "package://"
-"""What begins the names of files in URDF; the name of a package follows."""
+PACKAGE = re.compile(r"(?:package|model)://([^/]*)/+")
+"""What begins the names of files in URDF, with the name of a package."""
+MESHES = (".stl", ".obj", ".msh")
+"""Files that MuJoCo reads as meshes."""
+ABOVE = 4
+"""Number of folders above the model's that may be the package's."""
+MANIFEST = "package.xml"
+"""File in the folder of a ROS package that says how it is called."""
+OTHERS = ("gazebo", "transmission", "ros2_control")
+"""Elements of URDF that are about other things than the hand's shape, and may hold anything."""
+TURNING = {"revolute", "continuous", "prismatic"}
+"""Kinds of URDF joints that move by one number."""
+PLAIN = re.compile(r"[\w.-]+", re.ASCII)
+MOST_NAMED = 8
+"""Number of links that a note names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +60,8 @@ class ModelText:
     xml: str
     files: dict[str, bytes]
     """The files that it names, by the names in it."""
+    notes: tuple[str, ...] = ()
+    """What was read otherwise than it is written, a sentence each."""
 
 
 def model_text(path: Path) -> ModelText:
@@ -63,6 +81,10 @@ def model_text(path: Path) -> ModelText:
         raise InputError(
             f"{path}: expected an MJCF or URDF file, but it is no XML: {error}"
         ) from error
+    for other in [each for each in root if each.tag in OTHERS and root.tag == "robot"]:
+        root.remove(other)
+    _check_followed(path, root)
+    notes = _with_shapes(root)
     elements = list(root.iter())
     if root.tag not in {"mujoco", "robot"} or len(elements) > MOST_ELEMENTS:
         raise InputError(
@@ -71,7 +93,54 @@ def model_text(path: Path) -> ModelText:
         )
     for element in elements:
         _check_element(path, element)
-    return ModelText(*_with_files(path, root, elements, etree))
+    return ModelText(*_with_files(path, root, elements, etree), notes)
+
+
+def _check_followed(path: Path, root: Any) -> None:
+    """Refuse URDF joints that follow one which does not move: MuJoCo would take them as free.
+
+    Raises:
+        InputError: There are some.
+    """
+    kinds = {joint.get("name"): joint.get("type") for joint in root.findall("joint")}
+    for joint in root.findall("joint"):
+        mimic = joint.find("mimic")
+        if mimic is not None and not {kinds.get(mimic.get("joint")), joint.get("type")} <= TURNING:
+            raise InputError(
+                f"{path}: joint {joint.get('name')} must follow a joint that moves, got <mimic> "
+                f"of {mimic.get('joint')}; name another joint there, or remove it"
+            )
+
+
+def _with_shapes(root: Any) -> tuple[str, ...]:
+    """Let the visual shapes of a URDF link collide where it has no others, and drop all others.
+
+    Returns:
+        Notes about the links whose visual shapes collide, and those that have none to be read.
+    """
+    lent, bare = list[str](), list[str]()
+    for link in root.findall("link"):
+        visuals, known = link.findall("visual"), link.find("collision") is not None
+        for visual in visuals:
+            meshes = [mesh.get("filename", "") for mesh in visual.iter("mesh")]
+            if known or not all(Path(name).suffix.lower() in MESHES for name in meshes):
+                link.remove(visual)
+            else:
+                visual.tag = "collision"
+        if visuals and not known:
+            (bare if link.find("collision") is None else lent).append(link.get("name", "?"))
+    return (
+        *([f"links without collision shapes collide with their visual ones: {listed(lent)}"]
+          if lent else []),
+        *([f"links without collision shapes, whose visual ones are in files other than "
+           f"{', '.join(MESHES)}, touch nothing: {listed(bare)}"] if bare else []),
+    )  # fmt: skip
+
+
+def listed(names: list[str]) -> str:
+    """List names for a note, the first of many."""
+    more = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _check_element(path: Path, element: Any) -> None:
@@ -86,7 +155,7 @@ def _check_element(path: Path, element: Any) -> None:
         )
     if element.tag == "size":  # how much memory MuJoCo takes
         element.attrib.clear()
-    for key in COUNTS:
+    for key in COUNTS if element.tag in COUNTED else ():
         if len(element.get(key, "0")) > len(str(MOST_PIXELS)):
             raise InputError(
                 f"{path}: {key} of <{element.tag}> must be at most {MOST_PIXELS}, got "
@@ -107,7 +176,7 @@ def _with_files(
                 found = _found(path, given, places)
                 content = _bytes(found, left, path)
                 left -= len(content)
-                names[given] = f"file{len(names)}{found.suffix.lower()}"
+                names[given] = _named(found, files)
                 files[names[given]] = content
             if len(names) > MOST_FILES:
                 raise InputError(f"{path}: names more than {MOST_FILES} files")
@@ -115,6 +184,13 @@ def _with_files(
                 element.attrib.setdefault("name", Path(given).stem)
             element.attrib[key] = names[given]
     return etree.tostring(root, encoding="unicode"), files
+
+
+def _named(found: Path, taken: dict[str, bytes]) -> str:
+    """Name a file in the compiler's messages as it is called, if that name is plain and free."""
+    free = found.stem.lower() not in {Path(name).stem.lower() for name in taken}
+    plain = PLAIN.fullmatch(found.name) is not None
+    return found.name if free and plain else f"file{len(taken)}{found.suffix.lower()}"
 
 
 def _places(path: Path, elements: list[Any]) -> list[Path]:
@@ -130,26 +206,56 @@ def _places(path: Path, elements: list[Any]) -> list[Path]:
 
 
 def _found(path: Path, given: str, places: list[Path]) -> Path:
-    """Find a named file in the folder of the model.
+    """Find a named file in the folder of the model, or in the package that the name begins with.
 
     Raises:
-        InputError: It is missing or outside that folder.
+        InputError: It is missing or outside these folders.
     """
-    home, name = path.parent.resolve(), given
-    if given.startswith(PACKAGE):
-        name = given[len(PACKAGE) :].partition("/")[2]
-    tried = [place / name for place in places] + [place / Path(name).name for place in places]
-    for each in tried:
+    home, package = path.parent.resolve(), PACKAGE.match(given)
+    name = given[package.end() :] if package else given
+    tried = [(home, place / name) for place in places]
+    if package:
+        tried += [(root, root / name) for root in _roots(home, package[1])]
+    tried += [(home, place / Path(name).name) for place in places]
+    for root, each in tried:
         try:
             whole = each.resolve()
-            if whole.is_relative_to(home) and whole.is_file():
+            if whole.is_relative_to(root) and whole.is_file():
                 return whole
         except (OSError, ValueError, RuntimeError):
             continue
     raise InputError(
-        f"{path}: names the file {given[:80]!r}, which is not in the folder of the model; put it "
-        "there"
+        f"{path}: names the file {given[:80]!r}, which is not in the folder of the model"
+        + (f", and not in a package {package[1]} around it" if package else "")
+        + "; put it there"
     )
+
+
+def _roots(home: Path, package: str) -> list[Path]:
+    """Return the folders of a package in which a model is, or that is beside those it is in.
+
+    A folder above the model's is a package if it is called so, or if its manifest says so; another
+    folder only if it is called so and has a manifest that says so.
+    """
+    if not PLAIN.fullmatch(package) or package.startswith("."):
+        return []
+    found = list[Path]()
+    for above in (home, *home.parents[:ABOVE]):
+        if above.name == package or _is_called(above, package):
+            found.append(above)
+        if _is_called(above / package, package):
+            found.append((above / package).resolve())
+    return found
+
+
+def _is_called(folder: Path, package: str) -> bool:
+    """Return whether the manifest in a folder gives the name of a package."""
+    try:
+        with (folder / MANIFEST).open("rb") as file:
+            said = re.search(rb"<name>\s*([\w.-]+)\s*</name>", file.read(LARGEST_MANIFEST))
+    except OSError:
+        return False
+    return said is not None and said[1].decode() == package
 
 
 def _bytes(path: Path, most: int, model: Path) -> bytes:

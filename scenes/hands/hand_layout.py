@@ -31,7 +31,7 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import direction, hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians
 from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import Stance, stance_of
+from grasp_core.hands.stance import Stance, stance_of, uncoupled
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
@@ -41,6 +41,7 @@ from scenes.layout import SQUEEZE, Layout, arrange
 TOUCH = 3e-6
 """Depth of fingertips in their faces at the start, in grasp sizes: more than numbers of nine
 digits leave open."""
+SIMULATION = "a simulation of the hand"
 REFINED = 3
 """Newton steps that put fingertips on their faces: from 10 micrometres to rounding."""
 
@@ -122,7 +123,7 @@ def hand_layout(
         InputError: The hand, the object or the pose do not belong together.
     """
     check_body(body)
-    stance = stance_of(hand, reach)
+    stance = stance_of(uncoupled(hand, SIMULATION), reach)
     motors = hand_motors(hand, reach, down=down)
     squeeze = squeezing(motors, stance.forces)
     push, radii = float(np.abs(squeeze).max()), stance.tip_radii

@@ -32,12 +32,13 @@ from grasp_core.hands.hand_grips import HandGrip
 from grasp_core.hands.hand_motors import hand_motors
 from grasp_core.hands.kinematics import HandPlaces, places
 from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import Stance, stance_of
+from grasp_core.hands.stance import Stance, stance_of, uncoupled
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from scenes.execution.held import FingersSeen, HeldLayout, HeldSettings, held_layout
 from scenes.hands.hand_layout import mean_lever, touching
 
+EXECUTION = "an execution with the hand"
 STRETCHED = 0.02
 """Least singular value of a finger's levers, over the root mean square of all, with which it
 counts as free to move in all directions."""
@@ -221,11 +222,12 @@ def strong_motors(hand: Hand, reach: HandReach) -> Motors:
     """Return the motors of a pose, which carry the links in any orientation if they weigh.
 
     Raises:
-        InputError: A joint has no torque limit, or a motor cannot carry the links.
+        InputError: A joint has no torque limit or follows another, or a motor cannot carry the
+            links.
     """
     weighs = all(link.mass_kg is not None and link.center_of_mass is not None
                  for link in hand.links)  # fmt: skip
-    return hand_motors(hand, reach, any_orientation=weighs)
+    return hand_motors(uncoupled(hand, EXECUTION), reach, any_orientation=weighs)
 
 
 def held_hand_layout(  # noqa: PLR0913, PLR0917 - a hand, an object, and how they meet

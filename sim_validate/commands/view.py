@@ -84,7 +84,8 @@ def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
         path = write_text(Path(folder) / f"{grasp.id}.xml", scene.xml)
         # -P: modules of the working folder are not run
         command = [sys.executable, "-P", "-m", "mujoco.viewer", f"--mjcf={path}"]
-        ended = subprocess.run(command, check=False).returncode  # noqa: S603 - MuJoCo's own
+        # the viewer writes its log where it runs
+        ended = subprocess.run(command, cwd=folder, check=False).returncode  # noqa: S603 - MuJoCo's
     if ended:
         raise GraphicsError(
             f"MuJoCo's viewer failed with exit code {ended}; show the grasp with --picture, "

@@ -23,7 +23,7 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_motors
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import stance_of
+from grasp_core.hands.stance import stance_of, uncoupled
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
@@ -102,7 +102,7 @@ def dex_record(
     Raises:
         InputError: The pose is another hand's, or none was found.
     """
-    stance = stance_of(hand, reach)
+    stance = stance_of(uncoupled(hand, "a record of DexGraspBench"), reach)
     positive(push_n, "push_n")
     positive(servo_n_m_per_rad, "servo_n_m_per_rad")
     text(object_path, "object_path")

@@ -3,13 +3,14 @@
 A file that holds them can be drawn without the file or the table that the hand was made from.
 """
 
-from typing import Annotated
+from typing import Annotated, NotRequired
 
 import numpy as np
 from pydantic import Field
 from typing_extensions import TypedDict
 
 from grasp_core.arrays import Array
+from grasp_core.hands.couplings import Coupling
 from grasp_core.hands.hand import (
     MOST_FINGERS,
     MOST_LINKS,
@@ -67,12 +68,24 @@ class FingerRecord(TypedDict):
     tip_radius_m: Finite
 
 
+class CouplingRecord(TypedDict):
+    """Fields about a joint that follows another."""
+
+    joint: str
+    driver: str
+    ratio: Finite
+    offset_rad: Finite
+
+
 class ModelRecord(TypedDict):
     """Fields about all parts of a hand."""
 
     palm: Annotated[list[ShapeRecord], Field(max_length=MOST_SHAPES)]
     fingers: Annotated[list[FingerRecord], Field(max_length=MOST_FINGERS)]
     ignored_pairs: list[tuple[str, str]]
+    couplings: NotRequired[list[CouplingRecord]]
+    """Absent in files of versions that took all joints as free, as is the next."""
+    notes: NotRequired[list[str]]
 
 
 def model_record(hand: Hand) -> ModelRecord:
@@ -89,7 +102,22 @@ def model_record(hand: Hand) -> ModelRecord:
             for finger in hand.fingers
         ],
         "ignored_pairs": list(hand.ignored_pairs),
+        "couplings": couplings_record(hand),
+        "notes": list(hand.notes),
     }
+
+
+def couplings_record(hand: Hand) -> list[CouplingRecord]:
+    """Write which joints follow others."""
+    return [
+        {
+            "joint": each.joint,
+            "driver": each.driver,
+            "ratio": each.ratio,
+            "offset_rad": each.offset,
+        }
+        for each in hand.couplings
+    ]
 
 
 def hand_of_model(
@@ -110,7 +138,12 @@ def hand_of_model(
     )  # fmt: skip
     palm = tuple(map(_shape_of, record["palm"]))
     pairs = tuple(record["ignored_pairs"])
-    return Hand(name, palm, fingers, tuple(sources), torque_source, pairs)
+    couplings = tuple(
+        Coupling(each["joint"], each["driver"], each["ratio"], each["offset_rad"])
+        for each in record.get("couplings", [])
+    )
+    notes = tuple(record.get("notes", []))
+    return Hand(name, palm, fingers, tuple(sources), torque_source, pairs, couplings, notes)
 
 
 def _shape(shape: LinkShape) -> ShapeRecord:

@@ -1,4 +1,4 @@
-"""Starts MuJoCo, compiles scenes and steps them: the only module that imports the simulator.
+"""Starts MuJoCo, compiles scenes and steps them: the only module that steps the simulator.
 
 Scenes reach the simulator as text, so that the text is the whole experiment. All trials of a scene
 run together on MuJoCo's own threads; each is bit for bit what a plain loop over `mj_step` gives,
@@ -8,22 +8,13 @@ whatever the number of threads.
 # pyright: basic, reportAttributeAccessIssue=false
 # MuJoCo ships no types for its core.
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
-
-try:
-    import mujoco  # noqa: TID251 - this is the door
-    from mujoco import batch  # noqa: TID251
-except (ImportError, RuntimeError, AttributeError, OSError) as error:
-    raise InputError(  # importing mujoco looks for graphics, which nothing here needs
-        f"MuJoCo cannot be imported ({error}). If MUJOCO_GL names graphics that are missing, "
-        "unset it; otherwise reinstall the package"
-    ) from error
+from scenes.silent_mujoco import batch, mujoco, unlogged
 
 STATE = ("time", "qpos", "qvel", "ctrl", "xfrc_applied")
 """Parts of a state, which lie in the order of their bits."""
@@ -36,7 +27,8 @@ def compiled(xml: str) -> mujoco.MjModel:
         InputError: The simulator refuses the text.
     """
     try:
-        return mujoco.MjModel.from_xml_string(xml)
+        with unlogged():
+            return mujoco.MjModel.from_xml_string(xml)
     except ValueError as error:
         raise InputError(f"MuJoCo cannot compile the scene: {error}") from error
 
@@ -83,7 +75,8 @@ def touched(model: mujoco.MjModel, data: mujoco.MjData, tips: Sequence[int]) -> 
         Normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a fingertip
         that has not exactly one contact.
     """
-    mujoco.mj_forward(model, data)
+    with unlogged():
+        mujoco.mj_forward(model, data)
     normals, depths = np.full((len(tips), 3), np.nan), np.full(len(tips), np.nan)
     for finger, tip in enumerate(tips):
         own = [contact for contact in data.contact if tip in contact.geom]
@@ -92,18 +85,3 @@ def touched(model: mujoco.MjModel, data: mujoco.MjData, tips: Sequence[int]) -> 
             normals[finger] = contact.frame[:3] * (1.0 if contact.geom[0] == tip else -1.0)
             depths[finger] = -contact.dist
     return normals, depths
-
-
-@contextmanager
-def unlogged() -> Iterator[None]:
-    """Keep the simulator from writing warnings to a file in the working directory.
-
-    The simulator's data counts the warnings, and `Motion.warnings` reports them.
-    """
-    before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
-    quiet.logto_file = quiet.logto_console = False
-    mujoco.MjLogConfig.set(quiet)
-    try:
-        yield
-    finally:
-        mujoco.MjLogConfig.set(before)

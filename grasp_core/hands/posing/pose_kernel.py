@@ -1,8 +1,9 @@
 """Moves a hand until fingertips touch given planes and nothing else is touched, compiled.
 
-Unknown are a move of the palm (translation, and turn about the contacts' middle) and the joint
-angles. Gauss and Newton's steps with Levenberg's damping make the sum of squares of the residuals
-small; joints that stand at a limit and would go beyond are held there for the step.
+Unknown are a move of the palm (translation, and turn about the contacts' middle) and the angles of
+the joints that follow no other. Gauss and Newton's steps with Levenberg's damping make the sum of
+squares of the residuals small; joints that stand at a limit and would go beyond are held there for
+the step.
 """
 
 import numpy as np
@@ -106,7 +107,7 @@ def _step(  # noqa: PLR0913, PLR0917 - a pose and its sums
 
 @loop()
 def _stepped(hand: HandArrays, pose: Pose, pivot: Array, step: Array, new: Pose) -> None:
-    """Fill in palm and joints of the pose after a step; angles stay within their ranges."""
+    """Fill in palm and joints of the pose after a step, within ranges and as they are coupled."""
     axis, angle, about, arm = np.zeros(3), 0.0, np.empty((3, 3)), np.empty(3)
     for j in range(3):
         angle += step[3 + j] ** 2
@@ -123,6 +124,9 @@ def _stepped(hand: HandArrays, pose: Pose, pivot: Array, step: Array, new: Pose)
         new.origin[j] += step[j]
     for k in range(len(pose.q)):
         angle = pose.q[k] + step[MOVES + k]
+        new.q[k] = min(max(angle, hand.ranges[k, 0]), hand.ranges[k, 1])
+    for k in range(len(pose.q)):  # the angles of free joints stay as they are
+        angle = hand.offsets[k] + hand.ratios[k] * new.q[hand.drivers[k]]
         new.q[k] = min(max(angle, hand.ranges[k, 0]), hand.ranges[k, 1])
 
 

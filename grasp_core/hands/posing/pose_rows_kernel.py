@@ -5,7 +5,8 @@ is taken along the line to the nearest point, by
 
     dx = dp + w x (x - c) + sum over the finger's joints of w_k x (x - p_k) dq_k           (1)
 
-for a point x that a link carries, with the palm's move dp, its turn w about the pivot c.
+for a point x that a link carries, with the palm's move dp, its turn w about the pivot c. A joint
+that follows another moves with it by (1) of `couplings`, so that its share is the driver's.
 """
 
 import numpy as np
@@ -74,7 +75,7 @@ def _moves(  # noqa: C901, PLR0913, PLR0917 - a point and a direction
         for j in range(3):
             arm[j] = x[j] - pose.p[k, j]
         cross(pose.W[k], arm, way)
-        sums.row[MOVES + k] += sign * dotted(way, along) * MM
+        sums.row[MOVES + hand.drivers[k]] += hand.ratios[k] * sign * dotted(way, along) * MM
 
 
 @loop()

@@ -185,7 +185,7 @@ def blocking(asked: Asked, pose: Pose, fingers: Indices | None, clearance: float
 
 def _why_away(hand: Hand, q: Array) -> str:
     low, high = hand.ranges.T
-    return "limit" if ((q <= low) | (q >= high)).any() else "away"
+    return "limit" if (((q <= low) | (q >= high)) & (low < high)).any() else "away"
 
 
 def _as_pose(pose: Pose) -> Array:

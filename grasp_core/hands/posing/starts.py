@@ -75,7 +75,7 @@ def postures(hand: Hand, seed: int) -> Postures:
     arrays, rng = hand_arrays(hand), np.random.default_rng(seed)
     low, high = arrays.ranges.T
     share = rng.uniform(*INNER, (TRIES, len(low)))
-    angles = low + (high - low) * share
+    angles = hand.drives.obeyed(low + (high - low) * share)
     kept, tips = np.empty(POSTURES, np.int64), np.empty((POSTURES + 1, len(arrays.tip_radii), 3))
     kernel = compiled("grasp_core.hands.posing.postures_kernel")
     count = kernel.free_postures(arrays, angles, APART, WIDEST, kept, tips)

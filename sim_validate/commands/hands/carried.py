@@ -22,7 +22,7 @@ def carried(hand: Hand, saved: SavedGrasps, found: Sequence[HandReach]) -> dict[
         which motors cannot carry their links.
     """
     unknown = any(link.mass_kg is None or link.center_of_mass is None for link in hand.links)
-    if unknown or any(joint.torque_limit_n_m is None for joint in hand.joints):
+    if unknown or any(joint.torque_limit_n_m is None for joint in hand.free_joints):
         return {}
     each = ((reach.grasp, _payload(hand, saved, reach)) for reach in found if reach.reached)
     return {grasp: payload for grasp, payload in each if payload is not None}

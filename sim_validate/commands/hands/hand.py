@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from grasp_core.hands.couplings import Coupling
 from grasp_core.hands.hand import Hand, HandFinger
 from grasp_core.hands.named_hands import HANDS
 from grasp_core.short_text import counted
@@ -10,6 +11,7 @@ from scenes.hand_files.loading import load_hand
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.records.hand_model import couplings_record
 
 MM = 1e3
 NONE_STATED = "none stated"
@@ -42,10 +44,14 @@ def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
     if hand.ignored_pairs:
         listed = ", ".join(" and ".join(pair) for pair in hand.ignored_pairs)
         reporter.say(f"Links that may overlap, besides neighbours: {listed}.")
+    if hand.couplings:
+        reporter.say(f"Joints that follow others: {', '.join(map(_follows, hand.couplings))}.")
     reporter.say(f"Torque limits: {hand.torque_source}.")
     for line in (_weight(hand), _small_ranges(hand)):
         if line:
             reporter.say(line)
+    for note in hand.notes:
+        reporter.say(f"Note: {note}.")
     for source in hand.sources:
         reporter.say(f"Source: {source}.")
     return Exit.GOOD
@@ -76,16 +82,23 @@ def _shapes(finger: HandFinger) -> int:
 
 def _joints(hand: Hand) -> list[tuple[str, ...]]:
     """Return the cells of a table with one row for each joint."""
+    links = [(finger, link) for finger in hand.fingers for link in finger.links]
     return [
         (
             link.joint.name,
             finger.name,
-            f"{math.degrees(link.joint.lowest):.1f} to {math.degrees(link.joint.highest):.1f}",
+            f"{math.degrees(lowest):.1f} to {math.degrees(highest):.1f}",
             _torque(link.joint.torque_limit_n_m),
         )
-        for finger in hand.fingers
-        for link in finger.links
+        for (finger, link), (lowest, highest) in zip(links, hand.ranges.tolist(), strict=True)
     ]
+
+
+def _follows(coupling: Coupling) -> str:
+    """Write a coupling as a formula, angles in degrees."""
+    said = f"{coupling.joint} = {coupling.ratio:g} {coupling.driver}"
+    offset = math.degrees(coupling.offset)
+    return f"{said} {'-' if offset < 0.0 else '+'} {abs(offset):.4g} deg" if offset else said
 
 
 def _torque(limit: float | None) -> str:
@@ -118,6 +131,8 @@ def hand_facts(hand: Hand) -> dict[str, Any]:
         ],
         "palm_shapes": len(hand.palm),
         "may_overlap": [list(pair) for pair in hand.ignored_pairs],
+        "couplings": couplings_record(hand),
+        "notes": list(hand.notes),
         "torque_source": hand.torque_source,
         "sources": list(hand.sources),
     }

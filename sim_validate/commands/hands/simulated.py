@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
+from grasp_core.hands.stance import uncoupled
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
@@ -20,8 +21,8 @@ def with_motors(hand: Hand, command: hand_flags.Reach) -> Hand:
     """Return the hand with the torque limits that the command gives.
 
     Raises:
-        InputError: A simulation is asked for, and a joint has no torque limit; or a published test
-            is asked for without a simulation.
+        InputError: A simulation is asked for, and a joint has no torque limit or follows another;
+            or a published test is asked for without a simulation.
     """
     if command.torque_limit_n_m is not None:
         hand = hand.with_torque_limits(command.torque_limit_n_m, GIVEN)
@@ -31,6 +32,8 @@ def with_motors(hand: Hand, command: hand_flags.Reach) -> Hand:
         )
     missing = [joint.name for joint in hand.joints if joint.torque_limit_n_m is None]
     asked = "--simulate" if command.simulate else "--mass-kg"
+    if command.simulate or command.mass_kg is not None:
+        uncoupled(hand, asked)
     if (command.simulate or command.mass_kg is not None) and missing:
         raise InputError(
             f"{asked} needs a torque limit for each joint, but {hand.name} has none for "

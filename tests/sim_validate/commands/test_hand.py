@@ -82,3 +82,22 @@ def test_the_weight_of_links_is_said_with_its_source(words, capsys):
 def test_a_file_without_named_fingertips_is_refused(words, capsys):
     assert main(words[:2]) == Exit.INPUT
     assert "name 3 to 5 fingertips" in capsys.readouterr().err
+
+
+def test_joints_that_follow_others_and_notes_are_said(tmp_path, capsys):
+    path = tmp_path / "coupled.xml"
+    rule = '<equality><joint joint1="left_curl" joint2="left_bend" polycoef="0.1 0.5 0 0 0"/>'
+    tendon = '<tendon><fixed name="cable"><joint joint="thumb_curl" coef="1"/></fixed></tendon>'
+    text = three_fingers_mjcf().replace("</mujoco>", f"{rule}</equality>{tendon}</mujoco>")
+    path.write_text(text)
+    words = ["hand", str(path), "--fingertips", ",".join(THREE_TIPS)]
+    assert main(words) == Exit.GOOD
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Joints that follow others: left_curl = 0.5 left_bend + 5.73 deg." in said
+    assert "Note: tendons are left out, as if joints had motors of their own: cable." in said
+    assert main([*words, "--json"]) == Exit.GOOD
+    facts = json.loads(capsys.readouterr().out)
+    (coupling,) = facts["couplings"]
+    assert coupling == {"joint": "left_curl", "driver": "left_bend", "ratio": 0.5,
+                        "offset_rad": pytest.approx(0.1)}  # fmt: skip
+    assert len(facts["notes"]) == 1

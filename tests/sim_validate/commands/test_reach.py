@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -120,6 +121,47 @@ def test_three_fingers_stand_at_contacts_that_the_file_names(grasps, tmp_path, c
     saved, _ = read_reaches(tmp_path / REACHES)
     kept = {each["id"]: each["pose"]["used"] for each in record["reaches"]}
     assert {name: each.used.tolist() for name, each in saved.found.items()} == kept
+
+
+def coupled_file(folder):
+    """The gripper with fingers that curl as they bend."""
+    path = three_fingers_file(folder)
+    text = Path(path).read_text()
+    rules = "".join(
+        f'<joint joint1="{each}_curl" joint2="{each}_bend"/>' for each in ("left", "right")
+    )
+    Path(path).write_text(text.replace("</mujoco>", f"<equality>{rules}</equality></mujoco>"))
+    return ["--hand", path, "--fingertips", ",".join(THREE_TIPS)]
+
+
+def test_poses_of_coupled_joints_obey_and_are_kept_with_the_couplings(grasps, tmp_path):
+    words = ["reach", str(grasps), *coupled_file(tmp_path), "--out", str(tmp_path), "-q"]
+    main(words)
+    text = (tmp_path / REACHES).read_text()
+    record = record_of(ReachesFile, text, REACHES, schema=1)
+    assert record["summary"]["reached"] >= 1
+    names = record["hand"]["joints"]
+    for each in record["reaches"]:
+        for key in ("joints_rad", "pregrasp_joints_rad"):
+            if each["pose"] and each["pose"][key]:
+                angles = dict(zip(names, each["pose"][key], strict=True))
+                for finger in ("left", "right"):
+                    assert abs(angles[f"{finger}_curl"] - angles[f"{finger}_bend"]) <= 1e-9
+    saved, _ = read_reaches(tmp_path / REACHES)
+    assert [(c.joint, c.driver, c.ratio) for c in saved.hand.couplings] == [
+        ("left_curl", "left_bend", 1.0), ("right_curl", "right_bend", 1.0),
+    ]  # fmt: skip
+    old = json.loads(text)
+    del old["hand"]["model"]["couplings"], old["hand"]["model"]["notes"]
+    assert record_of(ReachesFile, json.dumps(old), REACHES, schema=1)
+
+
+@pytest.mark.parametrize("flags", [("--simulate",), ("--mass-kg", "0.05")])
+def test_what_needs_a_motor_at_each_joint_names_those_that_follow(flags, grasps, tmp_path, capsys):
+    assert main(["reach", str(grasps), *coupled_file(tmp_path), *flags]) == Exit.INPUT
+    said = capsys.readouterr().err
+    assert f"{flags[0]} needs a hand with a motor at each joint" in said
+    assert "left_curl follows left_bend, right_curl follows right_bend" in said
 
 
 def test_where_no_three_contacts_close_the_command_says_so(tmp_path, capsys):

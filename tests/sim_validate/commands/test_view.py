@@ -56,7 +56,8 @@ def test_without_a_display_files_are_offered(planned, capsys):
 def test_with_a_display_the_viewer_is_opened(planned, monkeypatch):
     opened = []
 
-    def run(command, **_):
+    def run(command, cwd, **_):
+        assert Path(cwd) == Path(command[-1].partition("=")[2]).parent  # where its log is left
         path = command[-1].partition("=")[2]
         with open(path, encoding="utf-8") as scene:  # noqa: PTH123 - while it is there
             opened.append((command[1:4], scene.read()))

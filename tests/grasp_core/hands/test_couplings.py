@@ -1,0 +1,147 @@
+"""Joints that follow others: hand-worked angles, poses, and torques by virtual work."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+from grasp_core.errors import InputError
+from grasp_core.hands.couplings import Coupling
+from grasp_core.hands.kinematics import places
+from tests.grasp_core.hands.gripping import FRICTION, grasps, plain_hand, scaled
+from tests.three_fingers import THREE_TIPS, three_fingers_file
+
+CURLS = tuple(
+    Coupling(f"{finger}_curl", f"{finger}_bend", ratio, offset)
+    for finger, ratio, offset in (("thumb", 1.2, -0.1), ("left", 0.8, -0.2), ("right", 0.8, -0.2))
+)
+FALSE = {
+    "unknown": (Coupling("f10", "elbow", 1.0), "single joints of the hand, got elbow"),
+    "itself": (Coupling("f10", "f10", 1.0), "follow one free joint, got f10"),
+    "a follower": (Coupling("f10", "f01", 1.0), "follow one free joint, got f10"),
+    "two": (Coupling("f01", "f10", 1.0), "follow one free joint, got f01"),
+    "no angle": (Coupling("f11", "f10", 1.0, 4.0), "got none for f10, f11"),
+}
+
+
+@pytest.fixture(scope="module")
+def coupled(tmp_path_factory):
+    """A gripper whose fingers curl as they bend."""
+    path = three_fingers_file(tmp_path_factory.mktemp("hand"))
+    return replace(scenes.load_hand(path, THREE_TIPS), couplings=CURLS)
+
+
+@pytest.fixture(scope="module")
+def reached(coupled):
+    tried = [(name, grasp) for name in ("box", "dodecahedron") for grasp in grasps(name, 0.035)]
+    found = [gc.reach_with(coupled, scaled(name, 0.035), g, FRICTION) for name, g in tried]
+    return [each for each in found if each.reached]
+
+
+def off(hand, joints):
+    """The largest difference from what the couplings say."""
+    angles = {joint.name: angle for joint, angle in zip(hand.joints, joints, strict=True)}
+    return max(abs(angles[c.joint] - c.offset - c.ratio * angles[c.driver])
+               for c in hand.couplings)  # fmt: skip
+
+
+def test_poses_obey_couplings_and_the_ranges_of_all_joints(coupled, reached):
+    assert len(reached) >= 4
+    for each in reached:
+        for joints in (each.joints, each.pregrasp):
+            if joints is not None:
+                assert off(coupled, joints) <= 1e-12
+                for joint, angle in zip(coupled.joints, joints, strict=True):
+                    assert joint.lowest <= angle <= joint.highest
+
+
+def test_the_range_of_a_joint_ends_where_that_of_a_follower_does():
+    """The follower turns by 2 q + 0.5 from -1.5 to 1.5, so that q is from -1 to 0.5."""
+    hand = replace(plain_hand(), couplings=(Coupling("f01", "f00", 2.0, 0.5),))
+    assert hand.ranges[:3] == pytest.approx(np.array([[-1.0, 0.5], [-1.5, 1.5], [-1.5, 1.5]]))
+    back = replace(plain_hand(), couplings=(Coupling("f01", "f00", -2.0, 0.5),))
+    assert back.ranges[:2] == pytest.approx(np.array([[-0.5, 1.0], [-1.5, 1.5]]))
+
+
+@pytest.mark.parametrize("case", FALSE)
+def test_couplings_that_cannot_be_are_refused(case):
+    coupling, said = FALSE[case]
+    with pytest.raises(InputError, match=said):
+        replace(plain_hand(), couplings=(Coupling("f01", "f00", 1.0), coupling))
+
+
+def test_a_motor_carries_what_its_followers_do(coupled, reached):
+    """Virtual work: the torque of a motor is the work of the contact force per turn of it."""
+    for each in reached:
+        motors = gc.hand_motors(coupled, each)
+        names = [joint.name for joint in coupled.free_joints]
+        assert names == [j.name for j in coupled.joints if not j.name.endswith("curl")]
+        assert motors.limits == pytest.approx([0.5] * len(names))
+        for row, name in enumerate(names):
+            step, turned = 1e-6, np.array(each.joints)
+            index = [joint.name for joint in coupled.joints].index(name)
+            turned[index] += step
+            for c in coupled.couplings:
+                if c.driver == name:
+                    follower = [joint.name for joint in coupled.joints].index(c.joint)
+                    turned[follower] += c.ratio * step
+            rows = motors.levers.reshape(len(names), -1, 3)[row]
+            for k, finger in enumerate(each.fingers):
+                moved = material_point(coupled, each, int(finger), k, turned)
+                assert rows[k] == pytest.approx((moved - each.contacts[k].position) / step,
+                                                abs=1e-6)  # fmt: skip
+
+
+def material_point(hand, reach, finger, k, joints):
+    """Where the point of the last link that touches at contact k is at other angles."""
+    last = sum(len(f.links) for f in hand.fingers[: finger + 1]) - 1
+    before, after = (places(hand, q, reach.palm_pose) for q in (reach.joints, joints))
+    R, p = before.link_rotations[0, last], before.link_positions[0, last]
+    local = R.T @ (reach.contacts[k].position - p)
+    return after.link_positions[0, last] + after.link_rotations[0, last] @ local
+
+
+def test_gravity_of_links_loads_the_motor_of_the_joint_that_is_followed(coupled, reached):
+    each, down = reached[0], np.array([0.0, 0.0, -1.0])
+    motors = gc.hand_motors(coupled, each, down=down)
+
+    def height(joints):
+        at = places(coupled, joints, each.palm_pose)
+        centers = [at.link_positions[0, i] + at.link_rotations[0, i] @ link.center_of_mass
+                   for i, link in enumerate(coupled.links)]  # fmt: skip
+        masses = [link.mass_kg for link in coupled.links]
+        return float(np.array(masses) @ np.array(centers) @ -down)
+
+    names, step = [joint.name for joint in coupled.joints], 1e-6
+    for row, joint in enumerate(coupled.free_joints):
+        turned = np.array(each.joints)
+        turned[names.index(joint.name)] += step
+        for c in coupled.couplings:
+            if c.driver == joint.name:
+                turned[names.index(c.joint)] += c.ratio * step
+        work = 9.80665 * (height(turned) - height(each.joints)) / step
+        assert abs(motors.gravity[row]) == pytest.approx(abs(work), rel=1e-4, abs=1e-7)
+
+
+def test_followers_need_no_torque_limit_and_simulations_name_them(coupled, reached):
+    fingers = tuple(
+        replace(finger, links=tuple(
+            replace(link, joint=replace(link.joint, torque_limit_n_m=None))
+            if link.joint.name.endswith("curl") else link for link in finger.links
+        ))
+        for finger in coupled.fingers
+    )  # fmt: skip
+    each = reached[0]
+    assert gc.hand_motors(replace(coupled, fingers=fingers), each).limits.tolist() == [0.5] * 5
+    body = scaled("box", 0.035)
+    with pytest.raises(InputError, match="thumb_curl follows thumb_bend"):
+        scenes.build_hand_scene(coupled, body, each, FRICTION)
+
+
+def test_a_pose_that_breaks_couplings_is_refused(coupled, reached):
+    joints = np.array(reached[0].joints)
+    joints[1] += 0.01
+    with pytest.raises(InputError, match=r"off by 0\.01 rad"):
+        gc.hand_motors(coupled, replace(reached[0], joints=joints))

@@ -1,0 +1,366 @@
+"""Files of the kinds that makers publish: fixed links, packages, odd inertias, coupled joints."""
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+import scenes
+from grasp_core.errors import InputError
+from grasp_core.hands.kinematics import places
+
+INERTIA = '<inertia ixx="{0}" iyy="1e-6" izz="1e-6" ixy="0" ixz="0" iyz="0"/>'
+SPHERE = '<geometry><sphere radius="0.008"/></geometry>'
+BALL_KG = 1000.0 * 4.0 / 3.0 * np.pi * 0.008**3
+"""Mass of a fingertip, which has no inertia in the file, at the density of water."""
+TIPS = ("t0", "t1", "t2")
+
+
+def link(name, shapes="", odd=False):
+    weight = f'<inertial><mass value="0.02"/>{INERTIA.format("5e-6" if odd else "1e-6")}</inertial>'
+    return f'<link name="{name}">{weight}{shapes}</link>'
+
+
+def box(tag="collision", length=0.05):
+    return (f'<{tag}><origin xyz="0 0 {0.5 * length}"/><geometry><box size="0.01 0.01 {length}"/>'
+            f"</geometry></{tag}>")  # fmt: skip
+
+
+def joint(name, ends, place, turn="0 0 0", kind="revolute", extra=""):
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{ends[0]}"/><child link="{ends[1]}"/>'
+        f'<origin xyz="{place}" rpy="{turn}"/><axis xyz="0 1 0"/>'
+        f'<limit lower="-1.2" upper="0.9" effort="0.5" velocity="1"/>{extra}</joint>'
+    )
+
+
+def robot(tip=f"<collision>{SPHERE}</collision>", middle=None, follows="", odd=False, more=""):
+    """Three fingers of two joints, with fingertips on fixed joints."""
+    parts = [link("palm", box(length=0.01)), more]
+    for n in range(3):
+        turn = 2.0 * np.pi * n / 3.0
+        root = f"{0.04 * np.cos(turn)} {0.04 * np.sin(turn)} 0.01"
+        parts += [
+            link(f"a{n}", box()), link(f"b{n}", box() if middle is None else middle, odd=odd),
+            f'<link name="t{n}">{tip}</link>',
+            joint(f"ja{n}", ("palm", f"a{n}"), root, f"0 0 {turn}"),
+            joint(f"jb{n}", (f"a{n}", f"b{n}"), "0 0 0.055", extra=follows.format(n=n)),
+            joint(f"jt{n}", (f"b{n}", f"t{n}"), "0.003 0 0.06", "0.1 0.2 0.3", kind="fixed"),
+        ]  # fmt: skip
+    return f'<robot name="r">{"".join(parts)}</robot>'
+
+
+def loaded(folder, text, tips=TIPS, name="hand.urdf"):
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / name
+    path.write_text(text)
+    return scenes.load_hand(path, tips)
+
+
+def turned(axis, angle):
+    x, y, z = axis
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
+
+
+def numbers(element, key):
+    return np.array([float(each) for each in element.get(key, "0 0 0").split()])
+
+
+def in_robot(text, name, angles):
+    """Pose of a link in the root's frame, by plain products along the joints of the text."""
+    root = ET.fromstring(text)  # noqa: S314 - the test's own text
+    above = {each.find("child").get("link"): each for each in root.findall("joint")}
+    R, p = np.eye(3), np.zeros(3)
+    while name in above:
+        each = above[name]
+        roll, pitch, yaw = numbers(each.find("origin"), "rpy")
+        frame = turned((0, 0, 1), yaw) @ turned((0, 1, 0), pitch) @ turned((1, 0, 0), roll)
+        if each.get("type") == "revolute":
+            frame = frame @ turned(numbers(each.find("axis"), "xyz"), angles[each.get("name")])
+        R, p = frame @ R, frame @ p + numbers(each.find("origin"), "xyz")
+        name = each.find("parent").get("link")
+    return R, p
+
+
+def check_places(hand, text, tips=TIPS, local=(0.0, 0.0, 0.0)):
+    """Compare fingertips with points of the named links at random angles."""
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        angles = hand.drives.obeyed(rng.uniform(*hand.ranges.T)[None])[0]
+        named = {j.name: angle for j, angle in zip(hand.joints, angles, strict=True)}
+        found = places(hand, angles).tips[0]
+        for f, tip in enumerate(tips):
+            R, p = in_robot(text, tip, named)
+            assert found[f] == pytest.approx(p + R @ local, abs=1e-9)
+
+
+def test_links_on_fixed_joints_keep_their_names(tmp_path):
+    text = robot()
+    hand = loaded(tmp_path, text)
+    assert [finger.name for finger in hand.fingers] == list(TIPS)
+    assert [finger.tip.radius for finger in hand.fingers] == pytest.approx([0.008] * 3)
+    assert hand.notes == ()
+    check_places(hand, text)
+
+
+def test_inertias_that_no_body_can_have_are_said_and_masses_stay(tmp_path):
+    hand = loaded(tmp_path, robot(odd=True))
+    assert any("masses alone: b0, b1, b2" in note for note in hand.notes)
+    assert [each.mass_kg for each in hand.links] == pytest.approx([0.02, 0.02 + BALL_KG] * 3)
+
+
+def test_full_inertias_of_mjcf_are_balanced_too(tmp_path):
+    fingers = "".join(
+        f'<body name="a{n}" pos="0.0{n + 2} 0 0"><inertial mass="0.1" pos="0 0 0" '
+        f'fullinertia="1e-6 1e-6 9e-6 0 0 0"/><joint name="j{n}" range="-9 9"/>'
+        '<geom type="sphere" size="0.008" pos="0.001 0 0"/></body>'
+        for n in range(3)
+    )
+    text = f'<mujoco><worldbody><body name="palm">{fingers}</body></worldbody></mujoco>'
+    hand = loaded(tmp_path, text, ("a0", "a1", "a2"), "hand.xml")
+    assert any("masses alone: a0, a1, a2" in note for note in hand.notes)
+    assert [each.mass_kg for each in hand.links] == pytest.approx([0.1] * 3)
+
+
+def obj(half=0.005):
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    faces = ("1 2 4", "1 4 3", "5 7 8", "5 8 6", "1 5 6", "1 6 2", "3 4 8", "3 8 7", "1 3 7",
+             "1 7 5", "2 6 8", "2 8 4")  # fmt: skip
+    lines = [" ".join(["v", *(f"{half * c}" for c in corner)]) for corner in corners]
+    return "\n".join([*lines, *(f"f {face}" for face in faces)])
+
+
+def meshed(name, tag="collision"):
+    return f'<{tag}><geometry><mesh filename="{name}"/></geometry></{tag}>'
+
+
+def test_a_package_is_looked_for_above_the_file(tmp_path):
+    root = tmp_path / "my_hand"
+    (root / "meshes").mkdir(parents=True)
+    (root / "meshes" / "middle.obj").write_text(obj())
+    text = robot(middle=meshed("package://my_hand/meshes/middle.obj"))
+    hand = loaded(root / "models" / "urdf", text)
+    assert hand.links[1].shapes[0].half_sizes == pytest.approx([0.005] * 3)
+    beside = loaded(root, text)
+    assert beside.links[1] == hand.links[1]
+
+
+def test_messages_of_mujoco_call_files_as_they_are_called(tmp_path):
+    (tmp_path / "finger middle.stl").write_bytes(b"x")
+    (tmp_path / "middle.stl").write_bytes(b"x")
+    with pytest.raises(InputError, match=r"middle\.stl"):
+        loaded(tmp_path, robot(middle=meshed("middle.stl")))
+    with pytest.raises(InputError, match="cannot compile"):
+        loaded(tmp_path, robot(middle=meshed("finger middle.stl")))
+
+
+def test_a_package_may_be_called_otherwise_than_its_folder(tmp_path):
+    root = tmp_path / "checkout"
+    (root / "meshes").mkdir(parents=True)
+    (root / "meshes" / "middle.obj").write_text(obj())
+    text = robot(middle=meshed("package://my_hand/meshes/middle.obj"))
+    with pytest.raises(InputError, match="package my_hand around it"):
+        loaded(root / "urdf", text)
+    (root / "package.xml").write_text("<package><name>my_hand</name></package>")
+    assert loaded(root / "urdf", text).links[1].shapes
+
+
+OUTSIDE = {
+    "another": "package://other/meshes/secret.obj",
+    "climbing": "package://my_hand/../other/meshes/secret.obj",
+    "link": "package://my_hand/meshes/link.obj",
+    "root": "package:///etc/passwd",
+    "dots": "package://../other/meshes/secret.obj",
+}
+
+
+@pytest.mark.parametrize("case", OUTSIDE)
+def test_nothing_is_read_outside_the_package(case, tmp_path):
+    for name in ("my_hand", "other"):
+        (tmp_path / name / "meshes").mkdir(parents=True)
+    secret = tmp_path / "other" / "meshes" / "secret.obj"
+    secret.write_text(obj())
+    (tmp_path / "my_hand" / "meshes" / "link.obj").symlink_to(secret)
+    with pytest.raises(InputError, match="not in the folder of the model"):
+        loaded(tmp_path / "my_hand" / "urdf", robot(middle=meshed(OUTSIDE[case])))
+
+
+def test_visual_shapes_are_taken_where_a_link_has_no_others(tmp_path):
+    hand = loaded(tmp_path, robot(middle=box("visual"), tip=f"<visual>{SPHERE}</visual>"))
+    assert any("collide with their visual ones: b0, t0, b1, t1, b2, t2" in n for n in hand.notes)
+    assert [len(each.shapes) for each in hand.links] == [1, 2] * 3
+    assert [finger.tip.radius for finger in hand.fingers] == pytest.approx([0.008] * 3)
+
+
+def test_visual_shapes_of_links_that_have_others_are_not_read(tmp_path):
+    hand = loaded(tmp_path, robot(middle=box() + meshed("missing.glb", "visual")))
+    assert hand.notes == ()
+    assert [len(each.shapes) for each in hand.links] == [1, 2] * 3
+
+
+def test_links_with_pictures_alone_touch_nothing_and_are_named(tmp_path):
+    hand = loaded(tmp_path, robot(middle=meshed("missing.dae", "visual")))
+    assert any("touch nothing: b0, b1, b2" in note for note in hand.notes)
+
+
+def test_bodies_of_mjcf_without_shapes_that_collide_take_all_they_have(tmp_path):
+    fingers = "".join(
+        f'<body name="a{n}" pos="0.0{n + 2} 0 0"><joint name="j{n}" range="-9 9"/>'
+        f'<geom type="sphere" size="0.00{n + 5}" contype="0" conaffinity="0"/></body>'
+        for n in range(3)
+    )
+    text = f'<mujoco><worldbody><body name="palm">{fingers}</body></worldbody></mujoco>'
+    hand = loaded(tmp_path, text, ("a0", "a1", "a2"), "hand.xml")
+    assert [len(each.shapes) for each in hand.links] == [1, 1, 1]
+    assert any("with all they have: a0, a1, a2" in note for note in hand.notes)
+    assert not any({"a0", "a2"} == set(pair) for pair in hand.ignored_pairs)
+
+
+def test_a_fingertip_without_shape_is_the_nearest_of_its_link(tmp_path):
+    ball = '<collision><origin xyz="0 0 0.055"/><geometry><sphere radius="0.006"/></geometry>'
+    text = robot(tip="", middle=f"{ball}</collision>{box(length=0.04)}")
+    hand = loaded(tmp_path, text)
+    assert [finger.tip.radius for finger in hand.fingers] == pytest.approx([0.006] * 3)
+    assert any("nearest shape of their link: t0, t1, t2" in note for note in hand.notes)
+    check_places(hand, text, ("b0", "b1", "b2"), (0.0, 0.0, 0.055))
+
+
+def test_a_finger_without_any_shape_says_what_to_do(tmp_path):
+    with pytest.raises(InputError, match="a sphere of the fingertip's radius"):
+        loaded(tmp_path, robot(tip="", middle=""))
+
+
+def test_what_simulators_add_to_urdf_is_left_out(tmp_path):
+    more = '<gazebo><plugin filename="libx.so" name="x"/></gazebo><transmission name="t"/>'
+    assert loaded(tmp_path, robot(more=more)) == loaded(tmp_path, robot())
+
+
+def test_joints_of_urdf_follow_others(tmp_path):
+    text = robot(follows='<mimic joint="ja{n}" multiplier="1.5" offset="0.1"/>')
+    hand = loaded(tmp_path, text)
+    assert [(c.joint, c.driver) for c in hand.couplings] == [(f"jb{n}", f"ja{n}") for n in range(3)]
+    assert [(c.ratio, c.offset) for c in hand.couplings] == [pytest.approx((1.5, 0.1))] * 3
+    # -1.2 <= 1.5 q + 0.1 <= 0.9
+    assert hand.ranges[0] == pytest.approx([-1.3 / 1.5, 0.8 / 1.5])
+    check_places(hand, text)
+
+
+def test_a_joint_that_follows_one_that_does_not_move_is_refused(tmp_path):
+    with pytest.raises(InputError, match="jb0 must follow a joint that moves, got <mimic> of jt0"):
+        loaded(tmp_path, robot(follows='<mimic joint="jt{n}"/>'))
+
+
+def gripper(equality="", tendon=""):
+    """Three fingers of three joints in degrees, drawn bent by ten, beside a crank on the palm."""
+    fingers = "".join(
+        f'<body name="a{n}" pos="{0.04 * np.cos(a)} {0.04 * np.sin(a)} 0" euler="0 0 {120 * n}">'
+        f'<joint name="a{n}" axis="0 0 1" range="-30 30"/>'
+        f'<joint name="b{n}" axis="0 1 0" range="-60 60" ref="10"/>'
+        '<geom type="capsule" fromto="0 0 0 0 0 0.04" size="0.006"/>'
+        f'<body name="c{n}" pos="0 0 0.04"><joint name="c{n}" axis="0 1 0" range="-80 20"/>'
+        '<geom type="capsule" fromto="0 0 0 0 0 0.03" size="0.006"/></body></body>'
+        for n, a in enumerate(2.0 * np.pi * np.arange(3) / 3.0)
+    )
+    crank = ('<body name="crank" pos="0 0 -0.03"><joint name="crank" axis="1 0 0" range="-10 10"/>'
+             '<geom type="box" size="0.01 0.01 0.01"/></body>')  # fmt: skip
+    return (
+        f'<mujoco><worldbody><body name="palm"><geom type="box" size="0.03 0.03 0.01"/>{fingers}'
+        f"{crank}</body></worldbody><tendon>{tendon}</tendon><equality>{equality}</equality>"
+        "</mujoco>"
+    )
+
+
+def rule(one, other, coefficients="0 1 0 0 0"):
+    return f'<joint joint1="{one}" joint2="{other}" polycoef="{coefficients}"/>'
+
+
+def coupled(tmp_path, equality, tendon=""):
+    return loaded(tmp_path, gripper(equality, tendon), ("c0", "c1", "c2"), "hand.xml")
+
+
+def test_equalities_are_about_the_angles_in_which_a_file_is_drawn(tmp_path):
+    """c - 0 = 0.2 + 0.5 (b - 10 degrees)."""
+    hand = coupled(tmp_path, rule("c0", "b0", "0.2 0.5 0 0 0"))
+    (coupling,) = hand.couplings
+    assert (coupling.joint, coupling.driver) == ("c0", "b0")
+    assert coupling.ratio == pytest.approx(0.5)
+    assert coupling.offset == pytest.approx(0.2 - 0.5 * np.deg2rad(10.0))
+
+
+def test_chains_of_couplings_end_at_one_free_joint(tmp_path):
+    hand = coupled(tmp_path, rule("c0", "b0", "0 0.5 0 0 0") + rule("b0", "a0", "0 -2 0 0 0"))
+    ten = np.deg2rad(10.0)
+    found = {c.joint: (c.driver, c.ratio, c.offset) for c in hand.couplings}
+    assert found == {"b0": ("a0", -2.0, pytest.approx(ten)), "c0": ("a0", -1.0, 0.0)}
+
+
+def test_joints_that_follow_one_that_moves_no_fingertip_follow_each_other(tmp_path):
+    """b0 = 4 k + 10 degrees and c1 = -2 k, with k from -10 to 10 degrees."""
+    hand = coupled(tmp_path, rule("b0", "crank", "0 4 0 0 0") + rule("c1", "crank", "0 -2 0 0 0"))
+    (coupling,) = hand.couplings
+    assert (coupling.joint, coupling.driver, coupling.ratio) == ("c1", "b0", -0.5)
+    names = [joint.name for joint in hand.joints]
+    assert np.rad2deg(hand.ranges[names.index("b0")]) == pytest.approx([-30.0, 50.0])
+    assert np.rad2deg(hand.ranges[names.index("c1")]) == pytest.approx([-20.0, 20.0])
+    assert any("crank" in note for note in hand.notes)
+
+
+def test_a_joint_that_is_held_at_an_angle_has_no_other(tmp_path):
+    hand = coupled(tmp_path, '<joint joint1="b0" polycoef="0.3 0 0 0 0"/>')
+    names = [joint.name for joint in hand.joints]
+    assert hand.ranges[names.index("b0")] == pytest.approx([0.3 + np.deg2rad(10.0)] * 2)
+
+
+def test_rules_that_are_off_do_not_count(tmp_path):
+    hand = coupled(tmp_path, '<joint joint1="c0" joint2="b0" active="false"/>')
+    assert hand.couplings == ()
+
+
+def test_tendons_without_rules_leave_joints_free_with_a_note(tmp_path):
+    tendon = '<fixed name="pull"><joint joint="b0" coef="1"/><joint joint="c0" coef="1"/></fixed>'
+    hand = coupled(tmp_path, "", tendon)
+    assert hand.couplings == ()
+    assert any("tendons are left out" in note and "pull" in note for note in hand.notes)
+
+
+REFUSED = {
+    "curve": (rule("c0", "b0", "0 1 0.5 0 0"), "joints b0, c0 are on a curve"),
+    "circle": (rule("c0", "b0") + rule("b0", "c0"), "joints b0, c0 follow each other in a circle"),
+    "two": (rule("c0", "b0") + rule("c0", "a0"), "joints c0 follow two others"),
+    "loop": ('<connect body1="c0" body2="crank" anchor="0 0 0"/>',
+             "joints a0, b0, c0 are in a loop that a connect closes"),
+    "weld": ('<weld body1="c0" body2="c1"/>', "joints a0, b0, c0, a1, b1, c1 are in a loop"),
+    "tendon": ('<tendon tendon1="pull"/>', "joints b0, c0 are coupled by the length of tendon"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_other_rules_are_refused_with_their_joints(case, tmp_path):
+    equality, said = REFUSED[case]
+    tendon = '<fixed name="pull"><joint joint="b0" coef="1"/><joint joint="c0" coef="1"/></fixed>'
+    with pytest.raises(InputError, match=said):
+        coupled(tmp_path, equality, tendon if case == "tendon" else "")
+
+
+def test_a_weld_that_holds_the_palm_is_no_loop(tmp_path):
+    text = gripper('<weld body1="palm"/>').replace(
+        '<body name="palm">', '<body name="palm"><freejoint/>'
+    )
+    assert len(loaded(tmp_path, text, ("c0", "c1", "c2"), "hand.xml").joints) == 9
+
+
+def test_fingers_with_joints_in_common_move_as_one(tmp_path):
+    """Fingers 1 and 2 stand on a link of the palm, as ring and little finger of some hands do."""
+    text = robot(more=link("arch", box(length=0.02)) + joint("arch", ("palm", "arch"), "0 0 0.01"))
+    for n in (1, 2):
+        text = text.replace(f'"palm"/><child link="a{n}"', f'"arch"/><child link="a{n}"')
+    hand = loaded(tmp_path, text)
+    assert [j.name for j in hand.fingers[1].links[0:1]] == ["arch"]
+    (coupling,) = hand.couplings
+    assert (coupling.joint, coupling.driver, coupling.ratio) == ("arch of t2", "arch", 1.0)
+    assert sum(len(each.shapes) for each in hand.links) == 10
+    assert sum(each.mass_kg for each in hand.links) == pytest.approx(7 * 0.02 + 3 * BALL_KG)
+    check_places(hand, text)
+    with pytest.raises(InputError, match="arch moves arch and another fingertip"):
+        loaded(tmp_path, text, ("t0", "t1", "arch"))
