@@ -9,38 +9,30 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from grasp_core.arrays import Array
-from grasp_core.hands.hand import Hand, Link, LinkShape
+from grasp_core.hands.hand import PALM, Hand, Link, LinkShape
 
+DENSITY_KG_M3 = 1000.0
+"""Density of links: the one that MuJoCo takes itself."""
+BALL = LinkShape(np.zeros(3), np.eye(3), np.zeros(3), 0.01)
+"""What a link without shapes is taken for."""
 LEAST_KG, LEAST_M = 1e-6, 1e-6
 """Least mass of a link [kg], and least length of a shape [m]: the simulator refuses none at all."""
 
 
-def link_inertials(hand: Hand, density_kg_m3: float) -> dict[str, dict[str, object]]:
-    """Return the MJCF inertial of each link: its own mass and centre, or those of its shapes."""
-    return {link.name: _of_link(link, density_kg_m3) for link in hand.links}
+def hand_inertials(hand: Hand) -> dict[str, dict[str, object]]:
+    """Return the MJCF inertial of the palm and of each link, by name."""
+    own = {link.name: _inertial(link.shapes, link) for link in hand.links}
+    return {PALM: _inertial(hand.palm, None), **own}
 
 
-def _of_link(link: Link, density_kg_m3: float) -> dict[str, object]:
-    """Return a link's inertial; a link without shapes has those of a ball of 1 cm."""
-    shapes = link.shapes or (LinkShape(np.zeros(3), np.eye(3), np.zeros(3), 0.01),)
-    return inertial(shapes, density_kg_m3, link.mass_kg, link.center_of_mass)
-
-
-def inertial(
-    shapes: Sequence[LinkShape], density_kg_m3: float, mass_kg: float | None, center: Array | None
-) -> dict[str, object]:
-    """Return the MJCF inertial of shapes that move as one.
-
-    Args:
-        shapes: The shapes, at least one.
-        density_kg_m3: Their density, where their mass is not known.
-        mass_kg: Their mass together, where it is known.
-        center: Their centre of mass, where it is known, (3,) [m].
-    """
+def _inertial(shapes: Sequence[LinkShape], link: Link | None) -> dict[str, object]:
+    """Return the inertial of shapes, with the mass and centre that are known of their link."""
+    shapes = shapes or (BALL,)
+    known = None if link is None else link.mass_kg
+    center = None if link is None else link.center_of_mass
     volumes = np.array([_volume(shape) for shape in shapes])
     middles = np.array([shape.position for shape in shapes])
-    mass = density_kg_m3 * float(volumes.sum()) if mass_kg is None else max(mass_kg, LEAST_KG)
+    mass = DENSITY_KG_M3 * float(volumes.sum()) if known is None else max(known, LEAST_KG)
     masses = mass * volumes / volumes.sum()
     middle = masses @ middles / mass
     second = np.zeros((3, 3))

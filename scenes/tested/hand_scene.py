@@ -13,7 +13,9 @@ soft one, and recoils as its fingers start.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +31,7 @@ from scenes.hands.chains_mjcf import (
     placed,
 )
 from scenes.hands.hand_layout import hand_layout
-from scenes.hands.link_masses import inertial, link_inertials
+from scenes.hands.link_masses import hand_inertials
 from scenes.mjcf_text import Element, add_element, as_texts, quaternion
 from scenes.physics import PhysicsSettings
 from scenes.tested.tested_object import TestedScene, begun, ended, mass_properties
@@ -63,9 +65,9 @@ class HandServos:
     """What holds the hand's root; None for a palm that is fixed."""
     root: Array = field(default_factory=lambda: np.eye(4))
     """Pose of the palm in its root, (4, 4)."""
-    density_kg_m3: float = 1000.0
-    """Density of links and of the palm where their masses are not known."""
-    palm_mass_kg: float | None = None
+    inertials: Mapping[str, Mapping[str, object]] = field(default_factory=dict[str, Any])
+    """MJCF's inertials of palm and links by name, where they are known; on a weld others have those
+    of their shapes."""
 
     def armature(self, step_s: float) -> float:
         """Return the inertia of each joint's motor [kg m^2]; links on a weld have their own."""
@@ -133,7 +135,7 @@ def hand_scene(  # noqa: PLR0913, PLR0917 - the hand at the object, and what a t
         physics: Simulation settings, with the torsional coefficient.
         servos: What drives the hand, and what it hangs on.
     """
-    mass = mass_properties(body, mass_kg)
+    mass, weights = mass_properties(body, mass_kg), {**hand_inertials(hand), **servos.inertials}
     root, world = begun(body, friction, mass, physics)
     palms = postures.palms.copy()
     palms[:, :3, 3] -= body.center_of_mass
@@ -142,10 +144,15 @@ def hand_scene(  # noqa: PLR0913, PLR0917 - the hand at the object, and what a t
     at = palms[1] if servos.weld is None else servos.root
     palm = add_element(hung, "body", {"name": PALM, **placed(at[:3, 3], at[:3, :3])})
     if servos.weld is not None:
-        own = inertial(hand.palm, servos.density_kg_m3, servos.palm_mass_kg, None)
-        add_element(palm, "inertial", own)
-    rubbing = {"friction": (friction, physics.torsion_m, 0.0)} | physics.contact()
-    _add_fingers(palm, hand, servos, physics, as_texts(rubbing))
+        add_element(palm, "inertial", weights[PALM])
+    touching = as_texts({"friction": (friction, physics.torsion_m, 0.0)} | physics.contact())
+    free = servos.weld is not None
+    tips = tuple({} if _covered(each) else {"conaffinity": 1, **touching} for each in hand.fingers)
+    chains = Chains(
+        hand, np.zeros(len(hand.joints)), servos.armature(physics.timestep), tips,
+        contact=touching, stops=free, inertials=weights if free else {},
+    )  # fmt: skip
+    add_fingers(palm, chains)
     add_exclusions(add_element(root, "contact", {}), hand)
     _add_servos(root, hand, postures, servos, physics.timestep)
     opened, shut, squeezing = np.hstack([roots, to_digits(postures.joints)])
@@ -179,21 +186,6 @@ def _welded(root: Element, world: Element, weld: Weld) -> Element:
             "anchor": (0.0, 0.0, 0.0), "torquescale": 1.0}  # fmt: skip
     add_element(add_element(root, "equality", {}), "weld", both)
     return body
-
-
-def _add_fingers(
-    palm: Element, hand: Hand, servos: HandServos, physics: PhysicsSettings,
-    touching: dict[str, str],
-) -> None:  # fmt: skip
-    """Add palm and links, at angles of zero, with what they weigh."""
-    free = servos.weld is not None
-    tips = tuple({} if _covered(each) else {"conaffinity": 1, **touching} for each in hand.fingers)
-    chains = Chains(
-        hand, np.zeros(len(hand.joints)), servos.armature(physics.timestep), tips,
-        contact=touching, stops=free,
-        inertials=link_inertials(hand, servos.density_kg_m3) if free else {},
-    )  # fmt: skip
-    add_fingers(palm, chains)
 
 
 def _covered(finger: HandFinger) -> bool:

@@ -129,7 +129,7 @@ def judge_hand_by(  # noqa: PLR0913 - the hand in its grasp, and how it is judge
     stiffness = file.servo_n_m_per_rad if found.own_servos else None
     servos = HandServos(
         found.servo_n_m_per_rad if stiffness is None else stiffness,
-        file.damping_n_m_s_per_rad, found.weld, file.root, file.density_kg_m3, file.palm_mass_kg,
+        file.damping_n_m_s_per_rad, found.weld, file.root, file.inertials,
     )  # fmt: skip
     if isinstance(reach, RecordedReach):
         postures = recorded_postures(reach, hand, servos.stiffness_n_m_per_rad)
