@@ -20,10 +20,11 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
-from grasp_core.hands.hand import PALM, Hand, HandFinger
+from grasp_core.hands.hand import PALM, Fingertip, Hand, HandFinger
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.hands.chains_mjcf import (
+    SHAPES,
     Chains,
     add_exclusions,
     add_fingers,
@@ -147,9 +148,10 @@ def hand_scene(  # noqa: PLR0913, PLR0917 - the hand at the object, and what a t
         add_element(palm, "inertial", weights[PALM])
     touching = as_texts({"friction": (friction, physics.torsion_m, 0.0)} | physics.contact())
     free = servos.weld is not None
-    tips = tuple({} if _covered(each) else {"conaffinity": 1, **touching} for each in hand.fingers)
+    tips = tuple(_tip(root, each, touching) for each in hand.fingers)
     chains = Chains(
-        hand, np.zeros(len(hand.joints)), servos.armature(physics.timestep), tips,
+        replace(hand, fingers=tuple(map(_without_cover, hand.fingers))), np.zeros(len(hand.joints)),
+        servos.armature(physics.timestep), tips,
         contact=touching, stops=free, inertials=weights if free else {},
     )  # fmt: skip
     add_fingers(palm, chains)
@@ -186,6 +188,32 @@ def _welded(root: Element, world: Element, weld: Weld) -> Element:
             "anchor": (0.0, 0.0, 0.0), "torquescale": 1.0}  # fmt: skip
     add_element(add_element(root, "equality", {}), "weld", both)
     return body
+
+
+def _tip(root: Element, finger: HandFinger, touching: dict[str, str]) -> dict[str, object]:
+    """Return what a fingertip is: a solid with its corners, a ball, or nothing under a shape."""
+    corners = corners_of(finger.tip)
+    if corners is None:
+        return {} if _covered(finger) else {"conaffinity": 1, **touching}
+    name = f"tip_{finger.name}"
+    solid = {"name": name, "inertia": "shell", "vertex": to_digits(corners)}
+    add_element(add_element(root, "asset", {}), "mesh", solid)
+    return {"type": "mesh", "mesh": name, "pos": np.zeros(3), "conaffinity": SHAPES,
+            "contype": SHAPES, **touching}  # fmt: skip
+
+
+def corners_of(tip: Fingertip) -> Array | None:
+    """Return the corners of a fingertip that is a block, (m, 3) [m]; None for a ball."""
+    return getattr(tip, "corners", None)
+
+
+def _without_cover(finger: HandFinger) -> HandFinger:
+    """Return a finger without the shape that covers a block, its last; the block itself touches."""
+    if corners_of(finger.tip) is None:
+        return finger
+    last = finger.links[-1]
+    links = (*finger.links[:-1], replace(last, shapes=last.shapes[:-1]))
+    return replace(finger, links=links, tip=Fingertip(finger.tip.center, finger.tip.radius))
 
 
 def _covered(finger: HandFinger) -> bool:

@@ -42,7 +42,7 @@ ALLEGRO: tuple[Row, ...] = (
     (22.5, -0.164, 0.017, 21.11, 7.526, 6.583, 2.143, 0.0, 0.097, 0.0),
     (23.18, 0.0, 0.003, 21.32, 7.132, 6.808, 1.806, 0.0, 0.0, 0.005),
 )
-"""Palm, links of a finger, links of the thumb: mass [g], centre [mm], and inertia about it [kg mm^2]
+"""Palm, links of a finger, links of the thumb: mass [g], centre [mm] and inertia about it [kg mm^2]
 (xx, yy, zz, xy, xz, yz), in the link's frame."""
 LEAP_THUMB = ("mp", "base", "proximal", "distal")
 LEAP: tuple[Row, ...] = (
