@@ -21,10 +21,10 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.geometry.nearest_points import nearest_on_surface
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_motors import hand_motors
+from grasp_core.hands.hand_motors import chains, hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians
 from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import stance_of
+from grasp_core.hands.stance import Stance, stance_of
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
@@ -39,6 +39,10 @@ PUSH_N = 5.0
 """Largest normal force of the squeeze unless stated [N]."""
 STRONG_N_M = 1e6
 """Torque limit of a hand whose levers are asked for: no limit matters to them."""
+GAP_M = 0.01
+"""How far fingertips have opened in a record's pregrasp unless stated [m]."""
+SHARES = 65
+"""Number of postures looked at on the way from the grasp to the pregrasp."""
 FEWEST = 3
 """Fewest fingertips that can hold an object without torsion."""
 
@@ -69,7 +73,7 @@ def _seven(pose: Array) -> Array:
 
 def dex_record(
     hand: Hand, reach: HandReach, object_path: str, *, push_n: float = PUSH_N,
-    servo_n_m_per_rad: float | None = None,
+    servo_n_m_per_rad: float | None = None, gap_m: float | None = GAP_M,
 ) -> DexRecord:  # fmt: skip
     """Record where a hand stands in a grasp, for DexGraspBench.
 
@@ -83,6 +87,8 @@ def dex_record(
         push_n: Largest normal force of the squeeze [N].
         servo_n_m_per_rad: Stiffness of the servos that are told to squeeze; None for that of
             DexGraspBench's file of the hand.
+        gap_m: How far each fingertip has opened in the record's pregrasp [m], so that all meet the
+            object at one moment; at most as far as in that of the pose. None for that one.
 
     Raises:
         InputError: The pose is another hand's, or none was found.
@@ -100,11 +106,27 @@ def dex_record(
     told = levers @ forces.ravel() / servo
     root = _seven(stance.palm_pose @ np.linalg.inv(hand_file(hand).root))
     opened = stance.joints if reach.pregrasp is None else reach.pregrasp
+    if gap_m is not None:
+        opened = _opened_by(stance, opened, number(gap_m, "gap_m", above=0.0, most=1.0))
     return DexRecord(
         object_path, 1.0, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
         *(np.concatenate([root, joints]) for joints in (opened, stance.joints,
                                                         stance.joints + to_digits(told))),
     )  # fmt: skip
+
+
+def _opened_by(stance: Stance, opened: Array, gap_m: float) -> Array:
+    """Open each finger on its way to a posture until its tip is a gap away along the normal."""
+    shares = np.linspace(0.0, 1.0, SHARES)
+    ways = stance.joints + shares[:, None] * (opened - stance.joints)
+    tips = places(stance.hand, ways, stance.palm_pose).tips
+    found, joints = opened.copy(), chains(stance.hand)
+    for finger, contact in zip(stance.fingers, stance.contacts, strict=True):
+        gaps = np.maximum.accumulate((tips[0, finger] - tips[:, finger]) @ contact.normal)
+        share = float(np.interp(gap_m, gaps, shares))
+        own = list(joints[finger])
+        found[own] = stance.joints[own] + share * (opened - stance.joints)[own]
+    return found
 
 
 def reach_of_record(
