@@ -4,9 +4,9 @@ The shapes of links, and fingertips that none of them covers, touch the object's
 have the hand's own angles. The palm is fixed in the world, links are light, and servos have as much
 inertia as their stiffness needs in steps of the test; or, where the test has it so, the hand is as
 heavy as it is, and its root is a free body on a weld to one that moves as told. A weld acts on a
-free body of the mass m as a spring of the stiffness
+free body with the inverse mass w (MuJoCo's `body_invweight0`) as a spring of the stiffness
 
-    m k d / (1 - d),   k = 1 / (d_max t z)^2                                              (1)
+    k d^2 / ((1 - d) w),   k = 1 / (d_max t z)^2                                          (1)
 
 with its `solref` (t, z) and the impedance d of its `solimp`, at most d_max: a light hand hangs on a
 soft one, and recoils as its fingers start.

@@ -94,13 +94,13 @@ def begun(
         solid = {"name": f"surface{place}", "inertia": "shell", "vertex": to_digits(corners)}
         add_element(assets, "mesh", solid)
     world = add_element(root, "worldbody", {})
-    rubbing = {"friction": (friction, physics.torsion_m, 0.0)} | physics.contact()
+    rubbing = as_texts({"friction": (friction, physics.torsion_m, 0.0), **physics.contact()})
     _object(world, mass, rubbing, len(solids))
     return root, world
 
 
 def _object(
-    world: Element, mass: tuple[float, Array], rubbing: dict[str, object], solids: int
+    world: Element, mass: tuple[float, Array], rubbing: dict[str, str], solids: int
 ) -> None:
     """Add the object with its mass, and the solids that are its surface."""
     body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
@@ -114,7 +114,7 @@ def _object(
                   "rgba": (0.9, 0.6, 0.2, 0.3)}  # fmt: skip
     for place in range(solids):
         named = {"name": f"surface{place}", "type": "mesh", "mesh": f"surface{place}"}
-        add_element(body, "geom", named | everything | as_texts(rubbing))
+        add_element(body, "geom", named | everything | rubbing)
 
 
 def ended(root: Element, opened: Array, told: int = 0) -> str:

@@ -39,7 +39,7 @@ PUSH_N = 5.0
 """Largest normal force of the squeeze unless stated [N]."""
 STRONG_N_M = 1e6
 """Torque limit of a hand whose levers are asked for: no limit matters to them."""
-GAP_M = 0.01
+GAP_M = 0.005
 """How far fingertips have opened in a record's pregrasp unless stated [m]."""
 SHARES = 65
 """Number of postures looked at on the way from the grasp to the pregrasp."""
@@ -88,7 +88,8 @@ def dex_record(
         servo_n_m_per_rad: Stiffness of the servos that are told to squeeze; None for that of
             DexGraspBench's file of the hand.
         gap_m: How far each fingertip has opened in the record's pregrasp [m], so that all meet the
-            object at one moment; at most as far as in that of the pose. None for that one.
+            object at one moment; less where one opens by less in that of the pose. None for that
+            one.
 
     Raises:
         InputError: The pose is another hand's, or none was found.
@@ -120,11 +121,14 @@ def _opened_by(stance: Stance, opened: Array, gap_m: float) -> Array:
     shares = np.linspace(0.0, 1.0, SHARES)
     ways = stance.joints + shares[:, None] * (opened - stance.joints)
     tips = places(stance.hand, ways, stance.palm_pose).tips
+    gaps = [
+        np.maximum.accumulate((tips[0, finger] - tips[:, finger]) @ contact.normal)
+        for finger, contact in zip(stance.fingers, stance.contacts, strict=True)
+    ]
+    gap = min(gap_m, *(float(each[-1]) for each in gaps))
     found, joints = opened.copy(), chains(stance.hand)
-    for finger, contact in zip(stance.fingers, stance.contacts, strict=True):
-        gaps = np.maximum.accumulate((tips[0, finger] - tips[:, finger]) @ contact.normal)
-        share = float(np.interp(gap_m, gaps, shares))
-        own = list(joints[finger])
+    for finger, each in zip(stance.fingers, gaps, strict=True):
+        share, own = float(np.interp(gap, each, shares)), list(joints[finger])
         found[own] = stance.joints[own] + share * (opened - stance.joints)[own]
     return found
 
@@ -160,8 +164,12 @@ def reach_of_record(
     coefficient(friction)
     number(touch_m, "touch_m", least=0.0, most=1.0)
     text(name, "name")
-    _check_joints(record, hand)
     joints = record.grasp[FREE:]
+    if len(joints) != len(hand.joints):
+        raise InputError(
+            f"record must have the {len(hand.joints)} joints of {hand.name}, got {len(joints)}; "
+            "give the hand that was recorded"
+        )
     palm = _palms(record, hand)[1]
     found = partial(RecordedReach, hand.name, name, record=record)
     touching, contacts = _touched(hand, body, joints, palm, touch_m)
@@ -187,31 +195,22 @@ def recorded_postures(reach: RecordedReach, hand: Hand, servo_n_m_per_rad: float
     Raises:
         InputError: The hand is not the recorded one.
     """
+    if reach.hand != hand.name:
+        raise InputError(f"hand must be the recorded one, {reach.hand}, got {hand.name}")
     record = reach.record
-    _check_joints(record, hand)
     joints = np.array([each[FREE:] for each in (record.pregrasp, record.grasp, record.squeeze)])
     palms = _palms(record, hand)
     torques = servo_n_m_per_rad * (joints[2] - joints[1])
     J = tip_jacobians(hand, joints[1], palms[1])[0].reshape(-1, len(torques))
-    forces = np.linalg.lstsq(J.T, torques, rcond=None)[0].reshape(-1, 3)
+    forces = np.asarray(np.linalg.lstsq(J.T, torques, rcond=None)[0], dtype=np.float64)
     axes = pose_of(record.object_pose)[:3, :3].T
-    return Postures(palms, joints, np.linalg.norm(forces, axis=1), axes=axes)
+    return Postures(palms, joints, np.linalg.norm(forces.reshape(-1, 3), axis=1), axes=axes)
 
 
 def _palms(record: DexRecord, hand: Hand) -> Array:
     """Return the poses of the palm in the object's frame, open, touching and squeezing."""
     roots = [pose_of(each) for each in (record.pregrasp, record.grasp, record.squeeze)]
     return np.linalg.inv(pose_of(record.object_pose)) @ np.array(roots) @ hand_file(hand).root
-
-
-def _check_joints(record: DexRecord, hand: Hand) -> None:
-    """Refuse a hand with other joints than a record."""
-    count = len(record.grasp) - FREE
-    if count != len(hand.joints):
-        raise InputError(
-            f"record must have the {len(hand.joints)} joints of {hand.name}, got {count}; "
-            "give the hand that was recorded"
-        )
 
 
 def _touched(
