@@ -66,8 +66,7 @@ class PhysicsSettings:
     diagexact: bool = False
     """Whether contact impedances use the exact inertia at each contact."""
     multiccd: bool = True
-    """Whether flat shapes touch at several points; MuJoCo before its version 3.5 had one unless
-    asked."""
+    """Whether flat shapes touch at several points, which MuJoCo 3.3 does only where asked."""
     torsion_m: float = 0.0
     """Torsional coefficient of every contact [m]: the largest torque about the normal over the
     normal force, where the contact does not slide; zero is a hard fingertip. Above zero contacts

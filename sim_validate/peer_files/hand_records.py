@@ -108,7 +108,7 @@ def dex_record(
     root = _seven(stance.palm_pose @ np.linalg.inv(hand_file(hand).root))
     opened = stance.joints if reach.pregrasp is None else reach.pregrasp
     if gap_m is not None:
-        opened = _opened_by(stance, opened, number(gap_m, "gap_m", above=0.0, most=1.0))
+        opened = _opened_by(stance, opened, positive(gap_m, "gap_m"))
     return DexRecord(
         object_path, 1.0, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
         *(np.concatenate([root, joints]) for joints in (opened, stance.joints,

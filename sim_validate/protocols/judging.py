@@ -121,6 +121,7 @@ def judge_hand_by(  # noqa: PLR0913 - the hand in its grasp, and how it is judge
             test has the name.
     """
     found = _protocol(protocol)
+    instance(hand, Hand, "hand", "load_hand makes one")
     check_body(body)
     coefficient(friction)
     seed_of(seed)
