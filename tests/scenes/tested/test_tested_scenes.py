@@ -156,6 +156,15 @@ def test_a_hand_recoils_as_its_fingers_move_by_what_its_masses_say():
     assert far["usual"] < 0.2 * far["loose"]
 
 
+def test_shapes_touch_at_one_point_where_the_test_has_it_so():
+    off = mujoco.mjtDisableBit.mjDSBL_MULTICCD.value
+    assert loaded(welded(Weld()))[0].opt.disableflags & off
+    usual = fingertip_scene(BODY, GRASP, 0.7, 0.2, PHYSICS, FingerSettings())
+    assert not loaded(usual)[0].opt.disableflags & off
+    assert "multiccd" not in PHYSICS.record()
+    assert replace(PHYSICS, multiccd=False).record()["multiccd"] is False
+
+
 def test_a_tip_under_a_shape_of_its_link_touches_once_and_another_by_its_ball():
     covered, _ = loaded(welded(Weld()))
     assert not covered.geom_conaffinity[covered.geom("tip_first").id]
