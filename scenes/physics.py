@@ -65,6 +65,8 @@ class PhysicsSettings:
     returns to its start, which looks perfectly stable."""
     diagexact: bool = False
     """Whether contact impedances use the exact inertia at each contact."""
+    multiccd: bool = True
+    """Whether flat shapes touch at several points, which MuJoCo 3.3 does only where asked."""
     torsion_m: float = 0.0
     """Torsional coefficient of every contact [m]: the largest torque about the normal over the
     normal force, where the contact does not slide; zero is a hard fingertip. Above zero contacts
@@ -106,8 +108,9 @@ class PhysicsSettings:
         return replace(self, gravity=gravity)
 
     def record(self) -> dict[str, Any]:
-        """Return the settings by name; torsion only where there is some, as older files have it."""
-        return {name: value for name, value in asdict(self).items() if name != "torsion_m" or value}
+        """Return the settings by name; two of them only where unusual, as older files have it."""
+        usual = {"torsion_m": 0.0, "multiccd": True}
+        return {name: value for name, value in asdict(self).items() if value != usual.get(name)}
 
     def options(self) -> dict[str, float | int | str | tuple[float, ...]]:
         """Return the attributes of MJCF's `option` element."""
@@ -177,11 +180,11 @@ VECTORS = {
 }
 """Number of components of each vector, and the largest size of a component."""
 CONTACT_SETTINGS = ("solref", "solimp", "condim", "margin", "gap", "torsion_m")
-CHOSEN_FLAGS = ("autoreset", "diagexact")
+CHOSEN_FLAGS = ("autoreset", "diagexact", "multiccd")
 ENABLED_FLAGS = (
     "constraint", "equality", "frictionloss", "limit", "contact", "spring", "damper", "gravity",
     "clampctrl", "warmstart", "filterparent", "actuation", "refsafe", "sensor", "nativeccd",
-    "eulerdamp", "multiccd",
+    "eulerdamp",
 )  # fmt: skip
 UNUSED_FLAGS = (
     "override", "energy", "fwdinv", "invdiscrete", "sleep", "ipc", "speculative", "midphase",

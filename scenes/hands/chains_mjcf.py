@@ -7,8 +7,9 @@ palm, except pairs that the hand lets overlap.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +47,10 @@ class Chains:
     fingertips do."""
     contact: Mapping[str, object] | None = None
     """Attributes of these contacts."""
+    inertials: Mapping[str, Mapping[str, object]] = field(default_factory=dict[str, Any])
+    """Mass and inertia of links by name, in place of those above."""
+    stops: bool = False
+    """Whether joints stop at the ends of their ranges."""
 
 
 def add_fingers(palm: Element, chains: Chains) -> None:
@@ -81,11 +86,13 @@ def _link(parent: Element, chains: Chains, numbered: tuple[Link, bool], angle: f
     add_element(
         body, "joint",
         {"name": joint.name, "type": "hinge", "axis": joint.axis, "pos": (0.0, 0.0, 0.0),
-         "limited": "false", "damping": 0.0, "stiffness": 0.0,
+         "limited": "true" if chains.stops else "false",
+         "range": (joint.lowest - angle, joint.highest - angle), "damping": 0.0, "stiffness": 0.0,
          "armature": chains.armature_kg_m2, "frictionloss": 0.0},
     )  # fmt: skip
     inertia = (mass * NOMINAL_M**2,) * 3
-    add_element(body, "inertial", {"pos": center, "mass": mass, "diaginertia": inertia})
+    nominal = {"pos": center, "mass": mass, "diaginertia": inertia}
+    add_element(body, "inertial", chains.inertials.get(link.name, nominal))
     for place, shape in enumerate(link.shapes):
         _shape(body, f"{link.name}_{place}", shape, chains, touches=not is_last)
     return body
@@ -137,7 +144,8 @@ def add_exclusions(contact: Element, hand: Hand) -> None:
 
 
 def add_servo(
-    actuators: Element, joint: str, stiffness: float, damping: float, limit: float
+    actuators: Element, joint: str, stiffness: float, damping: float, limit: float | None,
+    span: tuple[float, float] | None = None,
 ) -> None:  # fmt: skip
     """Add the servo of a joint.
 
@@ -146,10 +154,13 @@ def add_servo(
         joint: Name of the joint, and of its servo.
         stiffness: Torque per angle from the command [N m/rad].
         damping: Torque per speed [N m s/rad].
-        limit: Largest torque either way [N m].
+        limit: Largest torque either way [N m]; None for none.
+        span: Least and largest command [rad]; None for any.
     """
     servo = {
-        "name": joint, "joint": joint, "kp": stiffness, "kv": damping, "ctrllimited": "false",
-        "forcelimited": "true", "forcerange": (-limit, limit),
+        "name": joint, "joint": joint, "kp": stiffness, "kv": damping,
+        "ctrllimited": "false" if span is None else "true", "ctrlrange": span or (0.0, 0.0),
+        "forcelimited": "false" if limit is None else "true",
+        "forcerange": (0.0, 0.0) if limit is None else (-limit, limit),
     }  # fmt: skip
     add_element(actuators, "position", servo)

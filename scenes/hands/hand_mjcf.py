@@ -104,31 +104,19 @@ def hand_text(layout: HandLayout, physics: PhysicsSettings) -> str:
     root, world = opened(layout, physics, SCALED)
     contact = as_texts(physics.contact())
     add_object(world, layout, contact, weightless=bool(layout.gravity.any()))
-    add_hand(root, world, layout, physics)
+    _add_hand(root, world, layout, physics)
     return document(root)
 
 
-def add_hand(
-    root: Element, world: Element, layout: HandLayout, physics: PhysicsSettings,
-    shapes: dict[str, str] | None = None,
-) -> None:  # fmt: skip
-    """Add the hand with its servos to a scene.
-
-    Args:
-        root: The scene.
-        world: Its world, to which the palm is fixed.
-        layout: The hand's pose and servos.
-        physics: Settings of the contacts of fingertips.
-        shapes: Attributes that the shapes of links have besides their own.
-    """
+def _add_hand(root: Element, world: Element, layout: HandLayout, physics: PhysicsSettings) -> None:
+    """Add the hand with its servos to a scene; the palm is fixed to its world."""
     contact = as_texts(physics.contact())
     pose = layout.palm_pose
     palm = add_element(world, "body", {"name": PALM, **placed(pose[:3, 3], pose[:3, :3])})
     tips = tuple(_tip(layout, number, contact) for number in range(len(layout.hand.fingers)))
     chains = Chains(
-        layout.hand, layout.joints, layout.armature_kg_m2, tips, weighs=bool(layout.gravity.any()),
-        contact=shapes,
-    )  # fmt: skip
+        layout.hand, layout.joints, layout.armature_kg_m2, tips, weighs=bool(layout.gravity.any())
+    )
     add_fingers(palm, chains)
     add_exclusions(add_element(root, "contact", {}), layout.hand)
     actuators = add_element(root, "actuator", {})

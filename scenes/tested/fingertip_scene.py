@@ -47,7 +47,7 @@ def fingertip_scene(
     base = arrange(body, grasp, friction, fingers, physics.torsion_m)
     mass, inertia = mass_properties(body, mass_kg)
     layout = replace(base, center=np.zeros(3), mass_kg=mass, inertia_kg_m2=inertia)
-    root, world = begun(body, layout, physics)
+    root, world = begun(body, friction, (mass, inertia), physics)
     actuators = add_element(root, "actuator", {})
     for finger in range(len(layout.contacts)):
         _fingertip(world, layout, physics, finger)
@@ -58,8 +58,8 @@ def fingertip_scene(
     commands = to_digits(squeeze / layout.drive.stiffness_n_per_m).ravel()
     names = tuple((f"finger{finger}",) for finger in range(len(layout.contacts)))
     return TestedScene(
-        ended(root, opened), physics, friction, mass, inertia, squeeze[:, 0], opened, commands,
-        names,
+        ended(root, opened), physics, friction, mass, inertia, squeeze[:, 0], opened,
+        np.zeros_like(opened), commands, names,
     )  # fmt: skip
 
 

@@ -1,40 +1,79 @@
-"""Writes the scene in which a hand holds an object of a stated mass.
+"""Writes the scene in which a hand closes on an object of a stated mass and squeezes it.
 
-Fingertips and links all touch the object's own surface. The joints' servos have the stiffness that
-the test states, and the torque limits of the hand's motors, which most tests leave out.
+The shapes of links, and fingertips that none of them covers, touch the object's own surface. Joints
+have the hand's own angles. The palm is fixed in the world, links are light, and servos have as much
+inertia as their stiffness needs in steps of the test; or, where the test has it so, the hand is as
+heavy as it is, and its root is a free body on a weld to one that moves as told. A weld acts on a
+free body with the inverse mass w (MuJoCo's `body_invweight0`) as a spring of the stiffness
+
+    k d^2 / ((1 - d) w),   k = 1 / (d_max t z)^2                                          (1)
+
+with its `solref` (t, z) and the impedance d of its `solimp`, at most d_max: a light hand hangs on a
+soft one, and recoils as its fingers start.
 """
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
-from grasp_core.hands.hand import Hand
+from grasp_core.arrays import Array, to_digits
+from grasp_core.hands.hand import PALM, Fingertip, Hand, HandFinger
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.hands.hand_layout import HandLayout, hand_layout
-from scenes.hands.hand_mjcf import add_hand
-from scenes.mjcf_text import as_texts
+from scenes.hands.chains_mjcf import (
+    SHAPES,
+    Chains,
+    add_exclusions,
+    add_fingers,
+    add_servo,
+    placed,
+)
+from scenes.hands.hand_layout import hand_layout
+from scenes.hands.link_masses import hand_inertials
+from scenes.mjcf_text import Element, add_element, as_texts, quaternion
 from scenes.physics import PhysicsSettings
 from scenes.tested.tested_object import TestedScene, begun, ended, mass_properties
 
 ARMATURE_KG_M2 = 1e-4
-"""Least inertia of each joint's motor: links have no masses of their own here."""
+"""Least inertia of each joint's motor where links have no masses of their own."""
 RING_RAD = 0.5
 """Largest angle by which a joint on its servo rings in a step; stiffer servos get more inertia."""
+ROOT, TOLD = "root", "told"
+"""Names of the body that a weld holds, and of the one that moves as told."""
+COVERED_M = 1e-6
+"""How far a fingertip's ball may stand out of a shape that covers it [m]."""
 
 
 @dataclass(frozen=True, slots=True)
+class Weld:
+    """How a hand's root is welded to a body that moves as told: MJCF's `solref` and `solimp`."""
+
+    solref: tuple[float, float] = (0.02, 1.0)
+    solimp: tuple[float, float, float, float, float] = (0.9, 0.95, 0.001, 0.5, 2.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class HandServos:
-    """Stiffness and damping of the servos on all joints."""
+    """What drives a hand in a test, and what it hangs on."""
 
     stiffness_n_m_per_rad: float
     least_damping_n_m_s_per_rad: float = 0.1
-    """Damping, unless that of no overshoot is larger; 0.1 is that of the Allegro hand in
-    DexGraspBench."""
+    """Damping of each joint; on a fixed palm that of no overshoot, if it is larger."""
+    weld: Weld | None = None
+    """What holds the hand's root; None for a palm that is fixed."""
+    root: Array = field(default_factory=lambda: np.eye(4))
+    """Pose of the palm in its root, (4, 4)."""
+    inertials: Mapping[str, Mapping[str, object]] = field(default_factory=dict[str, Any])
+    """MJCF's inertials of palm and links by name, where they are known; on a weld others have those
+    of their shapes."""
 
     def armature(self, step_s: float) -> float:
-        """Return the inertia of each joint's motor [kg m^2]."""
+        """Return the inertia of each joint's motor [kg m^2]; links on a weld have their own."""
+        if self.weld is not None:
+            return 0.0
         return max(ARMATURE_KG_M2, self.stiffness_n_m_per_rad * (step_s / RING_RAD) ** 2)
 
     def damping(self, step_s: float) -> float:
@@ -43,54 +82,160 @@ class HandServos:
         return max(self.least_damping_n_m_s_per_rad, critical)
 
 
-def hand_scene(  # noqa: PLR0913, PLR0917 - the grasp, and what a test states about it
-    hand: Hand, body: Polyhedron, reach: HandReach, friction: float, mass_kg: float,
-    physics: PhysicsSettings, servos: HandServos,
-) -> TestedScene:  # fmt: skip
-    """Make the scene of a hand that stands in a grasp.
+@dataclass(frozen=True, slots=True, eq=False)
+class Postures:
+    """A hand at an object: open, touching, and as servos are told to squeeze."""
 
-    The hand starts in its pregrasp, if it has one, and squeezes with the balanced forces of the
+    palms: Array
+    """Poses of the palm in the object's frame, (3, 4, 4)."""
+    joints: Array
+    """Joint angles, (3, j) [rad]."""
+    pushes_n: Array
+    """Normal forces of the squeeze, (k,) [N]."""
+    limits_n_m: Array | None = None
+    """Largest torques of the joints' motors, (j,) [N m]; None for none."""
+    axes: Array = field(default_factory=lambda: np.eye(3))
+    """Columns are the axes along which the test pulls, in the object's frame, (3, 3)."""
+
+
+def planned_postures(
+    hand: Hand, body: Polyhedron, reach: HandReach, friction: float, stiffness_n_m_per_rad: float
+) -> Postures:
+    """Return the postures of a hand that stands in a grasp.
+
+    The hand is open in its pregrasp, if it has one, and squeezes with the balanced forces of the
     pose, as hard as closure tests do: 0.6 of what the motors can.
-
-    Args:
-        hand: The hand, with a torque limit for each joint.
-        body: The object.
-        reach: The pose in which the hand stands (see `gc.reach_with`).
-        friction: Coulomb coefficient at every contact.
-        mass_kg: Mass of the object [kg].
-        physics: Simulation settings, with the torsional coefficient.
-        servos: Stiffness and damping of the joints' servos.
 
     Raises:
         InputError: The hand, the object or the pose do not belong together.
     """
-    layout = tested_layout(hand, body, reach, friction, mass_kg, physics, servos)
-    root, world = begun(body, layout, physics)
-    # fingertips have these attributes anyway
-    rubbing = {"friction": (friction, physics.torsion_m, 0.0)}
-    add_hand(root, world, layout, physics, as_texts(rubbing | physics.contact()))
-    # the layout's joints touch exactly, the pose's within micrometres
-    shut = np.zeros(len(layout.joints))
-    opened = shut if reach.pregrasp is None else reach.pregrasp - layout.joints
-    forces = layout.squeeze_forces
-    squeezing = layout.commands(forces[None])[0]
+    layout = hand_layout(hand, body, reach, friction)
+    told = replace(layout, servo_n_m_per_rad=stiffness_n_m_per_rad)
+    squeeze = layout.joints + told.commands(layout.squeeze_forces[None])[0]
+    opened = layout.joints if reach.pregrasp is None else reach.pregrasp
+    palm = layout.palm_pose.copy()
+    palm[:3, 3] += body.center_of_mass
+    return Postures(
+        np.tile(palm, (3, 1, 1)), np.array([opened, layout.joints, squeeze]),
+        layout.squeeze[:, 0], layout.motors.limits,
+    )  # fmt: skip
+
+
+def hand_scene(  # noqa: PLR0913, PLR0917 - the hand at the object, and what a test states about it
+    hand: Hand, body: Polyhedron, postures: Postures, friction: float, mass_kg: float,
+    physics: PhysicsSettings, servos: HandServos,
+) -> TestedScene:  # fmt: skip
+    """Make the scene of a hand that closes on an object.
+
+    Args:
+        hand: The hand.
+        body: The object.
+        postures: Where the hand is open, touches and squeezes.
+        friction: Coulomb coefficient at every contact.
+        mass_kg: Mass of the object [kg].
+        physics: Simulation settings, with the torsional coefficient.
+        servos: What drives the hand, and what it hangs on.
+    """
+    mass, weights = mass_properties(body, mass_kg), {**hand_inertials(hand), **servos.inertials}
+    root, world = begun(body, friction, mass, physics)
+    palms = postures.palms.copy()
+    palms[:, :3, 3] -= body.center_of_mass
+    roots = _roots(palms, servos)
+    hung = world if servos.weld is None else _welded(root, world, servos.weld)
+    at = palms[1] if servos.weld is None else servos.root
+    palm = add_element(hung, "body", {"name": PALM, **placed(at[:3, 3], at[:3, :3])})
+    if servos.weld is not None:
+        add_element(palm, "inertial", weights[PALM])
+    touching = as_texts({"friction": (friction, physics.torsion_m, 0.0)} | physics.contact())
+    free = servos.weld is not None
+    tips = tuple(_tip(root, each, touching) for each in hand.fingers)
+    chains = Chains(
+        replace(hand, fingers=tuple(map(_without_cover, hand.fingers))), np.zeros(len(hand.joints)),
+        servos.armature(physics.timestep), tips,
+        contact=touching, stops=free, inertials=weights if free else {},
+    )  # fmt: skip
+    add_fingers(palm, chains)
+    add_exclusions(add_element(root, "contact", {}), hand)
+    _add_servos(root, hand, postures, servos, physics.timestep)
+    opened, shut, squeezing = np.hstack([roots, to_digits(postures.joints)])
     names = tuple(tuple(link.name for link in finger.links) for finger in hand.fingers)
     return TestedScene(
-        ended(root, opened), physics, friction, layout.mass_kg, layout.inertia_kg_m2,
-        layout.squeeze[:, 0], opened, squeezing, names,
+        ended(root, opened, roots.shape[1]), physics, friction, *mass,
+        postures.pushes_n, opened, shut, squeezing, names, postures.axes,
     )  # fmt: skip
 
 
-def tested_layout(  # noqa: PLR0913, PLR0917 - the grasp, and what a test states about it
-    hand: Hand, body: Polyhedron, reach: HandReach, friction: float, mass_kg: float,
-    physics: PhysicsSettings, servos: HandServos,
-) -> HandLayout:  # fmt: skip
-    """Return the usual layout of the hand with the object's true mass and the test's servos."""
-    base = hand_layout(hand, body, reach, friction)
-    mass, inertia = mass_properties(body, mass_kg)
-    return replace(
-        base, center=np.zeros(3), mass_kg=mass, inertia_kg_m2=inertia,
-        torsion_m=physics.torsion_m, servo_n_m_per_rad=servos.stiffness_n_m_per_rad,
-        damping_n_m_s_per_rad=servos.damping(physics.timestep),
-        armature_kg_m2=servos.armature(physics.timestep),
-    )  # fmt: skip
+def _roots(palms: Array, servos: HandServos) -> Array:
+    """Return the poses that a weld's root is told to have, (3, 7); (3, 0) for a fixed palm."""
+    if servos.weld is None:
+        return np.zeros((len(palms), 0))
+    poses = to_digits(palms @ np.linalg.inv(servos.root))
+    turns = np.array([quaternion(pose[:3, :3]) for pose in poses])
+    turns *= np.where(turns @ turns[1] < 0.0, -1.0, 1.0)[:, None]  # no long way round
+    return np.hstack([poses[:, :3, 3], turns])
+
+
+def _welded(root: Element, world: Element, weld: Weld) -> Element:
+    """Add a free body that is welded to one that moves as told; return it.
+
+    Both are written at the origin: MuJoCo takes the place of a body that has no mass of its own for
+    its centre of mass, and measures the weld's stiffness there.
+    """
+    add_element(world, "body", {"name": TOLD, "mocap": "true"})
+    body = add_element(world, "body", {"name": ROOT})
+    add_element(body, "freejoint", {"name": ROOT})
+    both = {"body1": TOLD, "body2": ROOT, "solref": weld.solref, "solimp": weld.solimp,
+            "anchor": (0.0, 0.0, 0.0), "torquescale": 1.0}  # fmt: skip
+    add_element(add_element(root, "equality", {}), "weld", both)
+    return body
+
+
+def _tip(root: Element, finger: HandFinger, touching: dict[str, str]) -> dict[str, object]:
+    """Return what a fingertip is: a solid with its corners, a ball, or nothing under a shape."""
+    corners = corners_of(finger.tip)
+    if corners is None:
+        return {} if _covered(finger) else {"conaffinity": 1, **touching}
+    name = f"tip_{finger.name}"
+    solid = {"name": name, "inertia": "shell", "vertex": to_digits(corners)}
+    add_element(add_element(root, "asset", {}), "mesh", solid)
+    return {"type": "mesh", "mesh": name, "pos": np.zeros(3), "conaffinity": SHAPES,
+            "contype": SHAPES, **touching}  # fmt: skip
+
+
+def corners_of(tip: Fingertip) -> Array | None:
+    """Return the corners of a fingertip that is a block, (m, 3) [m]; None for a ball."""
+    return getattr(tip, "corners", None)
+
+
+def _without_cover(finger: HandFinger) -> HandFinger:
+    """Return a finger without the shape that covers a block, its last; the block itself touches."""
+    if corners_of(finger.tip) is None:
+        return finger
+    last = finger.links[-1]
+    links = (*finger.links[:-1], replace(last, shapes=last.shapes[:-1]))
+    return replace(finger, links=links, tip=Fingertip(finger.tip.center, finger.tip.radius))
+
+
+def _covered(finger: HandFinger) -> bool:
+    """Return whether a shape of a finger's last link holds the whole ball of its tip."""
+    for shape in finger.links[-1].shapes:
+        off = np.abs((finger.tip.center - shape.position) @ shape.rotation) - shape.half_sizes
+        away = float(np.linalg.norm(np.maximum(off, 0.0)))
+        inside = shape.radius - away if away else shape.radius - float(off.max())
+        if inside > finger.tip.radius - COVERED_M:
+            return True
+    return False
+
+
+def _add_servos(
+    root: Element, hand: Hand, postures: Postures, servos: HandServos, step_s: float
+) -> None:
+    """Add a servo to each joint; on a weld, commands end where joints do, as in files of hands."""
+    actuators = add_element(root, "actuator", {})
+    limits = postures.limits_n_m
+    for number, joint in enumerate(hand.joints):
+        add_servo(
+            actuators, joint.name, servos.stiffness_n_m_per_rad, servos.damping(step_s),
+            None if limits is None else float(limits[number]),
+            None if servos.weld is None else (joint.lowest, joint.highest),
+        )  # fmt: skip

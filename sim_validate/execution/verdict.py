@@ -6,6 +6,7 @@ from typing import Literal, TypeAlias
 
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
+from grasp_core.errors import InputError
 from scenes.physics import PhysicsSettings
 from sim_validate.execution.enough import Enough
 from sim_validate.execution.settings import ExecutionSettings, TrialKind
@@ -14,6 +15,8 @@ from sim_validate.execution.trials import Skipped
 Fate: TypeAlias = Literal["stuck", "slipped", "dropped", "diverged"]
 """What became of the object: no contact slipped, one did and it was kept, it was lost, or the
 simulator could not follow it."""
+LOST = ("dropped", "diverged")
+"""Fates that no trial survives."""
 CLEAR_OF_SLIP = 1.05
 """Predicted first slip from which on no contact slips, however processors round."""
 
@@ -49,6 +52,17 @@ class ExecutionTrial:
     step_s: float
     """Length of the shortest steps that the simulator took: a loss with steps of the usual length
     counts only if short steps find it as well [s]."""
+
+    def __post_init__(self) -> None:
+        unknown = [math.isinf(each) for each in (self.slip_m, self.displacement_m, self.turn_rad)]
+        if unknown != [self.fate == "diverged"] * 3:
+            raise InputError(
+                f"trial {self.name}: slip_m, displacement_m and turn_rad are infinite (null in "
+                f"files) where the fate is diverged, and nowhere else; got the fate {self.fate} "
+                f"with {self.slip_m}, {self.displacement_m} and {self.turn_rad}"
+            )
+        if self.survived and self.fate in LOST:
+            raise InputError(f"trial {self.name}: survived is false where the fate is {self.fate}")
 
     @property
     def dropped(self) -> bool:
@@ -130,7 +144,7 @@ def ended(trial: ExecutionTrial, settings: ExecutionSettings | None = None) -> s
         trial: The trial.
         settings: How far an object may move and turn; if None, it is left open which it was.
     """
-    if trial.survived or trial.fate in ("dropped", "diverged"):
+    if trial.survived or trial.fate in LOST:
         return trial.fate
     ways = list[str]()
     if settings is not None:

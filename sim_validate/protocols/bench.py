@@ -48,19 +48,19 @@ class TestBench:
             for name in names
         }
 
-    def run(self, runs: Sequence[Timeline], starts: Array, opened: Array) -> tuple[Motion, ...]:
-        """Simulate runs, each from the open fingers.
+    def run(self, runs: Sequence[Timeline], starts: Array, began: Array) -> tuple[Motion, ...]:
+        """Simulate runs, each from the same fingers.
 
         Args:
             runs: What is told and applied.
             starts: Pose of the object at the start of each, (n, 7).
-            opened: Positions of the joints at the start, (u,).
+            began: Commands at whose positions the joints start, (u,).
         """
         count = len(runs)
         trials = batch.Batch(self.model, max(count, 2), self.threads)
         trials.reset(np.arange(count), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         joints = trials.bind("qpos")
-        joints[:count, :FREE], joints[:count, FREE:] = starts, opened
+        joints[:count, :FREE], joints[:count, FREE:] = starts, began
         lengths = np.array([len(each.commands) for each in runs])
         poses = np.zeros((count, int(lengths.max()), FREE))
         touching: list[list[frozenset[int]]] = [[] for _ in runs]
@@ -78,6 +78,7 @@ class TestBench:
         touching: list[list[frozenset[int]]],
     ) -> dict[int, str]:  # fmt: skip
         commands, applied = trials.bind("ctrl"), trials.bind("xfrc_applied")
+        told = (trials.bind("mocap_pos"), trials.bind("mocap_quat")) if self.model.nmocap else ()
         joints = trials.bind("qpos")
         looks = [{look for look, _ in each.looks} for each in runs]
         errors: dict[int, str] = {}
@@ -85,7 +86,10 @@ class TestBench:
             for sample in range(int(lengths.max())):
                 going = np.flatnonzero(lengths > sample)
                 for place in going.tolist():
-                    commands[place] = runs[place].commands[sample]
+                    now = runs[place].commands[sample]
+                    commands[place] = now[FREE:] if told else now
+                    for part, values in zip(told, np.split(now[:FREE], [3]), strict=False):
+                        part[place, 0] = values
                     applied[place, self.body] = runs[place].wrenches[sample]
                 step(trials, errors, CHUNK, going)
                 poses[going, sample] = joints[going, :FREE]

@@ -42,6 +42,13 @@ class PassingRecord(TypedDict):
     most_overlap_m: Positive | None
 
 
+class WeldRecord(TypedDict):
+    """Fields about what a hand hangs on."""
+
+    solref: list[float]
+    solimp: list[float]
+
+
 class ProtocolRecord(TypedDict):
     """Fields about a published test."""
 
@@ -60,6 +67,8 @@ class ProtocolRecord(TypedDict):
     close_s: NotNegative
     squeeze_s: NotNegative
     servo_n_m_per_rad: Positive
+    own_servos: NotRequired[bool]
+    weld: NotRequired[WeldRecord | None]
     copies: Count
     noise_m: NotNegative
     noise_deg: NotNegative

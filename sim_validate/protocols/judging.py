@@ -9,6 +9,7 @@ and thresholds are micrometres.
 from collections.abc import Iterable
 from functools import partial
 
+from grasp_core.arrays import Array
 from grasp_core.checked import coefficient, instance, one_of, seed_of, several
 from grasp_core.closure.contact_arrays import FEWEST
 from grasp_core.errors import InputError
@@ -20,12 +21,14 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.hands.hand_mjcf import build_hand_scene
 from scenes.tested.fingertip_scene import fingertip_scene
-from scenes.tested.hand_scene import HandServos, hand_scene
+from scenes.tested.hand_scene import HandServos, hand_scene, planned_postures
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.hands.validate_hand import hand_setup
+from sim_validate.peer_files.hand_files import hand_file
+from sim_validate.peer_files.hand_records import RecordedReach, recorded_postures
 from sim_validate.protocols.judgement import Judgement
 from sim_validate.protocols.named_protocols import PROTOCOLS
-from sim_validate.protocols.our_verdict import our_verdict
+from sim_validate.protocols.our_verdict import OurVerdict, our_verdict
 from sim_validate.protocols.published import PublishedProtocol
 from sim_validate.protocols.their_verdict import their_verdict
 from sim_validate.simulation.gate.gate import require_faithful
@@ -97,11 +100,15 @@ def judge_hand_by(  # noqa: PLR0913 - the hand in its grasp, and how it is judge
 ) -> Judgement:
     """Judge a hand that stands in a grasp by a published test.
 
+    A pose of `reach_of_record` is judged as its record says, with its own way in and its own
+    squeeze, whether or not its contacts are in force closure; motors have no limits in their test,
+    as there. Any other pose squeezes with 0.6 of what its motors can.
+
     Args:
         protocol: The test, or its name (see `protocol_names`).
         hand: The hand, with a torque limit for each joint (`hand.with_torque_limits`).
         body: The object.
-        reach: The pose in which the hand stands (see `gc.reach_with`).
+        reach: The pose in which the hand stands (see `gc.reach_with` and `reach_of_record`).
         friction: Coulomb coefficient of our verdict and of the prediction.
         setup: How our trials are simulated; None for that of `hand_setup`.
         seed: Seed of the noise of tests that have some.
@@ -114,29 +121,49 @@ def judge_hand_by(  # noqa: PLR0913 - the hand in its grasp, and how it is judge
             test has the name.
     """
     found = _protocol(protocol)
+    instance(hand, Hand, "hand", "load_hand makes one")
     check_body(body)
     coefficient(friction)
     seed_of(seed)
     setup = hand_setup() if setup is None else instance(setup, Setup, "setup")
-    scene = hand_scene(
-        hand, body, reach, found.friction, found.mass_of(body), found.physics,
-        HandServos(found.servo_n_m_per_rad),
+    file = hand_file(hand)
+    stiffness = file.servo_n_m_per_rad if found.own_servos else None
+    servos = HandServos(
+        found.servo_n_m_per_rad if stiffness is None else stiffness,
+        file.damping_n_m_s_per_rad, found.weld, file.root, file.inertials,
     )  # fmt: skip
-    require_faithful(setup, friction, body.radius)
-    require_faithful_hands(setup, friction)
-    held = build_hand_scene(hand, body, reach, friction, physics=setup.physics)
+    if isinstance(reach, RecordedReach):
+        postures = recorded_postures(reach, hand, servos.stiffness_n_m_per_rad)
+    else:
+        postures = planned_postures(hand, body, reach, found.friction, servos.stiffness_n_m_per_rad)
+    scene = hand_scene(
+        hand, body, postures, found.friction, found.mass_of(body), found.physics, servos
+    )
     return Judgement(
         grasp=reach.grasp,
         hand=hand.name,
         protocol=found,
         friction=friction,
         mass_kg=scene.mass_kg,
-        push_n=float(scene.pushes_n.max()),
+        push_n=float(scene.pushes_n.max(initial=0.0)),
         runs=their_verdict(found, scene, seed, setup.threads),
-        ours=our_verdict(
-            body, stance_of(hand, reach).contacts, friction, found.forces(scene.mass_kg), setup,
-            lambda: held, held.layout.motors,
-        ),
+        ours=_ours(hand, body, reach, friction, found.forces(scene.mass_kg), setup),
+    )
+
+
+def _ours(
+    hand: Hand, body: Polyhedron, reach: HandReach, friction: float, forces: tuple[Array, ...],
+    setup: Setup,
+) -> OurVerdict:  # fmt: skip
+    """Judge a hand by our trials; contacts that were proved open need none."""
+    if isinstance(reach, RecordedReach) and not reach.reached:
+        return OurVerdict(False, False, 0.0, reach.explanation)
+    require_faithful(setup, friction, body.radius)
+    require_faithful_hands(setup, friction)
+    held = build_hand_scene(hand, body, reach, friction, physics=setup.physics)
+    return our_verdict(
+        body, stance_of(hand, reach).contacts, friction, forces, setup, lambda: held,
+        held.layout.motors,
     )  # fmt: skip
 
 

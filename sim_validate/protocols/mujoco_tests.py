@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from scenes.physics import PhysicsSettings
+from scenes.tested.hand_scene import Weld
 from sim_validate.protocols.published import Passing, PublishedProtocol, Run, Source, Step, Triple
 
 SIX: tuple[Triple, ...] = (
@@ -28,12 +29,14 @@ def _pulls(acceleration: float, seconds: float, look_s: float) -> tuple[Run, ...
 DEX_PHYSICS = PhysicsSettings(
     timestep=0.004, integrator="implicitfast", impratio=10.0, noslip_iterations=2, torsion_m=0.02,
     tolerance=1e-8, jacobian="auto", solref=(0.0125, 1.0), solimp=(0.7, 0.97, 0.00055, 0.5, 2.0),
+    ccd_iterations=50, multiccd=False,
 )  # fmt: skip
 """Settings of DexGraspBench and Dexonomy. Contacts of a hand's geoms (solref 0.005 1, solimp 0.5
 0.99 0.0001) with those of an object (MuJoCo's defaults, 0.02 1 and 0.9 0.95 0.001) are mixed by
-MuJoCo: half of each."""
+MuJoCo: half of each. Shapes touch at one point, as in the version 3.3.2 that DexGraspBench asks
+for: several points alone change 7 of 96 of its verdicts."""
 DEX_OURS = (
-    "The palm is fixed, where theirs is welded softly to a body that moves.",
+    "What moves by less than 5 cm is the centre of mass, where theirs is the origin of the mesh.",
     "Convex objects are themselves, and others are covered with thin convex solids, where theirs "
     "are unions of convex pieces.",
 )
@@ -57,6 +60,8 @@ DEXGRASPBENCH = PublishedProtocol(
     close_s=0.4,
     squeeze_s=0.4,
     servo_n_m_per_rad=5.0,
+    own_servos=True,
+    weld=Weld(),
     runs=_pulls(10.0, 2.0, 0.2),
     passing=DEX_LIMITS,
     physics=DEX_PHYSICS,
@@ -81,6 +86,7 @@ DEXGRASPBENCH_PAPER = replace(
     ),
     mass_kg=0.03,
     servo_n_m_per_rad=1.0,
+    own_servos=False,
 )  # fmt: skip
 DEXONOMY = PublishedProtocol(
     name="dexonomy",
@@ -94,7 +100,10 @@ DEXONOMY = PublishedProtocol(
         ),
     ),
     imitates="",
-    ours=DEX_OURS,
+    ours=(
+        *DEX_OURS,
+        "The palm is fixed, where theirs is welded softly to a body that moves.",
+    ),
     friction=0.6,
     timestep_s=0.004,
     mass_kg=0.1,

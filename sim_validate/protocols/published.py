@@ -16,6 +16,7 @@ from grasp_core.arrays import Array
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.short_text import summary
 from scenes.physics import PhysicsSettings
+from scenes.tested.hand_scene import Weld
 
 Triple: TypeAlias = tuple[float, float, float]
 From: TypeAlias = Literal["before closing", "after closing", "each step"]
@@ -108,6 +109,10 @@ class PublishedProtocol:
     """Time in which fingers begin to push [s]; 0 for at once."""
     servo_n_m_per_rad: float = 5.0
     """Stiffness of the servos of a hand's joints."""
+    own_servos: bool = False
+    """Whether the hands that are known as `HandFile` have the stiffness of their files instead."""
+    weld: Weld | None = None
+    """What holds the root of a hand; None where its palm is fixed."""
     copies: int = 1
     """How often all runs are done, each time with the object displaced by noise."""
     noise_m: float = 0.0

@@ -27,9 +27,9 @@ def their_verdict(
     """
     runs = [timeline(protocol, scene, run) for run in protocol.runs]
     starts = [start for copy in range(protocol.copies) for start in [_start(protocol, seed, copy)]]
-    opened = scene.opened if protocol.close_s else np.zeros_like(scene.opened)
+    began = scene.opened if protocol.close_s else scene.shut
     motions = TestBench(scene, threads).run(
-        runs * protocol.copies, np.repeat(starts, len(runs), axis=0), opened
+        runs * protocol.copies, np.repeat(starts, len(runs), axis=0), began
     )
     return tuple(
         judged_run((place % len(runs), place // len(runs)), motion, runs[place % len(runs)],

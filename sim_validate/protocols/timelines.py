@@ -27,7 +27,7 @@ class Timeline:
     """What is told to the servos and acts on the object in each of the n samples of a run."""
 
     commands: Array
-    """Commands of the servos, (n, u) [m or rad]."""
+    """Commands of the servos, (n, u) [m or rad], as in `TestedScene`."""
     wrenches: Array
     """Force and torque on the object, along the world's axes, (n, 6) [N, N m]."""
     looks: tuple[tuple[int, int], ...]
@@ -51,6 +51,7 @@ def timeline(protocol: PublishedProtocol, scene: TestedScene, run: Run) -> Timel
     n = len(closing) + sum(counts)
     wrenches = np.zeros((n, 6))
     wrenches[len(closing) :] = _wrenches(run, counts, scene, sample_s)
+    wrenches = (wrenches.reshape(n, 2, 3) @ scene.axes.T).reshape(n, 6)
     held = np.broadcast_to(scene.squeezing, (sum(counts), len(scene.squeezing)))
     return Timeline(np.vstack([closing, held]), wrenches, tuple(looks), len(closing), sample_s)
 
@@ -61,11 +62,11 @@ def _samples(seconds: float, sample_s: float) -> int:
 
 def _closing(protocol: PublishedProtocol, scene: TestedScene, sample_s: float) -> Array:
     """Return commands from open to touching, then to squeezing, at equal steps, (n, u)."""
-    shut = np.zeros_like(scene.opened)
-    parts = [np.zeros((0, len(shut)))]
+    parts = [np.zeros((0, len(scene.shut)))]
     for seconds, begin, end in (
-        (protocol.close_s, scene.opened, shut), (protocol.squeeze_s, shut, scene.squeezing),
-    ):  # fmt: skip
+        (protocol.close_s, scene.opened, scene.shut),
+        (protocol.squeeze_s, scene.shut, scene.squeezing),
+    ):
         if seconds:
             parts.append(np.linspace(begin, end, _samples(seconds, sample_s) + 1)[1:])
     return np.vstack(parts)
@@ -90,7 +91,7 @@ def _wrenches(run: Run, counts: list[int], scene: TestedScene, sample_s: float) 
     found = np.zeros((sum(counts), 6))
     found[:, :3] = np.vstack(forces) - scene.mass_kg * _acceleration(np.vstack(paths), sample_s)
     turning = _acceleration(np.concatenate(angles)[:, None], sample_s)
-    found[:, 3:] = -turning * scene.inertia_kg_m2[:, 2]
+    found[:, 3:] = -turning * (scene.axes.T @ scene.inertia_kg_m2 @ scene.axes)[:, 2]
     return found
 
 

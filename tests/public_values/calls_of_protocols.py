@@ -64,7 +64,7 @@ CALLS = [
         "hand": hinged_hand(), "reach": stance(0.5), "object_path": "object",
     }, {
         "hand": VALUE, "reach": VALUE, "object_path": TEXT, "push_n": POSITIVE,
-        "servo_n_m_per_rad": POSITIVE,
+        "servo_n_m_per_rad": optional(POSITIVE), "gap_m": optional(POSITIVE),
     }),
     Call("sv.reach_of_record", lambda: {
         "record": record(), "hand": hinged_hand(), "body": cube(), "friction": 0.5,

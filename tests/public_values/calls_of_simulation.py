@@ -86,7 +86,7 @@ CALLS = [
         "condim": AT_LEAST_ONE | {"two": 2, "seven": 7},
         "torsion_m": NOT_NEGATIVE | {"less than MuJoCo's least friction": 1e-6, "two metres": 2.0},
         "autoreset": SWITCH,
-        "diagexact": SWITCH,
+        "diagexact": SWITCH, "multiccd": SWITCH,
     }),
     Call("sv.load_dataset", lambda: {"folder": "no/such/folder"}, {
         "folder": PATH | {"nowhere": "no/such/folder"}, "split": optional(WORD),

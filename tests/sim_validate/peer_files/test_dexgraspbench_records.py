@@ -16,13 +16,8 @@ from sim_validate.peer_files.dexgraspbench_records import (
     load_dex_record,
     write_dex_record,
 )
-from sim_validate.peer_files.hand_records import (
-    FREE,
-    ROOTS,
-    dex_record,
-    pose_of,
-    reach_of_record,
-)
+from sim_validate.peer_files.hand_files import hand_file
+from sim_validate.peer_files.hand_records import FREE, dex_record, pose_of, reach_of_record
 from sim_validate.peer_files.object_folders import write_dex_object
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
@@ -111,11 +106,46 @@ def test_the_squeeze_turns_joints_by_the_torque_of_the_forces_over_the_stiffness
 
 
 @pytest.mark.parametrize("hand", HANDS)
+@pytest.mark.parametrize("gap", [0.002, 0.005])
+def test_fingertips_of_a_record_meet_the_object_at_one_moment(hand, gap):
+    """Halfway in they are half the gap away, along each normal, but for the bend of their ways."""
+    model = gc.load_hand(hand)
+    (reach, *_) = [each for each in reached(hand) if each.pregrasp is not None]
+    record = dex_record(model, reach, "o", gap_m=gap)
+    palm = pose_of(record.grasp) @ hand_file(model).root
+    ways = np.linspace(record.pregrasp, record.grasp, 3)[:, FREE:]
+    tips = places(model, ways, palm).tips
+    for contact, finger in zip(reach.contacts, reach.fingers, strict=True):
+        away = (tips[2, finger] - tips[:2, finger]) @ contact.normal
+        assert away == pytest.approx([gap, 0.5 * gap], abs=0.1 * gap)
+    whole = dex_record(model, reach, "o", gap_m=None)
+    assert whole.pregrasp[FREE:] == pytest.approx(reach.pregrasp)
+
+
+@pytest.mark.parametrize(("hand", "servo"), [("allegro", 5.0), ("leap", 3.0)])
+def test_the_squeeze_is_for_the_servos_of_the_hands_file(hand, servo):
+    model, reach = gc.load_hand(hand), reached(hand)[0]
+    assert dex_record(model, reach, "o") == dex_record(model, reach, "o", servo_n_m_per_rad=servo)
+
+
+@pytest.mark.parametrize("hand", HANDS)
+def test_the_file_of_a_hand_has_an_inertial_for_palm_and_links(hand):
+    model = gc.load_hand(hand)
+    found = hand_file(model).inertials
+    assert list(found) == ["palm", *(link.name for link in model.links)]
+    for link in model.links:
+        if link.mass_kg is not None:
+            assert found[link.name]["mass"] == pytest.approx(link.mass_kg)
+            assert found[link.name]["pos"] == pytest.approx(link.center_of_mass, abs=1e-5)
+    assert hand_file(gc.Hand("other", model.palm, model.fingers)).inertials == {}
+
+
+@pytest.mark.parametrize("hand", HANDS)
 def test_the_root_of_a_record_leads_to_the_fingertips(hand):
     """Laid out by hand: root, palm in it, then the hand's own kinematics."""
     model, reach = gc.load_hand(hand), reached(hand)[0]
     record = dex_record(model, reach, "o")
-    palm = pose_of(record.grasp) @ ROOTS[hand].pose
+    palm = pose_of(record.grasp) @ hand_file(model).root
     tips = places(model, record.grasp[FREE:], palm).tips[0]
     radii = [finger.tip.radius for finger in model.fingers]
     for contact, finger in zip(reach.contacts, reach.fingers, strict=True):
