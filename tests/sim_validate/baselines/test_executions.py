@@ -25,7 +25,9 @@ from sim_validate.execution.verdict import Execution, ExecutionControl, Executio
 from sim_validate.simulation.setup import Agenda, Setup
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, OTHER_ARITHMETIC, OTHERS
 
-TRIAL = ExecutionTrial("weight", "weight", True, "stuck", 1e-7, 1e-3, 1e-4, 2.5, 2.75, 2.49, 0.00125)
+TRIAL = ExecutionTrial(
+    "weight", "weight", True, "stuck", 1e-7, 1e-3, 1e-4, 2.5, 2.75, 2.49, 0.00125
+)
 EXECUTION = Execution(
     mass_kg=0.3, squeeze=np.zeros((4, 3)), load_multiple=2.7,
     trials=(TRIAL, dataclasses.replace(TRIAL, kind="lift", name="lift", slip_m=2e-7)),

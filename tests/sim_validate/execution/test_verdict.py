@@ -58,7 +58,17 @@ def test_only_a_dropped_object_is_dropped():
 
 def test_losses_are_told_in_millimetres_and_degrees_as_limits_are_given():
     lost = ExecutionTrial(
-        "knock", "knock -y", False, "slipped", 2e-3, 0.123, math.radians(107.5), 0.8, 0.9, 0.75, 1e-3
+        "knock",
+        "knock -y",
+        False,
+        "slipped",
+        2e-3,
+        0.123,
+        math.radians(107.5),
+        0.8,
+        0.9,
+        0.75,
+        1e-3,
     )
     assert losses_in_words(execution(trial("weight", True), lost)) == [trial_in_words(lost)]
     assert trial_in_words(lost) == (

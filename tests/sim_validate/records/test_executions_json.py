@@ -105,10 +105,16 @@ def of_first(**changes):
 BAD = {
     "kind": (of_trial(kind="throw"), r"executions\[0\]\.trials\[0\]\.kind: expected 'weight'"),
     "fate": (of_trial(fate="flew"), r"trials\[0\]\.fate: expected 'stuck'"),
-    "slip": (of_trial(slip_m=None), r"trial lift: slip_m, displacement_m and turn_rad are infinite"),
+    "slip": (
+        of_trial(slip_m=None),
+        r"trial lift: slip_m, displacement_m and turn_rad are infinite",
+    ),
     "fell": (of_trial(survived=True), r"trial lift: survived is false where the fate is dropped"),
     "word": (of_trial(survived="no"), r"trials\[0\]\.survived: expected true or false"),
-    "survival": (of_trial(survived=True, fate="stuck"), r"executions\[0\]\.survived: expected true"),
+    "survival": (
+        of_trial(survived=True, fate="stuck"),
+        r"executions\[0\]\.survived: expected true",
+    ),
     "opposite": (of_first(survived=True), r"executions\[0\]\.survived: expected false"),
     "squeeze": (of_first(squeeze_n=[[1, 2, 3]]), r"squeeze_n: expected at least 2 items, got 1"),
     "no squeeze": (of_first(squeeze_n=None), r"executions\[0\]\.squeeze_n: null is not allowed"),
