@@ -25,6 +25,8 @@ from sim_validate.simulation.engine import batch, compiled, mujoco, step, touche
 
 FREE, PALM = 6, 12
 """Joint velocities up to the end of the object's, and up to the end of the palm's."""
+BOUNDLESS = 1e100
+"""Size from which on a number of the simulator says nothing."""
 LAID = 1e-7
 """Depth of a table in the object at the start, in object radii: more than the rounding of meshes to
 single precision, and about as deep as objects rest."""
@@ -259,8 +261,10 @@ class HeldBench:
     def _motion(
         self, joints: Array, forces: Array, states: Array, faults: tuple[str, ...]
     ) -> HeldMotion:
-        # what has no end is no number either: angles beyond all bounds have no cosine
-        joints = np.where(np.isfinite(joints), joints, np.nan)
+        # where the simulator diverges: what is beyond all bounds has no cosine and no square
+        joints, forces = (
+            np.where(np.abs(each) < BOUNDLESS, each, np.nan) for each in (joints, forces)
+        )
         layout = self.scene.layout
         palm = hinged(joints[:, 10 : PALM + 1])
         turned = palm.transpose(0, 2, 1) @ rotations(joints[:, 3:7])

@@ -10,6 +10,7 @@ from scenes.physics import PhysicsSettings
 from sim_validate.execution.gate.free_box import free_box
 from sim_validate.execution.gate.held_box import held_box
 from sim_validate.execution.gate.held_case import WEIGHT, HeldCase
+from sim_validate.execution.gate.struck_box import struck_box
 from sim_validate.execution.gate.surface import surfaces
 from sim_validate.simulation.gate.gate import Gate
 
@@ -64,7 +65,7 @@ def cases_of(
 @lru_cache(maxsize=256)
 def measured_case(case: HeldCase) -> Gate:
     """Check the simulator on all known cases, once per process for the same settings."""
-    checks = (*held_box(case), *free_box(case), *surfaces(case))
+    checks = (*held_box(case), *free_box(case), struck_box(case), *surfaces(case))
     return Gate(checks, versions()["mujoco"])
 
 
