@@ -1,0 +1,139 @@
+"""Losses count only where short steps find them too; what the simulator cannot follow is lost."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+import sim_validate as sv
+from sim_validate.execution import execute
+from sim_validate.execution.bench import HeldBench
+from sim_validate.execution.confirming import FINE_S, confirming_bench, run_again
+from sim_validate.execution.execute import chosen_squeeze, held_scene, run_trials
+from sim_validate.execution.predictions import held_dynamics
+from sim_validate.execution.slips import outcome
+from sim_validate.execution.trials import trials_of
+from sim_validate.execution.verdict import trial_in_words
+from tests.sim_validate.execution.held_rigs import planned
+
+MASSES = {"weight": 1.2, "shake": 0.8, "stop": 0.8, "knock": 0.8}
+
+LIGHT = sv.ExecutionSettings(0.00537, trials=("stop",))
+"""A bar of 5 g between fingertips of 50 g, one of which pushes with 0.15 N."""
+
+
+@pytest.fixture(scope="module")
+def bar():
+    """A grasp whose bar rattles between its fingers when the palm stops."""
+    body = scenes.example_object("double-wedge-bar")
+    plan = gc.plan(body, 0.4, families=("free",), limit=6, rank_by="diverse")
+    return body, plan["f-0-1-3-4"]
+
+
+def test_a_loss_of_a_step_that_is_too_long_does_not_count(bar, monkeypatch):
+    found = {trial.name: trial for trial in sv.execute(*bar, 0.4, LIGHT).trials}
+    monkeypatch.setattr(execute, "confirming_bench", lambda _: None)
+    once = {trial.name: trial for trial in sv.execute(*bar, 0.4, LIGHT).trials}
+    lost = {name for name, trial in once.items() if not trial.survived}
+    assert "stop -y" in lost
+    assert once["stop -y"].displacement_m > 0.05
+    for name, trial in found.items():
+        assert trial.survived, name
+        assert trial.displacement_m < 0.002, name
+        assert (trial.step_s == pytest.approx(FINE_S)) == (name in lost), name
+        if name not in lost:
+            assert trial == once[name]
+
+
+def test_a_run_of_short_steps_alone_agrees(bar):
+    """It is what `run_again` continues, from the first sample on."""
+    body, grasp = bar
+    best = chosen_squeeze(body, grasp, 0.4, LIGHT)
+    scene = held_scene(body, best.grip, LIGHT)
+    short = replace(scene.physics, timestep=FINE_S)
+    alone = sv.execute(body, grasp, 0.4, LIGHT, physics=short)
+    confirmed = sv.execute(body, grasp, 0.4, LIGHT)
+    assert [trial.step_s for trial in alone.trials] == [FINE_S] * 6
+    for one, other in zip(alone.trials, confirmed.trials, strict=True):
+        assert one.survived == other.survived
+        assert one.displacement_m == pytest.approx(other.displacement_m, abs=2e-4)
+
+
+@pytest.mark.parametrize("kind", ["shake", "stop", "knock", "weight"])
+def test_a_run_that_goes_on_at_the_same_steps_is_the_first_one(kind):
+    """Motions are joined where they were parted, with the speed that a stop begins with."""
+    body, grasp = planned("box")
+    settings = sv.ExecutionSettings(MASSES[kind], trials=(kind,), most_mm=5e3, most_deg=180.0)
+    best = chosen_squeeze(body, grasp, 0.5, settings)
+    scene = held_scene(body, best.grip, settings)
+    bench = HeldBench(scene)
+    lowest = held_dynamics(best.grip, scene.layout).lowest_frequency
+    trials, _ = trials_of(body, scene.layout, settings, lowest)
+    motions = run_trials(bench, trials)
+    slipped = 0
+    for trial, motion, again in zip(
+        trials, motions, run_again(bench, trials, motions, settings), strict=True
+    ):
+        first, second = (
+            outcome(each, scene.layout, trial.drive, best.grip.friction, trial.begun)
+            for each in (motion, again)
+        )
+        slipped += first.slipped
+        assert len(again.moved) == len(motion.moved)
+        # a stop that goes on from before its weight moves through the world for longer
+        assert second.displacement_m == pytest.approx(first.displacement_m, rel=1e-3), trial.name
+        assert second.dropped == first.dropped
+    assert slipped
+
+
+def test_steps_that_are_short_already_are_not_made_shorter(bar):
+    body, grasp = bar
+    best = chosen_squeeze(body, grasp, 0.4, LIGHT)
+    scene = held_scene(body, best.grip, LIGHT)
+    bench = confirming_bench(HeldBench(scene))
+    assert bench is not None
+    assert bench.step_s == pytest.approx(FINE_S)
+    assert bench.sample_s == pytest.approx(HeldBench(scene).sample_s)
+    assert confirming_bench(bench) is None
+
+
+def test_one_trial_that_diverges_loses_one_trial(monkeypatch):
+    """Of 192 trials of eight grasps one diverges; all others are as they would be without it."""
+    body = scenes.example_object("box")
+    grasps = gc.plan(body, 0.5, limit=8).grasps
+    settings = sv.ExecutionSettings(0.1, trials=("weight", "shake", "stop", "knock", "misplaced"))
+    plain = [sv.execute(body, grasp, 0.5, settings) for grasp in grasps]
+    judged = execute._judged
+
+    def diverging(trial, motion, *more):
+        if trial.name == "knock -y" and count[0] == 3:
+            motion = replace(motion, faults=("a number is not finite",))
+        return judged(trial, motion, *more)
+
+    count = [0]
+    monkeypatch.setattr(execute, "_judged", diverging)
+    trials = 0
+    for place, grasp in enumerate(grasps):
+        count[0] = place
+        for one, other in zip(
+            sv.execute(body, grasp, 0.5, settings).trials, plain[place].trials, strict=True
+        ):
+            trials += 1
+            if place == 3 and one.name == "knock -y":
+                assert (one.fate, one.survived, one.displacement_m) == ("diverged", False, np.inf)
+                assert "could not follow" in trial_in_words(one)
+            else:
+                assert one == other
+    assert trials == 8 * 24
+
+
+def test_an_object_that_is_shot_away_beyond_all_numbers_is_lost():
+    body, grasp = planned("box")
+    settings = sv.ExecutionSettings(0.1, trials=("weight", "knock"), knock_n_s=1e5)
+    found = sv.execute(body, grasp, 0.5, settings)
+    assert found.trials[0].survived
+    assert {trial.fate for trial in found.of_kind("knock")} <= {"dropped", "diverged"}
+    assert "diverged" in {trial.fate for trial in found.of_kind("knock")}
+    assert not found.survived
