@@ -217,6 +217,7 @@ class HeldBench:
         lost = np.zeros(len(drives), dtype=bool)
         most_m = np.array([each.away_m for each in limits])
         least_cosine = np.cos([min(each.turned_rad, math.pi) for each in limits])
+        turns_count = bool((least_cosine > -1.0).any())
         with unlogged():
             for sample in range(most):
                 going = np.flatnonzero((lengths > sample) & ~lost)
@@ -231,7 +232,9 @@ class HeldBench:
                 states[going, sample] = trials.state[going]
                 with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
                     away = np.linalg.norm(joints[going, :3] - joints[going, 7:10], axis=1)
-                    gone = (away > most_m[going]) | (_cosines(joints[going]) < least_cosine[going])
+                    gone = away > most_m[going]
+                    if turns_count:
+                        gone |= _cosines(joints[going]) < least_cosine[going]
                 for trial in going[gone]:
                     lost[trial] = True
                     moved[trial, sample:] = joints[trial]

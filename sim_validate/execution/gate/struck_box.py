@@ -21,9 +21,9 @@ from sim_validate.simulation.gate.case import Check
 
 BLOW = 1.2
 """Largest force of the blow, relative to the pushes of all fingers."""
-WATCHED = 3.0
+WATCHED = 1.0
 """Time for which the box is watched, in periods of its motion along an axis."""
-LEAST_WATCHED = 20
+LEAST_WATCHED = 8
 """Least number of samples for which it is watched."""
 SHORTER = 4
 """How much shorter the steps are that it is compared with."""
