@@ -113,7 +113,7 @@ EXECUTIONS = (
     Column("kind", "text", "weight, lift, shake, stop, knock or misplaced"),
     Column("name", "text", "the kind with its direction or number"),
     Column("survived", "bool", "whether the object was kept, and moved no farther than allowed"),
-    Column("fate", "text", "stuck, slipped (at a contact, but kept), or dropped"),
+    Column("fate", "text", "stuck, slipped (at a contact, but kept), dropped, or diverged"),
     Column("slip_m", "float", "farthest that a point of contact slid on the object", "m"),
     Column("displacement_m", "float", "largest displacement of the object in the hand", "m"),
     Column("turn_rad", "float", "largest turn of the object in the hand", "rad"),
