@@ -32,12 +32,16 @@ def geom(name, shape):
 
 
 def chain(finger):
-    """Nested bodies of a finger, with a sphere at its tip."""
+    """Nested bodies of a finger, with a sphere or a mesh at its tip."""
     text = ""
     for link in reversed(finger.links):
         joint = link.joint
-        geoms = "".join(geom(f"{link.name}:{i}", s) for i, s in enumerate(link.shapes))
-        if link is finger.links[-1]:
+        is_last, is_block = link is finger.links[-1], finger.tip.corners is not None
+        shapes = link.shapes[:-1] if is_last and is_block else link.shapes  # not a block's cover
+        geoms = "".join(geom(f"{link.name}:{i}", s) for i, s in enumerate(shapes))
+        if is_last and is_block:
+            geoms += f'<geom name="{finger.name}_tip" type="mesh" mesh="{finger.name}_tip"/>'
+        elif is_last:
             center = numbers(finger.tip.center)
             geoms += (f'<geom name="{finger.name}_tip" type="sphere" pos="{center}" '
                       f'size="{numbers([finger.tip.radius])}"/>')  # fmt: skip
@@ -55,6 +59,8 @@ def chain(finger):
 def hand_mjcf(hand, asset="", objects=""):
     """The whole model; the palm hangs on a mocap body, so that it can be put anywhere."""
     palm = "".join(geom(f"{PALM}:{i}", s) for i, s in enumerate(hand.palm))
+    asset += "".join(f'<mesh name="{f.name}_tip" vertex="{numbers(f.tip.corners)}"/>'
+                     for f in hand.fingers if f.tip.corners is not None)  # fmt: skip
     pairs = "".join(f'<exclude body1="{a}" body2="{b}"/>' for a, b in hand.ignored_pairs)
     return (
         f'<mujoco><compiler angle="radian" autolimits="true"/>'

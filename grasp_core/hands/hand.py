@@ -29,8 +29,13 @@ LARGEST_SIZE = 2.0
 MOST_TURN = 2.0 * np.pi
 """Largest angle of a joint, in either direction [rad]."""
 FEWEST_FINGERS, MOST_FINGERS = 3, 5
-MOST_LINKS, MOST_SHAPES = 40, 400
-"""Largest numbers of links and shapes of a hand."""
+MOST_LINKS, MOST_SHAPES, MOST_CORNERS = 40, 400, 200
+"""Largest numbers of links and shapes of a hand, and of corners of a fingertip."""
+LEAST_ROUNDING = 5e-5
+"""Least rounding of a fingertip [m]: the way from its hull to a surface must be a direction when it
+touches to 10 um."""
+SAME = 1e-9
+"""Length below which two lengths count as equal [m]: the rounding of a file."""
 RIGID_SLACK = 1e-9
 """How far the rows of a rotation may be from orthonormal: the rounding of ten digits."""
 PALM = "palm"
@@ -78,6 +83,12 @@ class LinkShape(ByValue):
                 f"half_sizes must be zero or more, and some of them or the radius above zero, got "
                 f"{sizes.tolist()} and {self.radius:g}"
             )
+
+    def holds(self, points: Array, radius: float) -> bool:
+        """Return whether balls about points (n, 3) of the link's frame are within the shape."""
+        out = np.abs((points - self.position) @ self.rotation) - self.half_sizes
+        away = np.linalg.norm(np.maximum(out, 0.0), axis=1) + np.minimum(out.max(axis=1), 0.0)
+        return bool((away + radius <= self.radius + SAME).all())
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -136,22 +147,49 @@ class Link(ByValue):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Fingertip(ByValue):
-    """The ball at the end of a finger that touches the object."""
+    """The end of a finger that touches the object: a ball, or a block.
+
+    A block is all points within `rounding` of the hull of its `corners`. A ball stands for it where
+    a tip has to be one: in planning, and in simulations, where it lies at the block's contact.
+    """
 
     center: Array
     """Middle of the ball in the last link's frame, (3,) [m]."""
     radius: float
     """Radius of the ball [m]."""
+    corners: Array | None = None
+    """Corners of the block in the last link's frame, (m, 3) [m]; None for a ball."""
+    rounding: float = 0.0
+    """Distance from their hull to the surface of the block [m]; zero for a ball."""
 
     def __post_init__(self) -> None:
         middle = frozen(self.center, (3,), "center", most=LARGEST_SIZE)
         object.__setattr__(self, "center", middle)
         number(self.radius, "radius", above=0.0, most=LARGEST_SIZE)
+        if self.corners is None:
+            number(self.rounding, "rounding", least=0.0, most=0.0)
+            return
+        corners = frozen(self.corners, (None, 3), "corners", most=LARGEST_SIZE)
+        object.__setattr__(self, "corners", corners)
+        number(self.rounding, "rounding", least=LEAST_ROUNDING, most=LARGEST_SIZE)
+        if not 2 <= len(corners) <= MOST_CORNERS:  # noqa: PLR2004 - one corner makes a ball
+            raise InputError(f"corners must be 2 to {MOST_CORNERS}, got {len(corners)}")
+
+    @property
+    def core(self) -> tuple[Array, float]:
+        """Return the corners whose hull is the tip but for a rounding, (m, 3), and that [m]."""
+        if self.corners is None:
+            return self.center[None], self.radius
+        return self.corners, self.rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class HandFinger(ByValue):
-    """A chain of links from the palm, with a ball on the last of them."""
+    """A chain of links from the palm, with a fingertip on the last of them.
+
+    The last shape of the last link covers a fingertip that is a block: it stands for the tip
+    wherever the tip is not to touch.
+    """
 
     name: str
     links: tuple[Link, ...]
@@ -165,6 +203,13 @@ class HandFinger(ByValue):
         instance(self.tip, Fingertip, "tip")
         if not links:
             raise InputError(f"links of finger {self.name} must be at least one, got none")
+        if self.tip.corners is not None and not (
+            links[-1].shapes and links[-1].shapes[-1].holds(*self.tip.core)
+        ):
+            raise InputError(
+                f"the last shape of the last link of finger {self.name} must cover its fingertip, "
+                "whose corners are outside"
+            )
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

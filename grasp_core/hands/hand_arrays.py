@@ -8,7 +8,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.hands.by_identity import kept_by_identity
-from grasp_core.hands.hand import PALM, Hand, LinkShape
+from grasp_core.hands.hand import PALM, SAME, Hand, HandFinger, LinkShape
 from grasp_core.hands.loop_values import HandArrays
 
 LEAST_BALL = 0.008
@@ -21,8 +21,6 @@ BALLS_APART = 1.7
 """Largest distance between neighbouring balls of a shape, in the smallest half-size."""
 OUTSIDE = 0.006
 """How far a ball must stick out of every larger ball of its link to be kept [m]."""
-SAME = 1e-9
-"""Length below which two lengths count as equal [m]: the rounding of a file."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,8 +41,13 @@ def hand_arrays(hand: Hand) -> HandArrays:
     lengths = [len(finger.links) for finger in hand.fingers]
     starts = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
     ends = starts[1:] - 1
-    tips = [LinkShape(f.tip.center, np.eye(3), np.zeros(3), f.tip.radius) for f in hand.fingers]
-    parts += [_Part(int(end), tip) for end, tip in zip(ends, tips, strict=True)]
+    tips = [_tip_shape(finger) for finger in hand.fingers]
+    parts += [
+        _Part(int(end), tip)
+        for end, tip, finger in zip(ends, tips, hand.fingers, strict=True)
+        if finger.tip.corners is None
+    ]
+    corners = [finger.tip.core[0] for finger in hand.fingers]
     free = _free_links(hand, starts)
     where = np.array([part.link for part in parts], np.int64)
     balls = _balls([part for part in parts if part.link not in ends])
@@ -62,13 +65,26 @@ def hand_arrays(hand: Hand) -> HandArrays:
         starts=starts,
         tip_centers=np.array([finger.tip.center for finger in hand.fingers]),
         tip_radii=np.array([finger.tip.radius for finger in hand.fingers]),
+        tip_corners=np.concatenate(corners),
+        cover_corners=np.concatenate(
+            [(own - tip.position) @ tip.rotation for own, tip in zip(corners, tips, strict=True)]
+        ),
+        tip_firsts=np.concatenate([[0], np.cumsum([len(own) for own in corners])]).astype(np.int64),
+        tip_roundings=np.array([finger.tip.core[1] for finger in hand.fingers]),
+        tip_shapes=np.array(
+            [
+                max(n for n, part in enumerate(parts) if part.shape is tip and part.link == end)
+                for end, tip in zip(ends, tips, strict=True)
+            ],
+            np.int64,
+        ),
         shape_links=where,
         shape_positions=np.array([shape.position for shape in shapes]),
         shape_rotations=np.array([shape.rotation for shape in shapes]),
         shape_sizes=np.array([shape.half_sizes for shape in shapes]),
         shape_radii=np.array([shape.radius for shape in shapes]),
         shape_reaches=np.array([_reach(shape) for shape in shapes]),
-        shape_tips=_shape_tips(parts, ends.tolist(), tips),
+        shape_tips=_shape_tips(hand, parts, ends.tolist(), tips),
         link_shapes=np.array([shape for shape, _ in held], np.int64),
         link_reaches=np.array([reach for _, reach in held]),
         pairs=_pairs(where, free),
@@ -149,12 +165,25 @@ def _balls(parts: list[_Part]) -> list[tuple[int, Array, float]]:
     return kept
 
 
-def _shape_tips(parts: list[_Part], ends: list[int], tips: list[LinkShape]) -> Indices:
-    """Find the shapes that share the balls of fingertips: those, and capsules that end there."""
+def _tip_shape(finger: HandFinger) -> LinkShape:
+    """Return the shape that stands for a fingertip: its ball, or what covers its corners."""
+    tip = finger.tip
+    if tip.corners is not None:
+        return finger.links[-1].shapes[-1]
+    return LinkShape(tip.center, np.eye(3), np.zeros(3), tip.radius)
+
+
+def _shape_tips(
+    hand: Hand, parts: list[_Part], ends: list[int], tips: list[LinkShape]
+) -> Indices:  # fmt: skip
+    """Find the shapes that stand for fingertips: covers, balls, and capsules that end in these."""
     found = np.full(len(parts), -1, np.int64)
     for number, part in enumerate(parts):
         if part.link in ends:
             finger, shape = ends.index(part.link), part.shape
+            if hand.fingers[finger].tip.corners is not None:
+                found[number] = finger if shape is tips[finger] else -1
+                continue
             local = (tips[finger].position - shape.position) @ shape.rotation
             out = np.linalg.norm(np.maximum(np.abs(local) - shape.half_sizes, 0.0))
             alike = abs(shape.radius - tips[finger].radius) <= SAME

@@ -32,6 +32,16 @@ class HandArrays(NamedTuple):
     """Middles of the fingertips' balls in the frames of the last links, (f, 3) [m]."""
     tip_radii: Array
     """Radii of these balls, (f,) [m]."""
+    tip_corners: Array
+    """Corners of all fingertips, finger by finger: for a ball its middle, (c, 3) [m]."""
+    cover_corners: Array
+    """The same in the frames of the shapes that cover blocks; zeros for balls, (c, 3) [m]."""
+    tip_firsts: Indices
+    """First corner of each finger, and the number of corners at the end, (f + 1,)."""
+    tip_roundings: Array
+    """Distances from the hulls of these corners to the tips' surfaces, (f,) [m]."""
+    tip_shapes: Indices
+    """The shape that is each finger's ball, or covers its block, (f,)."""
     shape_links: Indices
     """The link of each shape, -1 for the palm, (s,)."""
     shape_positions: Array
@@ -45,7 +55,8 @@ class HandArrays(NamedTuple):
     shape_reaches: Array
     """Largest distances of the shapes' points from their middles, (s,) [m]."""
     shape_tips: Indices
-    """The finger whose tip's ball a shape holds and shares, or -1, (s,)."""
+    """The finger whose tip a shape stands for: it shares the tip's ball or covers its corners; -1
+    for none, (s,)."""
     link_shapes: Indices
     """For the palm and each link, the shape about whose middle a ball holds all of its shapes, or
     -1 if it has none, (j + 1,)."""
@@ -92,6 +103,9 @@ class Targets(NamedTuple):
     """Two unit vectors in each plane, (k, 2, 3)."""
     pinned: Array
     """1.0 where the contact must be at the origin, 0.0 where in its region, (k,)."""
+    touching: Array
+    """Points of the tips' hulls that touch, in the last links' frames, (k, 3) [m]; NaN where it is
+    the corner that reaches farthest along the normal."""
     edge_contacts: Indices
     """The contact of each edge, (e,)."""
     edge_points: Array
@@ -143,7 +157,12 @@ class Pose(NamedTuple):
     middles: Array
     """Middles of the shapes, (s, 3) [m]."""
     tips: Array
-    """Middles of the fingertips' balls, by contact, (k, 3) [m]."""
+    """Points of the tips' hulls that touch, by contact, (k, 3) [m]: middles of tips that are
+    balls."""
+    fronts: Array
+    """Corners of the tips that are farthest along the normals, (k, 3) [m]."""
+    rolls: Array
+    """How points that touch move on their tips as the tips turn, (k, 3, 3) [m]."""
 
 
 class Sums(NamedTuple):

@@ -1,13 +1,15 @@
 """Says where a hand stands in a grasp that it reaches: what of a `HandReach` is then known."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.checked import instance
 from grasp_core.errors import InputError
-from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand import Fingertip, Hand
+from grasp_core.hands.kinematics import places
 from grasp_core.hands.reach import HandReach
 from grasp_core.values import Contact
 
@@ -20,6 +22,7 @@ class Stance:
     """A hand in a pose at its contacts."""
 
     hand: Hand
+    """The hand, with a ball at its contact in place of each fingertip that is a block."""
     joints: Array
     """Joint angles, (j,) [rad]."""
     palm_pose: Array
@@ -65,9 +68,10 @@ def stance_of(hand: Hand, reach: HandReach) -> Stance:
             f"reach must have the joints that follow others where they follow them, got one off by "
             f"{off:.3g} rad for grasp {reach.grasp}"
         )
+    fingers = tuple(reach.fingers.tolist())
     return Stance(
-        hand, reach.joints, reach.palm_pose, reach.contacts, tuple(reach.fingers.tolist()),
-        reach.certificate.forces,
+        with_balls(hand, reach.joints, reach.palm_pose, fingers, reach.contacts), reach.joints,
+        reach.palm_pose, reach.contacts, fingers, reach.certificate.forces,
     )  # fmt: skip
 
 
@@ -85,3 +89,33 @@ def uncoupled(hand: Hand, doing: str) -> Hand:
             "reach_with, hand_motors and hand_payload take such hands"
         )
     return hand
+
+
+def with_balls(
+    hand: Hand, joints: Array, palm_pose: Array, fingers: Iterable[int],
+    contacts: Iterable[Contact],
+) -> Hand:  # fmt: skip
+    """Put a ball that touches at its contact in place of each fingertip that is a block.
+
+    Scenes and drawings know fingertips as balls on the last links. Which part of a block touches is
+    the pose's.
+
+    Args:
+        hand: The hand.
+        joints: Joint angles, (j,) [rad].
+        palm_pose: Pose of the palm in the object's frame, (4, 4).
+        fingers: The hand's finger at each contact.
+        contacts: Where they touch.
+    """
+    touching = {f: each for f, each in zip(fingers, contacts, strict=True)
+                if hand.fingers[f].tip.corners is not None}  # fmt: skip
+    if not touching:
+        return hand
+    found, made = places(hand, joints, palm_pose), list(hand.fingers)
+    ends = np.cumsum([len(finger.links) for finger in hand.fingers]) - 1
+    for f, contact in touching.items():
+        radius, R = made[f].tip.radius, found.link_rotations[0, ends[f]]
+        middle = contact.position - radius * contact.normal
+        center = R.T @ (middle - found.link_positions[0, ends[f]])
+        made[f] = replace(made[f], tip=Fingertip(center, radius))
+    return replace(hand, fingers=tuple(made))

@@ -50,8 +50,8 @@ def load_hand(hand: str | Path, fingertips: Iterable[str] = ()) -> Hand:
     """Load a hand by name or from a file.
 
     Args:
-        hand: "allegro" or "leap"; the path of an MJCF file (.xml, .mjcf) or a URDF file (.urdf); or
-            "menagerie:NAME" for a model of the package `mujoco-menagerie`.
+        hand: "allegro", "allegro-urdf" or "leap"; the path of an MJCF file (.xml, .mjcf) or a URDF
+            file (.urdf); or "menagerie:NAME" for a model of the package `mujoco-menagerie`.
         fingertips: For a file, the name of a site, geom or body for each of three to five
             fingertips. A built-in hand has its own.
 
@@ -158,7 +158,8 @@ def _balls(
         turned, origin = frames[chain[-1]]
         ball: TipBall = tips.tip_ball(model, tip, R.T @ (origin - p), name)
         center = turned.T @ (p + R @ ball.center - origin)
-        balls.append((Fingertip(center, ball.radius), ball))
+        corners = None if ball.corners is None else (p + ball.corners @ R.T - origin) @ turned
+        balls.append((Fingertip(center, ball.radius, corners, ball.rounding), ball))
     return balls
 
 
@@ -167,20 +168,21 @@ def _shapes(
     balls: list[tuple[Fingertip, "TipBall"]],
 ) -> dict[int, list[LinkShape]]:  # fmt: skip
     """Collect the shapes that collide, by the joint that moves them, in the links' frames."""
-    stand_ins = {
-        tip.geom: ball.stand_in
+    covers = {
+        tip.geom: ball.cover
         for tip, (_, ball) in zip(found.tips, balls, strict=True)
-        if tip.geom is not None and ball.stand_in is not None
+        if tip.geom is not None and ball.cover is not None
     }
     shapes: dict[int, list[LinkShape]] = {}
-    for g, body in enumerate(model.geom_bodies.tolist()):
-        owner, kind = found.owners[int(body)], model.geom_kinds[g]
-        named = g in stand_ins or any(tip.geom == g for tip in found.tips)
+    for g in sorted(range(len(model.geom_kinds)), key=covers.__contains__):  # covers come last
+        body = int(model.geom_bodies[g])
+        owner, kind = found.owners[body], model.geom_kinds[g]
+        named = any(tip.geom == g for tip in found.tips)
         if owner not in frames or kind in {"plane", "hfield"}:
             continue
         if not (model.geom_bits[g].any() or named):
             continue
-        shape = stand_ins.get(g) or _shape(model, g)
+        shape = covers.get(g) or _shape(model, g)
         turned, origin = frames[owner]
         R, p = model.rotations[body], model.positions[body]
         shapes.setdefault(owner, []).append(

@@ -92,6 +92,8 @@ class HandModel(NamedTuple):
     """Origins of the geoms' frames in the bodies', (g, 3) [m]."""
     geom_rotations: Array
     """Their axes, (g, 3, 3)."""
+    geom_points: tuple[Array, ...]
+    """Corners of each geom that is a mesh in the geom's frame, (v, 3) [m]; none of others."""
     geom_bits: Indices
     """Bits that say with what a geom collides: its type and its affinity, (g, 2)."""
     site_bodies: Indices
@@ -161,6 +163,7 @@ def compiled_hand(text: ModelText, name: str) -> HandModel:
         geom_boxes=np.array(model.geom_aabb),
         geom_positions=np.array(model.geom_pos),
         geom_rotations=_turns(model.geom_quat),
+        geom_points=tuple(_points(model, int(mesh)) for mesh in _meshes(model)),
         geom_bits=bits,
         site_bodies=model.site_bodyid.astype(np.int64),
         site_positions=np.array(model.site_pos),
@@ -252,6 +255,18 @@ def _active(model: mujoco.MjModel, kind: mujoco.mjtEq) -> list[int]:
 
 def _names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> tuple[str, ...]:
     return tuple(mujoco.mj_id2name(model, kind, i) or "" for i in range(count))
+
+
+def _meshes(model: mujoco.MjModel) -> Array:
+    """Return the number of each geom's mesh, -1 for other geoms, (g,)."""
+    return np.where(model.geom_type == int(mujoco.mjtGeom.mjGEOM_MESH), model.geom_dataid, -1)
+
+
+def _points(model: mujoco.MjModel, mesh: int) -> Array:
+    if mesh < 0:
+        return np.empty((0, 3))
+    first = int(model.mesh_vertadr[mesh])
+    return np.array(model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])], float)
 
 
 def _turns(quaternions: Array) -> Array:

@@ -140,7 +140,7 @@ def hand_layout(
     centers = base.contacts - (radii - drive.indentation_m)[:, None] * base.frames[:, :, 0]
     joints = touching(replace(stance, palm_pose=pose), centers)
     return HandLayout(
-        **own, hand=hand, joints=to_digits(joints), palm_pose=to_digits(pose),
+        **own, hand=stance.hand, joints=to_digits(joints), palm_pose=to_digits(pose),
         used_fingers=stance.fingers, motors=motors, gravity=to_digits(gravity),
         servo_n_m_per_rad=servo, damping_n_m_s_per_rad=2.0 * math.sqrt(servo * armature),
         armature_kg_m2=armature,

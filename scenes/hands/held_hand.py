@@ -263,7 +263,7 @@ def held_hand_layout(  # noqa: PLR0913, PLR0917 - a hand, an object, and how the
     own = {each.name: getattr(base, each.name) for each in fields(base)}
     own["damping"] = damping / shares
     return HeldHandLayout(
-        **own, hand=hand, angles=to_digits(angles), palm_pose=to_digits(pose),
+        **own, hand=stance.hand, angles=to_digits(angles), palm_pose=to_digits(pose),
         used_fingers=stance.fingers, motors=motors, servo_n_m_per_rad=servo,
         damping_n_m_s_per_rad=_rounded(damping), armature_kg_m2=_rounded(armature),
         inertias=armature / shares,

@@ -30,7 +30,7 @@ class Hand:
     """Show what a hand was read as: fingers, joints with ranges and torque limits, fingertips."""
 
     hand: Positional[str]
-    """The hand: allegro, leap, an MJCF or URDF file, or menagerie:NAME for a model of the package
+    """The hand: allegro, allegro-urdf, leap, an MJCF or URDF file, or menagerie:NAME of the package
     mujoco-menagerie."""
     fingertips: Fingertips = ""
     """For a hand from a file: names of sites, geoms or bodies that are fingertips, separated by
@@ -45,7 +45,7 @@ class Reach:
     grasps: Positional[Path]
     """A grasps.json."""
     hand: str = "allegro"
-    """The hand: allegro, leap, an MJCF or URDF file, or menagerie:NAME for a model of the package
+    """The hand: allegro, allegro-urdf, leap, an MJCF or URDF file, or menagerie:NAME of the package
     mujoco-menagerie."""
     fingertips: Fingertips = ""
     """For a hand from a file: names of sites, geoms or bodies that are fingertips, separated by

@@ -37,7 +37,7 @@ class Learned:
     """Read units from file names, as in bracket.mm.stl."""
     synthetic: Annotated[int, at_least(0, up_to=5)] = 5
     """Largest number of synthetic negative controls of each grasp."""
-    hand: Literal["", "allegro", "leap"] = ""
+    hand: Literal["", "allegro", "allegro-urdf", "leap"] = ""
     """Hand whose pose is looked for in each grasp in force closure."""
 
     def asked(self) -> dict[str, Any] | None:

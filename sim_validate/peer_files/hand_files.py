@@ -86,6 +86,7 @@ HAND_FILES = {
     ),
 }  # fmt: skip
 """By the names of built-in hands."""
+HAND_FILES["allegro-urdf"] = HAND_FILES["allegro"]
 
 
 def hand_file(hand: Hand) -> HandFile:

@@ -19,7 +19,7 @@ from grasp_core.arrays import Array, to_digits
 from grasp_core.checked import coefficient, instance, number, positive, text
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
-from grasp_core.geometry.nearest_points import nearest_on_surface
+from grasp_core.hands.distances.collisions import tip_gaps
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import chains, hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians
@@ -139,9 +139,9 @@ def reach_of_record(
 ) -> RecordedReach:  # fmt: skip
     """Find the contacts of a recorded grasp, and prove whether they are in force closure.
 
-    A fingertip's contact is the point of the surface that is nearest to the middle of its ball, if
-    the ball is at most `touch_m` away from it or in it. Links other than fingertips are not looked
-    at, and neither are overlaps: a record may hold any pose.
+    A fingertip's contact is the point of the surface that is nearest to it, or to its deepest
+    corner, if the fingertip is at most `touch_m` away from the surface or in it. Links other than
+    fingertips are not looked at, and neither are overlaps: a record may hold any pose.
 
     Args:
         record: The recorded grasp.
@@ -217,17 +217,13 @@ def _touched(
     hand: Hand, body: Polyhedron, joints: Array, palm: Array, touch_m: float
 ) -> tuple[list[int], tuple[Contact, ...]]:
     """Find the fingers that touch, and where."""
-    tips = places(hand, joints, palm).tips[0]
-    nearest = nearest_on_surface(body.vertices, body.triangles, tips)
-    fingers, contacts = list[int](), list[Contact]()
-    for finger, (tip, point) in enumerate(zip(tips, nearest, strict=True)):
-        away = float(np.linalg.norm(point - tip)) - hand.fingers[finger].tip.radius
-        if abs(away) > touch_m:
-            continue
-        normal = _inward(body, tip, point)
-        fingers.append(finger)
-        contacts.append(Contact(point, normal))
-    return fingers, tuple(contacts)
+    found = tip_gaps(hand, body, joints, palm, np.arange(len(hand.fingers)))
+    fingers = np.flatnonzero(np.abs(found.gaps) <= touch_m).tolist()
+    contacts = tuple(
+        Contact(found.on_object[k], _inward(body, found.on_tips[k], found.on_object[k]))
+        for k in fingers
+    )
+    return fingers, contacts
 
 
 def _inward(body: Polyhedron, tip: Array, point: Array) -> Array:

@@ -12,6 +12,7 @@ from typing_extensions import TypedDict
 from grasp_core.arrays import Array
 from grasp_core.hands.couplings import Coupling
 from grasp_core.hands.hand import (
+    MOST_CORNERS,
     MOST_FINGERS,
     MOST_LINKS,
     MOST_SHAPES,
@@ -66,6 +67,8 @@ class FingerRecord(TypedDict):
     links: Annotated[list[LinkRecord], Field(max_length=MOST_LINKS)]
     tip_center_m: Triple
     tip_radius_m: Finite
+    tip_corners_m: NotRequired[Annotated[list[Triple], Field(max_length=MOST_CORNERS)]]
+    tip_rounding_m: NotRequired[Finite]
 
 
 class CouplingRecord(TypedDict):
@@ -92,15 +95,7 @@ def model_record(hand: Hand) -> ModelRecord:
     """Write the parts of a hand."""
     return {
         "palm": [_shape(each) for each in hand.palm],
-        "fingers": [
-            {
-                "name": finger.name,
-                "links": [_link(link) for link in finger.links],
-                "tip_center_m": _triple(finger.tip.center),
-                "tip_radius_m": finger.tip.radius,
-            }
-            for finger in hand.fingers
-        ],
+        "fingers": [_finger(finger) for finger in hand.fingers],
         "ignored_pairs": list(hand.ignored_pairs),
         "couplings": couplings_record(hand),
         "notes": list(hand.notes),
@@ -132,7 +127,7 @@ def hand_of_model(
         HandFinger(
             each["name"],
             tuple(map(_link_of, each["links"])),
-            Fingertip(np.array(each["tip_center_m"]), each["tip_radius_m"]),
+            _tip_of(each),
         )
         for each in record["fingers"]
     )  # fmt: skip
@@ -144,6 +139,28 @@ def hand_of_model(
     )
     notes = tuple(record.get("notes", []))
     return Hand(name, palm, fingers, tuple(sources), torque_source, pairs, couplings, notes)
+
+
+def _finger(finger: HandFinger) -> FingerRecord:
+    tip = finger.tip
+    record: FingerRecord = {
+        "name": finger.name,
+        "links": [_link(link) for link in finger.links],
+        "tip_center_m": _triple(tip.center),
+        "tip_radius_m": tip.radius,
+    }
+    if tip.corners is not None:
+        record["tip_corners_m"] = list(map(_triple, tip.corners))
+        record["tip_rounding_m"] = tip.rounding
+    return record
+
+
+def _tip_of(record: FingerRecord) -> Fingertip:
+    center, radius = np.array(record["tip_center_m"]), record["tip_radius_m"]
+    if "tip_corners_m" not in record:
+        return Fingertip(center, radius)
+    corners = np.array(record["tip_corners_m"])
+    return Fingertip(center, radius, corners, record.get("tip_rounding_m", 0.0))
 
 
 def _shape(shape: LinkShape) -> ShapeRecord:

@@ -15,8 +15,9 @@ from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
 from grasp_core.files.text_files import read_text
+from grasp_core.frames import POSE
+from grasp_core.hands.distances.collisions import tip_distances
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.kinematics import places
 from grasp_core.hands.named_hands import HANDS, load_hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.values import Contact
@@ -213,9 +214,9 @@ def _touches(hand: Hand, reached: Sequence[HandReach]) -> bool:
         if each.fingers is None or each.contacts is None or each.joints is None:
             continue
         used = [int(finger) for finger in each.fingers]
-        tips = places(hand, each.joints, each.palm_pose).tips[0, used]
-        radii = np.array([hand.fingers[finger].tip.radius for finger in used])
         touched = np.array([contact.position for contact in each.contacts])
-        if (np.abs(np.linalg.norm(tips - touched, axis=1) - radii) > TOUCHING_M).any():
+        pose = np.eye(POSE) if each.palm_pose is None else each.palm_pose
+        off = tip_distances(hand, each.joints, pose, used, touched)
+        if (np.abs(off) > TOUCHING_M).any():
             return False
     return True

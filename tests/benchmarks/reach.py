@@ -27,6 +27,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import trimesh
+from scipy.spatial import ConvexHull
 
 import grasp_core as gc
 import scenes
@@ -102,8 +103,11 @@ class Judge:
         """How deep points of the surface are inside shapes [m]."""
         at, deepest = places(self.hand, found.joints, found.palm_pose), -FAR_M
         frames = [(s, found.palm_pose[:3, :3], found.palm_pose[:3, 3]) for s in self.hand.palm]
+        blocks = [f for f in self.hand.fingers if f.tip.corners is not None]
+        covers = {id(f.links[-1].shapes[-1]) for f in blocks}  # no parts of the hand
         frames += [(s, at.link_rotations[0, k], at.link_positions[0, k])
-                   for k, link in enumerate(self.hand.links) for s in link.shapes]  # fmt: skip
+                   for k, link in enumerate(self.hand.links) for s in link.shapes
+                   if id(s) not in covers]  # fmt: skip
         for shape, rotation, position in frames:
             middle, reach = position + rotation @ shape.position, np.linalg.norm(shape.half_sizes)
             near = np.linalg.norm(self.points - middle, axis=1) <= reach + shape.radius + FAR_M
@@ -113,9 +117,16 @@ class Judge:
             out = np.abs(local @ shape.rotation) - shape.half_sizes
             away = np.linalg.norm(np.maximum(out, 0.0), axis=1) + np.minimum(out.max(axis=1), 0.0)
             deepest = max(deepest, float(shape.radius - away.min()))
-        for k, tip in enumerate(at.tips[0]):
-            away = np.linalg.norm(self.points - tip, axis=1).min()
-            deepest = max(deepest, float(self.hand.fingers[k].tip.radius - away))
+        for finger in self.hand.fingers:
+            last = self.hand.links.index(finger.links[-1])
+            local = (self.points - at.link_positions[0, last]) @ at.link_rotations[0, last]
+            if finger.tip.corners is None:
+                away = np.linalg.norm(local - finger.tip.center, axis=1).min()
+                deepest = max(deepest, float(finger.tip.radius - away))
+            else:
+                sides = ConvexHull(finger.tip.corners).equations
+                within = -(local @ sides[:, :3].T + sides[:, 3]).max(axis=1)
+                deepest = max(deepest, float(within.max()))
         return deepest
 
 

@@ -19,8 +19,16 @@ BOX_CORNERS, BOX_EDGES = 8, 12
 
 
 @loop()
-def point_triangle(p: Array, T: Array, near: Array) -> float:
+def point_triangle(p: Array, T: Array, near: Array, weights: Array) -> float:
     """Fill in the point of a triangle, (3, 3), nearest to a point, and return its squared distance.
+
+    The last two corners may be one point.
+
+    Args:
+        p: The point, (3,).
+        T: Corners of the triangle.
+        near: Filled with the nearest point, (3,).
+        weights: Filled with the weights of the last two corners in it, (2,).
 
     Source: C. Ericson, Real-Time Collision Detection, section 5.1.5 (regions of Voronoi).
     """
@@ -46,6 +54,7 @@ def point_triangle(p: Array, T: Array, near: Array) -> float:
     else:
         total = va + vb + vc
         v, w = vb / total, vc / total
+    weights[0], weights[1] = v, w
     square = 0.0
     for j in range(3):
         near[j] = T[0, j] + v * ab[j] + w * ac[j]
@@ -178,11 +187,11 @@ def box_triangle(  # noqa: C901 - loops that are written out
     corners, starts, along = np.empty((8, 3)), np.empty((12, 3)), np.empty((12, 3))
     corners_of(h, np.eye(3), np.zeros(3), corners)
     edges_of(corners, starts, along)
-    best, near, between = np.inf, np.empty(3), np.empty(3)
+    best, near, between, weights = np.inf, np.empty(3), np.empty(3), np.empty(2)
     for k in range(CORNERS):
         best = min(best, point_box(T[k], h))
     for k in range(BOX_CORNERS):
-        best = min(best, point_triangle(corners[k], T, near))
+        best = min(best, point_triangle(corners[k], T, near, weights))
     for e in range(BOX_EDGES):
         for k in range(CORNERS):
             best = min(best, segment_segment(starts[e], along[e], T[k], sides[k], between, near))

@@ -4,6 +4,7 @@ Distances are exact, between boxes with rounded edges and triangles. A shape who
 object counts as overlapping it.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.frames import POSE
 from grasp_core.hands.distances.surface import surface_tree
-from grasp_core.hands.hand import PALM, Hand
+from grasp_core.hands.hand import PALM, SAME, Hand
 from grasp_core.hands.hand_arrays import hand_arrays
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.loop_values import HandArrays
@@ -29,9 +30,9 @@ class Clearances:
     itself: float
     """Between links that must not overlap."""
     object: float
-    """From the object, of all shapes but those that share the balls of touching fingertips."""
+    """From the object, of all shapes but those that stand for touching fingertips."""
     tips: float
-    """From the object, of those shapes: zero where they touch."""
+    """From the object, of those fingertips: zero where they touch."""
     table: float
     """From the table; `FAR` where there is none."""
 
@@ -67,7 +68,67 @@ def clearances(  # noqa: PLR0913, PLR0917 - a hand, where it is, and what is aro
     ]
     low = FAR if up is None else kernel.of_table(arrays, turned, middles, up, height, worst[:1])
     own = kernel.of_itself(arrays, turned, middles, FAR, worst)
-    return Clearances(min(own, FAR), apart[0] + FAR, apart[1] + FAR, min(low, FAR))
+    return Clearances(
+        min(own, FAR), min(apart[0], 0.0) + FAR, min(apart[1], 0.0) + FAR, min(low, FAR)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class TipGaps:
+    """Where fingertips are nearest to an object, or deepest in it."""
+
+    gaps: Array
+    """Distances of the tips from the surface, negative where they overlap, (k,) [m]."""
+    on_tips: Array
+    """Points of the tips' hulls there, (k, 3) [m]: middles of tips that are balls."""
+    on_object: Array
+    """Points of the surface there, (k, 3) [m]."""
+
+
+def tip_gaps(
+    hand: Hand, body: Polyhedron, joints: Array, palm_pose: Array, fingers: Indices
+) -> TipGaps:
+    """Measure how far fingertips are from an object.
+
+    Args:
+        hand: The hand.
+        body: The object.
+        joints: Joint angles, (j,) [rad].
+        palm_pose: Pose of the palm in the object's frame, (4, 4).
+        fingers: The fingers, (k,).
+    """
+    arrays, tree = hand_arrays(hand), surface_tree(body)
+    turned, middles = _shapes(hand, arrays, joints, palm_pose)
+    kernel = compiled("grasp_core.hands.distances.collisions_kernel")
+    near, other = np.empty((len(fingers), 3)), np.empty((len(fingers), 3))
+    apart = np.empty(len(fingers))
+    for k, finger in enumerate(fingers):
+        apart[k] = kernel.tip_surface(arrays, turned, middles, tree, finger, near[k], other[k])
+        if apart[k] <= SAME:
+            s = arrays.tip_shapes[finger]
+            corners, _ = kernel.core_in(arrays, turned[s], middles[s], s)
+            apart[k] = kernel.deepest(corners, tree, near[k], other[k])
+    return TipGaps(apart - arrays.tip_roundings[fingers], near, other)
+
+
+def tip_distances(
+    hand: Hand, joints: Array, palm_pose: Array, fingers: Iterable[int], points: Array
+) -> Array:
+    """Measure how far points are from fingertips: zero where these touch them, (k,) [m].
+
+    Args:
+        hand: The hand.
+        joints: Joint angles, (j,) [rad].
+        palm_pose: Pose of the palm, (4, 4).
+        fingers: The fingers, (k,).
+        points: A point for each, (k, 3) [m].
+    """
+    arrays, kernel = hand_arrays(hand), compiled("grasp_core.hands.distances.collisions_kernel")
+    turned, middles = _shapes(hand, arrays, joints, palm_pose)
+    return np.array([
+        kernel.tip_point(arrays, turned, middles, finger, point)
+        for finger, point in zip(fingers, points, strict=True)
+    ])  # fmt: skip
 
 
 def _shapes(hand: Hand, arrays: HandArrays, joints: Array, palm_pose: Array) -> tuple[Array, Array]:

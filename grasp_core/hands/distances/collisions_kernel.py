@@ -6,8 +6,9 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import dotted
-from grasp_core.hands.distances.boxes_kernel import box_box, into_frame
-from grasp_core.hands.distances.surface_kernel import box_surface, windings
+from grasp_core.hands.distances.boxes_kernel import box_box, corners_of, into_frame
+from grasp_core.hands.distances.hulls_kernel import hull_hull, hull_surface
+from grasp_core.hands.distances.surface_kernel import box_surface, nearest, windings
 from grasp_core.hands.kinematics_kernel import moved, product
 from grasp_core.hands.loop_values import HandArrays, SurfaceTree
 
@@ -90,7 +91,79 @@ def _apart_by_faces(hand: HandArrays, turned: Array, middles: Array, i: int, j: 
 
 
 @loop()
-def pair_distance(  # noqa: PLR0913, PLR0917 - two shapes, and where they are nearest
+def is_block(hand: HandArrays, s: int) -> bool:
+    """Return whether a shape covers a fingertip that is a block."""
+    finger = hand.shape_tips[s]
+    return bool(finger >= 0 and hand.tip_firsts[finger + 1] - hand.tip_firsts[finger] > 1)
+
+
+@loop()
+def core_in(hand: HandArrays, R: Array, middle: Array, s: int) -> tuple[Array, float]:
+    """Return corners (m, 3) whose hull is a shape but for its rounding, and that.
+
+    For a shape that covers a block they are the block's.
+
+    Args:
+        hand: The hand.
+        R: The shape's axes in some frame (columns), (3, 3).
+        middle: Its middle there, (3,).
+        s: Number of the shape.
+    """
+    if not is_block(hand, s):
+        corners = np.empty((8, 3))
+        corners_of(hand.shape_sizes[s], R, middle, corners)
+        return corners, float(hand.shape_radii[s])
+    first, end = hand.tip_firsts[hand.shape_tips[s]], hand.tip_firsts[hand.shape_tips[s] + 1]
+    corners = np.empty((end - first, 3))
+    for c in range(first, end):
+        moved(R, middle, hand.cover_corners[c], corners[c - first])
+    return corners, float(hand.tip_roundings[hand.shape_tips[s]])
+
+
+@loop()
+def _from_block(  # noqa: PLR0913, PLR0917 - two shapes, and where they are nearest
+    hand: HandArrays, turned: Array, middles: Array, block: int, s: int, limit: float, way: Array,
+    point: Array,
+) -> float:  # fmt: skip
+    """Return the distance of a shape from a block, `pair_distance` with the block first.
+
+    It is minus infinity if they overlap by more than their roundings.
+    """
+    finger, local, between = hand.shape_tips[block], np.empty(3), np.empty((3, 3))
+    own = hand.cover_corners[hand.tip_firsts[finger] : hand.tip_firsts[finger + 1]]
+    relative_frame(turned, middles, block, s, local, between)
+    others, rounding = core_in(hand, between, local, s)
+    near, other, both = np.empty(3), np.empty(3), float(hand.tip_roundings[finger]) + rounding
+    apart = hull_hull(own, others, limit + both, near, other)
+    if apart <= ROUNDING:
+        return -np.inf
+    if apart <= limit + both:
+        for a in range(3):
+            near[a] = (other[a] - near[a]) / apart
+            other[a] -= near[a] * rounding
+        moved(turned[block], middles[block], other, point)
+        for a in range(3):
+            way[a] = dotted(turned[block, a], near)
+    return apart - both
+
+
+@loop()
+def relative_frame(
+    turned: Array, middles: Array, i: int, j: int, local: Array, between: Array
+) -> None:  # fmt: skip
+    """Fill in the middle, (3,), and the axes, (3, 3), of a shape j in the frame of a shape i."""
+    into_frame(turned[i], middles[i], middles[j], local)
+    for a in range(3):
+        for b in range(3):
+            between[a, b] = (
+                turned[i, 0, a] * turned[j, 0, b]
+                + turned[i, 1, a] * turned[j, 1, b]
+                + turned[i, 2, a] * turned[j, 2, b]
+            )
+
+
+@loop()
+def pair_distance(  # noqa: C901, PLR0913, PLR0917 - two shapes, and where they are nearest
     hand: HandArrays, turned: Array, middles: Array, i: int, j: int, limit: float, way: Array,
     point: Array,
 ) -> float:  # fmt: skip
@@ -111,15 +184,16 @@ def pair_distance(  # noqa: PLR0913, PLR0917 - two shapes, and where they are ne
     apart = _apart_by_faces(hand, turned, middles, i, j) - both
     if apart > limit + ROUNDING:
         return apart
+    if is_block(hand, i) or is_block(hand, j):
+        block, s = (i, j) if is_block(hand, i) else (j, i)
+        exact = _from_block(hand, turned, middles, block, s, limit, way, point)
+        if exact > -np.inf:  # else what covers the blocks shows the way
+            if block == j:
+                for a in range(3):
+                    way[a] = -way[a]
+            return exact
     local, between, found, at = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3)
-    into_frame(turned[i], middles[i], middles[j], local)
-    for a in range(3):
-        for b in range(3):
-            between[a, b] = (
-                turned[i, 0, a] * turned[j, 0, b]
-                + turned[i, 1, a] * turned[j, 1, b]
-                + turned[i, 2, a] * turned[j, 2, b]
-            )
+    relative_frame(turned, middles, i, j, local, between)
     apart = box_box(h, g, between, local, limit + both, found, at) - both
     if apart <= limit:
         for a in range(3):
@@ -163,6 +237,77 @@ def of_itself(
 
 
 @loop()
+def tip_surface(  # noqa: PLR0913, PLR0917 - a hand's tip, a surface, and where they are nearest
+    hand: HandArrays, turned: Array, middles: Array, tree: SurfaceTree, finger: int, near: Array,
+    other: Array,
+) -> float:  # fmt: skip
+    """Return the distance of a surface from the hull of a tip's corners, zero if they overlap.
+
+    The tip touches where the distance is its rounding.
+
+    Args:
+        hand: The hand.
+        turned: Axes of its shapes, (s, 3, 3).
+        middles: Their middles, (s, 3).
+        tree: The surface.
+        finger: Number of the finger.
+        near: Filled with the hull's nearest point, (3,).
+        other: Filled with the surface's, (3,).
+    """
+    s, square = hand.tip_shapes[finger], 0.0
+    if is_block(hand, s):
+        corners, _ = core_in(hand, turned[s], middles[s], s)
+        return hull_surface(
+            corners, np.inf, tree.corners, tree.middles, tree.radii, tree.links, near, other
+        )
+    near[:] = middles[s]
+    nearest(near, np.inf, tree.corners, tree.middles, tree.radii, tree.links, other)
+    for j in range(3):
+        square += (other[j] - near[j]) ** 2
+    return np.sqrt(square)
+
+
+@loop()
+def deepest(corners: Array, tree: SurfaceTree, near: Array, other: Array) -> float:
+    """Return the signed distance from a surface of the corner that is deepest in it.
+
+    Args:
+        corners: The corners, (m, 3).
+        tree: The surface.
+        near: Filled with the corner, (3,).
+        other: Filled with the surface's point nearest to it, (3,).
+    """
+    best, at = np.inf, np.empty(3)
+    for c in range(len(corners)):
+        nearest(corners[c], np.inf, tree.corners, tree.middles, tree.radii, tree.links, at)
+        away = np.sqrt(((corners[c] - at) ** 2).sum())
+        if windings(corners[c], tree.corners) > INSIDE:
+            away = -away
+        if away < best:
+            best = away
+            near[:], other[:] = corners[c], at
+    return best
+
+
+@loop()
+def tip_point(hand: HandArrays, turned: Array, middles: Array, finger: int, point: Array) -> float:
+    """Return the distance of a point from a fingertip, negative within it by its rounding at most.
+
+    Args:
+        hand: The hand.
+        turned: Axes of its shapes, (s, 3, 3).
+        middles: Their middles, (s, 3).
+        finger: Number of the finger.
+        point: The point, (3,).
+    """
+    s = hand.tip_shapes[finger]
+    corners, rounding = core_in(hand, turned[s], middles[s], s)
+    alone, near, other = np.empty((1, 3)), np.empty(3), np.empty(3)
+    alone[0] = point
+    return hull_hull(corners, alone, np.inf, near, other) - rounding
+
+
+@loop()
 def of_object(
     hand: HandArrays, turned: Array, middles: Array, tree: SurfaceTree, needs: Array, worst: Indices
 ) -> float:  # fmt: skip
@@ -176,7 +321,7 @@ def of_object(
         needs: Least distance of each shape, (s,).
         worst: Filled with the shape that lacks most, (1,); -1 if none does.
     """
-    best = np.inf
+    best, near, other = np.inf, np.empty(3), np.empty(3)
     worst[0] = -1
     low, high = tree.corners[0, 0].copy(), tree.corners[0, 0].copy()
     for j in range(3):
@@ -184,10 +329,17 @@ def of_object(
         high[j] = tree.middles[0, j] + tree.radii[0]
     for s in range(len(hand.shape_links)):
         radius = hand.shape_radii[s]
-        apart = box_surface(
-            hand.shape_sizes[s], turned[s], middles[s], needs[s] + radius, tree.corners,
-            tree.middles, tree.radii, tree.links,
-        ) - radius - needs[s]  # fmt: skip
+        if is_block(hand, s):
+            corners, radius = core_in(hand, turned[s], middles[s], s)
+            apart = hull_surface(
+                corners, needs[s] + radius, tree.corners, tree.middles, tree.radii, tree.links,
+                near, other,
+            ) - radius - needs[s]  # fmt: skip
+        else:
+            apart = box_surface(
+                hand.shape_sizes[s], turned[s], middles[s], needs[s] + radius, tree.corners,
+                tree.middles, tree.radii, tree.links,
+            ) - radius - needs[s]  # fmt: skip
         inner = True
         for j in range(3):
             inner = inner and low[j] < middles[s, j] < high[j]
@@ -215,6 +367,15 @@ def of_table(
     """
     best = np.inf
     for s in range(len(hand.shape_links)):
+        if is_block(hand, s):
+            corners, rounding = core_in(hand, turned[s], middles[s], s)
+            lowest = np.inf
+            for c in range(len(corners)):
+                lowest = min(lowest, dotted(up, corners[c]) - height - rounding)
+            if lowest < best:
+                best = lowest
+                worst[0] = s
+            continue
         lowest = dotted(up, middles[s]) - height - hand.shape_radii[s]
         for k in range(3):
             lowest -= hand.shape_sizes[s, k] * abs(

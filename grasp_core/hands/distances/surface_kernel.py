@@ -36,7 +36,7 @@ def nearest(  # noqa: C901, PLR0913, PLR0917 - the arrays of a tree
         The triangle's place in the tree, or -1 if none is within the distance.
     """
     stack, gaps, found, depth = np.empty(DEEPEST, np.int64), np.empty(DEEPEST), -1, 1
-    best, at, gap2 = within * within, np.empty(3), np.empty(2)
+    best, at, gap2, weights = within * within, np.empty(3), np.empty(2), np.empty(2)
     stack[0], gaps[0] = 0, 0.0
     while depth > 0:
         depth -= 1
@@ -45,7 +45,7 @@ def nearest(  # noqa: C901, PLR0913, PLR0917 - the arrays of a tree
             continue
         if links[node, 0] < 0:
             for t in range(links[node, 1], links[node, 1] - links[node, 0]):
-                square = point_triangle(p, corners[t], at)
+                square = point_triangle(p, corners[t], at, weights)
                 if square < best:
                     best, found = square, t
                     near[:] = at

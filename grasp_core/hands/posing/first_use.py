@@ -28,7 +28,8 @@ def compile_posing(hand: Hand, body: Polyhedron) -> None:
     aims = Targets(
         np.arange(count, dtype=np.int64), np.zeros((count, 3)), normals,
         np.array([plane_tangents(*normal) for normal in normals.tolist()]), np.ones(count),
-        np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)), np.array(AXIS), -np.inf,
+        np.full((count, 3), np.nan), np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)),
+        np.array(AXIS), -np.inf,
     )  # fmt: skip
     wanted = Wanted(0.0, 0.0, 0.0, 0.0, 0.0, overlaps=True, palm_moves=True)
     pose: Pose = kernel.empty_pose(arrays, count)

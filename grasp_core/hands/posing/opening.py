@@ -72,8 +72,8 @@ def _open_joints(asked: Asked, found: FoundPose) -> Array | None:
         sums = kernel.empty_sums(arrays, aims)
         kernel.settle(arrays, tree, aims, wanted, pose, sums, STEPS, 1e3 * 0.1 * gap)
         compiled("grasp_core.hands.posing.pose_rows_kernel").place(arrays, aims, pose)
-        away = np.einsum("ki,ki->k", contacts.positions - pose.tips, contacts.normals)
-        open_by = away - arrays.tip_radii[found.fingers]
+        away = np.einsum("ki,ki->k", contacts.positions - pose.fronts, contacts.normals)
+        open_by = away - arrays.tip_roundings[found.fingers]
         if open_by.min() >= LEAST_GAP * gap and not blocking(asked, pose, None, asked.clearance):
             return pose.q
     return None

@@ -10,7 +10,8 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
-from grasp_core.hands.distances.surface_kernel import nearest
+from grasp_core.hands.distances.boxes_kernel import into_frame
+from grasp_core.hands.distances.collisions_kernel import tip_surface
 from grasp_core.hands.kinematics_kernel import moved, product, turn
 from grasp_core.hands.loop_values import HandArrays, Pose, Sums, SurfaceTree, Targets, Wanted
 from grasp_core.hands.posing.pose_rows_kernel import MOVES, ON_SURFACE, place, residuals
@@ -23,6 +24,8 @@ FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-7, 1e4
 GROWTH, SHRINKING = 4.0, 0.3
 STALLED, PATIENCE = 0.02, 4
 """A start is given up after so many steps in a row that make the cost smaller by less than this."""
+BACK = 2.5e-4
+"""How far the plane of a block is moved at once that overlaps the surface [m]."""
 FREE = 1e-9
 """Sum of squares below which nothing overlaps [mm^2]."""
 
@@ -34,6 +37,7 @@ def empty_pose(hand: HandArrays, contacts: int) -> Pose:
     return Pose(
         np.empty((3, 3)), np.empty(3), np.empty(j), np.empty((j, 3, 3)), np.empty((j, 3)),
         np.empty((j, 3)), np.empty((s, 3, 3)), np.empty((s, 3)), np.empty((contacts, 3)),
+        np.empty((contacts, 3)), np.empty((contacts, 3, 3)),
     )  # fmt: skip
 
 
@@ -183,12 +187,14 @@ def lay(
     """Lay the planes that fingertips touch on the surface itself.
 
     The plane of a fingertip is moved to the nearest point of the surface, and turned across the
-    line to it.
+    line to it from the tip's nearest point, which is to touch it. The plane of a block whose hull
+    overlaps the surface is moved back.
 
     Args:
         hand: The hand.
         tree: The object's surface.
-        targets: Where fingertips are to touch; `origins` and `normals` are changed in place.
+        targets: Where fingertips are to touch; `origins`, `normals` and `touching` are changed in
+            place.
         pose: The pose, whose parts are placed.
         points: Filled with the nearest points of the surface, (k, 3) [m].
 
@@ -198,16 +204,22 @@ def lay(
     place(hand, targets, pose)
     off = 0.0
     for k in range(len(targets.fingers)):
-        tip, square = pose.tips[k], 0.0
-        nearest(tip, np.inf, tree.corners, tree.middles, tree.radii, tree.links, points[k])
-        for j in range(3):
-            square += (points[k, j] - tip[j]) ** 2
-        distance = np.sqrt(square)
-        off = max(off, abs(distance - hand.tip_radii[targets.fingers[k]]))
+        finger, tip = targets.fingers[k], pose.tips[k]
+        distance = tip_surface(hand, pose.turned, pose.middles, tree, finger, tip, points[k])
+        targets.touching[k] = np.nan
+        if distance <= ON_SURFACE:
+            off = np.inf
+            for j in range(3):
+                targets.origins[k, j] -= BACK * targets.normals[k, j]
+            continue
+        if hand.tip_firsts[finger + 1] - hand.tip_firsts[finger] > 1:
+            last = hand.starts[finger + 1] - 1
+            into_frame(pose.R[last], pose.p[last], tip, targets.touching[k])
+        off = max(off, abs(distance - hand.tip_roundings[finger]))
         ahead = 0.0
         for j in range(3):
-            targets.normals[k, j] = (points[k, j] - tip[j]) / max(distance, ON_SURFACE)
+            targets.normals[k, j] = (points[k, j] - tip[j]) / distance
             ahead += (points[k, j] - targets.origins[k, j]) * targets.normals[k, j]
         for j in range(3):  # across the normal, the planned contact stays the one to be near
             targets.origins[k, j] += ahead * targets.normals[k, j]
-    return off
+    return float(off)

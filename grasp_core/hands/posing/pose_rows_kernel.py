@@ -14,8 +14,9 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import cross, dotted
-from grasp_core.hands.distances.boxes_kernel import corners_of
 from grasp_core.hands.distances.collisions_kernel import (
+    core_in,
+    is_block,
     may_be_near,
     near_links,
     pair_distance,
@@ -30,6 +31,9 @@ MOVES = 6
 MM = 1e3
 EQUAL = 3.0
 """Weight of touching."""
+SOFT = 2e-3
+"""Depth of a corner of a block below the one that reaches farthest, at which it counts less by the
+factor e while a pose is sought [m]."""
 AT_TIP = 1e-6
 """Distance from the middle of a fingertip at which an end of a capsule is that of the tip [m]."""
 ANYWHERE = 10.0
@@ -48,7 +52,58 @@ def place(hand: HandArrays, targets: Targets, pose: Pose) -> None:
     place_shapes(hand, pose.palm, pose.origin, pose.R, pose.p, pose.turned, pose.middles)
     for k in range(len(targets.fingers)):
         last = hand.starts[targets.fingers[k] + 1] - 1
-        moved(pose.R[last], pose.p[last], hand.tip_centers[targets.fingers[k]], pose.tips[k])
+        point = targets.touching[k].copy()
+        front = _ahead(hand, pose.R[last], targets, k, point, pose.rolls[k])
+        moved(pose.R[last], pose.p[last], hand.tip_corners[front], pose.fronts[k])
+        moved(pose.R[last], pose.p[last], point, pose.tips[k])
+
+
+@loop()
+def _ahead(  # noqa: C901 - loops that are written out
+    hand: HandArrays, R: Array, targets: Targets, k: int, point: Array, roll: Array
+) -> int:  # fmt: skip
+    """Return the corner of a contact's tip that reaches farthest, and fill in the point that does.
+
+    The corner of a block that is farthest along the normal n jumps as the block turns. For the
+    point p, corners c count with weights w that fall by the factor e for each height `SOFT` below
+    the farthest, so that it moves steadily: by M dv for a small turn dv of the block, beside what
+    the turn moves a point of the block, with
+
+        M = sum of w (c - p) ((c - p) x n)' / SOFT.                                        (2)
+
+    Args:
+        hand: The hand.
+        R: Axes of the last link, (3, 3).
+        targets: Where fingertips are to touch.
+        k: The contact.
+        point: Filled with the point in the last link's frame, (3,), unless it is known.
+        roll: Filled with M, (3, 3); zeros where the point is known.
+    """
+    finger, n, way, arm = targets.fingers[k], targets.normals[k], np.empty(3), np.empty(3)
+    first, count = hand.tip_firsts[finger], hand.tip_firsts[finger + 1] - hand.tip_firsts[finger]
+    heights = np.empty(count)
+    roll[:] = 0.0
+    for j in range(3):
+        way[j] = R[0, j] * n[0] + R[1, j] * n[1] + R[2, j] * n[2]
+    for c in range(count):
+        heights[c] = dotted(way, hand.tip_corners[first + c])
+    front = int(np.argmax(heights))
+    if count == 1:
+        point[:] = hand.tip_corners[first]
+    if not np.isnan(point[0]):
+        return int(first + front)
+    weights = np.exp((heights - heights[front]) / SOFT)
+    weights /= weights.sum()
+    for j in range(3):
+        point[j] = (weights * hand.tip_corners[first : first + count, j]).sum()
+    for c in range(count):
+        for i in range(3):
+            arm[i] = dotted(R[i], hand.tip_corners[first + c]) - dotted(R[i], point)
+        cross(arm, n, way)
+        for i in range(3):
+            for j in range(3):
+                roll[i, j] += weights[c] * arm[i] * way[j] / SOFT
+    return int(first + front)
 
 
 @loop()
@@ -98,6 +153,16 @@ def _tip(  # noqa: PLR0913, PLR0917 - a fingertip, a direction and a residual
     """Add a residual of a fingertip, whose derivative is along a direction."""
     sums.parts[1] += (weight * off * MM) ** 2
     _moves(hand, pose, sums, link, pose.tips[k], along, weight, True)
+    turn, first = np.zeros(3), 0
+    for j in range(3):
+        for i in range(3):
+            turn[j] += along[i] * pose.rolls[k, i, j]
+        sums.row[3 + j] += weight * turn[j] * MM
+    for f in range(len(hand.starts) - 1):
+        if hand.starts[f] <= link:
+            first = hand.starts[f]
+    for a in range(first, link + 1):
+        sums.row[MOVES + a] += weight * dotted(pose.W[a], turn) * MM
     _add(sums, weight * off * MM)
 
 
@@ -109,11 +174,13 @@ def _touching(  # noqa: C901 - loops that are written out
     for k in range(len(targets.fingers)):
         finger = targets.fingers[k]
         link, normal = int(hand.starts[finger + 1] - 1), targets.normals[k]
-        gap = float(hand.tip_radii[finger])
+        gap = float(hand.tip_roundings[finger])
         for j in range(3):
-            gap += (pose.tips[k, j] - targets.origins[k, j]) * normal[j]
+            gap += (pose.fronts[k, j] - targets.origins[k, j]) * normal[j]
         sums.parts[0] = max(sums.parts[0], abs(gap) * MM)
-        _tip(hand, pose, sums, link, k, normal, EQUAL, gap)
+        sums.parts[1] += (EQUAL * gap * MM) ** 2
+        _moves(hand, pose, sums, link, pose.fronts[k], normal, EQUAL, True)
+        _add(sums, EQUAL * gap * MM)
         pinned = targets.pinned[k] > 0.0
         for side in range(2):
             tangent, off = targets.tangents[k, side], 0.0
@@ -168,6 +235,17 @@ def _outward(center: Array, need: float, tree: SurfaceTree, along: Array) -> flo
 
 
 @loop()
+def _keep_off(  # noqa: PLR0913, PLR0917 - a point, a direction and a residual
+    hand: HandArrays, pose: Pose, sums: Sums, link: int, x: Array, along: Array, sign: float,
+    short: float,
+) -> None:  # fmt: skip
+    """Add the residual of a point that must move by `short` against sign * along."""
+    sums.parts[2] += (short * MM) ** 2
+    _moves(hand, pose, sums, link, x, along, sign, True)
+    _add(sums, short * MM)
+
+
+@loop()
 def _balls(
     hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums,
 ) -> None:  # fmt: skip
@@ -182,14 +260,10 @@ def _balls(
         need = hand.ball_radii[b] + wanted.clear
         short = need - dotted(targets.up, x) + targets.height
         if short > 0.0:
-            sums.parts[2] += (short * MM) ** 2
-            _moves(hand, pose, sums, link, x, targets.up, -1.0, True)
-            _add(sums, short * MM)
+            _keep_off(hand, pose, sums, link, x, targets.up, -1.0, short)
         short = need - _outward(x, need, tree, along)
         if short > 0.0:
-            sums.parts[2] += (short * MM) ** 2
-            _moves(hand, pose, sums, link, x, along, -1.0, True)
-            _add(sums, short * MM)
+            _keep_off(hand, pose, sums, link, x, along, -1.0, short)
 
 
 @loop()
@@ -215,43 +289,62 @@ def _links(hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums) -> None:
 
 
 @loop()
-def _deepest(hand: HandArrays, targets: Targets, pose: Pose, k: int, s: int, x: Array) -> float:
-    """Return how far a shape reaches behind the plane of a contact, and fill in its corner there.
+def _farthest(  # noqa: PLR0913, PLR0917 - a shape and a plane
+    hand: HandArrays, pose: Pose, s: int, origin: Array, way: Array, left_out: Array, x: Array
+) -> float:  # fmt: skip
+    """Return how far a shape reaches beyond a plane, and fill in its corner there.
 
-    Ends of capsules that are the fingertip itself do not count.
+    Args:
+        hand: The hand.
+        pose: Its pose.
+        s: The shape.
+        origin: A point of the plane, (3,).
+        way: Unit vector across it, (3,).
+        left_out: Where a corner does not count: an end of a capsule that is the fingertip, (3,).
+        x: Filled with the corner, (3,).
     """
-    corners, deepest = np.empty((8, 3)), -np.inf
-    corners_of(hand.shape_sizes[s], pose.turned[s], pose.middles[s], corners)
+    (corners, rounding), farthest = core_in(hand, pose.turned[s], pose.middles[s], s), -np.inf
     for c in range(len(corners)):
-        square, height = 0.0, hand.shape_radii[s]
+        square, height = 0.0, rounding
         for j in range(3):
-            square += (corners[c, j] - pose.tips[k, j]) ** 2
-            height += (corners[c, j] - targets.origins[k, j]) * targets.normals[k, j]
-        if square > AT_TIP * AT_TIP and height > deepest:
-            deepest = height
+            square += (corners[c, j] - left_out[j]) ** 2
+            height += (corners[c, j] - origin[j]) * way[j]
+        if square > AT_TIP * AT_TIP and height > farthest:
+            farthest = height
             x[:] = corners[c]
-    return deepest
+    return farthest
 
 
 @loop()
-def _last_links(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums) -> None:
-    """Add the residuals of last links: behind the planes that tips touch, and tips on the table."""
-    x = np.empty(3)
+def _last_links(  # noqa: C901 - loops that are written out
+    hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums
+) -> None:
+    """Add the residuals of last links: behind the planes that tips touch, and tips on the table.
+
+    A block as a whole is behind the plane that it touches, and counts on the table.
+    """
+    x, down, zero = np.empty(3), -targets.up, np.zeros(3)
     for k in range(len(targets.fingers)):
-        last = int(hand.starts[targets.fingers[k] + 1] - 1)
-        short = float(hand.tip_radii[targets.fingers[k]]) + wanted.clear + targets.height
-        short -= dotted(targets.up, pose.tips[k])
-        if short > 0.0:
-            sums.parts[2] += (short * MM) ** 2
-            _moves(hand, pose, sums, last, pose.tips[k], targets.up, -1.0, True)
-            _add(sums, short * MM)
+        finger = targets.fingers[k]
+        last = int(hand.starts[finger + 1] - 1)
+        if hand.tip_firsts[finger + 1] - hand.tip_firsts[finger] == 1:
+            short = float(hand.tip_radii[finger]) + wanted.clear + targets.height
+            short -= dotted(targets.up, pose.tips[k])
+            if short > 0.0:
+                _keep_off(hand, pose, sums, last, pose.tips[k], targets.up, -1.0, short)
         for s in range(len(hand.shape_links)):
-            if hand.shape_links[s] == last:
-                short = _deepest(hand, targets, pose, k, s, x) + wanted.behind
+            if hand.shape_links[s] != last:
+                continue
+            if not is_block(hand, s):
+                way, tip = targets.normals[k], pose.tips[k]
+                short = _farthest(hand, pose, s, targets.origins[k], way, tip, x) + wanted.behind
                 if short > 0.0:
-                    sums.parts[2] += (short * MM) ** 2
-                    _moves(hand, pose, sums, last, x, targets.normals[k], 1.0, True)
-                    _add(sums, short * MM)
+                    _keep_off(hand, pose, sums, last, x, way, 1.0, short)
+            elif targets.height > -np.inf:
+                short = _farthest(hand, pose, s, zero, down, pose.tips[k], x)
+                short += wanted.clear + targets.height
+                if short > 0.0:
+                    _keep_off(hand, pose, sums, last, x, down, 1.0, short)
 
 
 @loop()

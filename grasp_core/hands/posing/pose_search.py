@@ -37,6 +37,9 @@ MOST_TOUCHES, TOUCH_STEPS = 12, 8
 SETTLED, RESTING_MM = 1e-9, 1e-9
 """Change of a distance below which a fingertip rests on a surface [m], and distance from touching
 at which it does [mm]."""
+STAYING = 1e-6
+"""Way of the point of a block that touches, from one plane to the next, that leaves it where it is
+[m]."""
 ROOM = 0.0015
 """Distance beyond the one asked for that the search keeps from the object [m]."""
 PULL = 0.03
@@ -133,25 +136,33 @@ def _tried(asked: Asked, used: Indices, aims: Targets, start: Start) -> FoundPos
     kernel.settle(arrays, tree, aims, far, pose, sums, MOST_STEPS, GOOD_MM)
     if sums.parts[0] > ROUGH_MM:
         return _why_away(asked.hand, pose.q)
-    laid = aims._replace(origins=np.array(aims.origins), normals=np.array(aims.normals))
+    laid = aims._replace(
+        origins=np.array(aims.origins), normals=np.array(aims.normals),
+        touching=np.array(aims.touching),
+    )  # fmt: skip
     near = far._replace(overlaps=False, margin=LEAST_MARGIN, pull=0.0)
-    points, off, before = np.empty((len(used), 3)), np.inf, np.inf
+    points, off, before, stays = np.empty((len(used), 3)), np.inf, np.inf, False
     for _ in range(MOST_TOUCHES):
         kernel.settle(arrays, tree, laid, near, pose, sums, TOUCH_STEPS, FINE_MM)
-        before, off = off, kernel.lay(arrays, tree, laid, pose, points)
-        if off <= RESTING_MM or abs(before - off) <= SETTLED:
+        before, held = off, laid.touching.copy()
+        off = kernel.lay(arrays, tree, laid, pose, points)
+        stays = bool(np.allclose(held, laid.touching, rtol=0.0, atol=STAYING, equal_nan=True))
+        if stays and (off <= RESTING_MM or abs(before - off) <= SETTLED):
             break
-    if off > TOUCHING:
+    if off > TOUCHING or not (stays or all(_are_within(aims, points, TOUCHING))):
         return _why_away(asked.hand, pose.q)
     if blocked := blocking(asked, pose, start.fingers, asked.clearance):
         return blocked
     certificate = proved_closure(points, laid.normals, asked.friction)
     if certificate is None or not certificate.closed:
         return "open"
-    within = tuple(
-        is_within(aims, k, point, MARGIN) for k, point in enumerate(certificate.positions)
-    )
+    within = _are_within(aims, certificate.positions, MARGIN)
     return FoundPose(used, start.fingers, pose.q, _as_pose(pose), certificate, within)
+
+
+def _are_within(aims: Targets, points: Array, slack: float) -> tuple[bool, ...]:
+    """Return which contacts are in the regions that fingers aimed at."""
+    return tuple(is_within(aims, k, point, slack) for k, point in enumerate(points))
 
 
 def blocking(asked: Asked, pose: Pose, fingers: Indices | None, clearance: float) -> str:

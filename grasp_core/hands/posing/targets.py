@@ -37,6 +37,7 @@ def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: fl
         normals,
         np.array([plane_tangents(*normal) for normal in normals.tolist()]),
         np.where(aimed, 0.0, 1.0),
+        np.full((len(used), 3), np.nan),
         np.array([row[0] for row in rows], np.int64),
         np.array([row[1] for row in rows]).reshape(-1, 3),
         np.array([row[2] for row in rows]).reshape(-1, 3),

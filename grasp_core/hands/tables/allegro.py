@@ -2,9 +2,10 @@
 
 Numbers of the URDF that SimLab publishes (BSD-2-Clause, copyright 2016 SimLab), in the frames of
 MuJoCo Menagerie's model `wonik_allegro` (BSD-2-Clause), whose capsules stand for the fingertips.
-The fingertip is the ball of radius 12 mm at the end of that capsule. The URDF states no efforts and
-Menagerie no torque limits. Menagerie states the mass of the palm and a density of links, but no
-masses of links.
+The fingertip is the ball of radius 12 mm at the end of that capsule. Capsules end 2.3 mm (thumb:
+.7 mm) beyond the balls of the URDF and its meshes: `allegro-urdf` ends with those. The URDF states
+no efforts and Menagerie no torque limits. Menagerie states the mass of the palm and a density of
+links, but no masses of links.
 """
 
 import math
@@ -20,6 +21,9 @@ SOURCES = (
     "MuJoCo Menagerie, wonik_allegro (BSD-2-Clause): capsules of the fingertips, pairs that may "
     "overlap",
 )
+TIPS, URDF_TIPS = (0.029, 0.043), (0.0267, 0.0423)
+"""Places of the fingertips' balls along the last links, of fingers and of the thumb, in Menagerie's
+model and in the URDF [m]."""
 TIP_RADIUS = 0.012
 WIDTH_X, WIDTH_Y = 0.0098, 0.01375
 """Half widths of the links of all fingers [m]."""
@@ -41,8 +45,11 @@ def _along(half_z: float) -> LinkShape:
     return _box((0.0, 0.0, half_z), (WIDTH_X, WIDTH_Y, half_z))
 
 
-def _capsule(z: float, half: float) -> LinkShape:
-    return LinkShape(np.array([0.0, 0.0, z]), np.eye(3), np.array([0.0, 0.0, half]), TIP_RADIUS)
+def _capsule(start: float, end: float) -> LinkShape:
+    middle, half = (round(0.5 * length, 6) for length in (start + end, end - start))
+    return LinkShape(
+        np.array([0.0, 0.0, middle]), np.eye(3), np.array([0.0, 0.0, half]), TIP_RADIUS
+    )
 
 
 def _finger(  # noqa: PLR0913, PLR0917 - the rows of the table
@@ -61,38 +68,44 @@ def _finger(  # noqa: PLR0913, PLR0917 - the rows of the table
     return HandFinger(name, links, Fingertip(np.array([0.0, 0.0, tip]), TIP_RADIUS))
 
 
-def _straight(name: str, root: Triple, lean: float) -> HandFinger:
+def _straight(name: str, root: Triple, lean: float, tip: float) -> HandFinger:
     base = from_quaternion(math.cos(0.5 * lean), math.sin(0.5 * lean), 0.0, 0.0)
     shapes = (
         (_along(0.0082),), (_along(0.027),), (_along(0.0192),),
-        (_along(0.008), _capsule(0.019, 0.01)),
+        (_along(0.008), _capsule(0.009, tip)),
     )  # fmt: skip
     offsets = (root, (0.0, 0.0, 0.0164), (0.0, 0.0, 0.054), (0.0, 0.0, 0.0384))
-    return _finger(name, offsets, base, (ROLL, BEND, BEND, BEND), RANGES, shapes, 0.029)
+    return _finger(name, offsets, base, (ROLL, BEND, BEND, BEND), RANGES, shapes, tip)
 
 
-def _thumb() -> HandFinger:
+def _thumb(tip: float) -> HandFinger:
     base = from_quaternion(0.477714, -0.521334, -0.521334, -0.477714)
     shapes = (
         (_box((-0.0179, 0.009, 0.0145), (0.0179, 0.017, 0.02275)),), (_along(0.00885),),
-        (_along(0.0257),), (_along(0.0157), _capsule(0.035, 0.008)),
+        (_along(0.0257),), (_along(0.0157), _capsule(0.027, tip)),
     )  # fmt: skip
     offsets = ((-0.0182, 0.019333, -0.045987), (-0.027, 0.005, 0.0399), (0.0, 0.0, 0.0177),
                (0.0, 0.0, 0.0514))  # fmt: skip
     return _finger("thumb", offsets, base, (THUMB_ROLL, ROLL, BEND, BEND), THUMB_RANGES, shapes,
-                   0.043)  # fmt: skip
+                   tip)  # fmt: skip
 
 
-def allegro() -> Hand:
-    """Return the right Allegro hand."""
+def allegro(name: str = "allegro", tips: tuple[float, float] = TIPS) -> Hand:
+    """Return the right Allegro hand.
+
+    Args:
+        name: Its name.
+        tips: Places of the fingertips' balls along the last links, of fingers and of the thumb [m].
+    """
+    finger, thumb = tips
     return Hand(
-        "allegro",
+        name,
         (_box((-0.0093, 0.0, -0.0475), (0.0204, 0.0565, 0.0475)),),
         (
-            _straight("first", (0.0, 0.0435, -0.001542), -LEAN),
-            _straight("middle", (0.0, 0.0, 0.0007), 0.0),
-            _straight("ring", (0.0, -0.0435, -0.001542), LEAN),
-            _thumb(),
+            _straight("first", (0.0, 0.0435, -0.001542), -LEAN, finger),
+            _straight("middle", (0.0, 0.0, 0.0007), 0.0, finger),
+            _straight("ring", (0.0, -0.0435, -0.001542), LEAN, finger),
+            _thumb(thumb),
         ),
         SOURCES,
         ignored_pairs=(("palm", "thumb_proximal"),),

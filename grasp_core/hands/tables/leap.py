@@ -3,20 +3,21 @@
 Numbers of MuJoCo Menagerie's model `leap_hand` (MIT, copyright 2023 Ananye Agarwal), which comes
 from dexsuite's URDF. Boxes, masses and centres of mass are those of the model.
 
-The real fingertips are no balls: each is a rubber block 21 mm wide, 24 mm broad and rounded at the
-end. The ball taken for it has the radius 10.4 mm, half the block's width, and touches the block's
-end and both its wide sides; a capsule from the joint's side to the ball stands for the block in
-collisions. Along the axis of the last joint the block is 1.7 mm broader than the ball on each side.
+Fingertips are rubber blocks 21 mm wide, 24 mm broad and rounded at the end: the hulls of the
+corners of the model's meshes, given to .1 mm. All points within .1 mm of such a hull hold the mesh,
+and reach at most .18 mm beyond it. The ball of 10.4 mm, half a block's width, stands for a block
+where a tip has to be a ball.
 """
 
 import numpy as np
 
+from grasp_core.arrays import Array
 from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link, LinkShape
 from grasp_core.hands.tables.turns import from_quaternion
 
 SOURCES = (
     "MuJoCo Menagerie, leap_hand (MIT, copyright 2023 Ananye Agarwal): joints, ranges, boxes, "
-    "masses, extents of the fingertips' meshes",
+    "masses, corners of the fingertips' meshes",
 )
 TORQUE_SOURCE = "MuJoCo Playground's model of the hand (Apache-2.0): the motors' current limit"
 TORQUE_LIMIT_N_M = 0.2196
@@ -83,8 +84,37 @@ THUMB_BOXES: tuple[tuple[Row, ...], ...] = (
     ),
     ((0, -8.5, -15, 10, 18, 12), (0, -29, -14, 10, 2, 15), (15, -17.5, -11.5, 4, 12, 9)),
 )  # fmt: skip
-TIP_FROM, THUMB_TIP_FROM = -0.030, -0.042
-"""Where the capsules of the fingertips begin, along the links' y axes [m]."""
+TIP_ROUNDING = 1e-4
+"""More than the rounding of the corners moves one [m]."""
+TIP_CORNERS: tuple[Row, ...] = (
+    (4, -500, 136), (2, -498, 103), (-101, -497, 160), (3, -493, 203), (-93, -492, 88),
+    (33, -490, 94), (-110, -485, 107), (-92, -484, 219), (-109, -482, 196), (-87, -480, 63),
+    (35, -478, 221), (58, -478, 146), (31, -471, 58), (-110, -462, 66), (9, -461, 246),
+    (-110, -452, 228), (59, -452, 61), (-84, -449, 253), (-83, -448, 38), (84, -445, 99),
+    (69, -444, 225), (42, -443, 249), (86, -443, 189), (11, -439, 32), (-97, -437, 40),
+    (-98, -434, 250), (53, -408, 34), (95, -408, 144), (83, -404, 61), (92, -403, 81),
+    (76, -401, 237), (26, -399, 24), (48, -399, 259), (-62, -398, 24), (20, -397, 266),
+    (95, -397, 197), (-59, -396, 267), (-113, -219, 214), (-112, -217, 70), (-107, -202, 146),
+    (20, -199, 266), (34, -198, 27), (79, -198, 54), (-62, -197, 24), (55, -197, 255),
+    (84, -197, 227), (96, -197, 98), (96, -197, 191), (-96, -196, 251), (-95, -196, 41),
+    (-86, -196, 31), (-66, -196, 266),
+)  # fmt: skip
+THUMB_TIP_CORNERS: tuple[Row, ...] = (
+    (-88, -621, -146), (6, -619, -181), (27, -615, -117), (-92, -614, -93), (3, -613, -87),
+    (-107, -612, -150), (-91, -606, -214), (17, -602, -218), (-88, -600, -64), (56, -599, -179),
+    (47, -593, -73), (67, -589, -104), (-91, -578, -245), (-112, -577, -69), (-108, -577, -230),
+    (16, -575, -42), (51, -574, -236), (70, -571, -216), (13, -569, -252), (-86, -567, -38),
+    (84, -565, -189), (86, -562, -94), (-99, -556, -42), (68, -554, -55), (-88, -544, -258),
+    (-77, -537, -27), (-67, -533, -264), (95, -529, -101), (89, -520, -74), (-24, -519, -23),
+    (74, -517, -242), (19, -516, -266), (68, -516, -43), (90, -516, -217), (31, -515, -25),
+    (96, -515, -192), (-113, -339, -80), (-112, -337, -214), (-106, -337, -238), (20, -319, -24),
+    (23, -318, -266), (65, -318, -41), (89, -318, -218), (89, -318, -72), (-93, -317, -36),
+    (-63, -317, -24), (-62, -317, -266), (56, -317, -254), (96, -317, -191), (96, -317, -99),
+    (-94, -316, -250), (-95, -315, -40),
+)  # fmt: skip
+"""Corners of the blocks in the frames of the last links [0.1 mm]."""
+ROUND = 0.005
+"""How far the edges of a block are rounded, nearly [m]."""
 
 
 def _shape(row: Row) -> LinkShape:
@@ -93,43 +123,46 @@ def _shape(row: Row) -> LinkShape:
     return LinkShape(numbers[:3], from_quaternion(*quaternion), numbers[3:], 0.0)
 
 
-def _block(tip: tuple[float, float, float], start: float) -> LinkShape:
-    """Return the capsule from y = start to the fingertip's ball."""
-    x, y, z = tip
-    half = np.array([0.0, 0.5 * abs(start - y), 0.0])
-    return LinkShape(np.array([x, 0.5 * (start + y), z]), np.eye(3), half, TIP_RADIUS)
+def _cover(corners: Array) -> LinkShape:
+    """Return a box with rounded edges that covers a block."""
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low) - ROUND
+    out = np.linalg.norm(np.maximum(np.abs(corners - middle) - half, 0.0), axis=1)
+    return LinkShape(middle, np.eye(3), half, float(out.max()) + TIP_ROUNDING)
 
 
 def _finger(  # noqa: PLR0913, PLR0917 - the rows of the table
     name: str, names: tuple[str, ...], offsets: tuple[tuple[float, float, float], ...],
     turns: tuple[tuple[float, float, float, float], ...], ranges: tuple[tuple[float, float], ...],
     boxes: tuple[tuple[Row, ...], ...], masses: tuple[float, ...],
-    centers: tuple[tuple[float, float, float], ...], tip: tuple[float, float, float], start: float,
+    centers: tuple[tuple[float, float, float], ...], tip: tuple[float, float, float],
+    block: tuple[Row, ...],
 ) -> HandFinger:  # fmt: skip
+    corners = 1e-4 * np.array(block)
     links = tuple(
         Link(
             f"{name}_{link}",
             Joint(f"{name}_j{i}", np.array(offsets[i]), from_quaternion(*turns[i]), np.array(DOWN),
                   *ranges[i], TORQUE_LIMIT_N_M),
             tuple(_shape(row) for row in boxes[i])
-            + ((_block(tip, start),) if i == len(names) - 1 else ()),
+            + ((_cover(corners),) if i == len(names) - 1 else ()),
             masses[i],
             np.array(centers[i]),
         )
         for i, link in enumerate(names)
     )  # fmt: skip
-    return HandFinger(name, links, Fingertip(np.array(tip), TIP_RADIUS))
+    return HandFinger(name, links, Fingertip(np.array(tip), TIP_RADIUS, corners, TIP_ROUNDING))
 
 
 def leap() -> Hand:
     """Return the right LEAP hand."""
     fingers = tuple(
         _finger(name, LINKS, (root, *OFFSETS[1:]), TURNS, RANGES, BOXES, MASSES_KG, CENTERS,
-                TIP_AT, TIP_FROM)
+                TIP_AT, TIP_CORNERS)
         for name, root in zip(FINGERS, ROOTS, strict=True)
     )  # fmt: skip
     thumb = _finger("thumb", THUMB_LINKS, THUMB_OFFSETS, THUMB_TURNS, THUMB_RANGES, THUMB_BOXES,
-                    THUMB_MASSES_KG, THUMB_CENTERS, THUMB_TIP_AT, THUMB_TIP_FROM)  # fmt: skip
+                    THUMB_MASSES_KG, THUMB_CENTERS, THUMB_TIP_AT, THUMB_TIP_CORNERS)  # fmt: skip
     bases = [f"{name}_base" for name in FINGERS]
     return Hand(
         "leap",

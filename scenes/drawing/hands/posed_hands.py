@@ -5,10 +5,11 @@ viewer. Long parts are cut into pieces about as long as they are thick: parts ar
 of the depths of their middles, which is the right order for parts of like size.
 """
 
+import importlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from grasp_core.frames import POSE
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays
 from grasp_core.hands.kinematics import places
+from grasp_core.hands.stance import with_balls
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.hands.rounded_boxes import rounded_box
 from scenes.drawing.shapes import Role, Shape
@@ -67,8 +69,9 @@ class PosedHand:
 
     @property
     def tips(self) -> Array:
-        """Return the middles of the fingertips at the contacts, (contacts, 3) [m]."""
-        return places(self.hand, self.joints, self.palm_pose).tips[0, list(self.fingers)]
+        """Return the middles of the fingertips' balls at the contacts, (contacts, 3) [m]."""
+        hand = with_balls(self.hand, self.joints, self.palm_pose, self.fingers, self.contacts)
+        return places(hand, self.joints, self.palm_pose).tips[0, list(self.fingers)]
 
     @property
     def finger_names(self) -> tuple[str, ...]:
@@ -121,17 +124,19 @@ class HandParts:
     """Distances from the boxes to the surfaces, (n,) [m]."""
     contacts: tuple[int | None, ...]
     """The contact at which a part touches, for the parts that are fingertips."""
+    blocks: tuple[Array | None, ...]
+    """Corners of the parts that are blocks, which the boxes cover, (m, 3) [m]."""
 
 
 def parts_of(held: PosedHand) -> HandParts:
-    """Place the parts of a hand; a fingertip is its ball, or the capsule that ends in the ball."""
+    """Place the parts of a hand; a tip is its block, its ball, or the capsule that ends in it."""
     arrays = hand_arrays(held.hand)
     at = places(held.hand, held.joints, held.palm_pose)
     R = np.concatenate([at.link_rotations[0], held.palm_pose[None, :3, :3]])  # the palm's is -1
     p = np.concatenate([at.link_positions[0], held.palm_pose[None, :3, 3]])
     tips = arrays.shape_tips.tolist()
-    first_ball = len(tips) - len(held.hand.fingers)
-    kept = np.array([n for n, tip in enumerate(tips) if n < first_ball or tips.count(tip) == 1])
+    own = arrays.tip_shapes.tolist()
+    kept = np.array([n for n, tip in enumerate(tips) if n not in own or tips.count(tip) == 1])
     links = arrays.shape_links[kept]
     contact_of = {finger: contact for contact, finger in enumerate(held.fingers)}
     return HandParts(
@@ -140,7 +145,17 @@ def parts_of(held: PosedHand) -> HandParts:
         arrays.shape_sizes[kept],
         arrays.shape_radii[kept],
         tuple(contact_of.get(tips[n]) for n in kept.tolist()),
+        tuple(
+            _block(held.hand, tips[n], R[links[i]], p[links[i]]) if n in own else None
+            for i, n in enumerate(kept.tolist())
+        ),
     )
+
+
+def _block(hand: Hand, finger: int, R: Array, p: Array) -> Array | None:
+    """Place the corners of a fingertip that is a block on a link with axes R and origin p."""
+    corners = hand.fingers[finger].tip.corners
+    return None if corners is None else p + corners @ R.T
 
 
 def hand_shapes(held: PosedHand) -> tuple[Shape, ...]:
@@ -149,6 +164,9 @@ def hand_shapes(held: PosedHand) -> tuple[Shape, ...]:
     least = LEAST * max(finger.tip.radius for finger in held.hand.fingers)
     for n, contact in enumerate(parts.contacts):
         role: Role = "hand" if contact is None else "fingertip"
+        if (corners := parts.blocks[n]) is not None:
+            shapes.append(Shape(role, contact, polygons=_hull(corners)))
+            continue
         for sides in _pieces(parts.half_sizes[n], float(parts.radii[n]), least):
             placed = tuple(parts.middles[n] + side @ parts.axes[n].T for side in sides)
             shapes.append(Shape(role, contact, polygons=placed))
@@ -175,6 +193,17 @@ def _pieces(half: Array, radius: float, least: float) -> Iterator[tuple[Array, .
         yield rounded_box(
             -half + steps * at - spare[0], -half + steps * (at + 1) + spare[1], radius, outer
         )
+
+
+def _hull(corners: Array) -> tuple[Array, ...]:
+    """Return the triangles around points, corners counter-clockwise as seen from outside."""
+    spatial: Any = importlib.import_module("scipy.spatial")
+    found = spatial.ConvexHull(corners)
+    sides: Array = corners[found.simplices]
+    across = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
+    inward = np.einsum("ij,ij->i", across, found.equations[:, :3]) < 0.0
+    sides[inward] = sides[inward, ::-1]
+    return tuple(sides)
 
 
 def numbers_behind(held: PosedHand) -> Array:

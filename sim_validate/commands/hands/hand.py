@@ -32,11 +32,11 @@ def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
     hand = asked_hand(command)
     reporter.document(hand_facts(hand))
     fingers = [
-        (f.name, str(len(f.links)), f"{MM * f.tip.radius:.1f}", str(_shapes(f)))
+        (f.name, str(len(f.links)), f"{MM * f.tip.radius:.1f}", _kind(f), str(_shapes(f)))
         for f in hand.fingers
     ]
     reporter.table(
-        f"fingers of {hand.name}", ("fingertip", "joints", "radius mm", "shapes"), fingers
+        f"fingers of {hand.name}", ("fingertip", "joints", "radius mm", "kind", "shapes"), fingers
     )
     columns = ("joint", "fingertip", "range deg", "torque limit N m")
     reporter.table("joints, from the palm outwards", columns, _joints(hand))
@@ -74,6 +74,11 @@ def _small_ranges(hand: Hand) -> str:
         return ""
     degrees = math.degrees(SMALL_RANGE)
     return f"Every joint turns by less than {degrees:g} degrees: {IN_DEGREES}."
+
+
+def _kind(finger: HandFinger) -> str:
+    """Say what a fingertip is: a block has a ball only in simulation."""
+    return "ball" if finger.tip.corners is None else f"block of {len(finger.tip.corners)} corners"
 
 
 def _shapes(finger: HandFinger) -> int:
@@ -114,6 +119,7 @@ def hand_facts(hand: Hand) -> dict[str, Any]:
                 "fingertip": finger.name,
                 "tip_radius_m": finger.tip.radius,
                 "tip_center_m": finger.tip.center.tolist(),
+                "tip_corners": 0 if finger.tip.corners is None else len(finger.tip.corners),
                 "joints": [
                     {
                         "name": link.joint.name,

@@ -14,9 +14,8 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import GraspError
 from grasp_core.frames import POSE
 from grasp_core.geometry.on_mesh import Surface
-from grasp_core.hands.distances.collisions import clearances
+from grasp_core.hands.distances.collisions import clearances, tip_distances
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.kinematics import places
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import FINGERS
 from sim_validate.datasets.verifying.rows_by_object import Row
@@ -73,9 +72,9 @@ def _place_faults(row: Row, hand: Hand, body: Polyhedron) -> Iterator[str]:
     pairs = zip(points, normals, strict=True)
     if not all(surface.holds(point, normal, TOUCHES_M) for point, normal in pairs):
         yield "hand_points_m are not on the object, or hand_normals not its normals there"
-    radii = np.array([hand.fingers[finger].tip.radius for finger in fingers])
-    tips = places(hand, joints, pose).tips[0, fingers]
-    if np.linalg.norm(tips + radii[:, None] * normals - points, axis=1).max() > TOUCHES_M:
+    roundings = np.array([hand.fingers[finger].tip.core[1] for finger in fingers])
+    behind = points - roundings[:, None] * normals  # within the tips, as deep as they are rounded
+    if (tip_distances(hand, joints, pose, fingers, behind) + roundings).max() > TOUCHES_M:
         yield "the fingertips of hand_joints_rad do not touch the object at hand_points_m"
     found = clearances(hand, body, joints, pose, np.array(fingers))
     # a link whose tip touches the object may come as near to it as it likes

@@ -16,6 +16,53 @@ EXACT = 1e-7
 """Accuracy of the program that judges: its own tolerance is 1e-15 on squares."""
 
 
+HULLS = "grasp_core.hands.distances.hulls_kernel"
+
+
+def test_hulls_are_as_far_apart_as_the_program_says():
+    """Also hulls that are flat, alike or a point, and such that overlap."""
+    kernel, rng, seen = compiled(HULLS), np.random.default_rng(20), 0
+    for n in range(300):
+        A = rng.normal(size=(int(rng.integers(1, 30)), 3))
+        B = rng.normal(size=(int(rng.integers(1, 9)), 3)) * 10.0 ** rng.uniform(-3, 0)
+        B += rng.normal(size=3) * 2.0
+        if n % 3 == 0:
+            A[:, 2] = 0.0
+        if n % 5 == 0:
+            B[:] = B[0]
+        near, other = np.empty(3), np.empty(3)
+        apart, true = kernel.hull_hull(A, B, np.inf, near, other), hulls_apart(A, B)
+        assert apart == pytest.approx(true, abs=EXACT)
+        if apart > 0.0:
+            seen += 1
+            assert np.linalg.norm(other - near) == pytest.approx(apart, abs=1e-12)
+            way = (other - near) / apart  # the planes across it separate the hulls
+            assert (A @ way).max() <= near @ way + 1e-9
+            assert (B @ way).min() >= other @ way - 1e-9
+            bound = kernel.hull_hull(A, B, 0.5 * apart, near, other)
+            assert 0.5 * apart < bound <= apart + 1e-12
+    assert seen > 100
+
+
+def test_a_hull_is_as_far_from_a_surface_as_from_its_nearest_triangle():
+    kernel, rng = compiled(HULLS), np.random.default_rng(21)
+    body = scenes.example_object("l-bracket")
+    tree = surface_tree(body)
+    for _ in range(20):
+        points = rng.normal(size=(12, 3)) * 0.01 + rng.normal(size=3) * 0.06
+        near, other, buffers = np.empty(3), np.empty(3), np.empty((2, 3))
+        found = kernel.hull_surface(
+            points, np.inf, tree.corners, tree.middles, tree.radii, tree.links, near, other
+        )
+        each = [kernel.hull_hull(points, t, np.inf, *buffers) for t in tree.corners]
+        assert found == pytest.approx(min(each), abs=1e-12)
+        limit = 0.5 * found
+        farther = kernel.hull_surface(
+            points, limit, tree.corners, tree.middles, tree.radii, tree.links, near, other
+        )
+        assert farther == (0.0 if found == 0.0 else np.inf)
+
+
 def frame(rng):
     """A random rotation."""
     Q, R = np.linalg.qr(rng.normal(size=(3, 3)))

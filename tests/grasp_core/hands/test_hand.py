@@ -8,6 +8,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Fingertip, Hand, Joint, LinkShape
+from sim_validate.records.hand_model import hand_of_model, model_record
 from tests.grasp_core.hands.gripping import plain_hand
 
 HANDS = ["allegro", "leap"]
@@ -39,8 +40,41 @@ def test_torque_limits_can_be_given_with_their_source():
 
 
 def test_an_unknown_hand_names_the_known_ones():
-    with pytest.raises(InputError, match="allegro or leap"):
+    with pytest.raises(InputError, match="allegro or allegro-urdf or leap"):
         gc.load_hand("shadow")
+
+
+def test_allegro_ends_where_the_source_that_is_chosen_has_it():
+    """Menagerie's capsules end 2.3 mm beyond the URDF's balls, the thumb's 0.7 mm."""
+    ours, urdf = gc.load_hand("allegro"), gc.load_hand("allegro-urdf")
+    for one, other in zip(ours.fingers, urdf.fingers, strict=True):
+        shorter = one.tip.center - other.tip.center
+        assert shorter == pytest.approx([0.0, 0.0, 0.0007 if one.name == "thumb" else 0.0023])
+        capsule = other.links[-1].shapes[-1]
+        end = capsule.position + capsule.half_sizes
+        assert end == pytest.approx(other.tip.center, abs=1e-9)
+    assert [joint.name for joint in urdf.joints] == [joint.name for joint in ours.joints]
+
+
+def test_a_fingertip_that_is_a_block_is_covered_by_the_last_shape():
+    hand = plain_hand()
+    first, corners = hand.fingers[0], 0.005 * np.vstack([np.eye(3), -np.eye(3)])
+    tip = Fingertip(np.zeros(3), 0.006, corners + np.array([0.0, 0.0, 0.02]), 1e-4)
+    assert replace(first, tip=tip).tip.core[1] == 1e-4
+    with pytest.raises(InputError, match="last shape of the last link of finger f0 must cover"):
+        replace(first, tip=replace(tip, corners=corners))
+    with pytest.raises(InputError, match="corners must be 2"):
+        replace(tip, corners=corners[:1])
+    with pytest.raises(InputError, match="rounding"):
+        replace(tip, rounding=0.0)
+    with pytest.raises(InputError, match="rounding"):
+        Fingertip(np.zeros(3), 0.006, rounding=1e-4)
+
+
+def test_a_hand_with_blocks_is_kept_in_files():
+    hand = gc.load_hand("leap")
+    again = hand_of_model(hand.name, model_record(hand), list(hand.sources), hand.torque_source)
+    assert again == hand
 
 
 def test_values_refuse_what_makes_no_hand():

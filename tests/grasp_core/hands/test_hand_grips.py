@@ -12,15 +12,16 @@ from grasp_core.hands.kinematics import places
 from grasp_core.hands.stance import stance_of
 from tests.sim_validate.hands.executing import standing
 
-SMALL = 1e-6
+SMALL = 1e-7
 """Size of a motion [m, rad] whose square is nothing beside it."""
 HANDS = ("allegro", "leap")
 
 
 def torques(hand, reach, k, joints, point_normal, force):
     """Return l_a . f of a finger at joint angles, with the ball touching along a normal, (m,)."""
-    stance, rho = stance_of(hand, reach), stance_of(hand, reach).tip_radii[k]
-    found, own = places(hand, joints, stance.palm_pose), list(chains(hand)[stance.fingers[k]])
+    stance = stance_of(hand, reach)
+    rho, own = stance.tip_radii[k], list(chains(hand)[stance.fingers[k]])
+    found = places(stance.hand, joints, stance.palm_pose)
     point = found.tips[0, stance.fingers[k]] + rho * point_normal
     arms = point - found.link_positions[0, own]
     return np.cross(found.joint_axes[0, own], arms) @ force

@@ -1,18 +1,20 @@
 """A hand in a grasp: what is returned is true, and what was not found is not denied."""
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 
+import mujoco
 import numpy as np
 import pytest
 import trimesh
 
 import grasp_core as gc
-from grasp_core.hands.distances.collisions import FAR, clearances
+from grasp_core.hands.distances.collisions import FAR, clearances, tip_distances, tip_gaps
 from grasp_core.hands.hand import Hand, HandFinger
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.posing.pose_search import TOUCHING
 from tests.grasp_core.hands.gripping import FRICTION, finger, grasps, plain_hand, reaches, scaled
+from tests.hand_models import hand_mjcf, numbers
 from tests.marks import MORE
 
 CASES = [("allegro", "dodecahedron", 0.035), ("leap", "dodecahedron", 0.035),
@@ -34,6 +36,15 @@ def strewn(shape, rotation, position, count=9):
     return position + (shape.position + local @ shape.rotation.T) @ rotation.T
 
 
+def placed_tip(hand, reach, finger):
+    """Corners of a fingertip in the object's frame, (m, 3), and its rounding."""
+    found = places(hand, reach.joints, reach.palm_pose)
+    last = hand.links.index(hand.fingers[finger].links[-1])
+    corners, rounding = hand.fingers[finger].tip.core
+    turned, origin = found.link_rotations[0, last], found.link_positions[0, last]
+    return origin + corners @ turned.T, rounding
+
+
 @pytest.mark.parametrize(("hand", "name", "radius"), CASES)
 def test_most_grasps_are_reached_and_each_claim_holds(hand, name, radius):
     found, held, body = reaches(hand, name, radius), gc.load_hand(hand), scaled(name, radius)
@@ -49,13 +60,16 @@ def test_most_grasps_are_reached_and_each_claim_holds(hand, name, radius):
         assert ((low <= each.joints) & (each.joints <= high)).all()
         pose = each.palm_pose
         assert pose[:3, :3] @ pose[:3, :3].T == pytest.approx(np.eye(3), abs=1e-9)
-        tips = places(held, each.joints, pose).tips[0]
         assert len(set(each.fingers.tolist())) == 4
-        for k, contact in enumerate(each.contacts):
-            tip = held.fingers[each.fingers[k]].tip
-            away = contact.position - tips[each.fingers[k]]
-            assert np.linalg.norm(away) == pytest.approx(tip.radius, abs=TOUCHING)
-            assert away / np.linalg.norm(away) == pytest.approx(contact.normal, abs=1e-6)
+        for f, contact in zip(each.fingers, each.contacts, strict=True):
+            corners, rounding = placed_tip(held, each, f)
+            ahead = (corners - contact.position) @ contact.normal
+            assert ahead.max() == pytest.approx(-rounding, abs=TOUCHING)
+            front = corners[ahead >= ahead.max() - 1e-6] - contact.position
+            middle = front - ahead.max() * contact.normal
+            # the contact is ahead of the farthest corner, or between several
+            assert (middle.min(axis=0) <= 1e-6).all()
+            assert (middle.max(axis=0) >= -1e-6).all()
         points = np.array([contact.position for contact in each.contacts])
         normals = np.array([contact.normal for contact in each.contacts])
         assert gc.force_closure(points, normals, FRICTION).closed
@@ -82,12 +96,15 @@ def test_points_strewn_over_links_are_outside_the_object(hand, name, radius):
             for k, link in enumerate(held.links)
             for s in link.shapes
         ]
-        for shape, rotation, position in frames:
-            points = strewn(shape, rotation, position)
+        # a block's cover is no part of the hand
+        covers = {f.links[-1].shapes[-1] for f in held.fingers if f.tip.corners is not None}
+        cloud = [(strewn(*frame), frame[0].radius) for frame in frames if frame[0] not in covers]
+        cloud += [placed_tip(held, each, f) for f in range(len(held.fingers))]
+        for points, thick in cloud:
             near, away, triangles = trimesh.proximity.closest_point_naive(mesh, points)
             outward = np.einsum("ij,ij->i", points - near, mesh.face_normals[triangles])
             signed = np.where(outward >= 0.0, away, -away)
-            assert signed.min() >= shape.radius - TOUCHING - 1e-9
+            assert signed.min() >= thick - TOUCHING - 1e-9
         measured = clearances(held, body, each.joints, each.palm_pose, each.fingers)
         assert measured.itself >= 5e-4
         assert measured.object >= 0.0
@@ -212,6 +229,95 @@ def test_a_hand_with_five_fingers_uses_four():
     assert found.reached
     assert len(set(found.fingers.tolist())) == 4
     assert len(found.joints) == 20
+
+
+TIPS = {
+    "finger": (
+        (-0.0109843, -0.0485305, 0.0107332), (-0.0109382, -0.0482203, 0.0196376),
+        (-0.0101487, -0.0496906, 0.0159898), (-0.0092378, -0.0484128, 0.0218931),
+        (-0.00867589, -0.0479687, 0.0063242), (0.000381281, -0.0500004, 0.0136489),
+        (0.00578903, -0.0477754, 0.0145699), (-0.00837368, -0.0448847, 0.0253221),
+        (-0.00825562, -0.044846, 0.00378645), (-0.0112503, -0.0219082, 0.0214304),
+        (-0.0111545, -0.0217225, 0.00703861), (0.00953552, -0.0407669, 0.0144241),
+    ),
+    "thumb": (
+        (-0.0107232, -0.0611614, -0.0149982), (-0.008826, -0.0620958, -0.0145755),
+        (-0.00919783, -0.0614221, -0.00934658), (-0.00911828, -0.0606159, -0.0214199),
+        (-0.0112175, -0.0576915, -0.006927), (-0.0108374, -0.0576804, -0.0229782),
+        (0.000575562, -0.0618537, -0.0181157), (0.00559988, -0.0599286, -0.0179396),
+        (-0.00858019, -0.0567087, -0.00376859), (-0.00910804, -0.0577736, -0.0245153),
+        (-0.0112391, -0.033747, -0.0213736), (-0.011265, -0.033908, -0.007986),
+        (0.00948306, -0.0528781, -0.0101047), (0.009593, -0.05148, -0.019153),
+    ),
+}  # fmt: skip
+"""Corners of the meshes of LEAP's fingertips in MuJoCo Menagerie, in the last links' frames [m]."""
+
+
+@pytest.mark.parametrize("name", ["dodecahedron", "box"])
+def test_leap_with_the_fingertips_of_the_public_model_overlaps_nothing(name):
+    """MuJoCo has corners of the public meshes; hulls of some of them are within the true tips."""
+    hand, body, seen = gc.load_hand("leap"), scaled(name, 0.035), 0
+    corners = {f.name: np.array(TIPS["thumb" if f.name == "thumb" else "finger"])
+               for f in hand.fingers}  # fmt: skip
+    for f in hand.fingers:
+        table, rounding = f.tip.core
+        near = np.linalg.norm(table - corners[f.name][:, None], axis=2).min(axis=1)
+        assert near.max() <= rounding  # each is within the rounding of the table's, and so the hull
+    true = replace(hand, fingers=tuple(
+        replace(f, tip=replace(f.tip, corners=corners[f.name])) for f in hand.fingers
+    ))  # fmt: skip
+    mesh = f'<mesh name="object" vertex="{numbers(body.vertices)}"/>'
+    geom = '<body name="object"><geom name="object" type="mesh" mesh="object"/></body>'
+    model = mujoco.MjModel.from_xml_string(hand_mjcf(true, mesh, geom))
+    data, at = mujoco.MjData(model), model.geom("object").id
+    pairs = pairs_apart(model, hand, at)
+    for each in reaches("leap", name, 0.035):
+        if not each.reached:
+            continue
+        seen += 1
+        data.mocap_pos[0] = each.palm_pose[:3, 3]
+        mujoco.mju_mat2Quat(data.mocap_quat[0], each.palm_pose[:3, :3].ravel())
+        for joint, angle in zip(hand.joints, each.joints, strict=True):
+            data.joint(joint.name).qpos = angle
+        mujoco.mj_forward(model, data)
+        gaps = [mujoco.mj_geomDistance(model, data, i, j, 0.01, None) for i, j in pairs]
+        assert min(gaps) > -1e-5
+    assert seen >= 3
+
+
+def test_a_block_that_is_moved_into_the_object_is_said_to_be_deep_in_it():
+    hand, body, seen = gc.load_hand("leap"), scaled("box", 0.035), 0
+    for each in reaches("leap", "box", 0.035):
+        if not each.reached:
+            continue
+        seen += 1
+        at = tip_gaps(hand, body, each.joints, each.palm_pose, each.fingers)
+        assert at.gaps == pytest.approx(np.zeros(4), abs=TOUCHING)
+        assert at.on_object == pytest.approx(np.array([c.position for c in each.contacts]))
+        for k, contact in enumerate(each.contacts):
+            pose = each.palm_pose.copy()
+            pose[:3, 3] += 1e-3 * contact.normal
+            inside = tip_gaps(hand, body, each.joints, pose, each.fingers)
+            # a corner beside an edge is less deep below the other face
+            assert -1e-3 - 2.0 * TOUCHING <= inside.gaps[k] <= -4e-4
+            moved = clearances(hand, body, each.joints, pose, each.fingers)
+            assert moved.tips < -5e-5
+            off = tip_distances(hand, each.joints, each.palm_pose, each.fingers, at.on_object)
+            assert off == pytest.approx(np.zeros(4), abs=TOUCHING)
+    assert seen >= 3
+
+
+def pairs_apart(model, hand, at):
+    """Pairs of geoms that must not overlap: links that are not let to, and any with the object."""
+    links = {i: model.body(int(model.geom_bodyid[i])).name for i in range(model.ngeom) if i != at}
+    beside = {frozenset(pair) for pair in hand.ignored_pairs}
+    for f in hand.fingers:
+        beside |= {frozenset(pair) for pair in pairwise(["palm", *(each.name for each in f.links)])}
+    own = [
+        (i, j) for i, j in combinations(links, 2)
+        if links[i] != links[j] and frozenset((links[i], links[j])) not in beside
+    ]  # fmt: skip
+    return [*own, *((i, at) for i in links)]
 
 
 def test_fingers_of_one_hand_that_overlap_are_told():

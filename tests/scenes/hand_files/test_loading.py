@@ -99,8 +99,17 @@ def test_the_hands_of_tables_are_where_mujoco_has_them(name):
         for k, link in enumerate(hand.links):
             assert data.body(link.name).xpos == pytest.approx(found.link_positions[0, k], abs=1e-9)
         for f, finger in enumerate(hand.fingers):
-            tip = data.geom(f"{finger.name}_tip").xpos
-            assert tip == pytest.approx(found.tips[0, f], abs=1e-9)
+            geom, tip = data.geom(f"{finger.name}_tip"), found.tips[0, f]
+            last = hand.links.index(finger.links[-1])
+            if finger.tip.corners is None:
+                assert tip == pytest.approx(geom.xpos, abs=1e-9)
+            else:
+                corners = model.mesh_vert[model.mesh(f"{finger.name}_tip").vertadr[0] :]
+                placed = corners[: len(finger.tip.corners)] @ geom.xmat.reshape(3, 3).T + geom.xpos
+                own = found.link_positions[0, last] + (
+                    finger.tip.corners @ found.link_rotations[0, last].T
+                )
+                assert placed == pytest.approx(own, abs=1e-8)
             jacobian = np.zeros((3, model.nv))
             body = model.body(finger.links[-1].name).id
             mujoco.mj_jac(model, data, jacobian, None, tip, body)
@@ -123,8 +132,15 @@ def test_a_table_written_as_mjcf_is_read_back_as_it_was(name, tmp_path):
     assert read.ranges == pytest.approx(hand.ranges)
     angles = np.random.default_rng(9).uniform(*hand.ranges.T)
     ours, theirs = places(hand, angles), places(read, angles)
-    assert theirs.tips == pytest.approx(ours.tips, abs=1e-9)
-    assert [f.tip.radius for f in read.fingers] == [f.tip.radius for f in hand.fingers]
+    ends = np.cumsum([len(finger.links) for finger in hand.fingers]) - 1
+    ways = np.random.default_rng(10).normal(size=(50, 3))
+    for end, own, other in zip(ends, hand.fingers, read.fingers, strict=True):
+        heights = [
+            ((p.link_positions[0, end] + tip.core[0] @ p.link_rotations[0, end].T) @ ways.T).max(0)
+            for p, tip in ((ours, own.tip), (theirs, other.tip))
+        ]
+        assert heights[1] == pytest.approx(heights[0], abs=5e-8)
+        assert other.tip.core[1] == own.tip.core[1]
     assert [j.torque_limit_n_m for j in read.joints] == [j.torque_limit_n_m for j in hand.joints]
     assert {frozenset(p) for p in hand.ignored_pairs} <= {frozenset(p) for p in read.ignored_pairs}
 
@@ -145,14 +161,59 @@ def test_fingertips_are_named_by_site_geom_or_body(tips, tmp_path):
     assert places(hand, angles).tips[0] == pytest.approx(np.array(true), abs=1e-9)
 
 
-def test_a_box_as_a_fingertip_is_taken_as_the_capsule_in_it(tmp_path):
+def test_a_box_as_a_fingertip_is_a_block_with_a_ball_in_it(tmp_path):
     hand = scenes.load_hand(written(tmp_path, gripper(BOX)), [f"p{n}" for n in range(4)])
     tip = hand.fingers[0].tip
     assert tip.radius == pytest.approx(0.008)
     assert tip.center == pytest.approx([0.0, 0.0, 0.032], abs=1e-12)
+    assert np.abs(tip.corners - [0.0, 0.0, 0.02]) == pytest.approx(
+        np.tile([0.008, 0.009, 0.02], (8, 1)), abs=1e-12
+    )
+    assert tip.rounding == 1e-4
     (shape,) = hand.fingers[0].links[-1].shapes
-    assert shape.radius == pytest.approx(0.008)
-    assert shape.half_sizes == pytest.approx([0.0, 0.0, 0.012])
+    assert shape.half_sizes == pytest.approx(np.array([0.008, 0.009, 0.02]) + 1e-4, abs=1e-8)
+
+
+BLOCKS = {
+    "box": BOX,
+    "mesh": ("mesh", 'mesh="tip"'),  # a wedge: its ball is well inside of it
+    "cylinder": ("cylinder", 'pos="0 0 0.02" size="0.008 0.02"'),
+}
+WEDGE = ('<asset><mesh name="tip" vertex="-.008 -.009 0  .008 -.009 0  -.008 .009 0  .008 .009 0 '
+         '-.008 -.009 .04  -.008 .009 .04"/></asset>')  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", BLOCKS)
+def test_a_fingertip_that_is_no_ball_is_free_where_it_is_said_to_be(kind, tmp_path):
+    """MuJoCo has the file's own geoms: none is in the object by more than 0.1 mm, and boxes and
+    meshes touch it."""
+    path = written(tmp_path, gripper(BLOCKS[kind], extra=WEDGE))
+    hand, body, seen = scenes.load_hand(path, [f"p{n}" for n in range(4)]), scaled("box", 0.02), 0
+    spec = mujoco.MjSpec.from_file(str(path))
+    mesh = spec.add_mesh(name="object")
+    mesh.uservert = (body.vertices - body.center_of_mass).ravel()
+    held = spec.worldbody.add_body(name="object", mocap=True)
+    held.add_geom(name="object", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="object")
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    object_geom = model.geom("object").id
+    for grasp in grasps("box", 0.02, 12):
+        found = gc.reach_with(hand, body, grasp, FRICTION)
+        if not found.reached:
+            continue
+        seen += 1
+        for joint, angle in zip(hand.joints, found.joints, strict=True):
+            data.joint(joint.name).qpos = angle
+        pose = found.palm_pose
+        mujoco.mju_mat2Quat(data.mocap_quat[0], np.ascontiguousarray(pose[:3, :3].T).ravel())
+        center = pose[:3, :3].T @ (body.center_of_mass - pose[:3, 3])
+        data.mocap_pos[0] = center + np.array([0.0, 0.0, 0.3])
+        mujoco.mj_forward(model, data)
+        gaps = [mujoco.mj_geomDistance(model, data, model.geom(f"p{n}").id, object_geom, 1.0, None)
+                for n in range(4)]  # fmt: skip
+        assert min(gaps) > -1e-4
+        assert kind == "cylinder" or max(gaps) < 3e-4
+    assert seen >= 2
 
 
 def test_a_urdf_gripper_is_read_with_efforts_and_masses(tmp_path):

@@ -43,6 +43,9 @@ def test_links_and_tips_are_where_the_hand_has_them(hand):
         name = held.fingers[finger].name
         tip = data.geom(f"tip_{name}").xpos
         assert tip == pytest.approx(scene.layout.tip_centers[contact], abs=WRITTEN)
+        there = reach.contacts[contact]
+        touched = tip + held.fingers[finger].tip.radius * there.normal
+        assert touched == pytest.approx(there.position - body.center_of_mass, abs=2e-5)
     # the pose is only moved as far as fingertips were off their faces
     assert np.abs(scene.layout.joints - reach.joints).max() < 1e-3
 

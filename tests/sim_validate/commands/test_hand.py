@@ -74,7 +74,9 @@ def test_the_weight_of_links_is_said_with_its_source(words, capsys):
     assert f"The links of the fingers weigh {1e3 * weight:.3g} g together; MuJoCo gives" in said
     assert "Every joint turns" not in said
     assert main(["hand", "leap"]) == Exit.GOOD
-    assert "The links of the fingers weigh" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "The links of the fingers weigh" in said
+    assert "block of 52 corners" in said
     assert main(["hand", "allegro"]) == Exit.GOOD
     assert "Masses of links: unknown" in capsys.readouterr().out
 

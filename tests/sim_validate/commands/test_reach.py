@@ -91,7 +91,7 @@ def test_a_grasp_that_is_not_reached_is_a_negative_answer(grasps, tmp_path, caps
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--hand", "nose"], "hand must be allegro, leap"),
+        (["--hand", "nose"], "hand must be allegro, allegro-urdf, leap"),
         (["--hand", "allegro", "--fingertips", "a,b,c,d"], "has its own fingertips"),
         (["--hand", "absent.xml", "--fingertips", "a,b,c,d"], "cannot be read"),
         (["--grasp", "c-9-9-9-9"], "c-9-9-9-9"),

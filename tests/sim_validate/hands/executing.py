@@ -7,7 +7,7 @@ from scenes.hands.held_hand_mjcf import held_hand_scene
 from sim_validate.hands.execute_hand import hand_execution_settings, hand_squeeze
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
-OBJECT, RADIUS, MASS, TORQUE = "dodecahedron", 0.035, 0.1, 0.35
+OBJECT, RADIUS, MASS, TORQUE = "dodecahedron", 0.035, 0.07, 0.35
 
 
 @lru_cache(maxsize=4)

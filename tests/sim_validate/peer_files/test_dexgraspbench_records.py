@@ -146,11 +146,14 @@ def test_the_root_of_a_record_leads_to_the_fingertips(hand):
     model, reach = gc.load_hand(hand), reached(hand)[0]
     record = dex_record(model, reach, "o")
     palm = pose_of(record.grasp) @ hand_file(model).root
-    tips = places(model, record.grasp[FREE:], palm).tips[0]
-    radii = [finger.tip.radius for finger in model.fingers]
+    found, ends = places(model, record.grasp[FREE:], palm), np.cumsum(
+        [len(finger.links) for finger in model.fingers]
+    ) - 1  # fmt: skip
     for contact, finger in zip(reach.contacts, reach.fingers, strict=True):
-        away = np.linalg.norm(contact.position - tips[finger])
-        assert away == pytest.approx(radii[finger], abs=1e-5)
+        corners, rounding = model.fingers[finger].tip.core
+        R, p = found.link_rotations[0, ends[finger]], found.link_positions[0, ends[finger]]
+        ahead = (p + corners @ R.T - contact.position) @ contact.normal
+        assert ahead.max() == pytest.approx(-rounding, abs=1e-5)
 
 
 def test_a_record_away_from_the_object_touches_nothing_and_an_open_one_is_refuted():

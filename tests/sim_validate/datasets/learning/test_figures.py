@@ -147,10 +147,13 @@ def test_a_hand_stands_where_its_joints_say(grasps):
     for row in reached:
         body = BODIES[row["object_id"]]
         found = places(hand, row["hand_joints_rad"], np.array(row["T_object_palm_m"]))
-        tips = found.tips[0, row["hand_fingers"]]
-        radii = [[hand.fingers[finger].tip.radius] for finger in row["hand_fingers"]]
         points, normals = np.array(row["hand_points_m"]), np.array(row["hand_normals"])
-        assert tips + radii * normals == pytest.approx(points, abs=1e-5)
+        for finger, point, normal in zip(row["hand_fingers"], points, normals, strict=True):
+            last = hand.links.index(hand.fingers[finger].links[-1])
+            corners, rounding = hand.fingers[finger].tip.core
+            placed = found.link_positions[0, last] + corners @ found.link_rotations[0, last].T
+            ahead = (placed - point) @ normal
+            assert ahead.max() == pytest.approx(-rounding, abs=1e-5)
         corners = body.vertices[body.triangles]
         for point in points:
             away = nearest_on_triangles(corners, point) - point
