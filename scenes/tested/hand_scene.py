@@ -204,7 +204,7 @@ def _tip(root: Element, finger: HandFinger, touching: dict[str, str]) -> dict[st
 
 def corners_of(tip: Fingertip) -> Array | None:
     """Return the corners of a fingertip that is a block, (m, 3) [m]; None for a ball."""
-    return getattr(tip, "corners", None)
+    return tip.corners
 
 
 def _without_cover(finger: HandFinger) -> HandFinger:

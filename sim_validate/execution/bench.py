@@ -51,6 +51,9 @@ class HeldMotion:
     turn."""
     forces: Array
     """Contact forces on the object along the axes of the springs, (n, k, 3) [N]."""
+    pressed: Array
+    """Orientation of the object in the palm when these forces acted, (n, 3, 3): at the start of the
+    last step of a sample."""
     table: Array
     """Force of the table on the object, (n, 3) [N]; other loads are taken away."""
     states: Array
@@ -64,7 +67,7 @@ class HeldMotion:
         return np.concatenate([self.moved, self.turned, self.palm, self.fingers], axis=1)
 
 
-SERIES = ("moved", "turned", "palm", "fingers", "tips", "forces", "table", "states")
+SERIES = ("moved", "turned", "palm", "fingers", "tips", "forces", "pressed", "table", "states")
 """Fields of a motion that have a row for each sample."""
 
 
@@ -209,9 +212,10 @@ class HeldBench:
         loads, motors, commands = self._applied(drives, most)
         applied, palm = trials.bind("xfrc_applied"), trials.bind("qfrc_applied")
         servos, pushed = trials.bind("ctrl"), trials.bind("qfrc_constraint")
-        joints = trials.bind("qpos")
-        moved, forces, states = (
-            np.zeros((len(drives), most, each.shape[1])) for each in (joints, pushed, trials.state)
+        joints, rates = trials.bind("qpos"), trials.bind("qvel")
+        moved, speeds, forces, states = (
+            np.zeros((len(drives), most, each.shape[1]))
+            for each in (joints, rates, pushed, trials.state)
         )
         errors: dict[int, str] = {}
         lost = np.zeros(len(drives), dtype=bool)
@@ -228,6 +232,7 @@ class HeldBench:
                 servos[:] = commands[sample]
                 step(trials, errors, self.chunk, going)
                 moved[going, sample] = joints[going]
+                speeds[going, sample] = rates[going]
                 forces[going, sample] = pushed[going]
                 states[going, sample] = trials.state[going]
                 with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
@@ -241,8 +246,8 @@ class HeldBench:
                     forces[trial, sample:] = 0.0
         return tuple(
             self._motion(
-                moved[trial, :length], forces[trial, :length], states[trial, :length],
-                _faults(trials, trial, errors.get(trial, "")),
+                moved[trial, :length], speeds[trial, :length], forces[trial, :length],
+                states[trial, :length], _faults(trials, trial, errors.get(trial, "")),
             )
             for trial, length in enumerate(lengths)
         )  # fmt: skip
@@ -262,26 +267,33 @@ class HeldBench:
         return loads, motors, commands
 
     def _motion(
-        self, joints: Array, forces: Array, states: Array, faults: tuple[str, ...]
+        self, joints: Array, speeds: Array, forces: Array, states: Array, faults: tuple[str, ...]
     ) -> HeldMotion:
         # where the simulator diverges: what is beyond all bounds has no cosine and no square
-        joints, forces = (
-            np.where(np.abs(each) < BOUNDLESS, each, np.nan) for each in (joints, forces)
+        joints, speeds, forces = (
+            np.where(np.abs(each) < BOUNDLESS, each, np.nan) for each in (joints, speeds, forces)
         )
-        layout = self.scene.layout
-        palm = hinged(joints[:, 10 : PALM + 1])
-        turned = palm.transpose(0, 2, 1) @ rotations(joints[:, 3:7])
-        fingers = joints[:, PALM + 1 :]
-        found = layout.fingers_seen(fingers, forces[:, PALM:], turned)
-        finger_forces = np.einsum("kij,nkj->ni", layout.axes, found.forces)
+        layout, palm, fingers = self.scene.layout, joints[:, 7 : PALM + 1], joints[:, PALM + 1 :]
+        object_turns = rotations(joints[:, 3:7])
+        turned = hinged(palm[:, 3:]).transpose(0, 2, 1) @ object_turns
+        # contact forces are those of the last step's start, from which speeds lead to its end
+        back = -self.step_s * speeds
+        half = np.column_stack([np.ones(len(back)), 0.5 * back[:, 3:FREE]])
+        half /= np.linalg.norm(half, axis=1)[:, None]
+        palm_then = hinged(palm[:, 3:] + back[:, FREE + 3 : PALM]).transpose(0, 2, 1)
+        pressed = palm_then @ object_turns @ rotations(half)
+        seen = layout.fingers_seen(fingers, forces[:, PALM:], turned)
+        contact = layout.fingers_seen(fingers + back[:, PALM:], forces[:, PALM:], pressed).forces
+        finger_forces = np.einsum("kij,nkj->ni", layout.axes, contact)
         return HeldMotion(
             moved=joints[:, :3],
             turned=joints[:, 3:7],
-            palm=joints[:, 7 : PALM + 1],
+            palm=palm,
             fingers=fingers,
-            tips=found.tips,
-            tip_turns=found.turns,
-            forces=found.forces,
+            tips=seen.tips,
+            tip_turns=seen.turns,
+            forces=contact,
+            pressed=pressed,
             table=forces[:, :3] - finger_forces,
             states=states,
             faults=faults,

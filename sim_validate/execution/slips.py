@@ -91,7 +91,7 @@ def seen(motion: HeldMotion, layout: HeldLayout) -> Seen:
     centers = layout.tip_centers + np.einsum("kij,nkj->nki", layout.axes, motion.tips)
     tips = np.einsum("nji,nkj->nki", turned, centers - moved[:, None])
     along = np.einsum("kij,nkj->nki", layout.axes, motion.forces)
-    own = np.einsum("nji,nkj->nki", turned, along)
+    own = np.einsum("nji,nkj->nki", motion.pressed, along)
     back: Array = turned.transpose(0, 2, 1)[:, None]
     spun = back if motion.tip_turns is None else back @ motion.tip_turns
     return Seen(moved, turned, spun, tips, np.einsum("kij,nki->nkj", layout.frames, own))

@@ -97,7 +97,7 @@ def test_where_no_push_is_enough_a_proof_says_so():
 def test_a_hand_says_what_is_enough_within_its_torques():
     reach, hand = stood("allegro")
     body = scaled(OBJECT, RADIUS)
-    weak = replace(hand_execution_settings(MASS), trials=("weight", "stop"), push_n=0.5)
+    weak = replace(hand_execution_settings(MASS), trials=("weight", "stop"), push_n=0.25)
     found = sv.execute_hand(hand, body, reach, FRICTION, weak)
     assert not found.survived
     enough = found.enough

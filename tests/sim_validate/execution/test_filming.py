@@ -20,7 +20,8 @@ FRICTION = 0.5
 
 
 def trial(kind, name, simulated=2.0, *, survived=True, fate="stuck", slip_m=0.0):
-    return ExecutionTrial(kind, name, survived, fate, slip_m, 0.0, 0.0, 2.0, 3.0, simulated, 1e-3)
+    kept = survived and fate != "dropped"
+    return ExecutionTrial(kind, name, kept, fate, slip_m, 0.0, 0.0, 2.0, 3.0, simulated, 1e-3)
 
 
 def chosen(*trials):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from scenes.execution.turns import hinged, rotations
 from sim_validate.execution.bench import HeldMotion
 from sim_validate.execution.drives import Table, idle
 from sim_validate.execution.slips import SLID, TOUCHED, outcome, seen, slides
@@ -33,10 +34,13 @@ def motion_of(moved=None, turned=None, palm=None, centers=None, forces=None):
     tips = np.einsum("kij,nki->nkj", layout.axes, centers - rest)
     if forces is None:
         forces = np.broadcast_to(layout.pushes, (COUNT, 4, 3))
+    turned = np.tile([1.0, 0, 0, 0], (COUNT, 1)) if turned is None else turned
+    palm = np.zeros((COUNT, 6)) if palm is None else palm
     return HeldMotion(
         moved=np.zeros((COUNT, 3)) if moved is None else moved,
-        turned=np.tile([1.0, 0, 0, 0], (COUNT, 1)) if turned is None else turned,
-        palm=np.zeros((COUNT, 6)) if palm is None else palm,
+        turned=turned,
+        palm=palm,
+        pressed=hinged(palm[:, 3:]).transpose(0, 2, 1) @ rotations(turned),
         fingers=tips.reshape(COUNT, -1),
         tips=tips,
         tip_turns=None,
@@ -200,6 +204,7 @@ def test_what_is_seen_does_not_depend_on_where_the_palm_is():
         tips=here.tips,
         tip_turns=None,
         forces=here.forces,
+        pressed=here.pressed,
         table=here.table,
         states=np.zeros((COUNT, 0)),
         faults=(),
