@@ -106,6 +106,9 @@ class Targets(NamedTuple):
     touching: Array
     """Points of the tips' hulls that touch, in the last links' frames, (k, 3) [m]; NaN where it is
     the corner that reaches farthest along the normal."""
+    soft: float
+    """Depth of a corner of a block below the one that reaches farthest, at which it counts less by
+    the factor e as the point that touches [m]."""
     edge_contacts: Indices
     """The contact of each edge, (e,)."""
     edge_points: Array

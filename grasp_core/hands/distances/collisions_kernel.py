@@ -138,8 +138,9 @@ def _from_block(  # noqa: PLR0913, PLR0917 - two shapes, and where they are near
     if apart <= ROUNDING:
         return -np.inf
     if apart <= limit + both:
+        length = np.sqrt(((other - near) ** 2).sum())
         for a in range(3):
-            near[a] = (other[a] - near[a]) / apart
+            near[a] = (other[a] - near[a]) / length
             other[a] -= near[a] * rounding
         moved(turned[block], middles[block], other, point)
         for a in range(3):
@@ -328,9 +329,10 @@ def of_object(
         low[j] = tree.middles[0, j] - tree.radii[0]
         high[j] = tree.middles[0, j] + tree.radii[0]
     for s in range(len(hand.shape_links)):
-        radius = hand.shape_radii[s]
+        radius, middle = hand.shape_radii[s], middles[s]
         if is_block(hand, s):
             corners, radius = core_in(hand, turned[s], middles[s], s)
+            middle = corners[0]
             apart = hull_surface(
                 corners, needs[s] + radius, tree.corners, tree.middles, tree.radii, tree.links,
                 near, other,
@@ -342,8 +344,8 @@ def of_object(
             ) - radius - needs[s]  # fmt: skip
         inner = True
         for j in range(3):
-            inner = inner and low[j] < middles[s, j] < high[j]
-        if apart >= 0.0 and inner and windings(middles[s], tree.corners) > INSIDE:
+            inner = inner and low[j] < middle[j] < high[j]
+        if apart >= 0.0 and inner and windings(middle, tree.corners) > INSIDE:
             apart = -tree.radii[0]
         if apart < min(best, 0.0):
             worst[0] = s

@@ -78,6 +78,8 @@ def hull_hull(  # noqa: C901 - loops that are written out
 ) -> float:  # fmt: skip
     """Return the distance between the hulls of two sets of corners, zero where they overlap.
 
+    It is that of two planes between which no hull is, so that rounding never makes it too large.
+
     Args:
         corners: Corners of the first hull, (m, 3).
         others: Corners of the second, (n, 3).
@@ -86,18 +88,20 @@ def hull_hull(  # noqa: C901 - loops that are written out
         other: Filled with the second's, (3,).
     """
     at, S, w, zero = corners[0] - others[0], np.empty((3, 3)), np.empty(3), np.zeros(3)
-    pairs, weights = np.zeros((3, 2), np.int64), np.empty(2)
+    pairs, weights, apart = np.zeros((3, 2), np.int64), np.empty(2), 0.0
     for n in range(3):
         S[n] = at
     for step in range(MOST_STEPS):
         square = dotted(at, at)
         if square == 0.0:
+            apart = 0.0
             break
         i, j = _reaching(corners, at, -1.0), _reaching(others, at, 1.0)
         w[:] = corners[i] - others[j]
         ahead = dotted(at, w)
-        if ahead > limit * np.sqrt(square):
-            return ahead / np.sqrt(square)
+        apart = max(apart, ahead / np.sqrt(square))
+        if apart > limit:
+            return apart
         if square - ahead <= CLOSE * square:
             break
         place = 1
@@ -116,7 +120,7 @@ def hull_hull(  # noqa: C901 - loops that are written out
             weight = 1.0 - weights[0] - weights[1] if n == 0 else weights[n - 1]
             near[j] += weight * corners[pairs[n, 0], j]
             other[j] += weight * others[pairs[n, 1], j]
-    return np.sqrt(dotted(at, at))
+    return apart
 
 
 @loop()

@@ -13,6 +13,7 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays
 from grasp_core.hands.loop_values import Pose, Targets, Wanted
 from grasp_core.hands.posing.starts import postures
+from grasp_core.hands.posing.targets import SOFT
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import FINGERS
 
@@ -28,8 +29,8 @@ def compile_posing(hand: Hand, body: Polyhedron) -> None:
     aims = Targets(
         np.arange(count, dtype=np.int64), np.zeros((count, 3)), normals,
         np.array([plane_tangents(*normal) for normal in normals.tolist()]), np.ones(count),
-        np.full((count, 3), np.nan), np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3)),
-        np.array(AXIS), -np.inf,
+        np.full((count, 3), np.nan), SOFT, np.empty(0, np.int64), np.empty((0, 3)),
+        np.empty((0, 3)), np.array(AXIS), -np.inf,
     )  # fmt: skip
     wanted = Wanted(0.0, 0.0, 0.0, 0.0, 0.0, overlaps=True, palm_moves=True)
     pose: Pose = kernel.empty_pose(arrays, count)

@@ -84,8 +84,9 @@ def _pulled_back(asked: Asked, found: FoundPose, gap: float) -> Targets:
     aims = _aims(asked, found)
     held = found.certificate
     return aims._replace(
-        origins=held.positions - gap * held.normals, normals=np.array(held.normals)
-    )
+        origins=held.positions - gap * held.normals, normals=np.array(held.normals),
+        touching=found.touching,
+    )  # fmt: skip
 
 
 def _aims(asked: Asked, found: FoundPose) -> Targets:

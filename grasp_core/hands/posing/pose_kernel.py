@@ -216,9 +216,12 @@ def lay(
             last = hand.starts[finger + 1] - 1
             into_frame(pose.R[last], pose.p[last], tip, targets.touching[k])
         off = max(off, abs(distance - hand.tip_roundings[finger]))
-        ahead = 0.0
+        ahead, square = 0.0, 0.0
         for j in range(3):
-            targets.normals[k, j] = (points[k, j] - tip[j]) / distance
+            square += (points[k, j] - tip[j]) ** 2
+        length = np.sqrt(square)  # the distance of a block is only a bound on it
+        for j in range(3):
+            targets.normals[k, j] = (points[k, j] - tip[j]) / length
             ahead += (points[k, j] - targets.origins[k, j]) * targets.normals[k, j]
         for j in range(3):  # across the normal, the planned contact stays the one to be near
             targets.origins[k, j] += ahead * targets.normals[k, j]

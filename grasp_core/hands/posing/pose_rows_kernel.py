@@ -31,9 +31,6 @@ MOVES = 6
 MM = 1e3
 EQUAL = 3.0
 """Weight of touching."""
-SOFT = 2e-3
-"""Depth of a corner of a block below the one that reaches farthest, at which it counts less by the
-factor e while a pose is sought [m]."""
 AT_TIP = 1e-6
 """Distance from the middle of a fingertip at which an end of a capsule is that of the tip [m]."""
 ANYWHERE = 10.0
@@ -65,11 +62,11 @@ def _ahead(  # noqa: C901 - loops that are written out
     """Return the corner of a contact's tip that reaches farthest, and fill in the point that does.
 
     The corner of a block that is farthest along the normal n jumps as the block turns. For the
-    point p, corners c count with weights w that fall by the factor e for each height `SOFT` below
+    point p, corners c count with weights w that fall by the factor e for each height s below
     the farthest, so that it moves steadily: by M dv for a small turn dv of the block, beside what
     the turn moves a point of the block, with
 
-        M = sum of w (c - p) ((c - p) x n)' / SOFT.                                        (2)
+        M = sum of w (c - p) ((c - p) x n)' / s.                                           (2)
 
     Args:
         hand: The hand.
@@ -92,7 +89,7 @@ def _ahead(  # noqa: C901 - loops that are written out
         point[:] = hand.tip_corners[first]
     if not np.isnan(point[0]):
         return int(first + front)
-    weights = np.exp((heights - heights[front]) / SOFT)
+    weights = np.exp((heights - heights[front]) / targets.soft)
     weights /= weights.sum()
     for j in range(3):
         point[j] = (weights * hand.tip_corners[first : first + count, j]).sum()
@@ -102,7 +99,7 @@ def _ahead(  # noqa: C901 - loops that are written out
         cross(arm, n, way)
         for i in range(3):
             for j in range(3):
-                roll[i, j] += weights[c] * arm[i] * way[j] / SOFT
+                roll[i, j] += weights[c] * arm[i] * way[j] / targets.soft
     return int(first + front)
 
 

@@ -37,9 +37,8 @@ MOST_TOUCHES, TOUCH_STEPS = 12, 8
 SETTLED, RESTING_MM = 1e-9, 1e-9
 """Change of a distance below which a fingertip rests on a surface [m], and distance from touching
 at which it does [mm]."""
-STAYING = 1e-6
-"""Way of the point of a block that touches, from one plane to the next, that leaves it where it is
-[m]."""
+HARD = 1e-4
+"""How far corners of a block below the farthest still count when fingertips are laid down [m]."""
 ROOM = 0.0015
 """Distance beyond the one asked for that the search keeps from the object [m]."""
 PULL = 0.03
@@ -86,6 +85,8 @@ class FoundPose:
     """Proof of force closure with the contacts that are reached."""
     within: tuple[bool, ...]
     """Whether each contact is in its region, or at the planned contact."""
+    touching: Array
+    """Points of blocks that touch, in the last links' frames, (k, 3) [m]; NaN for balls."""
     starts: int = 1
     """Number of starts that were tried."""
 
@@ -136,28 +137,45 @@ def _tried(asked: Asked, used: Indices, aims: Targets, start: Start) -> FoundPos
     kernel.settle(arrays, tree, aims, far, pose, sums, MOST_STEPS, GOOD_MM)
     if sums.parts[0] > ROUGH_MM:
         return _why_away(asked.hand, pose.q)
-    laid = aims._replace(
-        origins=np.array(aims.origins), normals=np.array(aims.normals),
-        touching=np.array(aims.touching),
-    )  # fmt: skip
     near = far._replace(overlaps=False, margin=LEAST_MARGIN, pull=0.0)
-    points, off, before, stays = np.empty((len(used), 3)), np.inf, np.inf, False
-    for _ in range(MOST_TOUCHES):
-        kernel.settle(arrays, tree, laid, near, pose, sums, TOUCH_STEPS, FINE_MM)
-        before, held = off, laid.touching.copy()
-        off = kernel.lay(arrays, tree, laid, pose, points)
-        stays = bool(np.allclose(held, laid.touching, rtol=0.0, atol=STAYING, equal_nan=True))
-        if stays and (off <= RESTING_MM or abs(before - off) <= SETTLED):
-            break
-    if off > TOUCHING or not (stays or all(_are_within(aims, points, TOUCHING))):
+    laid = _laid(asked, aims, near, pose)
+    if laid is None:
         return _why_away(asked.hand, pose.q)
+    targets, points = laid
     if blocked := blocking(asked, pose, start.fingers, asked.clearance):
         return blocked
-    certificate = proved_closure(points, laid.normals, asked.friction)
+    certificate = proved_closure(points, targets.normals, asked.friction)
     if certificate is None or not certificate.closed:
         return "open"
-    within = _are_within(aims, certificate.positions, MARGIN)
-    return FoundPose(used, start.fingers, pose.q, _as_pose(pose), certificate, within)
+    return FoundPose(
+        used, start.fingers, pose.q, _as_pose(pose), certificate,
+        _are_within(aims, certificate.positions, MARGIN), targets.touching,
+    )  # fmt: skip
+
+
+def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Targets, Array] | None:
+    """Move a hand that is near until its fingertips rest on the surface itself.
+
+    Which point of a block touches is only known then, so that its region is asked for again.
+
+    Returns:
+        The planes that are touched and the contacts, (k, 3); None if fingertips do not rest.
+    """
+    arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
+    kernel = compiled("grasp_core.hands.posing.pose_kernel")
+    laid = aims._replace(
+        origins=np.array(aims.origins), normals=np.array(aims.normals),
+        touching=np.array(aims.touching), soft=HARD,
+    )  # fmt: skip
+    sums, balls = kernel.empty_sums(arrays, aims), len(arrays.tip_corners) == len(arrays.tip_radii)
+    points, off, before, inside = np.empty((len(laid.fingers), 3)), np.inf, np.inf, True
+    for _ in range(MOST_TOUCHES):
+        kernel.settle(arrays, tree, laid, near, pose, sums, TOUCH_STEPS, FINE_MM)
+        before, off = off, kernel.lay(arrays, tree, laid, pose, points)
+        inside = balls or all(_are_within(aims, points, TOUCHING))
+        if inside and (off <= RESTING_MM or abs(before - off) <= SETTLED):
+            break
+    return (laid, points) if inside and off <= TOUCHING else None
 
 
 def _are_within(aims: Targets, points: Array, slack: float) -> tuple[bool, ...]:

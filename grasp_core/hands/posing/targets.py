@@ -9,6 +9,8 @@ from grasp_core.values import ContactRegion, Grasp
 
 NARROW = 1e-4
 """Least inscribed radius of a region that is aimed at; in smaller ones the contact is [m]."""
+SOFT = 2e-3
+"""How far corners of a block below the farthest count while a pose is sought [m]."""
 SHORT = 1e-9
 """Length below which an edge of a region is left out [m]."""
 
@@ -38,6 +40,7 @@ def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: fl
         np.array([plane_tangents(*normal) for normal in normals.tolist()]),
         np.where(aimed, 0.0, 1.0),
         np.full((len(used), 3), np.nan),
+        SOFT,
         np.array([row[0] for row in rows], np.int64),
         np.array([row[1] for row in rows]).reshape(-1, 3),
         np.array([row[2] for row in rows]).reshape(-1, 3),
