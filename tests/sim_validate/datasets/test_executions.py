@@ -31,7 +31,7 @@ from tests.sim_validate.datasets.forging import forged
 from tests.sim_validate.datasets.pair import all_rows
 
 pytest.importorskip("pyarrow")
-SETTINGS = sv.ExecutionSettings(mass_kg=1.0, trials=("weight",))
+SETTINGS = sv.ExecutionSettings(mass_kg=1.2, trials=("weight",))
 CONFIG = DatasetConfig(
     objects=("tetrahedron", "wedge"), families=("concurrent",), limit=1,
     execution=AskedExecution(SETTINGS),
@@ -109,7 +109,7 @@ def test_tables_and_exports_have_the_columns(executed, tmp_path):
 
 def test_the_readme_explains_executions(executed):
     text = (executed / CARD).read_text(encoding="utf-8")
-    assert "which has its mass of 1 kg" in text
+    assert "which has its mass of 1.2 kg" in text
     assert "natural negative" in text
     assert 'config_name: "executions"' in text
     for column in (*EXECUTED, *EXECUTIONS):
@@ -144,7 +144,7 @@ def executed_row(row):
     ("name", "change", "message"),
     [
         ("grasps", first(executed_row, load_multiple=2.0), "is not proved to carry as much"),
-        ("grasps", first(executed_row, mass_kg=0.5), "mass_kg is 0.5, but by config.toml it is 1"),
+        ("grasps", first(executed_row, mass_kg=0.5), "is 0.5, but by config.toml it is 1.2"),
         ("grasps", first(executed_row, squeeze_n=[[1.0] * 3] * 4), "the squeeze must balance"),
         ("grasps", first(executed_row, executed_trials=2), "executed_trials is 2, but 1 by"),
         ("grasps", first(executed_row, executed=False), "although none was simulated"),

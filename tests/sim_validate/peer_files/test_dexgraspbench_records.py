@@ -10,6 +10,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.errors import InputError
 from grasp_core.hands.kinematics import places
+from grasp_core.hands.stance import stance_of
 from scenes.mjcf_text import quaternion
 from sim_validate.peer_files.dexgraspbench_records import (
     DexRecord,
@@ -114,7 +115,7 @@ def test_fingertips_of_a_record_meet_the_object_at_one_moment(hand, gap):
     record = dex_record(model, reach, "o", gap_m=gap)
     palm = pose_of(record.grasp) @ hand_file(model).root
     ways = np.linspace(record.pregrasp, record.grasp, 3)[:, FREE:]
-    tips = places(model, ways, palm).tips
+    tips = places(stance_of(model, reach).hand, ways, palm).tips  # balls in place of blocks
     for contact, finger in zip(reach.contacts, reach.fingers, strict=True):
         away = (tips[2, finger] - tips[:2, finger]) @ contact.normal
         assert away == pytest.approx([gap, 0.5 * gap], abs=0.1 * gap)

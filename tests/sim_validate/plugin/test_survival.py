@@ -25,7 +25,7 @@ def test_light(grasp_case, assert_survives):
     assert assert_survives(case.body, case.grasp, case.friction, settings=settings).survived
 
 def test_heavy(grasp_case, assert_survives):
-    settings = sv.ExecutionSettings(mass_kg=1.0, trials=("weight",))
+    settings = sv.ExecutionSettings(mass_kg=1.2, trials=("weight",))
     assert_survives(grasp_case.body, grasp_case.grasp, grasp_case.friction, settings)
 """
 SUITE = """
@@ -51,7 +51,7 @@ def folder(tmp_path_factory):
 def found(folder):
     """What comes out where the wedge weighs one kilogram."""
     saved = read_grasps(folder / "grasps.json")
-    settings = sv.ExecutionSettings(mass_kg=1.0, trials=("weight",))
+    settings = sv.ExecutionSettings(mass_kg=1.2, trials=("weight",))
     return sv.execute(saved.body, saved.grasps[0], saved.friction, settings)
 
 
@@ -64,7 +64,7 @@ def test_an_assertion_names_the_trial_the_numbers_and_the_prediction(folder, fou
     code, said = run_pytest(folder, "test_it.py", "--grasp-report", str(tmp_path / "report"))
     assert code == 1, said
     assert "1 failed, 1 passed" in said
-    assert "with 1 kg: 1 of 1 trials lost; its squeeze is certified for" in said
+    assert "with 1.2 kg: 1 of 1 trials lost; its squeeze is certified for" in said
     assert f"{found.load_multiple:.4g} times the weight" in said
     assert "weight: moved or turned too far after a slip, moved " in said
     assert predicted(found) in said
@@ -74,11 +74,11 @@ def test_an_assertion_names_the_trial_the_numbers_and_the_prediction(folder, fou
 
 def test_a_suite_demands_survival_whatever_its_baseline_says(folder, found):
     suite = folder / "wedge.grasps.toml"
-    write_text(suite, SUITE.format(mass_kg=1.0))
+    write_text(suite, SUITE.format(mass_kg=1.2))
     code, said = run_pytest(folder, "--grasp-bless", str(suite))
     assert code == 0, said
     baseline = json.loads((folder / "wedge.baseline.json").read_text())
-    assert baseline["settings"]["execution"]["mass_kg"] == 1.0
+    assert baseline["settings"]["execution"]["mass_kg"] == 1.2
     assert baseline["grasps"][0]["execution"]["lost"] == ["weight"]
     code, said = run_pytest(folder, str(suite))
     assert code == 1
