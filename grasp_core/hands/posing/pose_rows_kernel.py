@@ -159,7 +159,8 @@ def _tip(  # noqa: PLR0913, PLR0917 - a fingertip, a direction and a residual
         if hand.starts[f] <= link:
             first = hand.starts[f]
     for a in range(first, link + 1):
-        sums.row[MOVES + a] += weight * dotted(pose.W[a], turn) * MM
+        turned = hand.ratios[a] * weight * dotted(pose.W[a], turn) * MM
+        sums.row[MOVES + hand.drivers[a]] += turned
     _add(sums, weight * off * MM)
 
 

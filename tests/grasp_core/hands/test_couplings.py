@@ -1,6 +1,7 @@
 """Joints that follow others: hand-worked angles, poses, and torques by virtual work."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -145,3 +146,16 @@ def test_a_pose_that_breaks_couplings_is_refused(coupled, reached):
     joints[1] += 0.01
     with pytest.raises(InputError, match=r"off by 0\.01 rad"):
         gc.hand_motors(coupled, replace(reached[0], joints=joints))
+
+
+def test_fingers_that_curl_touch_with_blocks(coupled):
+    fingers = []
+    for finger in coupled.fingers:
+        half = 0.55 * finger.tip.radius
+        corners = half * np.array(list(product((-1.0, 1.0), repeat=3))) + finger.tip.center
+        fingers.append(replace(finger, tip=replace(finger.tip, corners=corners, rounding=1e-4)))
+    hand, body = replace(coupled, fingers=tuple(fingers)), scaled("box", 0.035)
+    found = [gc.reach_with(hand, body, grasp, FRICTION) for grasp in grasps("box", 0.035)]
+    joints = [each.joints for each in found if each.reached]
+    assert len(joints) >= 2
+    assert max(off(hand, each) for each in joints) <= 1e-12
