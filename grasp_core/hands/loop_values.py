@@ -35,7 +35,7 @@ class HandArrays(NamedTuple):
     tip_corners: Array
     """Corners of all fingertips, finger by finger: for a ball its middle, (c, 3) [m]."""
     cover_corners: Array
-    """The same in the frames of the shapes that cover blocks; zeros for balls, (c, 3) [m]."""
+    """Corners of blocks in the frames of the shapes that cover them, zeros for balls, (c, 3)."""
     tip_firsts: Indices
     """First corner of each finger, and the number of corners at the end, (f + 1,)."""
     tip_roundings: Array

@@ -19,7 +19,7 @@ class OwnChains:
 
     fingers: tuple[HandFinger, ...]
     couplings: tuple[Coupling, ...]
-    """Those that were given, and those of the copies."""
+    """Couplings that were given, and those of the copies."""
     originals: dict[str, str]
     """For the name of each copy, the name of the link that it moves with."""
 

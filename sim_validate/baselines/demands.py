@@ -127,7 +127,7 @@ def survival(
 
     Raises:
         InputError: The arguments, the grasp or a setting are refused.
-        UnfaithfulError: The simulator failed in a trial.
+        UnfaithfulError: The simulator fails its checks.
     """
     if settings is None and given:
         given, settings = given[:-1], given[-1]

@@ -97,7 +97,7 @@ def execute_grasps(
 
     Raises:
         InputError: A grasp is refused.
-        UnfaithfulError: The simulator failed in a trial, or fails its checks.
+        UnfaithfulError: The simulator fails its checks.
     """
     if folder:
         remove_executions(folder)

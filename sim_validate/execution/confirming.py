@@ -75,13 +75,15 @@ def run_again(
 def _begin(trial: Trial, motion: HeldMotion, bench: HeldBench) -> int:
     """Return the sample after which a trial is run again.
 
-    It is the first where fingers that close do not come to hold the object.
+    It is the first where fingers that close do not come to hold the object, and where contacts slip
+    within samples only, so that nothing says when.
     """
     layout = bench.scene.layout
     pushing = np.linalg.norm(layout.pushes, axis=1) > IDLE * float(np.abs(layout.pushes).max())
     if (motion.forces[trial.begun, pushing] == 0.0).all(axis=1).any():
         return 0
-    return max(0, first_trouble(motion, layout, layout.friction, trial.begun) - BEFORE)
+    trouble = first_trouble(motion, layout, layout.friction, trial.begun)
+    return max(0, trouble - BEFORE) if trouble < len(motion.moved) else 0
 
 
 def _rest(trial: Trial, begin: int) -> Drive:

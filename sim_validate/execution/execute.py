@@ -99,7 +99,7 @@ def executed(
 
     Raises:
         NoForcesError: No squeeze carries the weight, or the grip is unstable under the best one.
-        UnfaithfulError: The simulator fails on a case with a known answer, or failed in a trial.
+        UnfaithfulError: The simulator fails on a case with a known answer.
     """
     try:
         best = choose(settings, None)

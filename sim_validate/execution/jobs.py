@@ -92,7 +92,7 @@ def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[Executed
 
     Raises:
         InputError: A grasp or a setting is refused.
-        UnfaithfulError: The simulator failed in a trial, or fails its checks.
+        UnfaithfulError: The simulator fails its checks.
     """
     count = processes(len(jobs), processors)
     threads = max(1, processors // count)
@@ -104,7 +104,7 @@ def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
 
     Raises:
         InputError: The grasp or a setting is refused.
-        UnfaithfulError: The simulator failed in a trial, or fails its checks.
+        UnfaithfulError: The simulator fails its checks.
     """
     grasp = job.grasp
     about = grasp.id, grasp.family, contacts_sha256(grasp.contacts)

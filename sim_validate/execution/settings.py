@@ -120,7 +120,7 @@ class ExecutionSettings:
 
     @property
     def used(self) -> "ExecutionSettings":
-        """The same settings with the impulse that is used, as files keep them."""
+        """Settings with the impulse that is used, as files keep them."""
         return replace(self, knock_n_s=self.impulse_n_s)
 
     @property

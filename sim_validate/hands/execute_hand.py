@@ -61,7 +61,7 @@ def execute_hand(  # noqa: PLR0913 - `mass_kg` is the one setting that has no de
             directions, or a number is out of range.
         NoForcesError: No squeeze within the motors' torques carries the weight, or the grip is
             unstable under the best one.
-        UnfaithfulError: The simulator fails on a case with a known answer, or failed in a trial.
+        UnfaithfulError: The simulator fails on a case with a known answer.
     """
     if settings is not None:
         instance(settings, ExecutionSettings, "settings")

@@ -56,7 +56,7 @@ LEAP: tuple[Row, ...] = (
     (38.0, -2.059, 15.91, -13.73, 9.814, 4.365, 9.381, 0.124, 0.163, 0.03),
     (49.0, 0.962, -24.2, -14.42, 20.48, 4.778, 20.72, -1.009, -0.206, 0.097),
 )
-"""As for Allegro."""
+"""Palm, links of a finger, links of LEAP's thumb, in the columns of `ALLEGRO`."""
 
 
 def _inertials(

@@ -157,5 +157,6 @@ def test_fingers_that_curl_touch_with_blocks(coupled):
     hand, body = replace(coupled, fingers=tuple(fingers)), scaled("box", 0.035)
     found = [gc.reach_with(hand, body, grasp, FRICTION) for grasp in grasps("box", 0.035)]
     joints = [each.joints for each in found if each.reached]
-    assert len(joints) >= 2
+    closing = [each for each in found if each.reason != "no closure"]
+    assert len(joints) == len(closing) > 1
     assert max(off(hand, each) for each in joints) <= 1e-12

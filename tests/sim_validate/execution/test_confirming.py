@@ -100,7 +100,7 @@ def test_steps_that_are_short_already_are_not_made_shorter(bar):
 
 
 def test_one_trial_that_diverges_loses_one_trial(monkeypatch):
-    """Of 192 trials of eight grasps one diverges; all others are as they would be without it."""
+    """One of 192 trials of eight grasps diverges; all others are as they would be without it."""
     body = scenes.example_object("box")
     grasps = gc.plan(body, 0.5, limit=8).grasps
     settings = sv.ExecutionSettings(0.1, trials=("weight", "shake", "stop", "knock", "misplaced"))
@@ -137,3 +137,19 @@ def test_an_object_that_is_shot_away_beyond_all_numbers_is_lost():
     assert {trial.fate for trial in found.of_kind("knock")} <= {"dropped", "diverged"}
     assert "diverged" in {trial.fate for trial in found.of_kind("knock")}
     assert not found.survived
+
+
+def test_a_loss_of_which_nothing_says_when_it_begins_is_run_again_as_a_whole():
+    """Contacts may slip within samples only; then no sample has one on its cone."""
+    body, grasp = planned("box")
+    settings = sv.ExecutionSettings(0.1, trials=("weight",))
+    best = chosen_squeeze(body, grasp, 0.5, settings)
+    scene = held_scene(body, best.grip, settings)
+    bench = HeldBench(scene)
+    lowest = held_dynamics(best.grip, scene.layout).lowest_frequency
+    trials, _ = trials_of(body, scene.layout, settings, lowest)
+    motions = run_trials(bench, trials)
+    (again,) = run_again(confirming_bench(bench), trials, motions, settings)
+    assert len(again.moved) == len(motions[0].moved)
+    assert np.array_equal(again.moved[0], motions[0].moved[0])
+    assert (again.moved[1:] != motions[0].moved[1:]).any(axis=1).all()
