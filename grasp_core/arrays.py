@@ -39,17 +39,7 @@ UNIT_SLACK = 1e-9
 def frozen(
     value: ArrayLike, shape: tuple[int | None, ...], name: str, *, most: float = LARGEST_ENTRY
 ) -> Array:
-    """Copy `value` into a read-only float array of the given shape.
-
-    Args:
-        value: Anything numpy reads as numbers.
-        shape: Expected length along each axis; None leaves that axis free.
-        name: What to call the value in an error message.
-        most: Largest size of an entry.
-
-    Raises:
-        InputError: The shape differs, or an entry is not a finite number, or too large.
-    """
+    """Copy `value` into a read-only float array of the given shape."""
     array = real_array(value, name)
     fits = array.ndim == len(shape) and all(
         want is None or want == got for want, got in zip(shape, array.shape, strict=True)
@@ -76,11 +66,7 @@ def frozen_copy(values: Array) -> Array:
 
 
 def real_array(value: ArrayLike, name: str) -> Array:
-    """Copy a value into a new float array; strings and truth values are refused, not converted.
-
-    Raises:
-        InputError: The value is not an array of real numbers.
-    """
+    """Copy a value into a new float array; strings and truth values are refused, not converted."""
     try:
         given: NDArray[Any] = np.asarray(value)
     except (TypeError, ValueError) as error:  # rows of different lengths
@@ -95,11 +81,7 @@ def real_array(value: ArrayLike, name: str) -> Array:
 
 
 def frozen_units(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
-    """Copy `value` into a read-only array of unit vectors along the last axis (see `frozen`).
-
-    Raises:
-        InputError: `frozen` refuses the array, or a vector's length is not 1.
-    """
+    """Copy `value` into a read-only array of unit vectors along the last axis (see `frozen`)."""
     array = frozen(value, shape, name)
     lengths = np.linalg.norm(array, axis=-1)
     if (np.abs(lengths - 1.0) > UNIT_SLACK).any():
@@ -145,10 +127,6 @@ def to_digits(values: Array, size: float = 0.0) -> Array:
 
     The last bits of the answers of solvers depend on where their numbers lie in memory; results
     that are simulated or written to files must not.
-
-    Args:
-        values: Numbers in an array of any shape.
-        size: Smallest size that the digits refer to, for values that are zero but for rounding.
     """
     largest = max(float(np.abs(values).max(initial=0.0)), size)
     if largest == 0.0:

@@ -91,10 +91,6 @@ def trusted(kind: type[Item], /, **given: Any) -> Item:
     """Make a frozen value without checking or copying its fields.
 
     This is for thousands of values whose fields were computed and checked together.
-
-    Args:
-        kind: Class of the value.
-        given: All fields by name; arrays have to be read-only floats of the right shape.
     """
     made, put = object.__new__(kind), object.__setattr__
     for name in given:

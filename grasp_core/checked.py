@@ -69,20 +69,7 @@ def number(  # noqa: PLR0913 - the ways in which a range can end
     most: float | None = None,
     where: str = "",
 ) -> float:
-    """Check that a value is a number in a range; it is finite unless `most` is infinite.
-
-    Args:
-        value: The value to check, of any type.
-        name: What to call the value in an error message.
-        above: Largest number that is too small.
-        least: Smallest number that is accepted.
-        below: Smallest number that is too large.
-        most: Largest number that is accepted.
-        where: Where the range comes from, appended to it in the message.
-
-    Raises:
-        InputError: The value is not a real number, or outside the range.
-    """
+    """Check that a value is a number in a range; it is finite unless `most` is infinite."""
     real = not isinstance(value, bool) and isinstance(value, Real)
     size = _as_float(value) if real else math.nan
     inside = math.isfinite(size) if most is None else size <= most
@@ -94,29 +81,17 @@ def number(  # noqa: PLR0913 - the ways in which a range can end
 
 
 def positive(value: Any, name: str) -> float:
-    """Check that a value is a length, force or similar quantity of a plausible size.
-
-    Raises:
-        InputError: The value is not a number from `SMALLEST` to `LARGEST`.
-    """
+    """Check that a value is a length, force or similar quantity of a plausible size."""
     return number(value, name, least=SMALLEST, most=LARGEST)
 
 
 def coefficient(value: Any, name: str = "friction") -> float:
-    """Check that a value is a Coulomb coefficient above zero.
-
-    Raises:
-        InputError: The value is not a number from `SMALLEST` to `LARGEST_FRICTION`.
-    """
+    """Check that a value is a Coulomb coefficient above zero."""
     return number(value, name, least=SMALLEST, most=LARGEST_FRICTION)
 
 
 def whole(value: Any, name: str, *, least: int = 0, most: int = MOST_COUNT) -> int:
-    """Check that a value is a whole number from `least` to `most`.
-
-    Raises:
-        InputError: The value is not a whole number, or outside the range.
-    """
+    """Check that a value is a whole number from `least` to `most`."""
     integral = not isinstance(value, bool) and isinstance(value, Integral)
     count = int(value) if integral else None
     if count is None or not least <= count <= most:
@@ -127,58 +102,32 @@ def whole(value: Any, name: str, *, least: int = 0, most: int = MOST_COUNT) -> i
 
 
 def seed_of(value: Any, name: str = "seed") -> int:
-    """Check that a value is a seed of random numbers.
-
-    Raises:
-        InputError: The value is not a whole number from 0 to `MOST_SEED`.
-    """
+    """Check that a value is a seed of random numbers."""
     return whole(value, name, most=MOST_SEED)
 
 
 def one_of(value: Any, choices: Iterable[str], name: str) -> None:
-    """Refuse a value that is not one of the given words.
-
-    Raises:
-        InputError: The value is not among `choices`.
-    """
+    """Refuse a value that is not one of the given words."""
     known = tuple(choices)
     if not isinstance(value, str) or value not in known:
         raise InputError(f"{name} must be one of {', '.join(known)}, got {shown(value)}")
 
 
 def switch(value: Any, name: str) -> None:
-    """Refuse a value that is neither True nor False.
-
-    Raises:
-        InputError: The value is not a bool.
-    """
+    """Refuse a value that is neither True nor False."""
     if not isinstance(value, bool):
         raise InputError(f"{name} must be True or False, got {shown(value)}")
 
 
 def text(value: Any, name: str) -> str:
-    """Check that a value is text.
-
-    Raises:
-        InputError: The value is not a string.
-    """
+    """Check that a value is text."""
     if not isinstance(value, str):
         raise InputError(f"{name} must be text, got {shown(value)}")
     return value
 
 
 def instance(value: Any, kind: type[Value], name: str, remedy: str = "") -> Value:
-    """Check that a value is an instance of a class.
-
-    Args:
-        value: The value to check, of any type.
-        kind: The class.
-        name: What to call the value in an error message.
-        remedy: Where values of the class come from, for the message.
-
-    Raises:
-        InputError: The value is of another class.
-    """
+    """Check that a value is an instance of a class."""
     if not isinstance(value, kind):
         hint = f"; {remedy}" if remedy else ""
         raise InputError(f"{name} must be a {kind.__name__}, got {shown(value)}{hint}")
@@ -186,21 +135,13 @@ def instance(value: Any, kind: type[Value], name: str, remedy: str = "") -> Valu
 
 
 def function(value: Any, name: str) -> None:
-    """Refuse a value that cannot be called.
-
-    Raises:
-        InputError: The value is not callable.
-    """
+    """Refuse a value that cannot be called."""
     if not callable(value):
         raise InputError(f"{name} must be a function, got {shown(value)}")
 
 
 def path_of(value: Any, name: str) -> Path:
-    """Check that a value names a file or folder.
-
-    Raises:
-        InputError: The value is not text or a path, is empty, or holds a zero byte.
-    """
+    """Check that a value names a file or folder."""
     if not isinstance(value, str | Path):
         raise InputError(f"{name} must be a path, as text or pathlib.Path, got {shown(value)}")
     if not str(value) or "\0" in str(value):
@@ -209,17 +150,7 @@ def path_of(value: Any, name: str) -> Path:
 
 
 def several(value: Any, each: Callable[[Any], Value], name: str, kind: str) -> tuple[Value, ...]:
-    """Check every item of a sequence; a string is refused, not split into letters.
-
-    Args:
-        value: The value to check, of any type.
-        each: Function that returns a checked item, or refuses it.
-        name: What to call the value in an error message.
-        kind: What the items are, in the plural, for the message.
-
-    Raises:
-        InputError: The value is not a sequence, or `each` refuses an item.
-    """
+    """Check every item of a sequence; a string is refused, not split into letters."""
     if isinstance(value, str | bytes) or not isinstance(value, Iterable):
         raise InputError(
             f"{name} must be a sequence of {kind}, such as a tuple, got {shown(value)}"

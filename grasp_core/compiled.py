@@ -31,10 +31,6 @@ def loop(
 
     Where no folder can be written, neither a cache folder of the user nor `__pycache__` beside the
     module, every process compiles the function again.
-
-    Args:
-        division: What dividing by zero does: raise an error, or give infinity or NaN as NumPy does.
-        beside: Whether other threads of the process run while the function does.
     """
     numba: Any = importlib.import_module("numba")
 
@@ -47,26 +43,14 @@ def loop(
 
 
 def wait_for(kernels: Mapping[str, Callable[[], object]]) -> None:
-    """Make the first use of kernels wait, as for another process that compiles them.
-
-    Args:
-        kernels: By the name of each kernel to wait for, a function that returns when it is
-            compiled; they replace those of an earlier call.
-    """
+    """Make the first use of kernels wait, as for another process that compiles them."""
     _AWAITED.clear()
     _AWAITED.update(kernels)
 
 
 @cache
 def compiled(name: str) -> Any:
-    """Load a kernel module.
-
-    Args:
-        name: The module's full name, such as `grasp_core.ROOM.NAME_kernel`.
-
-    Raises:
-        InputError: Numba refuses its settings or cannot be loaded.
-    """
+    """Load a kernel module."""
     if wait := _AWAITED.pop(name, None):
         wait()
     try:
@@ -83,9 +67,8 @@ def compiled(name: str) -> Any:
 def state_of(function: Any) -> Literal["kept", "not kept", "interpreted"]:
     """Return whether a function runs compiled by numba, kept on disk or not, or interpreted.
 
-    Returns:
-        Whether later processes find it compiled, or no folder keeps it, or Python runs it because
-        the environment variable NUMBA_DISABLE_JIT says so.
+    Gives whether later processes find it compiled, or no folder keeps it, or Python runs it because
+    the environment variable NUMBA_DISABLE_JIT says so.
     """
     if not hasattr(function, "stats"):
         return "interpreted"

@@ -37,9 +37,7 @@ def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:
 def poses_along(origins: Array, directions: Array) -> Array:
     """Return poses whose z axes run along given directions, (k, 4, 4).
 
-    Args:
-        origins: Origins of the frames, (k, 3) [m].
-        directions: Unit vectors, (k, 3).
+    Takes `origins` (k, 3) [m]; `directions` (k, 3).
     """
     poses = np.tile(np.eye(POSE), (len(origins), 1, 1))
     for pose, (x, y, z) in zip(poses, directions.tolist(), strict=True):

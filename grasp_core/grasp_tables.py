@@ -76,12 +76,7 @@ class ById(Generic[Item]):
     def __getitem__(self, key: slice) -> Self: ...
 
     def __getitem__(self, key: int | str | slice) -> Item | Self:
-        """Return an item by its place or its id, or a value with some of the items.
-
-        Raises:
-            KeyError: No item has this id; the message lists some that there are.
-            IndexError: There is no item at this place.
-        """
+        """Return an item by its place or its id, or a value with some of the items."""
         if isinstance(key, slice):
             return replace(cast("Any", self), **{self.ITEMS: self._items[key]})
         return self._named(key) if isinstance(key, str) else self._items[key]
@@ -142,11 +137,7 @@ class Demands:
 
 
 def families_of(given: Method | Iterable[Method] | None) -> tuple[Method, ...] | None:
-    """Return the families that are asked for, one or several; None where any will do.
-
-    Raises:
-        InputError: Something is no family.
-    """
+    """Return the families that are asked for, one or several; None where any will do."""
     if given is None:
         return None
     listed = (given,) if isinstance(given, str) else given
@@ -169,19 +160,12 @@ def data_frame(grasps: Sequence[Grasp]) -> Any:
     Columns have the names and units of `grasps.json`: `family`, `radius_m`, `span_angle_deg`,
     `critical_friction`, `closure_margin`, `ferrari_canny_lower_n` and `_upper_n`; for each finger
     `face_0`, its contact `position_0_x_m` and its inward normal `normal_0_x`, and so on.
-
-    Raises:
-        InputError: The library pandas is not installed.
     """
     return frame_of([_row(grasp) for grasp in grasps], [grasp.id for grasp in grasps])
 
 
 def frame_of(rows: Sequence[Mapping[str, object]], ids: Sequence[str]) -> Any:
-    """Return a `pandas.DataFrame` of rows, cells by column, indexed by id.
-
-    Raises:
-        InputError: The library pandas is not installed.
-    """
+    """Return a `pandas.DataFrame` of rows, cells by column, indexed by id."""
     try:
         pandas: Any = importlib.import_module("pandas")
     except ImportError as error:

@@ -32,12 +32,7 @@ OWN = "graspproof"
 
 
 def keep(loop: Any, function: Callable[..., Any]) -> None:
-    """Let numba keep a loop on disk, and look for it there; without a folder nothing is kept.
-
-    Args:
-        loop: What numba made of `function`; left as it is if numba leaves it to Python.
-        function: A function of a kernel.
-    """
+    """Let numba keep a loop on disk, and look for it there; without a folder nothing is kept."""
     if not hasattr(loop, "enable_caching"):
         return
     folder = folder_for(function.__module__, function.__code__.co_filename)
@@ -47,11 +42,7 @@ def keep(loop: Any, function: Callable[..., Any]) -> None:
 
 
 def is_kept(module: str) -> bool:
-    """Return whether loops of a kernel are kept already, or cannot be kept or compiled at all.
-
-    Args:
-        module: The kernel's full name.
-    """
+    """Return whether loops of a kernel are kept already, or cannot be kept or compiled at all."""
     found = importlib.util.find_spec(module)
     try:
         folder = None if found is None else folder_for(module, str(found.origin))
@@ -62,12 +53,7 @@ def is_kept(module: str) -> bool:
 
 @cache
 def folder_for(module: str, path: str) -> Path | None:
-    """Return the folder that keeps a module's loops; None if none can be written.
-
-    Args:
-        module: The module's full name.
-        path: Path of the module's file.
-    """
+    """Return the folder that keeps a module's loops; None if none can be written."""
     name = f"{module.rpartition('.')[2]}-{_stamp(module, Path(path))}"
     for folder in folders(Path(path)):
         try:

@@ -14,12 +14,7 @@ Surface = tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]
 
 
 def names_in_stub(package: str, file: str) -> Surface:
-    """Return what a package needs in order to offer the names that its stub imports.
-
-    Args:
-        package: The package's `__name__`.
-        file: The package's `__file__`.
-    """
+    """Return what a package needs in order to offer the names that its stub imports."""
     stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
     imports = [part for part in stub.body if isinstance(part, ast.ImportFrom)]
     homes = {alias.name: str(part.module) for part in imports for alias in part.names}

@@ -19,13 +19,7 @@ NOTHING = 1e-12
 
 
 def summary(kind: str, *said: str, **figures: object) -> str:
-    """Write `Kind(words, name=figure, ..)`, like a constructor call but not meant as code.
-
-    Args:
-        kind: Name of the class.
-        said: Words that are shown as they are.
-        figures: Numbers and vectors to six digits; anything else as in error messages.
-    """
+    """Write `Kind(words, name=figure, ..)`, like a constructor call but not meant as code."""
     parts = [*said, *(f"{name}={_figure(value)}" for name, value in figures.items())]
     return f"{kind}({', '.join(parts)})"
 
@@ -37,11 +31,7 @@ def short(kind: str, figures: Mapping[str, object]) -> str:
 
 
 def changed(settings: Any) -> str:
-    """Write settings by those that differ from the usual ones, in at most `MOST` characters.
-
-    Args:
-        settings: A dataclass.
-    """
+    """Write settings by those that differ from the usual ones, in at most `MOST` characters."""
     parts = [
         f"{field.name}={value!r}"
         for field in fields(settings)

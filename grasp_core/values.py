@@ -265,13 +265,7 @@ def _one_per_finger(value: Any, each: Callable[[Any], object], name: str, kind: 
 def fill_in(
     grasps: Iterable[Grasp], name: str, computed: Callable[[list[Figures]], Iterable[Any]]
 ) -> None:
-    """Compute a figure that some grasps have put off, for all of them at once, and keep it.
-
-    Args:
-        grasps: Grasps; those that have the figure are left as they are.
-        name: One of `PUT_OFF`.
-        computed: Computes the figure of many grasps, in order, from what each would compute it by.
-    """
+    """Compute a figure that some grasps have put off, for all of them at once, and keep it."""
     late = [
         (grasp, way) for grasp in grasps
         if (way := grasp._figures) is not None  # pyright: ignore[reportPrivateUsage] - our own
@@ -290,11 +284,7 @@ def _is_known(grasp: Grasp, name: str) -> bool:
 
 
 def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:
-    """Return exactly four items, one per finger.
-
-    Raises:
-        InputError: There are more or fewer than four.
-    """
+    """Return exactly four items, one per finger."""
     listed = tuple(items)
     if len(listed) != FINGERS:
         raise InputError(f"a grasp needs {FINGERS} items, one per finger, got {len(listed)}")

@@ -79,10 +79,7 @@ class FingerSettings:
 def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:
     """Choose a fingertip radius [m] at which nothing overlaps, if a large enough one exists.
 
-    Args:
-        body: The object.
-        positions: Contact points, (k, 3) [m].
-        normals: Unit vectors into the object, (k, 3).
+    Takes `positions` (k, 3) [m]; `normals` (k, 3).
     """
     usual = TIP_RADIUS * body.radius
     clear = float(_largest_clear(body, positions, normals, usual).min())
@@ -95,14 +92,8 @@ def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:
 def clashes(body: Polyhedron, positions: Array, normals: Array, radius: float) -> tuple[str, ...]:
     """List what fingertips of a radius overlap: each other, or the object beside their contacts.
 
-    Args:
-        body: The object.
-        positions: Contact points, (k, 3) [m].
-        normals: Unit vectors into the object, (k, 3).
-        radius: Fingertip radius [m].
-
-    Returns:
-        One sentence for each overlap.
+    Takes `positions` (k, 3) [m]; `normals` (k, 3); `radius` [m]. Gives one sentence for each
+    overlap.
     """
     least = radius * (1.0 - TOUCHING)
     found = [

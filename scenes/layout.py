@@ -170,15 +170,7 @@ def arrange(
     visible motions. Everything after the rounding is plain arithmetic with the same result on every
     machine.
 
-    Args:
-        body: The object.
-        grasp: A grasp, or contacts of any origin.
-        friction: Coulomb coefficient at every contact.
-        fingers: How fingertips are built and driven.
-        torsion_m: Torsional coefficient at every contact [m].
-
-    Raises:
-        InputError: The friction is not positive, or a fingertip is larger than the object.
+    Takes `torsion_m` [m].
     """
     coefficient(friction)
     fingers = fingers or FingerSettings()
@@ -256,8 +248,7 @@ def _ways_in(grasp: Grasp | Sequence[Contact], normals: Array, fingers: FingerSe
 def grasp_size(positions: Array) -> float:
     """Compute the root mean square distance [m] of contacts from the axis they are closest to.
 
-    Args:
-        positions: Contact points, (k, 3) [m].
+    Takes `positions` (k, 3) [m].
     """
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     lever = np.linalg.norm(spread[1:]) / math.sqrt(len(positions))

@@ -119,11 +119,7 @@ class Analysis:
 
 
 def check_edges(sets: Iterable[ContactSet], edges: int) -> None:
-    """Refuse pyramids with so many edges that their hull would take minutes.
-
-    Raises:
-        InputError: A grasp exceeds the limit; the message names both.
-    """
+    """Refuse pyramids with so many edges that their hull would take minutes."""
     for contacts in sets:
         count = len(contacts.positions)
         if count * edges > MOST_EDGES:

@@ -70,11 +70,7 @@ COLLECTED_AFTER = 50_000
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the `graspproof` command with some arguments.
 
-    Args:
-        argv: Arguments without the program's name; None for those of the process.
-
-    Returns:
-        An exit code; see `Exit`.
+    Gives an exit code; see `Exit`.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:

@@ -237,20 +237,7 @@ def assert_stable(
     """A function that simulates a grasp and fails the test unless it holds as predicted."""
 
     def check(*case: Any, friction: float | None = None, **asked: Any) -> "Verdict":
-        """Simulate a grasp with its negative controls.
-
-        Args:
-            case: A `grasp_case`; or the object, a grasp on its faces, and the friction.
-            friction: Coulomb coefficient; None for the case's own, or 0.5.
-            asked: Fields of `Demands`: `wrenches` to hold as they are, `trials` with `noise`,
-                `min_pass_rate` of them, `min_margin` of the friction over the critical one,
-                `random_wrenches`, `seed`, `setup`.
-
-        Raises:
-            UnstableError: A wrench was not held, a negative control was held, simulation
-                contradicts the analysis, or a demand in `asked` is not met.
-            InputError: The grasp or `asked` is refused.
-        """
+        """Simulate a grasp with its negative controls."""
         from sim_validate.baselines.demands import checked, demands_of
         from sim_validate.baselines.entries import entry_of, plain
         from sim_validate.baselines.grasp_cases import case_of
@@ -277,16 +264,7 @@ def assert_survives(
     """A function that executes a grasp and fails the test unless the object survives."""
 
     def check(*case: Any, settings: Any = None, friction: float | None = None) -> "Execution":
-        """Execute a grasp with its negative controls.
-
-        Args:
-            case: A `grasp_case`; or the object, a grasp on its faces, and the friction.
-            settings: The `ExecutionSettings`; also allowed as the last of `case`.
-            friction: As in `assert_stable`.
-
-        Raises:
-            UnstableError: A trial was lost, no squeeze carries the weight, or a control held.
-        """
+        """Execute a grasp with its negative controls."""
         from sim_validate.baselines.demands import survival
         from sim_validate.baselines.executions import execution_entry
 

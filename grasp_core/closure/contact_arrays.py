@@ -30,16 +30,7 @@ def contact_arrays(
 ) -> tuple[Array, Array]:  # fmt: skip
     """Return checked positions and normals of one set of contacts, or of many sets.
 
-    Args:
-        positions: Contact points, (k, 3) [m], a Grasp, or Contacts; for many sets (g, k, 3), or
-            grasps.
-        normals: Unit vectors into the object, of the same shape; None where grasps or Contacts are
-            given.
-        many: Whether there is an axis of sets.
-
-    Raises:
-        InputError: Shapes differ, a normal is not a unit vector, or there are fewer than two
-            contacts in a set.
+    Takes `positions` (k, 3) or (g, k, 3) [m].
     """
     given: Any = positions
     if normals is None and many:
@@ -90,13 +81,7 @@ def _of_grasps(given: Any) -> tuple[Array, Array]:
 def check_spread(extents: Array, name: str = "positions") -> None:
     """Refuse contacts that are apart by so little that squares of lengths vanish.
 
-    Args:
-        extents: Extent of each set of contacts along each axis, (..., 3) [m].
-        name: What to call the contacts in an error message.
-
-    Raises:
-        InputError: The contacts of a set are in different places, yet less than `SMALLEST_SIZE`
-            apart.
+    Takes `extents` (..., 3) [m].
     """
     sizes: Array = extents.max(axis=-1)
     tiny = (sizes > 0.0) & (sizes < SMALLEST_SIZE)
@@ -110,12 +95,7 @@ def check_spread(extents: Array, name: str = "positions") -> None:
 def contact_frictions(friction: ArrayLike, shape: int | tuple[int, int]) -> Array:
     """Return one checked Coulomb coefficient for each contact.
 
-    Args:
-        friction: One coefficient for all contacts; one each, (k,); or one each of all sets, (g, k).
-        shape: Number of contacts k, or numbers of sets and of contacts in each, (g, k).
-
-    Raises:
-        InputError: The shape differs, or a coefficient is negative or too large.
+    Takes `friction` (k,) or (g, k); `shape` (g, k).
     """
     sizes = (shape,) if isinstance(shape, int) else shape
     values = real_array(friction, "friction")
@@ -134,9 +114,8 @@ def contact_frictions(friction: ArrayLike, shape: int | tuple[int, int]) -> Arra
 def unit_size(points: Array) -> tuple[Array, Array, Array]:
     """Scale contacts (..., k, 3) so that the longest arm from their mean has length one.
 
-    Returns:
-        Arms from the mean contact over the longest, (..., k, 3); that centre, (..., 3) [m]; and
-        that length, (...) [m], which is one where all contacts are in one place.
+    Gives arms from the mean contact over the longest, (..., k, 3); that centre, (..., 3) [m]; and
+    that length, (...) [m], which is one where all contacts are in one place.
     """
     centers: Array = points.mean(axis=-2)
     arms = points - centers[..., None, :]

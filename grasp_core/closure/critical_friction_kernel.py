@@ -44,14 +44,7 @@ def search(
 ) -> None:
     """Bracket the critical friction of each of many sets of contacts.
 
-    Args:
-        arms: Contacts at unit size, (g, k, 3).
-        normals: Inward unit normals, (g, k, 3).
-        width: Wanted widths of the brackets, relative to their lower ends.
-        forces: Filled with forces that balance, (g, k, 3).
-        twists: Filled with twists that separate, (g, 6).
-        bounds: Filled with the frictions that twists separate at and forces close at, (g, 2).
-            A pair that is no bracket, or not narrow, was given up.
+    Takes `arms`, `normals`, `forces` (g, k, 3); `twists` (g, 6); `bounds` (g, 2).
     """
     k = arms.shape[1]
     axes, rows, columns = np.empty((k, 3, 3)), np.empty((k, 3, WRENCH)), np.empty((k, 3, WRENCH))
@@ -91,12 +84,7 @@ def deepest(
 ) -> None:
     """Balance each of many sets of contacts with forces as deep inside their cones as possible.
 
-    Args:
-        contacts: Arms at unit size, (g, k, 3), normals, (g, k, 3), and frictions, (g,).
-        share: Gap that may be left (see `least_cone_sum`).
-        forces: Filled with the forces, (g, k, 3).
-        twists: Filled with the twists of the dual programs, (g, 6).
-        values: Filled with the values of the primal and the dual programs, (g, 2).
+    Takes `contacts` (g, k, 3) or (g,); `forces` (g, k, 3); `twists` (g, 6); `values` (g, 2).
     """
     arms, normals, frictions = contacts
     k = arms.shape[1]

@@ -70,9 +70,7 @@ class Rounds:
 def rounds(arms: Array, normals: Array) -> Rounds:
     """Find out whether every positive friction is enough for force closure.
 
-    Args:
-        arms: Contacts at unit size, (k, 3).
-        normals: Inward unit normals, (k, 3).
+    Takes `arms`, `normals` (k, 3).
     """
     maps = grasp_map(arms).reshape(WRENCH, -1, 3)
     pushes = np.einsum("wki,ki->wk", maps, normals)
@@ -100,9 +98,7 @@ def rounds(arms: Array, normals: Array) -> Rounds:
 def hopeless_twist(arms: Array, normals: Array) -> Array | None:
     """Find a twist (6,) that separates at every friction, by (2); None if there is none.
 
-    Args:
-        arms: Contacts at unit size, (k, 3).
-        normals: Inward unit normals, (k, 3).
+    Takes `arms`, `normals` (k, 3).
     """
     at_rest = _complement(grasp_map(arms))
     if at_rest.shape[1]:
@@ -124,9 +120,7 @@ def pushing_forces(arms: Array, normals: Array) -> Array | None:
 
     Some friction allows such forces.
 
-    Args:
-        arms: Contacts at unit size, (k, 3).
-        normals: Inward unit normals, (k, 3).
+    Takes `arms`, `normals` (k, 3).
     """
     basis = _null_space(grasp_map(arms))
     n = basis.shape[1]

@@ -103,9 +103,7 @@ class FrictionInterval(ByValue):
 def at_the_first(twist: Array, positions: Array) -> Array:
     """Move a twist at unit size from the mean contact to the first contact, (6,) [m/s, rad/s].
 
-    Args:
-        twist: Velocity at the mean contact and angular velocity, with arms from `unit_size`, (6,).
-        positions: Contact points, (k, 3) [m].
+    Takes `twist` (6,); `positions` (k, 3) [m].
     """
     arms, _, size = unit_size(positions)
     velocity = twist[:3] + cross(twist[3:], arms[0])

@@ -63,9 +63,7 @@ STALLED = 1e-3
 def search_interval(points: Array, units: Array) -> FrictionInterval:
     """Find the interval of the critical friction, as narrow as accuracy or proofs allow.
 
-    Args:
-        points: Contact points, (k, 3) [m].
-        units: Inward unit normals, (k, 3).
+    Takes `points` (k, 3) [m]; `units` (k, 3).
     """
     for strict in (False, True):
         found = _searched(Ends.of(points, units, strict=strict)).interval()
@@ -270,8 +268,7 @@ class Ends:
 def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tuple[Array, float]:
     """Put slow contacts to rest under a unit twist.
 
-    Returns:
-        The changed twist, and the friction up to which it may separate.
+    Gives the changed twist, and the friction up to which it may separate.
     """
     rows = grasp_map(arms).T.reshape(-1, 3, WRENCH)
     slowest = np.linalg.norm(rows @ twist, axis=1) <= slow

@@ -96,12 +96,7 @@ def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
 def classify_each(points: Array, directions: Array) -> list[LineClass]:
     """Classify many sets of four lines, as `classify_lines` classifies one.
 
-    Args:
-        points: One point on each line, (g, 4, 3) [m].
-        directions: Non-zero vectors along the lines, of any length, (g, 4, 3).
-
-    Raises:
-        InputError: A direction is zero, or not finite.
+    Takes `points` (g, 4, 3) [m]; `directions` (g, 4, 3).
     """
     found: list[LineClass | None] = [None] * len(points)
     lengths = np.linalg.norm(directions, axis=-1, keepdims=True)

@@ -58,17 +58,8 @@ def least_cone_sum(
 ) -> tuple[float, float]:
     """Solve the margin program (1) and its dual (2), up to a gap between their values.
 
-    Args:
-        columns: Columns of each A_i, as rows, (k, 3, 6).
-        mean: The mean m of the normals' wrenches, (6,).
-        share: The gap between primal and dual that may be left, relative to the distance of V from
-            one: with `SIGN_SHARE` it is clear on which side of one V is.
-        pair: Filled with s and z, (2, k, 3).
-        y: Filled with the twist, (6,).
-
-    Returns:
-        Values of the primal and of the dual program. The optimum lies between them where the
-        forces balance.
+    Takes `columns` (k, 3, 6); `mean`, `y` (6,); `pair` (2, k, 3). Gives values of the primal and of
+    the dual program. The optimum lies between them where the forces balance.
     """
     k = len(columns)
     W, middle, V = np.empty((2, k, 3, 3)), np.empty((k, 3)), np.empty((WRENCH, k, 3))
@@ -137,8 +128,7 @@ def _missing(columns: Array, mean: Array, pair: Array, missing: Array) -> float:
 def _factor(columns: Array, W: Array, V: Array, R: Array) -> bool:
     """Find reflections 1 - v v' that turn the columns A_i W_i into a triangular matrix R.
 
-    Returns:
-        False if the wrenches do not span all six dimensions.
+    Gives false if the wrenches do not span all six dimensions.
     """
     for w in range(WRENCH):
         for i in range(len(columns)):

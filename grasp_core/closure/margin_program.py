@@ -30,17 +30,10 @@ def deepest_forces(
 ) -> tuple[Array, Array, Array]:
     """Balance many sets of contacts with forces as deep in the cones as possible.
 
-    Args:
-        arms: Contacts at unit size, (g, k, 3).
-        normals: Inward unit normals, (g, k, 3).
-        friction: Coulomb coefficient of each set, positive, (g,).
-        share: The gap that may be left (see `margin_kernel`).
-
-    Returns:
-        Forces, (g, k, 3); twists, (g, 6), on which the supports are at most the margin over the
-        friction; and lower and upper bounds of the margin, (g, 2), where the forces balance. A
-        search that broke down, as it does on degenerate contacts, ends with bounds that have
-        crossed or are not numbers.
+    Takes `arms`, `normals` (g, k, 3); `friction` (g,). Gives forces, (g, k, 3); twists, (g, 6), on
+    which the supports are at most the margin over the friction; and lower and upper bounds of the
+    margin, (g, 2), where the forces balance. A search that broke down, as it does on degenerate
+    contacts, ends with bounds that have crossed or are not numbers.
     """
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
     values = np.ones((len(arms), 2))
@@ -57,10 +50,7 @@ def margin_program(balance: Array, normals: Array, friction: Array) -> tuple[flo
     force and its tangential force over mu, so that small coefficients are solved as well as large
     ones; without friction only the normal force is unknown.
 
-    Args:
-        balance: Matrix on the stacked forces whose product must vanish, (m, 3k).
-        normals: Inward unit normals, (k, 3).
-        friction: Coulomb coefficients, (k,).
+    Takes `balance` (m, 3k); `normals` (k, 3); `friction` (k,).
     """
     k, m = len(normals), len(balance)
     frames = contact_frames(normals) * np.array([np.ones(k), friction, friction]).T[:, None]

@@ -71,14 +71,8 @@ def refutes_closure(
 ) -> NDArray[np.bool_]:
     """Return whether, by (2), no contact force in its cone has positive power on a twist.
 
-    Args:
-        twist: One twist per set of contacts, (..., 6).
-        arms: Contacts at unit size, (..., k, 3).
-        normals: Inward unit normals, (..., k, 3).
-        friction: Coulomb coefficients, (..., k) or (..., 1).
-
-    Returns:
-        Truth values, (...).
+    Takes `twist` (..., 6); `arms`, `normals` (..., k, 3); `friction` (..., k) or (..., 1). Gives
+    truth values, (...).
     """
     twist = without_giants(twist, 1)
     length: Array = np.linalg.norm(twist, axis=-1)
@@ -92,14 +86,8 @@ def proves_closure(
 ) -> NDArray[np.bool_]:
     """Return whether forces, by (1), prove closure: they stay in the cones once balanced.
 
-    Args:
-        forces: Nearly balanced contact forces, (..., k, 3).
-        arms: Contacts at unit size, (..., k, 3).
-        normals: Inward unit normals, (..., k, 3).
-        friction: Coulomb coefficients, (..., k) or (..., 1).
-
-    Returns:
-        Truth values, (...).
+    Takes `forces`, `arms`, `normals` (..., k, 3); `friction` (..., k) or (..., 1). Gives truth
+    values, (...).
     """
     forces, maps = without_giants(forces, 2), grasp_map(arms)
     flat = np.broadcast_to(friction == 0.0, forces.shape[:-1])[..., None]
@@ -128,15 +116,8 @@ def proved_margin(
 ) -> float:
     """Compute the margin (1) that forces prove: their depth, less the cost of balancing them.
 
-    Args:
-        forces: Nearly balanced contact forces, (k, 3).
-        arms: Contacts at unit size, (k, 3).
-        normals: Inward unit normals, (k, 3).
-        friction: Coulomb coefficients, (k,).
-        caution: Factor on the length c of the correction.
-
-    Returns:
-        A lower bound of the optimum of the margin program; minus infinity if there is none.
+    Takes `forces`, `arms`, `normals` (k, 3); `friction` (k,). Gives a lower bound of the optimum of
+    the margin program; minus infinity if there is none.
     """
     along, _ = normal_and_tangential(forces, normals)
     depth = depths_in_cones(forces, normals, friction)
@@ -166,16 +147,9 @@ def margin_ceiling(
     deep in their cones balanced forces can lie, relative to the sum of their normal parts; without
     closure it is negative.
 
-    Args:
-        twist: Velocity at the mean contact and angular velocity, (6,).
-        arms: Contacts at unit size, (k, 3).
-        normals: Inward unit normals, (k, 3).
-        friction: Coulomb coefficients, (k,).
-        caution: Factor on the rounding that is allowed for.
-
-    Returns:
-        The bound, below zero; zero where the largest work M that a force does on the twist is zero
-        to within rounding; infinity where M is more, and the twist proves nothing.
+    Takes `twist` (6,); `arms`, `normals` (k, 3); `friction` (k,). Gives the bound, below zero; zero
+    where the largest work M that a force does on the twist is zero to within rounding; infinity
+    where M is more, and the twist proves nothing.
     """
     if not refutes_closure(twist, arms, normals, friction):
         return math.inf
@@ -193,9 +167,7 @@ def margin_ceiling(
 def without_giants(vectors: Array, axes: int) -> Array:
     """Replace sets that contain huge numbers or NaN by zeros, which prove nothing.
 
-    Args:
-        vectors: Twists, (..., 6), or forces, (..., k, 3).
-        axes: Number of last axes that make up one set.
+    Takes `vectors` (..., 6) or (..., k, 3).
     """
     last = tuple(range(-axes, 0))
     sizes = np.max(np.abs(vectors), axis=last, keepdims=True, initial=0.0)

@@ -47,11 +47,7 @@ of unit size: moving it by this share of the contacts' size would put it to rest
 def closes(forces: Array, positions: Array, normals: Array, friction: float) -> bool:
     """Return whether nearby forces balance exactly, strictly inside cones of full rank.
 
-    Args:
-        forces: Contact forces that balance but for rounding, (k, 3).
-        positions: Contact points, (k, 3) [m].
-        normals: Inward unit normals, (k, 3).
-        friction: Coulomb coefficient of all contacts.
+    Takes `forces`, `normals` (k, 3); `positions` (k, 3) [m].
     """
     return closing_forces(forces, positions, normals, friction) is not None
 
@@ -61,11 +57,7 @@ def closing_forces(
 ) -> Array | None:
     """Return the exactly balanced forces that `closes` finds as floats; None if there are none.
 
-    Args:
-        forces: Contact forces that balance but for rounding, (k, 3).
-        positions: Contact points, (k, 3) [m].
-        normals: Inward unit normals, (k, 3).
-        friction: Coulomb coefficient of all contacts.
+    Takes `forces`, `normals` (k, 3); `positions` (k, 3) [m].
     """
     if not (np.isfinite(forces).all() and 0.0 < friction < math.inf):
         return None
@@ -89,11 +81,7 @@ def closing_forces(
 def separates(twist: Array, positions: Array, normals: Array, friction: float) -> bool:
     """Return whether, for a nearby twist, no force in the friction cones has positive power.
 
-    Args:
-        twist: Velocity of the object at the first contact, and angular velocity, (6,) [m/s, rad/s].
-        positions: Contact points, (k, 3) [m].
-        normals: Inward unit normals, (k, 3).
-        friction: Coulomb coefficient of all contacts; infinite to ask for every coefficient.
+    Takes `twist` (6,) [m/s, rad/s]; `positions` (k, 3) [m]; `normals` (k, 3).
     """
     arms, size = _arms(positions)
     unit = twist * np.repeat([1.0, size], 3)
@@ -177,8 +165,7 @@ def _balanced(
 ) -> tuple[list[list[int]], int] | None:
     """Change some components of forces, listed as (contact, axis), until they balance exactly.
 
-    Returns:
-        The forces as whole numbers over one positive number, which is given last.
+    Gives the forces as whole numbers over one positive number, which is given last.
     """
     (whole, unit), (points, _) = _whole(forces), _whole(positions)
     arms = [[x - o for x, o in zip(point, points[0], strict=True)] for point in points]
@@ -203,8 +190,7 @@ def _eliminated(table: list[list[int]]) -> int:
 
     By Bareiss's elimination, whose divisions leave no remainder.
 
-    Returns:
-        The determinant up to its sign, which is the last columns' denominator; 0 if singular.
+    Gives the determinant up to its sign, which is the last columns' denominator; 0 if singular.
     """
     before = 1
     for k in range(WRENCH):

@@ -58,12 +58,7 @@ much where torques are over a thousandth of the scale (see `resisted_loads`)."""
 
 
 def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
-    """Compute levers of contacts (k, 3) about a centre, divided by the torque scale.
-
-    Raises:
-        InputError: The scale or the centre does not fit the contacts: rounding would
-            decide.
-    """
+    """Compute levers of contacts (k, 3) about a centre, divided by the torque scale."""
     scale = positive(torque_scale, "torque_scale")
     spread = np.ptp(points, axis=0)
     check_spread(spread)
@@ -112,11 +107,7 @@ class WrenchSet(ByValue):
         norm: Norm = "l1",
         torsion_m: ArrayLike = 0.0,
     ) -> Self:
-        """Make the wrench set of contacts; torques are about `center`, over `torque_scale`.
-
-        Raises:
-            InputError: Shapes, lengths or signs are wrong.
-        """
+        """Make the wrench set of contacts; torques are about `center`, over `torque_scale`."""
         points, units = contact_arrays(positions, normals)
         one_of(norm, get_args(Norm), "norm")
         arms = scaled_arms(points, center, torque_scale)
@@ -192,8 +183,7 @@ class WrenchSet(ByValue):
     def reach(self, slopes: Array) -> tuple[float, Array]:
         """Compute the largest value of a linear function of local forces, and forces that have it.
 
-        Args:
-            slopes: Coefficients of the function, (3k,), or (4k,) with torsion.
+        Takes `slopes` (3k,) or (4k,).
         """
         slopes = slopes.reshape(-1, self.width)
         across = _across(slopes)
@@ -230,9 +220,7 @@ class WrenchSet(ByValue):
     def holds(self, forces: Array, slack: float | Array) -> bool:
         """Return whether local forces, one a row, are within cones and bounds.
 
-        Args:
-            forces: The forces, (n, 3k), or (n, 4k) with torsion.
-            slack: By how much they may miss each of them, one for all rows or one each, (n,).
+        Takes `forces` (n, 3k) or (n, 4k); `slack` (n,).
         """
         each = forces.reshape(len(forces), -1, self.width)
         pushes, slides = each[:, :, 0], _across(each)
@@ -248,13 +236,8 @@ class WrenchSet(ByValue):
 def with_torques(G: Array, normals: Array, lengths: Array) -> Array:
     """Add a column to each contact: the wrench of a torque about the normal, a force at a lever.
 
-    Args:
-        G: Matrix on local forces of hard contacts, (6, 3k).
-        normals: Inward unit normals, (k, 3).
-        lengths: The levers, over the torque scale, (k,).
-
-    Returns:
-        The matrix on local forces of soft contacts, (6, 4k).
+    Takes `G` (6, 3k); `normals` (k, 3); `lengths` (k,). Gives the matrix on local forces of soft
+    contacts, (6, 4k).
     """
     k = len(normals)
     every = np.zeros((WRENCH, k, LOCAL))
@@ -283,10 +266,9 @@ def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
 
     It is found by a cone program that always has a solution.
 
-    Returns:
-        Local forces of that wrench, which show how near to balance the contacts come; and
-        the direction from it to zero, (m,), a twist in which no contact has more support than minus
-        the distance. If the distance is positive, it separates the contacts' wrenches from zero.
+    Gives local forces of that wrench, which show how near to balance the contacts come; and the
+    direction from it to zero, (m,), a twist in which no contact has more support than minus the
+    distance. If the distance is positive, it separates the contacts' wrenches from zero.
     """
     m, n = wrenches.G.shape
     k, width = len(wrenches.friction), wrenches.width

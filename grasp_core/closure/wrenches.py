@@ -16,9 +16,7 @@ WRENCH = 6
 def grasp_map(positions: Array, center: Array | None = None) -> Array:
     """Build the matrix that maps stacked contact forces (3k,) to their wrench, (..., 6, 3k).
 
-    Args:
-        positions: Contact points, (..., k, 3) [m].
-        center: Point about which torques are taken, (3,) [m]; the origin when None.
+    Takes `positions` (..., k, 3) [m]; `center` (3,) [m].
     """
     arms = positions if center is None else positions - center
     x, y, z = arms[..., 0], arms[..., 1], arms[..., 2]

@@ -19,8 +19,7 @@ TRIPLES = np.array(list(combinations(range(FINGERS), 3)))
 def span_angles(normals: Array) -> Array:
     """Find the span angle of many quadruples of unit vectors (q, 4, 3), (q,) [rad].
 
-    Returns:
-        theta* of each; 0.0 where the vectors do not positively span R^3.
+    Gives theta* of each; 0.0 where the vectors do not positively span R^3.
     """
     triples = normals[:, TRIPLES]
     # (2), the minimum over signs being taken in `triple_sine`
@@ -41,9 +40,7 @@ def each_positively_spans(vectors: Array) -> NDArray[np.bool_]:
 def each_cones_positively_span(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
     """Return for many quadruples of circular cones whether they satisfy the generalised P3, (q,).
 
-    Args:
-        axes: Unit vectors, (q, 4, 3).
-        half_angles: Half-angles of the cones, (q, 4) [rad].
+    Takes `axes` (q, 4, 3); `half_angles` (q, 4) [rad].
     """
     spans = each_positively_spans(axes)
     triples = axes[spans][:, TRIPLES]

@@ -32,10 +32,7 @@ def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES)
 
     All v with g.v >= 0 for all g are inside the cone.
 
-    Args:
-        cone: The circular cone.
-        toward: Across the axis, the direction in which the pyramid's first edge leans, (3,).
-        sides: Number of facets.
+    Takes `toward` (3,).
     """
     return pyramid_facets(cone.axis, cone.half_angle, toward, sides)
 
@@ -45,11 +42,7 @@ def pyramid_facets(axes: Array, half_angle: float, toward: Array, sides: int) ->
 
     See `inscribed_facets` for what such a pyramid is.
 
-    Args:
-        axes: Unit vectors along the cones' axes, (..., 3).
-        half_angle: Half-angle of all cones [rad].
-        toward: Directions in which the first edges lean, (..., 3).
-        sides: Number of facets.
+    Takes `axes`, `toward` (..., 3); `half_angle` [rad].
     """
     first = toward - np.sum(toward * axes, axis=-1, keepdims=True) * axes
     first = first / np.linalg.norm(first, axis=-1, keepdims=True)

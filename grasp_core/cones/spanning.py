@@ -196,13 +196,8 @@ def triple_sine(one: Array, two: Array, three: Array) -> Array:
 
     It has the sign of the axes' determinant.
 
-    Args:
-        one: Unit vectors, (..., 3).
-        two: Unit vectors, (..., 3).
-        three: Unit vectors, (..., 3).
-
-    Returns:
-        The term of one triple in (2), (...): zero where the three are coplanar.
+    Takes `one`, `two`, `three` (..., 3). Gives the term of one triple in (2), (...): zero where the
+    three are coplanar.
     """
     one, two, three = np.broadcast_arrays(one, two, three)
     crosses = np.stack([np.cross(two, three), np.cross(three, one), np.cross(one, two)], axis=-2)
@@ -225,9 +220,7 @@ class SpanningQuadruples:
 def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruples:
     """List all quadruples of directions that positively span at a larger angle than given.
 
-    Args:
-        normals: Unit vectors, (n, 3).
-        least_angle: Angle that theta* must exceed [rad].
+    Takes `normals` (n, 3); `least_angle` [rad].
     """
     return SpanningTable(normals, least_angle).quadruples(0, len(normals))
 

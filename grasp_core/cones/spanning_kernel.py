@@ -29,12 +29,7 @@ def empty_table(count: int) -> NDArray[np.uint64]:
 def extend(table: NDArray[np.uint64], units: Array, start: int, end: int, least: float) -> None:
     """Enter the directions start .. end - 1 into the table.
 
-    Args:
-        table: Table that holds the directions before these; changed in place.
-        units: Unit vectors, (n, 3).
-        start: The first new direction.
-        end: One after the last new direction.
-        least: Smallest sine that counts.
+    Takes `units` (n, 3).
     """
     for k in range(start, end):
         to_k = np.empty(k)
@@ -57,13 +52,7 @@ def extend(table: NDArray[np.uint64], units: Array, start: int, end: int, least:
 def quadruples(table: NDArray[np.uint64], newest: int, found: Indices) -> int:
     """List the spanning quadruples of one direction and three earlier ones.
 
-    Args:
-        table: Table that holds all of these directions.
-        newest: The last direction of each quadruple.
-        found: Filled with quadruples, ascending in each row, as far as there is room.
-
-    Returns:
-        How many quadruples there are.
+    Gives how many quadruples there are.
     """
     count = 0
     word, bit = newest // WORD, np.uint64(1) << np.uint64(newest % WORD)

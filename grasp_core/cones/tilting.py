@@ -79,9 +79,7 @@ class TiltedCones:
 def tilted_cones(normals: Array, thetas: Array) -> TiltedCones:
     """Search for wide force cones that positively span, for many quadruples.
 
-    Args:
-        normals: Unit vectors, (q, 4, 3).
-        thetas: Half-angles of the friction cones, (q, 4) [rad].
+    Takes `normals` (q, 4, 3); `thetas` (q, 4) [rad].
     """
     cuts = [*range(0, len(normals), CHUNK), len(normals)]
     parts = [_search(normals[i:j], thetas[i:j]) for i, j in pairwise(cuts)]
@@ -97,10 +95,7 @@ def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
     Where the normals span, the smallest over m of max angle(n_i, m) - 90 deg is theta*. Else it is
     negative, and taken where m is in the middle of two normals, or as far from three.
 
-    Args:
-        normals: Unit vectors, (q, 4, 3).
-        thetas: Half-angles of the friction cones, (q, 4) [rad].
-        sines: Sines of theta*, not positive where the normals do not span, (q,).
+    Takes `normals` (q, 4, 3); `thetas` (q, 4) [rad]; `sines` (q,).
     """
     lowest = np.empty(len(normals))
     compiled(KERNEL).lowest_heights(np.ascontiguousarray(normals), lowest)
@@ -113,10 +108,7 @@ def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
 def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:
     """Search for force cones with axes near given directions inside the friction cones.
 
-    Args:
-        directions: Directions to start from, such as those of balanced forces, (q, 4, 3).
-        normals: Unit vectors, (q, 4, 3).
-        thetas: Half-angles of the friction cones, (q, 4) [rad].
+    Takes `directions`, `normals` (q, 4, 3); `thetas` (q, 4) [rad].
     """
     axes = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
     return TiltedCones(*_improved(axes, normals, thetas))
@@ -125,11 +117,7 @@ def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:
 def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> TiltedCones:
     """Search for force cones whose axes lean towards common points as far as possible.
 
-    Args:
-        points: One point for each quadruple, (q, 3).
-        positions: Points where the axes start, (q, 4, 3).
-        normals: Unit vectors, (q, 4, 3).
-        thetas: Half-angles of the friction cones, (q, 4) [rad].
+    Takes `points` (q, 3); `positions`, `normals` (q, 4, 3); `thetas` (q, 4) [rad].
     """
     ways = points[:, None] - positions
     inward = np.einsum("qfi,qfi->qf", ways, normals)
@@ -166,14 +154,8 @@ def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
 def _bent(axes: Array, reached: Array, normals: Array, thetas: Array) -> tuple[Array, Array]:
     """Bend axes out of a plane in which the normals nearly lie, two to either side.
 
-    Args:
-        axes: The best axes so far, (q, 4, 3).
-        reached: Their half-angles, (q,) [rad].
-        normals: Unit vectors, (q, 4, 3).
-        thetas: Half-angles of the friction cones, (q, 4) [rad].
-
-    Returns:
-        Axes and half-angles, with bent axes where they are better.
+    Takes `axes`, `normals` (q, 4, 3); `reached` (q,) [rad]; `thetas` (q, 4) [rad]. Gives axes and
+    half-angles, with bent axes where they are better.
     """
     _, _, directions = np.linalg.svd(normals)
     across = directions[:, 2]

@@ -53,12 +53,7 @@ def _height(normals: Array, middle: Array, side: float) -> float:
 def balance(axes: Array, normals: Array, caps: Array, sweeps: int, slight: float) -> None:
     """Point each axis in turn against the sum of the others, within a cap around its normal.
 
-    Args:
-        axes: Unit vectors, changed in place, (q, 4, 3).
-        normals: Unit vectors, (q, 4, 3).
-        caps: Angles that the axes may lean, (q, 4) [rad].
-        sweeps: How often each axis is pointed.
-        slight: Length below which a vector across a normal has no direction.
+    Takes `axes`, `normals` (q, 4, 3); `caps` (q, 4) [rad].
     """
     against = np.empty(3)
     for q in range(len(axes)):
@@ -90,14 +85,8 @@ def bend(
 ) -> None:
     """Lean axes to either side of a plane, and keep those that allow the widest cones.
 
-    Args:
-        cones: Axes, (q, 4, 3), and half-angles, (q,) [rad]; replaced where others are better.
-        normals: Unit vectors, (q, 4, 3).
-        thetas: Half-angles of the friction cones, (q, 4) [rad].
-        across: Unit vector across each plane, (q, 3).
-        signs: The side to which each finger's axis leans, (s, 4).
-        pace: The least improvement that counts, and angles up to which axes may lean, in
-            friction angles.
+    Takes `cones` (q, 4, 3) or (q,) [rad]; `normals` (q, 4, 3); `thetas` (q, 4) [rad]; `across` (q,
+    3); `signs` (s, 4).
     """
     (axes, reached), bent, way = cones, np.empty((FINGERS, 3)), np.empty(3)
     for q in range(len(axes)):
@@ -133,14 +122,8 @@ def improve(
 ) -> None:
     """Move all four axes of each quadruple at random, and keep moves that widen the cones.
 
-    Args:
-        cones: Axes, changed in place, (q, 4, 3); half-angles, filled in, (q,) [rad].
-        normals: Unit vectors, (q, 4, 3).
-        thetas: Half-angles of the friction cones, (q, 4) [rad].
-        frames: Two directions across each axis, (2, q, 4, 3).
-        moves: Random moves in these directions, (moves, 4, 2).
-        pace: The first step in friction angles, its growth after a success and its share after
-            a failure, and the least improvement that counts, (4,).
+    Takes `cones` (q, 4, 3) or (q,) [rad]; `normals` (q, 4, 3); `thetas` (q, 4) [rad]; `frames` (2,
+    q, 4, 3); `moves` (moves, 4, 2); `pace` (4,).
     """
     (axes, reached), moved = cones, np.empty((FINGERS, 3))
     for q in range(len(axes)):

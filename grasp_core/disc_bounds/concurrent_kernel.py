@@ -30,12 +30,7 @@ def concurrent_bounds(
 ) -> None:
     """Bound the discs of concurrent grasps, with the focus before or behind all fingers.
 
-    Args:
-        faces: The faces of the object.
-        attempts: Faces in finger order, with their force cones.
-        turns: Cosines and sines of the directions in which a pyramid's facets lean, (m, 2).
-        least: Smaller discs do not matter: their bounds may be anything up to this.
-        bounds: Filled with the bounds, (a,); infinite where none was proved.
+    Takes `turns` (m, 2); `bounds` (a,).
     """
     corners = Corners(faces.corners, faces.edges)
     room = np.empty((VARIABLES + 2) * FINGERS * (len(turns) + faces.E.shape[1]))

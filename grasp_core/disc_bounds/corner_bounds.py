@@ -68,16 +68,9 @@ def disc_limits(
 ) -> Array:
     """Bound the radius of the smallest disc of many quadruples from above, (q, 4).
 
-    Args:
-        corners: Corners of all faces.
-        normals: Inward unit normals of all faces, (f, 3).
-        faces: Faces of each quadruple, (q, 4).
-        axes: Axes of force cones that positively span, (q, 4, 3).
-        half_angles: Half-angle of all four cones, (q,) [rad]; not positive where there are none.
-
-    Returns:
-        Upper bounds on the smallest of four discs: in a concurrent grasp, then in a pencil in
-        each of the `PAIRINGS`. They are in units of the corners.
+    Takes `normals` (f, 3); `faces` (q, 4); `axes` (q, 4, 3); `half_angles` (q,) [rad]. Gives upper
+    bounds on the smallest of four discs: in a concurrent grasp, then in a pencil in each of the
+    `PAIRINGS`. They are in units of the corners.
     """
     limits = np.empty((len(faces), 1 + len(PAIRINGS)))
     compiled(KERNEL).fill(
@@ -90,10 +83,7 @@ def disc_limits(
 def angle_limits(extent: float, widths: Array, half_angles: Array) -> Array:
     """Bound the discs from above where only the cones' half-angles are known, (q, 4).
 
-    Args:
-        extent: Largest distance of a corner from the centre of mass, which no reach exceeds.
-        widths: Upper bounds on s_i + s_j (see `widths_apart`), (q, 4, 4).
-        half_angles: Upper bounds on the half-angles, (q,) [rad].
+    Takes `widths` (q, 4, 4); `half_angles` (q,) [rad].
     """
     reaches = np.full(len(half_angles), extent)
     concurrent = concurrent_radius_bounds(reaches, widths, half_angles)
@@ -116,11 +106,7 @@ def widths_apart(faces: Indices, apart: Array, halves: Array, leaning: Array) ->
     length 2 / |a_i - a_j|, and the angle between the axes differs from the angle between the
     normals by at most the sum of both leans.
 
-    Args:
-        faces: Faces of each quadruple, (q, 4).
-        apart: The `distances` of all faces, (f, f).
-        halves: Half the angles between their normals, (f, f) [rad].
-        leaning: Largest angle between an axis and its normal, (q,) [rad].
+    Takes `faces` (q, 4); `apart` (f, f); `halves` (f, f) [rad]; `leaning` (q,) [rad].
     """
     widths = np.full((len(faces), FINGERS, FINGERS), np.inf)
     for i, j in combinations(range(FINGERS), 2):

@@ -31,13 +31,7 @@ def fill(
 ) -> None:
     """Bound the discs of many quadruples from above (see `disc_limits`).
 
-    Args:
-        corners: Corners of all faces.
-        normals: Inward unit normals of all faces, (f, 3).
-        faces: Faces of each quadruple, (q, 4).
-        axes: Axes of force cones that positively span, (q, 4, 3).
-        half_angles: Half-angle of all four cones, (q,) [rad]; not positive where there are none.
-        limits: Filled with upper bounds, (q, 4).
+    Takes `normals` (f, 3); `faces`, `limits` (q, 4); `axes` (q, 4, 3); `half_angles` (q,) [rad].
     """
     for q in range(len(faces)):
         if half_angles[q] <= 0.0:  # there are no such cones, and so no discs

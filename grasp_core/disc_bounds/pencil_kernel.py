@@ -32,12 +32,7 @@ def pencil_bounds(
 ) -> None:
     """Bound the discs of pencil grasps from above, for both orders of the foci.
 
-    Args:
-        faces: The faces of the object.
-        attempts: Faces in finger order, with their force cones; the pencils are (0, 1) and (2, 3).
-        least_gap: Least distance of the foci.
-        least: Smaller discs do not matter: their bounds may be anything up to this.
-        bounds: Filled with the bounds, (a,); infinite where none was proved.
+    Takes `attempts` (0, 1) or (2, 3); `bounds` (a,).
     """
     room = np.empty((VARIABLES + 2) * (1 + FINGERS * (2 + faces.E.shape[1])))
     for a in range(len(bounds)):
@@ -63,8 +58,7 @@ def _depth_along(
 ) -> tuple[Array, float, float]:
     """Express a finger's distance s from its focus by (1), as a linear function.
 
-    Returns:
-        Its slopes in (x0, k), its constant, and the sign of k u.
+    Gives its slopes in (x0, k), its constant, and the sign of k u.
     """
     a, finger = place
     face, s = attempts.faces[a, finger], np.empty(K + 1)

@@ -37,11 +37,6 @@ class AttemptBounds:
         """Bound the smallest radius from above, (a,) [object radii]; infinite if not proved.
 
         For reguli the bounds are infinite or, where no slopes are feasible, minus infinity.
-
-        Args:
-            construction: The construction of a family.
-            attempts: Faces with room, in finger order, with cones that positively span (P3).
-            least: Smaller discs do not matter: bounds below it need not be tight.
         """
         attempts = Attempts(
             np.ascontiguousarray(attempts.faces),

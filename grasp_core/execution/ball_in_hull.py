@@ -24,9 +24,8 @@ its sides and its distance: differences, products and sums lose about one each."
 def nearest_facet(points: Array) -> tuple[Array, float, Indices]:
     """Find the facet of the hull of points (n, 3) that is nearest to the origin, inside the hull.
 
-    Returns:
-        The facet's outward unit normal, (3,), its distance from the origin, and all triangles of
-        the hull, (t, 3).
+    Gives the facet's outward unit normal, (3,), its distance from the origin, and all triangles of
+    the hull, (t, 3).
     """
     spatial: Any = importlib.import_module("scipy.spatial")
     hull = spatial.ConvexHull(points)

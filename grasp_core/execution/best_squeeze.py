@@ -101,13 +101,7 @@ def best_squeeze(  # noqa: PLR0913 - each is a quantity of its own
 def searched(
     start: Grip, loads: LoadSet, most: float | None, motors: Motors | None = None
 ) -> BestSqueeze:
-    """Find the best squeeze of contacts, (see `best_squeeze`), starting from any squeeze.
-
-    Raises:
-        InputError: The contacts have no stiffness against some motion.
-        NoForcesError: No squeeze survives the loads, or the grip is unstable under the best one.
-        SolverError: A program's answer failed its check.
-    """
+    """Find the best squeeze of contacts, (see `best_squeeze`), starting from any squeeze."""
     survival = Survival.of(start, loads, motors)
     cuts = Cuts.first(len(survival.friction))
     best: _Round | None = None
@@ -212,12 +206,7 @@ def _program(survival: Survival, cuts: Cuts, most: float | None) -> tuple[Array,
 def _optimum(
     survival: Survival, rows: Rows, most: float | None, unit: float
 ) -> tuple[LinearProgram, Optimum]:
-    """Solve the program of some rows with forces in a unit [N].
-
-    Raises:
-        NoForcesError: No squeeze meets the rows.
-        SolverError: The program's answer failed its check.
-    """
+    """Solve the program of some rows with forces in a unit [N]."""
     goal = np.append(np.zeros(survival.G.shape[1]), 1.0)
     if most is None:  # the last unknown is minus the limit
         last, b = rows.d, (rows.b - (1.0 + ABOVE) * rows.c) / unit

@@ -64,15 +64,9 @@ it can be solved where everything slips."""
 def loss_multiples(grip: Grip, loads: Array, most_m: float, most_rad: float) -> Array:
     """Find the multiples of loads, each of which comes once, at which the object is lost.
 
-    Args:
-        grip: The squeezed contacts, inside their cones.
-        loads: External (force, torque), (m, 6) [N, N m], about the centre of mass.
-        most_m: Displacement from which on the object is lost [m].
-        most_rad: Turn from which on it is [rad].
-
-    Returns:
-        The multiples, (m,): at most those at which the object without slip would be lost; zero if
-        the grip is unstable at rest, infinite for a load of zero.
+    Takes `loads` (force, torque) or (m, 6) [N, N m]; `most_m` [m]; `most_rad` [rad]. Gives the
+    multiples, (m,): at most those at which the object without slip would be lost; zero if the grip
+    is unstable at rest, infinite for a load of zero.
     """
     if not grip.stable or not len(loads):
         return np.zeros(len(loads))
@@ -167,8 +161,7 @@ def _in_parts(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Solve (2) for one load after the other, (PARTS, m, 6), each from the balance before.
 
-    Returns:
-        The forces and motions of the last, and for which each balance was found, (m,).
+    Gives the forces and motions of the last, and for which each balance was found, (m,).
     """
     found = np.ones(len(forces), dtype=bool)
     for load in loads:
@@ -186,8 +179,7 @@ def _balanced(
 
     No step of Newton's method is longer than a reach, (6,): near the end of balance it would fly.
 
-    Returns:
-        The forces, the motions, and which were found, (m,).
+    Gives the forces, the motions, and which were found, (m,).
     """
     scale = np.repeat([1.0, 1.0 / grip.size], 3)
     rest = grip.local_squeeze
@@ -226,8 +218,7 @@ def _small_motions(grip: Grip) -> tuple[Array, Array, Array]:
 def _returned(tried: Array, friction: Array) -> tuple[Array, Array]:
     """Bring contact forces, (m, k, 3), back to their cones along the tangent.
 
-    Returns:
-        The forces, and their derivatives by those given, (m, k, 3, 3).
+    Gives the forces, and their derivatives by those given, (m, k, 3, 3).
     """
     pushing = tried[..., 0] > 0.0
     n = np.where(pushing, tried[..., 0], 0.0)

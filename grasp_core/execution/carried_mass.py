@@ -78,16 +78,7 @@ class Ray:
 def carried_mass(hand: CarryingHand, gap: float = GAP) -> HandPayload:
     """Bound the mass that a hand holds in every orientation, by rays until the bounds meet.
 
-    Args:
-        hand: Contacts, and motors that can carry their links.
-        gap: Wanted (upper - lower) / lower, from 1e-4. It is larger where `RAYS` do not suffice.
-
-    Returns:
-        Both bounds with their proofs; a lower bound of zero where no mass is shown to be held.
-
-    Raises:
-        InputError: The gap is out of range.
-        SolverError: A program's answer failed its check.
+    Gives both bounds with their proofs; a lower bound of zero where no mass is shown to be held.
     """
     number(gap, "gap", least=FINEST_GAP, below=1.0)
     first, weakest = _searched(hand, gap)
@@ -106,12 +97,8 @@ def carried_mass(hand: CarryingHand, gap: float = GAP) -> HandPayload:
 def _searched(hand: CarryingHand, gap: float) -> tuple[HandPayload, Ray]:
     """Bound the mass by rays; forces are as accurate as programs are.
 
-    Returns:
-        A certificate whose forces may not be balanced well enough, and the ray with its upper
-        bound.
-
-    Raises:
-        SolverError: A program's answer failed its check.
+    Gives a certificate whose forces may not be balanced well enough, and the ray with its upper
+    bound.
     """
     rays, weakest = _first_rays(hand)
     mass, lowered = rays[0].mass, gap
@@ -138,11 +125,7 @@ def _searched(hand: CarryingHand, gap: float) -> tuple[HandPayload, Ray]:
 def _first_rays(hand: CarryingHand) -> tuple[list[Ray], Ray]:
     """Cast the first rays at a mass that is a little too large, by a step of Newton's from above.
 
-    Args:
-        hand: Contacts, and motors that can carry their links.
-
-    Returns:
-        The rays at that mass, and of all rays the one with the least bound.
+    Gives the rays at that mass, and of all rays the one with the least bound.
     """
     # no forces are larger than all fingers' together
     mass = hand.push_n * float((1.0 + hand.friction).sum()) / GRAVITY_M_PER_S2
@@ -174,8 +157,7 @@ def _weakest(rays: list[Ray]) -> Ray:
 def _ends(hand: CarryingHand, rays: list[Ray], mass: float) -> tuple[Array, Array]:
     """Mix the ends of rays with links alone to points of S(m') for a mass m' up to the rays'.
 
-    Returns:
-        The points by (1), (n, 3), and the shares a of the rays' forces that hold them, (n,).
+    Gives the points by (1), (n, 3), and the shares a of the rays' forces that hold them, (n,).
     """
     ways = np.array([ray.direction for ray in rays])
     reach, masses = np.array([(ray.reach, ray.mass) for ray in rays]).T

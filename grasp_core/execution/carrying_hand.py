@@ -228,11 +228,7 @@ class CarryingHand(ByValue):
     def most(self, facet: Array, multipliers: Array, rounding: float = 1.0) -> float:
         """Return the mass above which (5) fails [kg]; infinite if there is none.
 
-        Args:
-            facet: Twist y, (6,).
-            multipliers: Multipliers u of the joints, (joints,).
-            rounding: How often h is raised by what rounding may take of it: certificates are made
-                with more than they are checked with, so that two ways to round agree.
+        Takes `facet` (6,); `multipliers` (joints,).
         """
         # facets of any length mean the same
         facet, multipliers = of_order_one(facet, multipliers)

@@ -51,13 +51,7 @@ def at_rest(grip: Grip) -> Held:
 def under(held: Held, start: Grip, load: Array) -> Held:
     """Find the equilibrium under a load, starting from one under a load nearby.
 
-    Args:
-        held: Equilibrium to start from.
-        start: The grip at rest, whose squeeze and springs the forces follow from.
-        load: External wrench, (6,) [N, N m], about the centre of mass, along the world's axes.
-
-    Raises:
-        SolverError: No equilibrium was found; there may be none.
+    Takes `load` (6,) [N, N m].
     """
     size = start.size
     scale = np.repeat([1.0, size], 3)
@@ -75,10 +69,7 @@ def under(held: Held, start: Grip, load: Array) -> Held:
 def stepped(held: Held, start: Grip, step: Array) -> Held:
     """Move the object by a translation and a turn, and let the tips follow.
 
-    Args:
-        held: The pose to start from.
-        start: The grip at rest, whose squeeze and springs the forces follow from.
-        step: Small motion, (6,) [m, rad], along the world's axes, about the centre of mass.
+    Takes `step` (6,) [m, rad].
     """
     shift, turn = step[:3], step[3:]
     R = rotation(turn)

@@ -174,10 +174,7 @@ def _check_rest(grip: Grip, max_push_n: float) -> None:
 def slip_steps(local: Array, change: Array, friction: Array) -> Array:
     """Solve (1) for each contact: the least s >= 0 at which it slips, (k,); infinite if never.
 
-    Args:
-        local: Contact forces (normal, tangent, tangent), inside their cones, (k, 3).
-        change: Their change per unit of load, (k, 3).
-        friction: Coulomb coefficients, (k,).
+    Takes `local` (normal, tangent, tangent) or (k, 3); `change` (k, 3); `friction` (k,).
     """
     n, t, a, b = local[:, 0], local[:, 1:], change[:, 0], change[:, 1:]
     # q2 s^2 + 2 q1 s + q0 is the squared cone less the squared tangential force, q0 >= 0
@@ -206,8 +203,7 @@ def _push_steps(local: Array, change: Array, most: float) -> Array:
 def _next_event(held: Held, load: Array, most: _Limits) -> tuple[float, Event, int]:
     """Find the next multiple of a load at which something happens, as the response stays.
 
-    Returns:
-        The further multiple, what happens, and the index of the contact or joint.
+    Gives the further multiple, what happens, and the index of the contact or joint.
     """
     grip = held.grip
     local, change = grip.local_squeeze, grip.response @ load

@@ -267,11 +267,7 @@ def unsqueezed(
     stiffness: ArrayLike,
     tip_radius_m: ArrayLike,
 ) -> Grip:
-    """Build a grip that does not push yet (see `grip`).
-
-    Raises:
-        InputError: Shapes or ranges are wrong.
-    """
+    """Build a grip that does not push yet (see `grip`)."""
     check_body(body)
     if isinstance(contacts, Grasp):
         check_on_faces(body, contacts)
@@ -296,10 +292,6 @@ def unsqueezed(
 
 
 def check_grip(value: Grip) -> None:
-    """Refuse a value that is not a grip, or is one that was tampered with.
-
-    Raises:
-        InputError: The value is not a sound `Grip`.
-    """
+    """Refuse a value that is not a grip, or is one that was tampered with."""
     if not instance(value, Grip, "grip", "gc.grip makes one").sound():
         raise InputError("grip must be as gc.grip makes it; its fields are not those of contacts")

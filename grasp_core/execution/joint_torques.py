@@ -45,11 +45,7 @@ class JointTorques:
     def of(cls, motors: Motors, frames: Array, offset: Array, change: Array) -> "JointTorques":
         """Take the joints of contacts with given responses.
 
-        Args:
-            motors: The joints, with levers for so many contacts.
-            frames: Axes of the contacts, (k, 3, 3).
-            offset: Forces f0 that the offset adds in each group of contacts, (groups k, 3) [N].
-            change: Their change C over the ellipsoid, (groups k, 3, m) [N].
+        Takes `frames` (k, 3, 3); `offset` (groups k, 3) [N]; `change` (groups k, 3, m) [N].
         """
         k, joints = len(frames), len(motors.limits)
         groups = len(offset) // k
@@ -83,8 +79,7 @@ class JointTorques:
     def under(self, local: Array) -> Array:
         """Compute the torques in the middle of the loads, (groups, joints) [N].
 
-        Args:
-            local: The squeeze in the contacts' frames, (k, 3) [N].
+        Takes `local` (k, 3) [N].
         """
         return self.start + self.levers @ local.ravel()
 
@@ -117,10 +112,7 @@ class JointTorques:
 def torque_steps(torques: Array, rates: Array, limits: Array) -> Array:
     """Find the further multiple of a load at which each torque reaches its limit, (joints,).
 
-    Args:
-        torques: Torques now, (joints,) [N m].
-        rates: Their change per unit of load, (joints,).
-        limits: Limits either way, (joints,) [N m].
+    Takes `torques`, `limits` (joints,) [N m]; `rates` (joints,).
     """
     # a torque grows towards the limit of its own sign, or falls to that of the other
     left = np.maximum(limits - np.sign(rates) * torques, 0.0)
@@ -131,10 +123,7 @@ def torque_steps(torques: Array, rates: Array, limits: Array) -> Array:
 def torque_excess(torques: Array, rates: Array, limits: Array) -> float:
     """Find how much less load brings joints that are just beyond their limits back, or zero.
 
-    Args:
-        torques: Torques now, (joints,) [N m].
-        rates: Their change per unit of load, (joints,).
-        limits: Limits either way, (joints,) [N m].
+    Takes `torques`, `limits` (joints,) [N m]; `rates` (joints,).
     """
     growing = np.sign(torques) * rates
     with np.errstate(divide="ignore", invalid="ignore"):

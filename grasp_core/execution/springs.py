@@ -14,12 +14,7 @@ SYMMETRIC = 1e-9
 def springs(stiffness: ArrayLike, count: int) -> Array:
     """Return one checked matrix for each fingertip, (count, 3, 3), of one number or one each.
 
-    Args:
-        stiffness: One number for all, one each, or a matrix each [N/m].
-        count: Number of fingertips.
-
-    Raises:
-        InputError: Shapes are wrong, or a spring is not positive definite.
+    Takes `stiffness` [N/m].
     """
     if real_array(stiffness, "stiffness").ndim < len(("finger", "row", "column")):
         each = frozen_each(stiffness, count, "stiffness")

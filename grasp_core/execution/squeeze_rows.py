@@ -97,11 +97,7 @@ class Survival:
 
     @classmethod
     def of(cls, grip: Grip, loads: LoadSet, motors: Motors | None = None) -> "Survival":
-        """Take the response of a grip at its squeeze.
-
-        Raises:
-            InputError: The motors are not those of so many contacts.
-        """
+        """Take the response of a grip at its squeeze."""
         joints = motors_for(motors, len(grip.friction))
         A, mu = grip.response, grip.friction
         offset, change = A @ loads.offset, A @ loads.axes
@@ -149,11 +145,7 @@ class Survival:
     def bound(self, cuts: Cuts, multipliers: Array, balance: Array, max_push_n: float) -> float:
         """Bound by (4) the scale that any squeeze with this response survives; infinite if none.
 
-        Args:
-            cuts: Which rows (1) are combined.
-            multipliers: y of these, of (2) and of (3), (r + 2 cases + joint rows,), not negative.
-            balance: z, (6,).
-            max_push_n: The limit N on pushes.
+        Takes `multipliers` (r + 2 cases + joint rows,); `balance` (6,).
         """
         rows = self.rows(cuts)
         # multipliers of any length mean the same

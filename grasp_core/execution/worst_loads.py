@@ -126,12 +126,7 @@ class Reactions:
         return leaning / (float(np.linalg.norm(leaning)) or 1.0)
 
     def survives(self, scale: float, multipliers: Array) -> bool:
-        """Return whether multipliers tau, (k,) [N^2], prove by (4) that no contact slips.
-
-        Args:
-            scale: Scale of the ellipsoid, not negative.
-            multipliers: One multiplier for each contact.
-        """
+        """Return whether multipliers tau, (k,) [N^2], prove by (4) that no contact slips."""
         M, ball = self._certificates(scale)
         pressed = self.start[:, 0] >= scale * self.swing * (1.0 - ROUNDING)
         least = np.linalg.eigvalsh(M - multipliers[:, None, None] * ball)[:, 0]

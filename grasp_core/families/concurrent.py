@@ -72,16 +72,7 @@ MIXED_SIDES: tuple[Sides, ...] = tuple(
 def place_concurrent(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least: float
 ) -> Placement | NoPlacement:
-    """Place a focus before or behind all fingers, and the largest four equal discs.
-
-    Args:
-        pieces: Four convex pieces, in finger order, in units where the object has size one.
-        cones: The force cones, in the same order; they must satisfy the generalised P3.
-        least: Least radius of the discs; smaller ones count as none.
-
-    Raises:
-        SolverError: A program's answer failed its check.
-    """
+    """Place a focus before or behind all fingers, and the largest four equal discs."""
     widest = math.tan(max(cone.half_angle for cone in cones))
     limits = [reach * widest for reach in _reaches(pieces, cones)]
     return _best(pieces, cones, zip((BEFORE, BEHIND), limits, strict=True), least)
@@ -141,18 +132,7 @@ def _reaches(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[f
 def place_on_sides(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], sides: Sides = BEFORE, *, least: float
 ) -> Placement | NoPlacement:
-    """Place a focus point and four discs of the largest common radius.
-
-    Args:
-        pieces: Four convex pieces, in finger order, in units where the object has size one.
-        cones: The force cones, in the same order; together they must satisfy the
-            generalised P3 for the result to mean equilibrium.
-        sides: 1 for a finger that pushes towards the focus, -1 for one that pushes away from it.
-        least: Least radius of the discs; smaller ones count as none.
-
-    Raises:
-        SolverError: A program's answer failed its check.
-    """
+    """Place a focus point and four discs of the largest common radius."""
     A, b = _rows(pieces, cones, sides)
     discs = largest_discs(A, b, RADII, SMALLEST, least)
     if isinstance(discs, NoPlacement):
@@ -184,9 +164,7 @@ def concurrent_radius_bounds(reaches: Array, _: Array, half_angles: Array) -> Ar
 
     The bound is (5), as the least s_i is at most the weighted mean of all s_i.
 
-    Args:
-        reaches: Upper bounds on the weighted mean of s_i, any shape [object radii].
-        half_angles: Half-angles of the cones, the same shape [rad].
+    Takes `reaches` [object radii]; `half_angles` [rad].
     """
     bounds: Array = reaches * np.tan(half_angles)
     return bounds[..., None]

@@ -46,18 +46,8 @@ def largest_discs(
 ) -> LargestDiscs | NoPlacement:
     """Find the largest four equal discs, then enlarge each, subject to rows A x <= b.
 
-    Args:
-        A: Rows over the variables, (rows, n); they keep the smallest radius below each of the four.
-        b: Limits of the rows, (rows,).
-        radii: Places of the four radii in x.
-        smallest: Place of the radii's lower bound in x.
-        least: Least radius of the discs; smaller ones count as none.
-
-    Returns:
-        The discs, or a proved bound below `least` on their common radius.
-
-    Raises:
-        SolverError: A program's answer failed its check.
+    Takes `A` (rows, n); `b` (rows,). Gives the discs, or a proved bound below `least` on their
+    common radius.
     """
     n = A.shape[1]
     common = np.eye(n)[smallest]

@@ -118,21 +118,7 @@ def place_free(
     restarts: int = RESTARTS,
     whole: ClosureCertificate | None = None,
 ) -> Placement | Absence | Undecided:
-    """Find a grasp of four convex pieces, or prove that there is none.
-
-    Args:
-        pieces: Four convex pieces, in finger order, in units where the object has size one.
-        friction: Coulomb coefficient at every contact, positive.
-        rng: Source of the random restarts.
-        cells: Largest number of parts of the pieces to examine; with 1 nothing is divided.
-        restarts: Number of smaller random pieces to try before giving up or dividing.
-        whole: The certificate of contacts at all corners of the pieces, where it is known (see
-            `close_patches`).
-
-    Raises:
-        InputError: The friction is not positive.
-        SolverError: A program's answer failed its check.
-    """
+    """Find a grasp of four convex pieces, or prove that there is none."""
     if not friction > 0.0:
         raise InputError(f"friction must be greater than 0, got {friction}")
     leaves: list[tuple[Path, ClosureCertificate]] = []
@@ -183,12 +169,7 @@ def close_patches(
 ) -> list[ClosureCertificate | None]:
     """Decide force closure of contacts at all corners of many sets of four pieces, at once.
 
-    Args:
-        quadruples: Four convex pieces each, in finger order.
-        friction: Coulomb coefficient at every contact, positive.
-
-    Returns:
-        A certificate for each, or None where `close_patch` has to decide.
+    Gives a certificate for each, or None where `close_patch` has to decide.
     """
     contacts = [corner_contacts(pieces, part_at(pieces, ())) for pieces in quadruples]
     sizes = np.array([len(points) for points, _ in contacts], dtype=np.int64)

@@ -98,12 +98,7 @@ def smallest_forces(
 ) -> Array | None:
     """Find the smallest balanced forces at points of pieces, (k, 3), or None if there are none.
 
-    Args:
-        pieces: The piece of each point, k of them.
-        points: Contact points, (k, 3).
-        normals: Inward unit normals, (k, 3).
-        friction: Coulomb coefficient at every point.
-        depth: Least distance of the forces from the facets of their pyramids.
+    Takes `points`, `normals` (k, 3).
     """
     # (1): f_0 is the least-squares solution, Z spans what it leaves free
     conditions = np.vstack([grasp_map(points), normals.reshape(1, -1)])
@@ -123,12 +118,8 @@ def smallest_forces(
 def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | None:
     """Place contacts at which given forces balance, as far from the edges as possible.
 
-    Args:
-        pieces: Four convex pieces.
-        forces: One force per piece, summing to zero, (4, 3).
-
-    Returns:
-        The placement; None if the contacts would be too near an edge or on one line.
+    Takes `forces` (4, 3). Gives the placement; None if the contacts would be too near an edge or on
+    one line.
     """
     A_eq = np.zeros((3, 2 * FINGERS + 1))
     b_eq = np.zeros(3)

@@ -84,15 +84,7 @@ def place_pencil(
 ) -> Placement | NoPlacement:
     """Place two foci and the largest four equal discs, for the better order of the foci.
 
-    Args:
-        pieces: Four convex pieces; the pencils are (0, 1) and (2, 3).
-        cones: The force cones, in the same order; they must satisfy the generalised P3.
-        least: Least radius of the discs; smaller ones count as none.
-        least_gap: Least distance of the foci; nearer ones would make the grasp concurrent.
-        cells: Orders of the foci to try.
-
-    Raises:
-        SolverError: A program's answer failed its check.
+    Takes `pieces` (0, 1) or (2, 3).
     """
     u = focus_direction(np.array([cone.axis for cone in cones]))
     discs = _discs(pieces, cones, u)
@@ -119,11 +111,7 @@ def pencil_radius_bounds(
     - c_1).w. In cell A the last term only lowers it. In cell B it is 2 k |w|, at most half of the
     left side, which can therefore double.
 
-    Args:
-        reaches: Upper bounds on the mean distance of a focus along the axes, any shape.
-        widths: Upper bounds on s_i + s_j for two fingers of one focus, (..., 4, 4).
-        half_angles: Half-angles of the cones, shaped like `reaches` [rad].
-        orders: Finger orders; the pairs are the first two and the last two.
+    Takes `widths` (..., 4, 4); `half_angles` [rad].
     """
     depths = [
         np.minimum(2.0 * reaches, 0.5 * np.minimum(widths[..., i, j], widths[..., k, m]))

@@ -57,8 +57,7 @@ def focus_direction(axes: Array) -> Array:
     the planes of both pairs, and the first pair pushes along it: with positive weights lam of sum
     lam a = 0, u points along w = lam_0 a_0 + lam_1 a_1 = -lam_2 a_2 - lam_3 a_3.
 
-    Args:
-        axes: Axes of four force cones that positively span, in finger order, (..., 4, 3).
+    Takes `axes` (..., 4, 3).
     """
     first = np.einsum("...i,...ij->...j", balancing_weights(axes)[..., :2], axes[..., :2, :])
     w = np.asarray(first, dtype=np.float64)

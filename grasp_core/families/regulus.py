@@ -54,16 +54,8 @@ def place_regulus(
 ) -> Placement | NoPlacement:
     """Place four contacts on the lines of one regulus, near the centres of the faces.
 
-    Args:
-        pieces: Four convex pieces; the pairs are (0, 1) and (2, 3).
-        cones: The force cones, in the same order; they must satisfy the generalised P3.
-
-    Returns:
-        The placement, with minus the largest offset t as its merit, or its absence for the slopes
-        tried.
-
-    Raises:
-        SolverError: A program's answer failed its check.
+    Takes `pieces` (0, 1) or (2, 3). Gives the placement, with minus the largest offset t as its
+    merit, or its absence for the slopes tried.
     """
     known = _best_choice(pieces, cones)
     if known is not None:
@@ -80,14 +72,8 @@ def regulus_bounds(
 ) -> tuple[Array, Indices]:
     """Bound the merits of regulus grasps for many attempts, in compiled code.
 
-    Args:
-        table: The faces.
-        attempts: Faces in finger order, with cones that positively span (P3).
-        enough: Merit above which no better choice is sought; no offset is below zero.
-
-    Returns:
-        The merits of the best choices, (a,): minus infinity where a proof excludes every choice,
-        infinity where a choice was not decided. Then these choices, (a, 3), -1 where there is none.
+    Gives the merits of the best choices, (a,): minus infinity where a proof excludes every choice,
+    infinity where a choice was not decided. Then these choices, (a, 3), -1 where there is none.
     """
     turns, shares = np.array(facet_turns(PYRAMID_SIDES)), np.array(SLOPES)
     terms = RegulusTerms(turns, shares, LEAST_DEPTH, LEAST_INSET, LEAST_GAP, SAME_OFFSET, enough)

@@ -94,8 +94,7 @@ def _facets(
 def _tightest(facets: Array, resultant: float, tau: float, tight: Array) -> bool:
     """Find the rows alpha x + beta z >= 0 that bound z / |x|, for x on the resultant's side.
 
-    Returns:
-        Whether the two rows leave anything between them.
+    Gives whether the two rows leave anything between them.
     """
     lower, upper = -np.inf, np.inf
     tight[:] = 0.0

@@ -66,13 +66,7 @@ def regulus_bounds(
 ) -> None:
     """Bound the merit, minus the largest offset t, over slopes until one is good enough.
 
-    Args:
-        faces: The faces of the object.
-        attempts: Faces in finger order; the pairs are (0, 1) and (2, 3).
-        terms: Which slopes are tried, and what counts as a regulus.
-        bounds: Filled with the bounds, (a,): minus infinity where no slopes are feasible, and
-            infinity where a program was not decided.
-        chosen: Filled with the best slopes of the two pairs and the side, (a, 3); -1 if none.
+    Takes `attempts` (0, 1) or (2, 3); `bounds` (a,); `chosen` (a, 3).
     """
     others = 1 + FINGERS * (4 + 1 + 1) + 4  # gap; offsets, depth, equality; bounds on z / x
     room = np.empty((VARIABLES + 2) * (others + FINGERS * faces.E.shape[1]))

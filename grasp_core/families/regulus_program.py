@@ -69,9 +69,7 @@ RESULTANTS = np.array([1.0, 1.0, -1.0, -1.0])
 def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
     """Return whether both pairs of each quadruple leave their slopes an interval (3), (q,).
 
-    Args:
-        axes: Axes of the force cones in finger order, (q, 4, 3).
-        half_angles: Half-angles of the cones, (q,) [rad].
+    Takes `axes` (q, 4, 3); `half_angles` (q,) [rad].
     """
     least, largest = _slope_angles(axes, half_angles[:, None])
     return np.all(least < largest, axis=1)
@@ -80,12 +78,8 @@ def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
 def _slope_angles(axes: Array, half_angles: Array) -> tuple[Array, Array]:
     """Return the ends of (3): the least and largest angle of each pair's forces [rad].
 
-    Args:
-        axes: Axes of the force cones in finger order, (..., 4, 3).
-        half_angles: One half-angle for all fingers, (..., 1), or one each, (..., 4) [rad].
-
-    Returns:
-        Two arrays, each (..., 2).
+    Takes `axes` (..., 4, 3); `half_angles` (..., 1) or (..., 4) [rad]. Gives two arrays, each (...,
+    2).
     """
     resultants = focus_direction(axes)[..., None, :] * RESULTANTS[:, None]
     phi = angles_between(axes, resultants)
@@ -117,11 +111,7 @@ class Line:
 
 
 def frames_of_pairs(cones: Sequence[ForceCone]) -> list[Pair]:
-    """Return the frames of the pairs (0, 1) and (2, 3), with the angles that their slopes may have.
-
-    Args:
-        cones: Four force cones that positively span, in finger order.
-    """
+    """Return the frames of the pairs (0, 1) and (2, 3), with the angles of their slopes."""
     axes = np.array([cone.axis for cone in cones])
     u = focus_direction(axes)
     least, largest = _slope_angles(axes, np.array([cone.half_angle for cone in cones]))

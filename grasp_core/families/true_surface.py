@@ -42,16 +42,7 @@ def on_true_surface(
 ) -> tuple[tuple[FacePiece, ...], Placement] | None:
     """Move a placement to the true surface; None if no contacts there hold the same grasp.
 
-    Args:
-        shapes: Shapes of the four faces, in finger order.
-        pieces: The pieces on which the grasp is planned.
-        cones: The force cones.
-        planned: The placement on the planes; its radii and merit are kept.
-        regions: Regions of the fingers, in the pieces' units.
-        place: The construction, as a function of pieces.
-
-    Returns:
-        The pieces that the contacts are on, and the placement.
+    Gives the pieces that the contacts are on, and the placement.
     """
     if all(shape.facets is None for shape in shapes):
         return pieces, planned

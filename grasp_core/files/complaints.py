@@ -28,18 +28,7 @@ OURS = {
 def record_of(
     kind: type[Record], text: str, wanted: str, *, schema: int | None = None, nulls: bool = True
 ) -> Record:
-    """Read the text of a JSON file as a record whose fields are checked.
-
-    Args:
-        kind: Class of the record with its fields: a model, or a typed dictionary.
-        text: Text of the file.
-        wanted: What the file should be, for messages.
-        schema: The version that it must have; None for files that have none.
-        nulls: Whether a value may be null.
-
-    Raises:
-        InputError: The text is not such a file; the message names the field.
-    """
+    """Read the text of a JSON file as a record whose fields are checked."""
     from pydantic import TypeAdapter, ValidationError
 
     object_of(text, wanted, schema=schema, nulls=nulls)
@@ -52,16 +41,7 @@ def record_of(
 def settings_of(
     kind: type[Record], given: Mapping[str, Any], inside: Sequence[str | int]
 ) -> Record:
-    """Make settings of a class from a part of a file, with every field checked.
-
-    Args:
-        kind: Class of the settings: a dataclass that checks its own fields.
-        given: The fields, as JSON or TOML gives them.
-        inside: Keys that lead to this part of its file.
-
-    Raises:
-        InputError: A field has the wrong type, or the settings refuse it; the message names it.
-    """
+    """Make settings of a class from a part of a file, with every field checked."""
     from pydantic import TypeAdapter, ValidationError
 
     try:
@@ -73,13 +53,7 @@ def settings_of(
 
 
 def complaint(error: "ValidationError", kind: Any, inside: Sequence[str | int] = ()) -> str:
-    """Describe the first thing that is wrong with a record.
-
-    Args:
-        error: The error that pydantic raised.
-        kind: The fields that were expected: a model, or a dataclass.
-        inside: Keys that lead to the record in its file.
-    """
+    """Describe the first thing that is wrong with a record."""
     first = error.errors(include_url=False)[0]
     loc, fault, came = first["loc"], first["type"], first["input"]
     where = place([*inside, *loc])

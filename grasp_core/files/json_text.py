@@ -10,14 +10,7 @@ from typing import Any, cast
 
 
 def text_of(document: Mapping[str, object]) -> str:
-    """Write an object as JSON, with one key per line, and one line per item of a list of objects.
-
-    Args:
-        document: Plain values by their keys.
-
-    Raises:
-        ValueError: A number is not finite.
-    """
+    """Write an object as JSON: one line per key, and per item of a list of objects."""
     lines = (f" {_line(key)}: {_value(value)}" for key, value in document.items())
     return "{\n" + ",\n".join(lines) + "\n}\n"
 

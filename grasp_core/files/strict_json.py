@@ -40,17 +40,7 @@ BESIDE = ("verdicts.json", "regions.json", "executions.json", "best.json")
 def object_of(
     text: str, wanted: str, *, schema: int | None = None, nulls: bool = True
 ) -> dict[str, Any]:
-    """Return the object that a JSON text holds.
-
-    Args:
-        text: Text of a file.
-        wanted: What the file should be, one of `KINDS` or something else.
-        schema: The version that it must have; None for files that have none.
-        nulls: Whether a value may be null.
-
-    Raises:
-        InputError: The text holds no such object; the message names the field.
-    """
+    """Return the object that a JSON text holds."""
     found = value_of(text, nulls=nulls)
     if not isinstance(found, dict):
         raise InputError(f"{_with_article(wanted)} must hold one JSON object, got {shown(found)}")
@@ -62,11 +52,7 @@ def object_of(
 
 
 def value_of(text: str, *, nulls: bool = True) -> Any:
-    """Return the value that a JSON text holds.
-
-    Raises:
-        InputError: The text is not JSON, or holds a value that no file of ours may hold.
-    """
+    """Return the value that a JSON text holds."""
     try:
         found = json.loads(text, object_pairs_hook=_without_twins)
     except RecursionError as error:
@@ -86,12 +72,7 @@ def value_of(text: str, *, nulls: bool = True) -> Any:
 
 
 def check_values(document: object, *, nulls: bool = True) -> None:
-    """Refuse plain values that no file of graspproof may hold, whatever its format.
-
-    Raises:
-        InputError: A number is not finite or too large, a text has no encoding, a value is null
-            that must not be, or nesting is too deep; the message names the field.
-    """
+    """Refuse plain values that no file of graspproof may hold, whatever its format."""
     try:
         _check([document], nulls, DEEPEST)
     except _FaultError as found:
@@ -123,11 +104,7 @@ def _check(holder: Any, nulls: bool, deeper: int) -> None:
 
 
 def check_kind(found: Mapping[str, Any], wanted: str) -> None:
-    """Refuse a JSON file of graspproof that is of another kind than the one asked for.
-
-    Raises:
-        InputError: The file is of another kind; the message says which.
-    """
+    """Refuse a JSON file of graspproof that is of another kind than the one asked for."""
     if wanted in KINDS and set(KINDS[wanted]) <= found.keys():
         return
     for kind, keys in KINDS.items():
@@ -144,11 +121,7 @@ def _with_article(kind: str) -> str:
 
 
 def check_schema(found: Mapping[str, Any], schema: int) -> None:
-    """Refuse a version of the file format that this package does not read.
-
-    Raises:
-        InputError: The key `schema` is missing, or is another number.
-    """
+    """Refuse a version of the file format that this package does not read."""
     came = found.get("schema")
     if came is None:
         raise InputError(f"schema: the key is missing; expected {schema}")

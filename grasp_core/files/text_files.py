@@ -15,11 +15,7 @@ class NotTextError(InputError):
 
 
 def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
-    """Read a regular file; pipes and devices are refused, because they may never end.
-
-    Raises:
-        InputError: The file cannot be read, is not a regular file, or is larger than `most` bytes.
-    """
+    """Read a regular file; pipes and devices are refused, because they may never end."""
     try:
         data = bounded_bytes(path, most)
     except OSError as error:
@@ -32,11 +28,7 @@ def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
 
 
 def read_text(path: Path, most: int = MAX_TEXT_BYTES) -> str:
-    """Read the text of a file.
-
-    Raises:
-        InputError: The file cannot be read, is too large, or is not UTF-8.
-    """
+    """Read the text of a file."""
     try:
         return text_of(read_bytes(path, most))
     except NotTextError as error:
@@ -44,11 +36,7 @@ def read_text(path: Path, most: int = MAX_TEXT_BYTES) -> str:
 
 
 def text_of(data: bytes) -> str:
-    """Decode the bytes of a file; line ends of Windows become plain ones.
-
-    Raises:
-        NotTextError: The bytes are not UTF-8.
-    """
+    """Decode the bytes of a file; line ends of Windows become plain ones."""
     if data.startswith(MARKS):
         raise NotTextError("the text begins with a byte order mark; save it as UTF-8 without one")
     try:

@@ -18,11 +18,7 @@ SHOWN = 40
 
 
 def write_parts(path: Path, parts: Iterable[bytes]) -> Path:
-    """Write a file from parts of bytes; missing folders are made.
-
-    Raises:
-        OSError: The file cannot be written; the error names the file.
-    """
+    """Write a file from parts of bytes; missing folders are made."""
     with replacing(path) as temporary, temporary.open("wb") as stream:
         stream.writelines(parts)
         stream.flush()
@@ -32,11 +28,7 @@ def write_parts(path: Path, parts: Iterable[bytes]) -> Path:
 
 @contextmanager
 def replacing(path: Path) -> Generator[Path]:
-    """Yield another path with the same suffix to write to; afterwards that file replaces `path`.
-
-    Raises:
-        OSError: The file cannot be written; the error names the file, not the other path.
-    """
+    """Yield another path with the same suffix to write to; afterwards that file replaces `path`."""
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         with _beside(path) as temporary:
@@ -75,9 +67,6 @@ def bounded_bytes(path: Path, most: int) -> bytes:
     """Read the bytes of a file, or its first `most + 1` bytes if it is longer.
 
     Named pipes are refused, so reading never blocks.
-
-    Raises:
-        OSError: The file cannot be read, or is a folder, a pipe or a device.
     """
     try:
         handle = os.open(

@@ -65,13 +65,8 @@ class Balance:
     ) -> "Balance":  # fmt: skip
         """Scale contacts and external wrenches to unit size.
 
-        Args:
-            arms: Contact points relative to the centre of torques, (k, 3) [m].
-            normals: Inward unit normals, (k, 3).
-            wrenches: External (force, torque), (n, 6) [N, N m].
-            normal_force: Least and largest normal force of each contact [N].
-            by_load: Whether the unit of force is the load, so that small loads are solved as
-                exactly as large ones; otherwise it is the largest normal force.
+        Takes `arms` (k, 3) [m]; `normals` (k, 3); `wrenches` (force, torque) or (n, 6) [N, N m];
+        `normal_force` [N].
         """
         least, largest = normal_force
         size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
@@ -103,8 +98,7 @@ class Balance:
         No arm is longer than one, so this bounds forces and torques alike. Wrenches far beyond that
         would keep solvers busy for seconds.
 
-        Args:
-            friction: Coulomb coefficient of each contact, (k,).
+        Takes `friction` (k,).
         """
         # force and torque separately, in units of the longest arm
         sizes = np.linalg.norm(self.W.reshape(-1, 2, 3), axis=2).max(axis=1)
@@ -114,8 +108,7 @@ class Balance:
     def pyramids(self, friction: Array) -> Array:
         """Return rows R with R @ f <= 0 in pyramids inside the friction cones, (16 k, 3 k).
 
-        Args:
-            friction: Coulomb coefficient of each contact, (k,).
+        Takes `friction` (k,).
         """
         count, each = len(friction), np.arange(len(friction))
         rows = np.zeros((count, PYRAMID_SIDES, count, 3))
@@ -163,9 +156,7 @@ class Balance:
 def needed_friction(F: Array, friction: Array) -> Array:
     """Return the largest share of its friction that any contact needs, (n,).
 
-    Args:
-        F: Local forces, (n, 3k).
-        friction: Coulomb coefficient of each contact, (k,).
+    Takes `F` (n, 3k); `friction` (k,).
     """
     along, across = F[:, 0::3], np.hypot(F[:, 1::3], F[:, 2::3])
     shares = across / np.maximum(friction * along, NO_FORCE)

@@ -25,9 +25,7 @@ KEPT_BACK = 1e-7
 def least_norm_in_cones(balance: Balance, friction: Array) -> Array | None:
     """Find local forces (3k,) in the cones that balance the first wrench, or None.
 
-    Args:
-        balance: The wrench and the limits.
-        friction: Coulomb coefficient of each contact, (k,).
+    Takes `friction` (k,).
     """
     unit = 1.0
     for _ in range(2):

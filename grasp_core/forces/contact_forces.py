@@ -85,9 +85,8 @@ def least_friction_forces(
 
     The search starts at `friction`, but the forces may need more than that.
 
-    Returns:
-        The forces [N] and the coefficient; None when the limits on the normal forces leave no
-        balance.
+    Gives the forces [N] and the coefficient; None when the limits on the normal forces leave no
+    balance.
     """
     load = frozen(wrench, (6,), "wrench")[None]
     balance = _balance(positions, normals, load, normal_force, center)

@@ -37,20 +37,9 @@ def even_forces(
 ) -> Array:
     """Find balanced forces whose least push is largest, when the largest push is 1 N.
 
-    Args:
-        positions: Contact points, (k, 3) [m].
-        normals: Unit vectors into the object, (k, 3).
-        friction: Coulomb coefficient, positive, one for all contacts or one each.
-        torsion_m: Torsional coefficient, one for all contacts or one each [m].
-
-    Returns:
-        Forces on the object, (k, 3) [N], balanced to `IMBALANCE`; with torsion, together with some
-        torques about the normals, which come from the contacts by themselves.
-
-    Raises:
-        InputError: Shapes, lengths or signs are wrong.
-        NoForcesError: No balanced forces were found with which every finger pushes.
-        SolverError: The program's answer failed its check.
+    Takes `positions` (k, 3) [m]; `normals` (k, 3); `torsion_m` [m]. Gives forces on the object, (k,
+    3) [N], balanced to `IMBALANCE`; with torsion, together with some torques about the normals,
+    which come from the contacts by themselves.
     """
     points, units = contact_arrays(positions, normals)
     mu = contact_frictions(friction, len(points))

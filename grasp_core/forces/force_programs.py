@@ -138,8 +138,7 @@ def _toward_less_friction(balance: Balance, friction: float, weights: Array) -> 
 def least_imbalance(balance: Balance, friction: float) -> Array | None:
     """Find forces (3k,) that leave the least imbalance against the first wrench.
 
-    Returns:
-        The forces, in pyramids and limits; None if no solver finds any.
+    Gives the forces, in pyramids and limits; None if no solver finds any.
     """
     # (3) and (2) hold, while (1) is only approached: the square of its residual is the objective
     rows = balance.pyramids(np.full(len(balance.frames), friction))

@@ -35,13 +35,8 @@ FRICTIONLESS = 1e-6
 def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
     """Find forces that balance the first wrench and need the least friction.
 
-    Args:
-        balance: The wrench and the limits.
-        weights: Friction of each contact in units of the common coefficient, (k,).
-        forces: Balanced local forces to start from, (3k,).
-
-    Returns:
-        Local forces, (3k,); the given ones where the solver finds none that need less.
+    Takes `weights` (k,); `forces` (3k,). Gives local forces, (3k,); the given ones where the solver
+    finds none that need less.
     """
     best, friction = forces, _needed_friction(forces, weights)
     program = _without_friction(balance, weights)

@@ -29,9 +29,7 @@ CANDIDATES = 400
 def clearest_point(points: Array, segments: Array) -> tuple[Array, float]:
     """Find the point farthest from all segments, (2,), and its distance from them.
 
-    Args:
-        points: Candidates, (n, 2); if there are many, only some are tried.
-        segments: End points of segments, (m, 2, 2).
+    Takes `points` (n, 2); `segments` (m, 2, 2).
     """
     tried = points[:: 1 + len(points) // CANDIDATES]
     room = np.array([_nearest(point, segments)[1].min() for point in tried])
@@ -44,10 +42,7 @@ def clearing(start: Array, segments: Array, gap: float) -> Array | None:
 
     The polygon is counter-clockwise; None if there is no room for one.
 
-    Args:
-        start: Point inside the polygon, (2,).
-        segments: End points of obstacles all around, (m, 2, 2).
-        gap: How far the polygon stays from them.
+    Takes `start` (2,); `segments` (m, 2, 2).
     """
     low, high = segments.min(axis=(0, 1)), segments.max(axis=(0, 1))
     box = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])

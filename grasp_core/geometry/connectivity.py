@@ -27,12 +27,7 @@ def close_pairs(points: Array, reach: float) -> Indices:
     Close points have close projections on a line, so only neighbours there are compared. Equal
     points are linked in a row, and only one of them is compared with other points.
 
-    Args:
-        points: Points, (n, 3), in any unit of length.
-        reach: Largest distance of a link, in the same unit.
-
-    Raises:
-        InputError: So many points are close to each other that their links cannot be listed.
+    Takes `points` (n, 3).
     """
     shadows = ((points - points[0]) * GENERAL).sum(axis=1)
     order = np.argsort(shadows, kind="stable")
@@ -72,12 +67,10 @@ def components(count: int, links: Indices) -> Indices:
     to the end of its way. Rounds grow as the square of the logarithm of `count` at most, and there
     are fifteen for a million items in a row of any order.
 
-    Args:
-        count: Number of items.
-        links: Pairs of indices of linked items, (k, 2).
-
     Source:
         Liu and Tarjan, "Simple concurrent labeling algorithms for connected components", SOSA 2019.
+
+    Takes `links` (k, 2).
     """
     least = np.arange(count)
     apart = links

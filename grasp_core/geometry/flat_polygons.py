@@ -42,9 +42,8 @@ def flat_polygon(arms: Array, normal: Array, slack: float) -> FlatPolygon | None
 
     The polygon is counter-clockwise about its normal.
 
-    Returns:
-        The polygon; None if the points are off the plane, or not corners of a convex polygon in
-        order.
+    Gives the polygon; None if the points are off the plane, or not corners of a convex polygon in
+    order.
     """
     if float(np.abs(arms @ normal).max()) > slack:
         return None

@@ -23,10 +23,7 @@ from grasp_core.solvers.ties import first_best
 def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Array:
     """Find the surface point nearest to each of several points, (n, 3) [m].
 
-    Args:
-        vertices: Vertices of the surface, (v, 3) [m].
-        triangles: Indices of the vertices of each triangle, (t, 3).
-        points: Points to start from, (n, 3) [m].
+    Takes `vertices` (v, 3) [m]; `triangles` (t, 3); `points` (n, 3) [m].
     """
     candidates = nearest_on_triangles(vertices[triangles], points)
     distances = np.linalg.norm(candidates - points[:, None], axis=2)
@@ -37,9 +34,7 @@ def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Ar
 def nearest_on_triangles(corners: Array, points: Array) -> Array:
     """Find the point of each of several triangles nearest to points, (..., t, 3) [m].
 
-    Args:
-        corners: Corners of the triangles, (t, 3, 3) [m].
-        points: Points to start from, (..., 3) [m].
+    Takes `corners` (t, 3, 3) [m]; `points` (..., 3) [m].
     """
     points = points[..., None, :]
     candidates = np.stack([*_on_edges(corners, points), _foot(corners, points)])

@@ -170,13 +170,11 @@ def merge_into_convex_pieces(points: Array, triangles: Indices) -> list[Array]:
     piece; the result has at most four times the least possible number of pieces. The order matters,
     so a few orders are tried and the result with the fewest pieces is kept.
 
-    Args:
-        points: Corners, (n, 2).
-        triangles: A triangulation without further points, (t, 3), counter-clockwise.
-
     Source:
         Hertel & Mehlhorn, "Fast triangulation of the plane with respect to simple
         polygons", Information and Control 64, 1985.
+
+    Takes `points` (n, 2); `triangles` (t, 3).
     """
     edges = {edge for triangle in triangles.tolist() for edge in _edges(triangle)}
     diagonals = sorted(edge for edge in edges if edge[0] < edge[1] and edge[::-1] in edges)

@@ -84,14 +84,7 @@ class Drives:
 def drives(names: Sequence[str], ranges: Array, couplings: Sequence[Coupling]) -> Drives:
     """Lay couplings out by the numbers of joints.
 
-    Args:
-        names: Names of the joints.
-        ranges: Lowest and highest angle of each joint by itself, (j, 2) [rad].
-        couplings: The couplings.
-
-    Raises:
-        InputError: A name is not that of one joint, a joint follows two others or one that follows
-            itself, or ranges leave no angle.
+    Takes `ranges` (j, 2) [rad].
     """
     j = len(names)
     drivers, ratios, offsets = np.arange(j), np.ones(j), np.zeros(j)

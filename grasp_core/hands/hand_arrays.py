@@ -102,8 +102,7 @@ def _reach(shape: LinkShape) -> float:
 def _link_ball(parts: list[_Part], link: int) -> tuple[int, float]:
     """Find the smallest ball about the middle of a link's shape that holds all shapes of the link.
 
-    Returns:
-        The shape's number and the ball's radius; -1 and zero for a link without shapes.
+    Gives the shape's number and the ball's radius; -1 and zero for a link without shapes.
     """
     best = (-1, 0.0)
     own = [(number, part.shape) for number, part in enumerate(parts) if part.link == link]

@@ -128,14 +128,7 @@ class HandGrip(Grip):
 def hand_grip(
     hand: Hand, stance: Stance, loose: Grip, servo_n_m_per_rad: float
 ) -> HandGrip:  # fmt: skip
-    """Hold contacts with the servos of a hand, without a squeeze.
-
-    Args:
-        hand: The hand.
-        stance: Where it stands.
-        loose: The contacts on springs of the stiffness k_q (L' L)^-1, without a squeeze.
-        servo_n_m_per_rad: Stiffness k_q of the servos.
-    """
+    """Hold contacts with the servos of a hand, without a squeeze."""
     found = places(hand, stance.joints, stance.palm_pose)
     own = [list(chains(hand)[finger]) for finger in stance.fingers]
     most = max(len(joints) for joints in own)

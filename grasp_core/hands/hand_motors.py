@@ -65,12 +65,8 @@ def hand_motors(
 def turned_motors(hand: Hand, reach: HandReach) -> tuple[Motors, Array, tuple[Contact, ...]]:
     """Derive what joints and links of a hand ask for when it is turned with its object.
 
-    Returns:
-        Motors without gravity; the torque of each joint that carries the weight of the links, per
-        unit vector of the direction of gravity, (joints, 3) [N m]; and the contacts.
-
-    Raises:
-        InputError: As `hand_motors` does, also where a motor cannot carry the links somewhere.
+    Gives motors without gravity; the torque of each joint that carries the weight of the links, per
+    unit vector of the direction of gravity, (joints, 3) [N m]; and the contacts.
     """
     stance = stance_of(hand, reach)
     found, levers, limits = _joints(hand, stance)
@@ -88,11 +84,7 @@ def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
 
 
 def direction(down: ArrayLike) -> Array:
-    """Scale a direction to unit length, (3,).
-
-    Raises:
-        InputError: It is not a direction.
-    """
+    """Scale a direction to unit length, (3,)."""
     way = frozen(down, (3,), "down")
     length = float(np.linalg.norm(way))
     if length == 0.0:
@@ -128,11 +120,7 @@ def _levers(hand: Hand, found: HandPlaces, points: Array, fingers: tuple[int, ..
 
 
 def _weights(hand: Hand, found: HandPlaces) -> Array:
-    """Return what (1) multiplies with the acceleration, for each motor, (joints, 3) [kg m].
-
-    Raises:
-        InputError: A link has no mass or centre of mass.
-    """
+    """Return what (1) multiplies with the acceleration, for each motor, (joints, 3) [kg m]."""
     weights = np.zeros((len(hand.joints), 3))
     links = hand.links
     for chain in chains(hand):

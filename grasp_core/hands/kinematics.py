@@ -39,14 +39,7 @@ class HandPlaces:
 def places(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) -> HandPlaces:
     """Compute where links and fingertips are.
 
-    Args:
-        hand: The hand.
-        joints: Joint angles in the order of `hand.joints`, (j,) or (n, j) [rad].
-        palm_pose: Pose of the palm, (4, 4), or one for each set of angles, (n, 4, 4); None for
-            places in the palm's own frame.
-
-    Raises:
-        InputError: Shapes are wrong.
+    Takes `joints` (j,) or (n, j) [rad]; `palm_pose` (4, 4) or (n, 4, 4).
     """
     angles = np.atleast_2d(real_array(joints, "joints"))
     arrays = hand_arrays(hand)
@@ -73,16 +66,7 @@ def places(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) ->
 def tip_jacobians(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) -> Array:
     """Compute how the middles of fingertips move with the joints, by (1).
 
-    Args:
-        hand: The hand.
-        joints: See `places`.
-        palm_pose: See `places`.
-
-    Returns:
-        Derivatives, (n, fingers, 3, joints) [m/rad]; zero for the joints of other fingers.
-
-    Raises:
-        InputError: Shapes are wrong.
+    Gives derivatives, (n, fingers, 3, joints) [m/rad]; zero for the joints of other fingers.
     """
     found = places(hand, joints, palm_pose)
     starts = hand_arrays(hand).starts

@@ -39,17 +39,8 @@ def chains(  # noqa: PLR0913, PLR0917 - the arrays of a hand
 ) -> None:  # fmt: skip
     """Fill in where links are for one set of joint angles.
 
-    Args:
-        positions: See `HandArrays`, as for the next three.
-        rotations: (j, 3, 3).
-        axes: (j, 3).
-        starts: (f + 1,).
-        palm_rotation: Axes of the palm's frame, (3, 3).
-        palm_position: Its origin, (3,) [m].
-        angles: Joint angles, (j,) [rad].
-        R: Filled with the axes of the links' frames, (j, 3, 3).
-        p: Filled with their origins, (j, 3) [m].
-        W: Filled with the axes of the joints, (j, 3).
+    Takes `rotations`, `R` (j, 3, 3); `axes`, `W` (j, 3); `starts` (f + 1,); `palm_rotation` (3, 3);
+    `palm_position` (3,) [m]; `angles` (j,) [rad]; `p` (j, 3) [m].
     """
     about, frame = np.empty((3, 3)), np.empty((3, 3))
     for f in range(len(starts) - 1):

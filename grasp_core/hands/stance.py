@@ -40,11 +40,7 @@ class Stance:
 
 
 def stance_of(hand: Hand, reach: HandReach) -> Stance:
-    """Return where a hand stands.
-
-    Raises:
-        InputError: The pose is another hand's, or none was found.
-    """
+    """Return where a hand stands."""
     instance(hand, Hand, "hand", "load_hand makes one")
     instance(reach, HandReach, "reach", "reach_with makes one")
     if reach.hand != hand.name:
@@ -76,11 +72,7 @@ def stance_of(hand: Hand, reach: HandReach) -> Stance:
 
 
 def uncoupled(hand: Hand, doing: str) -> Hand:
-    """Return a hand in which no joint follows another.
-
-    Raises:
-        InputError: Some do; what is done needs a motor at every joint.
-    """
+    """Return a hand in which no joint follows another."""
     instance(hand, Hand, "hand", "load_hand makes one")
     if hand.couplings:
         listed = ", ".join(f"{each.joint} follows {each.driver}" for each in hand.couplings)
@@ -100,12 +92,7 @@ def with_balls(
     Scenes and drawings know fingertips as balls on the last links. Which part of a block touches is
     the pose's.
 
-    Args:
-        hand: The hand.
-        joints: Joint angles, (j,) [rad].
-        palm_pose: Pose of the palm in the object's frame, (4, 4).
-        fingers: The hand's finger at each contact.
-        contacts: Where they touch.
+    Takes `joints` (j,) [rad]; `palm_pose` (4, 4).
     """
     touching = {f: each for f, each in zip(fingers, contacts, strict=True)
                 if hand.fingers[f].tip.corners is not None}  # fmt: skip

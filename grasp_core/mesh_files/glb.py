@@ -38,11 +38,7 @@ WRONG_TREE = (
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices, int]:
-    """Read the vertices (n, 3) and triangles (t, 3) of a GLB file's default scene; no digits.
-
-    Raises:
-        MeshError: The file breaks a rule, or has more than `most` triangles.
-    """
+    """Read the vertices (n, 3) and triangles (t, 3) of a GLB file's default scene; no digits."""
     tree, binary = _chunks(data)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
@@ -122,11 +118,7 @@ def _check_features(tree: Tree) -> None:
 
 
 def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
-    """Yield the 4x4 pose matrix and the index of each mesh in the default scene.
-
-    Raises:
-        MeshError: The nodes do not form a tree, or there are too many.
-    """
+    """Yield the 4x4 pose matrix and the index of each mesh in the default scene."""
     scenes = tree.get("scenes", [])
     if not scenes:
         return

@@ -20,14 +20,7 @@ Tree = dict[str, Any]
 def decoded_primitive(
     tree: Tree, binary: bytes, primitive: Tree, left: int
 ) -> tuple[Indices, Array]:
-    """Read the triangles (t, 3) of one primitive of a mesh, and the vertices (n, 3) that they use.
-
-    Args:
-        tree: The JSON chunk.
-        binary: The binary chunk.
-        primitive: The primitive's entry in the JSON chunk.
-        left: How many more triangles are allowed.
-    """
+    """Read the triangles (t, 3) of one primitive of a mesh, and their vertices (n, 3)."""
     mode = primitive.get("mode", TRIANGLES)
     if "targets" in primitive or primitive.get("extensions"):
         unsupported("a primitive has morph targets or extensions", "export plain triangles")
@@ -112,10 +105,6 @@ def _stored(tree: Tree, binary: bytes, number: int, shape: str) -> _Stored:
 
 
 def check_place(place: object, listed: list[Any]) -> None:
-    """Refuse a reference that is not the index of an item in a list of the JSON chunk.
-
-    Raises:
-        MeshError: The place is no whole number, or outside the list.
-    """
+    """Refuse a reference that is not the index of an item in a list of the JSON chunk."""
     if type(place) is not int or not 0 <= place < len(listed):
         broken("the JSON part", f"it refers to item {shown(place)} of a list of {len(listed)}")

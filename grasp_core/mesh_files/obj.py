@@ -34,11 +34,7 @@ GOES_ON = b"\\\n"
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices, int]:
-    """Read the vertices (n, 3), triangles (t, 3) and coordinates' digits of an OBJ file.
-
-    Raises:
-        MeshError: The text breaks a rule, with the line, or has more than `most` triangles.
-    """
+    """Read the vertices (n, 3), triangles (t, 3) and coordinates' digits of an OBJ file."""
     points, polygons = TextPoints(), Polygons(most, first=1)
     for number, (keyword, *words) in _statements(plain_text(data)):
         where = f"line {number}"

@@ -18,11 +18,7 @@ FLOATS = 3
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices, int]:
-    """Read the vertices (n, 3), triangles (t, 3) and coordinates' digits of an OFF file.
-
-    Raises:
-        MeshError: The text breaks a rule, with the line, or has more than `most` triangles.
-    """
+    """Read the vertices (n, 3), triangles (t, 3) and coordinates' digits of an OFF file."""
     lines = worded_lines(plain_text(data), comments=True)
     vertices, faces = _counts(lines)
     points, polygons = TextPoints(), Polygons(most)

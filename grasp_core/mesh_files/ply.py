@@ -25,11 +25,7 @@ Cells = dict[str, Sequence[float]]
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices, int]:
-    """Read the vertices (n, 3), triangles (t, 3) and coordinates' digits of a PLY file.
-
-    Raises:
-        MeshError: The file breaks a rule, or has more than `most` triangles.
-    """
+    """Read the vertices (n, 3), triangles (t, 3) and coordinates' digits of a PLY file."""
     header = read_header(data)
     polygons, digits = Polygons(most), 0
     if header.order == "=":
@@ -155,11 +151,7 @@ def _binary_points(header: Header, data: bytes, polygons: Polygons) -> Array:
 
 
 def _equal_rows(element: Element, data: bytes, place: int, order: str) -> NDArray[np.void] | None:
-    """Read a binary table at once if all its rows are equally long; return None if they may not be.
-
-    Raises:
-        MeshError: The rows do not fit into the file.
-    """
+    """Read a binary table at once if its rows are equally long; None if they may not be."""
     fields, counts, width = dict[str, tuple[str | tuple[str, int], int]](), dict[str, int](), 0
     for number, each in enumerate(element.properties):
         length, kind = 1, order + each.kind
@@ -215,11 +207,7 @@ def _whole_corners(listed: Sequence[float], where: str) -> list[int]:
 def _differing_rows(
     element: Element, data: bytes, place: int, order: str, most: int
 ) -> Iterator[tuple[int, Cells]]:
-    """Yield each row of a binary table whose rows differ in length, with the byte where it ends.
-
-    Raises:
-        MeshError: A row does not fit into the file, or is a polygon of more than `most` triangles.
-    """
+    """Yield each row of a binary table whose rows differ in length, with the byte where it ends."""
     steps = [
         (
             each.name,

@@ -40,11 +40,7 @@ class Element:
     properties: list[Property] = field(default_factory=list[Property])
 
     def place(self, names: tuple[str, ...]) -> Property:
-        """Find the one property whose name is among `names`.
-
-        Raises:
-            MeshError: The table has no such property, or more than one.
-        """
+        """Find the one property whose name is among `names`."""
         found = [each for each in self.properties if each.name in names]
         if len(found) != 1:
             broken("the header", f"element {self.name} needs one property {' or '.join(names)}")
@@ -72,11 +68,7 @@ class Header:
 
 
 def read_header(data: bytes) -> Header:
-    """Read the header of a PLY file.
-
-    Raises:
-        MeshError: The header breaks a rule, or announces no vertices or no faces.
-    """
+    """Read the header of a PLY file."""
     found = END.search(data[:LONGEST_HEADER])
     if not found:
         broken("the header", "expected `end_header`")

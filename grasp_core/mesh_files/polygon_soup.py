@@ -42,11 +42,7 @@ class Polygons:
     """The highest vertex number so far, and its place in the file."""
 
     def add(self, corners: Sequence[int], where: str) -> None:
-        """Add a polygon, given by vertex numbers that count from 0.
-
-        Raises:
-            MeshError: The polygon has fewer than three corners, or there are too many triangles.
-        """
+        """Add a polygon, given by vertex numbers that count from 0."""
         if len(corners) < CORNERS:
             broken(where, f"a face needs at least three corners, got {len(corners)}")
         triangles = len(self.triangles) // CORNERS + len(corners) - 2
@@ -67,11 +63,7 @@ class Polygons:
             self.large.append((where, corners))
 
     def on(self, points: Array) -> tuple[Array, Indices]:
-        """Return the given vertices (n, 3) and the triangles (t, 3), after checking every corner.
-
-        Raises:
-            MeshError: A corner names a missing vertex, or a polygon's fan folds back on itself.
-        """
+        """Return the vertices (n, 3) and triangles (t, 3), after checking every corner."""
         for (corner, where), wrong in (
             (self.lowest, self.lowest[0] < 0),
             (self.highest, self.highest[0] >= len(points)),
@@ -109,11 +101,7 @@ def points_of(coordinates: "array[float]") -> Array:
 
 
 def too_many(triangles: int, most: int) -> None:
-    """Refuse a file that has too many triangles.
-
-    Raises:
-        MeshError: Always.
-    """
+    """Refuse a file that has too many triangles."""
     message = f"the mesh has {triangles} or more triangles, the limit is {most}; simplify it"
     raise MeshError(MeshRefusal.TOO_MANY, message)
 

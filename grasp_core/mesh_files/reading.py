@@ -49,11 +49,7 @@ class MeshFile:
 
 
 def read_triangles(path: Path, limits: MeshLimits) -> MeshFile:
-    """Read a mesh file.
-
-    Raises:
-        MeshError: The file is not a complete mesh of a known format, or exceeds a limit.
-    """
+    """Read a mesh file."""
     try:
         kind = mesh_kind(path)
         return mesh_of_bytes(kind, _bytes_of(path, limits), limits.max_triangles)
@@ -65,11 +61,7 @@ def read_triangles(path: Path, limits: MeshLimits) -> MeshFile:
 
 
 def mesh_kind(path: Path) -> str:
-    """Name the format of a mesh file by its ending.
-
-    Raises:
-        MeshError: The ending belongs to no format that is read.
-    """
+    """Name the format of a mesh file by its ending."""
     kind = path.suffix.lower().lstrip(".")
     if kind not in FORMATS:
         message = f"the file's ending must be one of {', '.join(FORMATS)}, got {kind!r}"
@@ -78,16 +70,7 @@ def mesh_kind(path: Path) -> str:
 
 
 def mesh_of_bytes(kind: str, data: bytes, most: int) -> MeshFile:
-    """Read the bytes of a mesh file.
-
-    Args:
-        kind: One of `FORMATS`.
-        data: The file's bytes.
-        most: Most triangles allowed.
-
-    Raises:
-        MeshError: The file breaks its format, has no triangles, or more than `most`.
-    """
+    """Read the bytes of a mesh file."""
     text = data if kind == "stl" and stl.is_binary(data) else without_mark(data)
     check_beginning(kind, text)
     points, triangles, digits = READERS[kind](text, most)
@@ -112,11 +95,7 @@ def _bytes_of(path: Path, limits: MeshLimits) -> bytes:
 
 
 def check_beginning(kind: str, data: bytes) -> None:
-    """Refuse bytes that do not begin like a file of the given format.
-
-    Raises:
-        MeshError: The bytes begin otherwise.
-    """
+    """Refuse bytes that do not begin like a file of the given format."""
     for beginning, other in OTHER_FILES.items():
         if data.startswith(beginning):
             message = f"the file is {other}, expected {kind.upper()}; unpack or convert it first"

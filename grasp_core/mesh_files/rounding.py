@@ -105,9 +105,7 @@ def text_rounding(points: Array, digits: int) -> float:
 def single_rounding(points: Array, digits: int = 0) -> float:
     """Return the rounding of coordinates (n, 3) if all are of single precision; 0 otherwise.
 
-    Args:
-        points: Coordinates, (n, 3), in any unit.
-        digits: Significant digits with which they are written; 0 if they are what they are.
+    Takes `points` (n, 3).
     """
     with np.errstate(over="ignore", under="ignore", divide="ignore"):
         sizes = np.abs(points)

@@ -33,11 +33,7 @@ def is_text(data: bytes) -> bool:
 
 
 def read(data: bytes, most: int) -> tuple[Array, Indices, int]:
-    """Read the vertices (3 t, 3), triangles (t, 3) and coordinates' digits of an STL file.
-
-    Raises:
-        MeshError: The file breaks a rule, or has more than `most` triangles.
-    """
+    """Read the vertices (3 t, 3), triangles (t, 3) and coordinates' digits of an STL file."""
     digits = 0
     if is_binary(data):
         points = _of_binary(data, most)

@@ -35,13 +35,6 @@ def plain_text(data: bytes, start: int = 0) -> bytes:
 
     Letters outside ASCII, as in comments and names, become `?`, and so does the `#` of a number
     such as `1.#QNAN`, which begins no comment.
-
-    Args:
-        data: The bytes of a file.
-        start: Where the text begins.
-
-    Raises:
-        MeshError: The text holds control characters.
     """
     text = data[start:].rstrip(PADDING)
     if found := CONTROL.search(text):
@@ -52,11 +45,7 @@ def plain_text(data: bytes, start: int = 0) -> bytes:
 
 
 def numbered_lines(text: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield each line with its number, from 1 on, one at a time to save memory.
-
-    Raises:
-        MeshError: A line is too long.
-    """
+    """Yield each line with its number, from 1 on, one at a time to save memory."""
     for number, line in enumerate(io.BytesIO(text), 1):
         if len(line) > LONGEST_LINE:
             broken(f"line {number}", f"the line is longer than {LONGEST_LINE} bytes")
@@ -64,15 +53,7 @@ def numbered_lines(text: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def worded_lines(text: bytes, *, comments: bool = False) -> Iterator[tuple[int, list[bytes]]]:
-    """Yield the words of each line that is not blank, with the number of the line.
-
-    Args:
-        text: The text of a file.
-        comments: Whether to leave out what follows a `#`.
-
-    Raises:
-        MeshError: A line is too long.
-    """
+    """Yield the words of each line that is not blank, with the number of the line."""
     for number, line in numbered_lines(text):
         words = (line.partition(b"#")[0] if comments else line).split()
         if words:
@@ -80,11 +61,7 @@ def worded_lines(text: bytes, *, comments: bool = False) -> Iterator[tuple[int, 
 
 
 def numbers(words: Sequence[bytes], where: Where) -> list[float]:
-    """Read words as finite numbers.
-
-    Raises:
-        MeshError: A word is not a finite number.
-    """
+    """Read words as finite numbers."""
     try:
         values = [float(word) for word in words]
     except ValueError:
@@ -96,11 +73,7 @@ def numbers(words: Sequence[bytes], where: Where) -> list[float]:
 
 
 def check_unused(words: Sequence[bytes], where: Where) -> None:
-    """Refuse words that are not numbers in columns that are not used, as colours; nan may be there.
-
-    Raises:
-        MeshError: A word is neither a number nor one of the names of what is not finite.
-    """
+    """Refuse words that are not numbers in unused columns, as colours; nan may be there."""
     try:
         for word in words:
             float(word)
@@ -122,11 +95,7 @@ def _refused(word: bytes, where: Where) -> float:
 
 
 def whole(word: bytes, where: Where) -> int:
-    """Read a word as a whole number.
-
-    Raises:
-        MeshError: The word is not a whole number.
-    """
+    """Read a word as a whole number."""
     if not WHOLE.fullmatch(word):
         broken(where, f"expected a whole number, got {shown(word)!r}")
     return int(word)

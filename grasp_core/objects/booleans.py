@@ -78,12 +78,8 @@ def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
     At corners that turn inwards a little more is cut off, so that the remaining parts have few
     corners.
 
-    Args:
-        loops: Outer border and holes, each (k, 2).
-        margin: Least distance from the border, in the unit of the loops.
-
-    Returns:
-        Outer border and holes of each part; an empty list if the figure is too narrow.
+    Takes `loops` (k, 2). Gives outer border and holes of each part; an empty list if the figure is
+    too narrow.
     """
     kernel = _kernel()
     size = float(np.ptp(np.vstack(loops), axis=0).max())

@@ -102,18 +102,7 @@ def build(
 ) -> Parts:
     """Check a triangle mesh and find its faces.
 
-    Args:
-        vertices: Vertices, (n, 3) [m].
-        triangles: Vertex indices, (t, 3).
-        choices: How the mesh is taken.
-        rounding: Largest rounding error of a coordinate [m]; if not given, that of single precision
-            where all coordinates have it.
-        center_of_mass: Centre of mass, (3,) [m]; that of uniform density if not given.
-        known: What is known of the surface of an object that was built before.
-
-    Raises:
-        InputError: The centre of mass is not a point.
-        MeshError: The mesh is not a solid; its `reason` says why.
+    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `rounding` [m]; `center_of_mass` (3,) [m].
     """
     points, corners = _checked_arrays(vertices, triangles, choices.limits.max_triangles)
     extent = float(np.ptp(points[np.unique(corners)], axis=0).max())

@@ -8,11 +8,7 @@ from grasp_core.errors import InputError
 
 
 def triangles_of(mesh: Any) -> tuple[Any, Any]:
-    """Return the vertices and the triangles of a `trimesh.Trimesh`, unchecked.
-
-    Raises:
-        InputError: The value is not a mesh.
-    """
+    """Return the vertices and the triangles of a `trimesh.Trimesh`, unchecked."""
     if not (hasattr(mesh, "vertices") and hasattr(mesh, "faces")):
         raise InputError(
             f"mesh must be a trimesh.Trimesh, got {type(mesh).__name__}; for a trimesh.Scene, "

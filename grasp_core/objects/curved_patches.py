@@ -48,11 +48,7 @@ def flat_patches(
 ) -> tuple[Face, ...]:
     """Find the largest nearly flat patches of a surface, those with the largest discs first.
 
-    Args:
-        vertices: Vertices, (n, 3) [m].
-        triangles: Vertex indices, (t, 3), counter-clockwise seen from outside.
-        limits: Limits of flatness, and the number of patches.
-        caps: Indices of triangles that belong to no patch, (c,).
+    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `caps` (c,).
     """
     surface = _Surface.of(vertices, triangles)
     depth = limits.depth * surface.extent
@@ -75,10 +71,7 @@ def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) ->
     A ring has dozens of equal patches, and without this rule the first ones would all be on one
     side.
 
-    Args:
-        found: Radius of the largest disc of each patch [m], and the patch.
-        most: Number of patches to keep.
-        extent: Largest extent of the object [m].
+    Takes `found`, `extent` [m].
     """
     sizes = ranks([-radius for radius, _ in found])
     places = np.array([[*face.normal, *(face.centroid / extent)] for _, face in found])

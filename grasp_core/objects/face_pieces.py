@@ -155,10 +155,7 @@ def choices_near(
 ) -> list[tuple[FacePiece, ...]]:
     """List choices of one piece per face, those nearest to given points of the planes first.
 
-    Args:
-        shapes: Shapes of k faces.
-        positions: A point of each plane, (k, 3).
-        most: Largest number of choices.
+    Takes `positions` (k, 3).
     """
     ranked = [
         _nearest_first(shape.pieces, at)[:most] for shape, at in zip(shapes, positions, strict=True)
@@ -175,12 +172,7 @@ def _nearest_first(pieces: Sequence[FacePiece], at: Array) -> list[FacePiece]:
 
 
 def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
-    """Cut off the part of a piece that is too near its edges.
-
-    Args:
-        piece: Any convex piece.
-        inset: Distance from the edges; at most half the radius of the largest disc counts.
-    """
+    """Cut off the part of a piece that is too near its edges."""
     away = min(inset, LARGEST_INSET * piece.inradius)
     b = piece.b - away
     corners = clip(piece.corners, piece.E, b)
@@ -215,10 +207,7 @@ def pieces_by_face(body: Polyhedron) -> tuple[tuple[FacePiece, ...], ...]:
 def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
     """Make the `FacePiece` of a convex polygon.
 
-    Args:
-        face: Index of its face.
-        normal: Unit vector into the object, (3,).
-        polygon: Corners, (k, 3), counter-clockwise about the normal.
+    Takes `normal` (3,); `polygon` (k, 3).
     """
     edge = polygon[1] - polygon[0]
     along = np.asarray(edge / np.linalg.norm(edge), dtype=np.float64)

@@ -31,9 +31,7 @@ class Caps:
 def caps_of(points: Array, corners: Indices) -> Caps | None:
     """Close the holes of a surface; None if it has none, or its open edges do not form loops.
 
-    Args:
-        points: Vertices, (n, 3) [m].
-        corners: Vertex indices, (t, 3), wound alike across edges of two triangles.
+    Takes `points` (n, 3) [m]; `corners` (t, 3).
     """
     loops = _loops(corners)
     if not loops:

@@ -38,9 +38,7 @@ class MassProperties:
 def mass_properties(solid: Solid, center: Array | None = None) -> MassProperties:
     """Compute the mass properties of a solid of uniform density.
 
-    Args:
-        solid: A closed surface.
-        center: The centre of mass if it is known, (3,) [m]; the inertia is then about it.
+    Takes `center` (3,) [m].
     """
     a, b, c = solid.vertices[solid.triangles].transpose(1, 0, 2)
     areas = np.cross(b - a, c - b)  # normals, as long as twice the area

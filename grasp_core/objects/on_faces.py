@@ -17,21 +17,12 @@ within it."""
 
 
 def check_body(body: Polyhedron) -> None:
-    """Refuse a value that is not an object.
-
-    Raises:
-        InputError: The value is not a `Polyhedron`.
-    """
+    """Refuse a value that is not an object."""
     instance(body, Polyhedron, "body", "gc.load_polyhedron reads one from a mesh file")
 
 
 def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
-    """Refuse a grasp whose contacts are not on the faces it names.
-
-    Raises:
-        InputError: The object or the grasp is not one, a face does not exist, or a contact is off
-            its surface or outside its border.
-    """
+    """Refuse a grasp whose contacts are not on the faces it names."""
     check_body(body)
     instance(
         grasp, Grasp, "grasp", "gc.plan makes grasps; of contacts of your own, seat and grasp_of "
@@ -93,11 +84,7 @@ def _on_surface(body: Polyhedron, face: Face, contact: Contact) -> bool:
 def within(point: Array, polygon: Array, normal: Array, slack: float) -> bool:
     """Return whether a point is inside a convex polygon, or outside by at most `slack`.
 
-    Args:
-        point: A point in the plane, (3,) [m].
-        polygon: Corners in order about `normal`, (n, 3) [m].
-        normal: Unit normal of the plane, (3,).
-        slack: Allowed distance outside [m].
+    Takes `point` (3,) [m]; `polygon` (n, 3) [m]; `normal` (3,); `slack` [m].
     """
     edges = np.concatenate((polygon[1:], polygon[:1])) - polygon
     inward = cross(normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)

@@ -75,11 +75,7 @@ def coplanar_groups(
     Where coordinates are rounded, the plane is fitted again to what has grown. A triangle thinner
     than the distance limit has no meaningful normal, so only its distance counts.
 
-    Args:
-        vertices: Vertices, (n, 3) [m].
-        triangles: Vertex indices, (t, 3).
-        flatness: The limits.
-        caps: Indices of triangles that belong to no face, (c,).
+    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `caps` (c,).
     """
     table = _Triangles.of(vertices[triangles], triangle_neighbours(triangles), flatness)
     group_of = np.full(len(triangles), -1)
@@ -200,9 +196,7 @@ def _face(vertices: Array, triangles: Indices, slack: float) -> Face:
 def convex_pieces(loops: list[Array], slack: float) -> list[Array]:
     """Split a plane figure into convex polygons, (k, 2) each.
 
-    Args:
-        loops: Outer border, counter-clockwise, and holes, clockwise, each (k, 2).
-        slack: Corners within this distance of a line count as on it.
+    Takes `loops` (k, 2).
     """
     if len(loops) == 1 and is_convex(loops[0]):
         return loops

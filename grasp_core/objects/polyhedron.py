@@ -260,21 +260,7 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - what is known of a mesh, a keyword 
 ) -> AnyPolyhedron:
     """Check a triangle mesh and build the polyhedron of its faces.
 
-    Args:
-        vertices: Vertices, (n, 3) [m].
-        triangles: Vertex indices, (t, 3).
-        choices: How the mesh is taken.
-        name: Name of the object.
-        source_sha256: Hash of the file that the mesh came from, if any.
-        center_of_mass: See `load_polyhedron`.
-        rounding: Largest rounding error of a coordinate [m]; that of single precision if not given,
-            and if all coordinates have it.
-        known: What is known of the surface of a polyhedron that is built again.
-        kind: The class to build.
-
-    Raises:
-        InputError: The centre of mass is not a point.
-        MeshError: The mesh is not a solid; its `reason` says why.
+    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `rounding` [m].
     """
     text(name, "name")
     parts = build(

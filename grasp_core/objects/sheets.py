@@ -22,11 +22,7 @@ NEAR = 0.25
 
 
 def check_bounds(points: Array, corners: Indices) -> None:
-    """Refuse a closed surface if more than next to nothing of it does not bound the solid.
-
-    Raises:
-        MeshError: Parts of the surface are inside or outside of others.
-    """
+    """Refuse a closed surface if more than next to nothing of it does not bound the solid."""
     places = sampled(triangle_areas(points, corners))
     off = float((np.abs(winding_on(points[corners], places) - 0.5) > NEAR).mean())
     if off > SMALL:
@@ -36,13 +32,7 @@ def check_bounds(points: Array, corners: Indices) -> None:
 def outward_sheets(points: Array, corners: Indices, *, largest_part: bool) -> Shells:
     """Orient the parts of an open surface outwards.
 
-    Args:
-        points: Vertices, (n, 3) [m].
-        corners: Vertex indices, (t, 3), wound alike within each part.
-        largest_part: Whether to leave out all parts but the largest.
-
-    Raises:
-        MeshError: It is not certain which side is inside, or parts overlap.
+    Takes `points` (n, 3) [m]; `corners` (t, 3).
     """
     areas, label, said = triangle_areas(points, corners), _labels(corners), list[str]()
     whole, count = float(areas.sum()), int(label.max()) + 1

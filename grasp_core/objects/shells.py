@@ -80,16 +80,7 @@ def one_solid(
 ) -> Shells:
     """Orient the shells of a mesh outwards, and make one solid of them.
 
-    Args:
-        points: Vertices, (n, 3) [m].
-        corners: Vertex indices, (t, 3); every edge has as many triangles on one side as on the
-            other.
-        caps: Indices of the triangles that close holes, (c,).
-        most: Largest number of shells.
-        largest_part: Whether to leave out all bodies but the largest.
-
-    Raises:
-        MeshError: The shells do not make one solid; the `reason` says why.
+    Takes `points` (n, 3) [m]; `corners` (t, 3); `caps` (c,).
     """
     whole = Solid(points, corners)
     check_volume(whole)
@@ -210,11 +201,7 @@ def _boxes_meet(one: Solid, two: Solid) -> bool:
 
 
 def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
-    """Unite bodies that overlap or touch; those that do not are returned as they are.
-
-    Raises:
-        MeshError: Slits as thin as rounding remain, on whose walls fingers would be placed.
-    """
+    """Unite bodies that overlap or touch; those that do not are returned as they are."""
     if len(bodies) == 1:
         return bodies
     solid, marks = union([(body.solid, body.marks) for body in bodies])
@@ -245,11 +232,7 @@ def _with_cavities(shells: list[_Body], slack: float) -> list[_Body]:
 
 
 def _shells(points: Array, corners: Indices, most: int) -> list[_Body]:
-    """Split a mesh into shells.
-
-    Raises:
-        MeshError: There are more shells than `most`.
-    """
+    """Split a mesh into shells."""
     label = _labels(corners)
     if label.max() >= most:
         raise MeshError(

@@ -23,14 +23,8 @@ def welded(
 ) -> tuple[Array, Indices, int]:
     """Join close vertices, and drop unused vertices and collapsed triangles.
 
-    Args:
-        points: Vertices, (n, 3) [m].
-        corners: Vertex indices, (t, 3).
-        reach: Distance within which vertices are joined [m]; `WELD` of the extent if not given, and
-            below zero none are joined.
-
-    Returns:
-        Vertices, triangles, and the number of triangles that were dropped.
+    Takes `points` (n, 3) [m]; `corners` (t, 3); `reach` [m]. Gives vertices, triangles, and the
+    number of triangles that were dropped.
     """
     used, corners = np.unique(corners, return_inverse=True)
     points, corners = points[used], corners.reshape(-1, 3)
@@ -56,8 +50,7 @@ def _links(points: Array, reach: float) -> Indices:
 def edges_of(corners: Indices) -> tuple[Indices, NDArray[np.bool_]]:
     """Number the edges of triangles, and tell which run from the lower vertex to the higher.
 
-    Returns:
-        The number of the edge (k, k+1) of each triangle, and its direction, (3 t,) each.
+    Gives the number of the edge (k, k+1) of each triangle, and its direction, (3 t,) each.
     """
     tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
     names = np.minimum(tail, head) * (int(corners.max()) + 1) + np.maximum(tail, head)
@@ -114,11 +107,7 @@ def triangle_areas(points: Array, corners: Indices) -> Array:
 
 
 def check_volume(solid: Solid) -> None:
-    """Refuse a solid that encloses almost no volume.
-
-    Raises:
-        MeshError: The volume is next to nothing.
-    """
+    """Refuse a solid that encloses almost no volume."""
     extent = float(np.ptp(solid.vertices, axis=0).max())
     if abs(solid.volume) < THINNEST * extent**3:
         message = f"the mesh encloses only {solid.volume:.3g} m^3; close it around a solid"

@@ -39,19 +39,11 @@ class SoundSurface:
     """Why the triangles do not bound a solid with planar faces; None if they do."""
 
     def check_bounds(self) -> None:
-        """Refuse a closed surface if parts of it do not bound the solid.
-
-        Raises:
-            MeshError: Parts of the surface are inside or outside of others.
-        """
+        """Refuse a closed surface if parts of it do not bound the solid."""
         check_bounds(self.points, self.corners)
 
     def outward(self, *, largest_part: bool) -> "SoundSurface":
-        """Return this surface with an open one oriented outwards; a closed one is so already.
-
-        Raises:
-            MeshError: It is not certain which side is inside.
-        """
+        """Return this surface with an open one oriented outwards; a closed one is so already."""
         if self.surface.closed:
             self.check_bounds()
             return self
@@ -70,16 +62,7 @@ def sound_surface(
 ) -> SoundSurface:
     """Make one surface of triangles.
 
-    Args:
-        vertices: Vertices, (n, 3) [m].
-        triangles: Vertex indices, (t, 3).
-        flatness_m: Distance that the rounding of the coordinates explains [m].
-        most_parts: Largest number of parts.
-        largest_part: Whether to leave out all parts but the largest.
-        known: What is known of a surface that this function has returned before.
-
-    Raises:
-        MeshError: The triangles are not the surface of one solid, and cannot be made one.
+    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `flatness_m` [m].
     """
     if known is None:
         points, corners, said = _joined(vertices, triangles, flatness_m, most_parts)

@@ -26,12 +26,8 @@ taken, so that rounding decides nothing."""
 def with_halves(body: Polyhedron, apart: float) -> tuple[Polyhedron, tuple[int, ...]]:
     """Add two half faces to an object for each face that is long enough for two contacts.
 
-    Args:
-        body: The object.
-        apart: Least distance of two contacts on one face [m].
-
-    Returns:
-        The object, and for each of its faces the whole face that it is or is a part of.
+    Takes `apart` [m]. Gives the object, and for each of its faces the whole face that it is or is a
+    part of.
     """
     faces, owners = list(body.faces), list(range(len(body.faces)))
     for index, face in enumerate(body.faces):
@@ -42,11 +38,7 @@ def with_halves(body: Polyhedron, apart: float) -> tuple[Polyhedron, tuple[int, 
 
 
 def shared_quadruples(owners: Sequence[int]) -> Indices:
-    """List face quadruples with both halves of one face, or of two faces, (q, 4).
-
-    Args:
-        owners: The owners that `with_halves` returned.
-    """
+    """List face quadruples with both halves of one face, or of two faces, (q, 4)."""
     whole = [index for index, owner in enumerate(owners) if index == owner]
     halves: dict[int, list[int]] = {}
     for index, owner in enumerate(owners):
@@ -97,9 +89,7 @@ def _longest(border: Array) -> Array:
 def clear_of_edges(body: Polyhedron, margin: float) -> Polyhedron:
     """Shrink an object's faces so that contacts keep a distance from all edges and holes.
 
-    Args:
-        body: The object.
-        margin: The distance [m]; a face too narrow for it keeps no pieces.
+    Takes `margin` [m].
     """
     return replace(body, faces=tuple(_without_margin(face, margin) for face in body.faces))
 

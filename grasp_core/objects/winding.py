@@ -33,8 +33,7 @@ BLOCK = 20_000
 def sampled(areas: Array) -> Indices:
     """Choose triangles that stand for equal shares of a surface each, (s,).
 
-    Args:
-        areas: Areas of all triangles, (t,), in any unit.
+    Takes `areas` (t,).
     """
     count = min(max(MOST_ANGLES // len(areas), FEWEST_SAMPLES), MOST_SAMPLES, len(areas))
     upto: Array = np.cumsum(areas)
@@ -45,9 +44,7 @@ def sampled(areas: Array) -> Indices:
 def winding_on(corners: Array, places: Indices) -> Array:
     """Compute the mean of the winding numbers on both sides of triangles, at their middles, (s,).
 
-    Args:
-        corners: Corners of all triangles, (t, 3, 3), in any unit.
-        places: Indices of the triangles asked about, (s,).
+    Takes `corners` (t, 3, 3); `places` (s,).
     """
     found = np.zeros(len(places))
     step = max(BLOCK // len(corners), 1)
@@ -63,9 +60,7 @@ def winding_on(corners: Array, places: Indices) -> Array:
 def _solid_angles(axes: Array, points: Array) -> Array:
     """Compute the solid angles of triangles as seen from points, (p, t).
 
-    Args:
-        axes: The three coordinates of the three corners of each triangle, (3, 3, t).
-        points: Points, (p, 3).
+    Takes `axes` (3, 3, t); `points` (p, 3).
     """
     x, y, z = (axes[k] - points[:, k, None, None] for k in range(3))
     lengths = np.sqrt(x * x + y * y + z * z)
@@ -87,12 +82,7 @@ def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.boo
 
     In each part that connects across edges of two triangles, the larger area keeps its winding.
 
-    Args:
-        corners: Vertex indices, (t, 3).
-        areas: Areas, (t,), in any unit.
-
-    Returns:
-        The triangles, and which of them were turned.
+    Takes `corners` (t, 3); `areas` (t,). Gives the triangles, and which of them were turned.
     """
     across = triangle_neighbours(corners)
     against = _against(corners, across)

@@ -110,11 +110,7 @@ class ContactFaces:
     ) -> tuple[Array, float]:
         """Find the best move within the trust region, and the gain that it predicts.
 
-        Args:
-            y: Plane coordinates of the contacts, (k, 2).
-            lower: The least of the planes' distances.
-            planes: Distances (m,), and how they change with the contacts, (m, 2k).
-            reach: Size of the trust region.
+        Takes `y` (k, 2); `planes` (m,) or (m, 2k).
         """
         distances, slopes = planes
         n = y.size

@@ -37,12 +37,7 @@ the face, `a` or `b`; empty for a whole face."""
 
 
 def as_given(found: Certified, on: Standard) -> Certified:
-    """Translate a grasp to the object as given, fingers in the order of their faces.
-
-    Args:
-        found: The grasp in standard order.
-        on: The object in standard order.
-    """
+    """Translate a grasp to the object as given, fingers in the order of their faces."""
     places = [_place(on, face) for face in found.faces]
     order = _finger_order(found.id[0], places)
     swapped = found.id[0] in PAIRED and order[0] > 1
@@ -135,12 +130,7 @@ _mirrored_once = lru_cache(maxsize=MANY_PIECES)(_mirrored_piece)
 
 
 def absence_as_given(proof: Absence, on: Standard) -> Absence:
-    """Translate a proof of absence to the faces of the object as it was given.
-
-    Args:
-        proof: Proof about pieces of the standard object's faces.
-        on: The object in standard order.
-    """
+    """Translate a proof of absence to the faces of the object as it was given."""
     pieces = [replace(piece, face=on.faces[on.owners[piece.face]]) for piece in proof.pieces]
     if not on.mirrored:
         return replace(proof, pieces=tuple(pieces))

@@ -69,13 +69,7 @@ class BestFirst:
     def over(
         self, blocks: Blocks, places: range, least: Callable[[Construction], float]
     ) -> Iterator[tuple[Attempt, ...]]:
-        """Yield the attempts on each quadruple whose bound exceeds the threshold, best first.
-
-        Args:
-            blocks: Blocks of quadruples. The construction needs discs; see `in_rows`.
-            places: Places of the blocks to search.
-            least: Returns the radius that discs must exceed at present.
-        """
+        """Yield the attempts on each quadruple whose bound exceeds the threshold, best first."""
         rooms, make = blocks
         queue = [
             Waiting((-float(rooms[place]), BLOCK, (place,)), partial(self._made, make, place))
@@ -95,12 +89,7 @@ class BestFirst:
                 heappush(queue, item)
 
     def in_rows(self, wide: WideQuadruples, worth: float) -> Iterator[tuple[Attempt, ...]]:
-        """Yield the attempts on quadruples whose bound exceeds `worth`, in the table's order.
-
-        Args:
-            wide: Ranked quadruples.
-            worth: The merit that grasps must exceed.
-        """
+        """Yield the attempts on quadruples whose bound exceeds `worth`, in the table's order."""
         for start in range(0, len(wide), SMALLEST_CHUNK):
             rows = slice(start, start + SMALLEST_CHUNK)
             coned, bounds = wide.coned(rows).ranked(self.construction)

@@ -43,10 +43,7 @@ def kept(blocks: Blocks, count: int) -> Blocks:
 def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
     """Split all face quadruples of an object into blocks.
 
-    Args:
-        cones: Chooses force cones on the object's faces.
-        whole: Number of whole faces; faces after them are parts of whole ones.
-        shared: Quadruples with such parts, (s, 4); their blocks come last.
+    Takes `shared` (s, 4).
     """
     order = _by_room(cones, whole)
     order = order[cones.rooms[order] > 0.0]

@@ -139,12 +139,7 @@ def witness_fault(
 ) -> str | None:
     """Return why witness forces are wrong (unbalanced, outside a cone, another family), or None.
 
-    Args:
-        points: Contacts on an object of size one, (4, 3).
-        normals: Inward unit normals at the contacts, (4, 3).
-        forces: Contact forces whose normal parts sum to one, (4, 3).
-        friction: Coulomb coefficient.
-        family: The family of grasps to which the lines of force should belong.
+    Takes `points`, `normals`, `forces` (4, 3).
     """
     along, across = normal_and_tangential(forces, normals)
     if abs(float(along.sum()) - 1.0) > BALANCED:
@@ -162,12 +157,7 @@ def witnesses_fit(
 ) -> list[bool]:
     """Return for each of many sets of contacts whether `witness_fault` finds no fault.
 
-    Args:
-        points: Contacts on an object of size one, (g, 4, 3).
-        normals: Inward unit normals at the contacts, (g, 4, 3).
-        forces: Contact forces whose normal parts sum to one, (g, 4, 3).
-        friction: Coulomb coefficient.
-        families: The family to which the lines of force of each set should belong, (g,).
+    Takes `points`, `normals`, `forces` (g, 4, 3); `families` (g,).
     """
     along, across = normal_and_tangential(forces, normals)
     stacked = forces.reshape(len(forces), -1)
@@ -182,12 +172,7 @@ def witnesses_fit(
 
 
 def check_witness(body: Polyhedron, grasp: Grasp, friction: float) -> None:
-    """Refuse a grasp read from elsewhere whose witness does not show what the grasp claims.
-
-    Raises:
-        InputError: The forces are not at the contacts, do not balance, leave their friction
-            cones, or their lines are of another family.
-    """
+    """Refuse a grasp read from elsewhere whose witness does not show what the grasp claims."""
     points = (grasp.witness.points - body.center_of_mass) / body.radius
     contacts = (grasp.positions - body.center_of_mass) / body.radius
     fault = witness_fault(points, grasp.normals, grasp.witness.forces, friction, grasp.family)

@@ -230,13 +230,7 @@ class Tries:
     def certified(
         self, attempts: Sequence[Attempt], least: float, tally: Tally
     ) -> list[Certified | None]:
-        """Construct and certify a grasp for each attempt; None where there is none.
-
-        Args:
-            attempts: Which faces each finger touches, and with which force cones.
-            least: The merit that placements must exceed.
-            tally: Counts what was tried.
-        """
+        """Construct and certify a grasp for each attempt; None where there is none."""
         ends = self._settling.of(attempts, least)
         tally.count("tried", len(attempts))
         tally.count("solved", sum(end.solved for end in ends))

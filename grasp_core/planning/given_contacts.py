@@ -64,13 +64,7 @@ class Seated:
 def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
     """Move four contacts to the nearest faces of an object with fitting normals.
 
-    Args:
-        body: The object.
-        positions: Contact points in the object's frame, (4, 3) [m].
-        normals: Unit vectors into the object, (4, 3).
-
-    Raises:
-        InputError: An array does not have shape (4, 3), or a contact is near no face.
+    Takes `positions` (4, 3) [m]; `normals` (4, 3).
     """
     points = frozen(positions, (FINGERS, 3), "positions")
     inward = frozen_units(normals, (FINGERS, 3), "normals")
@@ -93,16 +87,7 @@ def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCerti
 
     The grasp has no contact regions, and its family is `regulus`, the most general one.
 
-    Args:
-        seated: Contacts on an object's faces.
-        friction: Coulomb coefficient.
-        name: The id of the grasp.
-
-    Returns:
-        The grasp, or the certificate with a separating wrench.
-
-    Raises:
-        UndecidedError: Force closure is too close to call.
+    Gives the grasp, or the certificate with a separating wrench.
     """
     body = seated.body
     positions = np.array([contact.position for contact in seated.contacts])
@@ -176,16 +161,8 @@ def nearest_like(
 ) -> Nearest | None:  # fmt: skip
     """Find the point nearest to a given one on parts whose normals lean little from a given one.
 
-    Args:
-        parts: Flat convex parts, in the order in which ties go to them.
-        point: The given point, (3,) [m].
-        normal: Unit vector into the object, (3,).
-        lean: Largest angle between that vector and a part's normal [rad].
-        reach: Largest distance of a part from the given point [m].
-        margin: Distance by which a part must be nearer than an earlier one to replace it [m].
-
-    Returns:
-        The point, with its part's normal; None if no such part is within reach.
+    Takes `point` (3,) [m]; `normal` (3,); `lean` [rad]; `reach`, `margin` [m]. Gives the point,
+    with its part's normal; None if no such part is within reach.
     """
     normals = np.array([part.normal for part in parts])
     firsts = np.array([part.polygon[0] for part in parts])
@@ -204,11 +181,7 @@ def nearest_like(
 def _nearest(
     body: Polyhedron, parts: Sequence[FlatPart], finger: int, point: Array, normal: Array
 ) -> Nearest:
-    """Find the nearest part with a fitting normal, and the contact on it.
-
-    Raises:
-        InputError: No part with a fitting normal is near.
-    """
+    """Find the nearest part with a fitting normal, and the contact on it."""
     reach = LARGEST_MOVE * body.radius
     found = nearest_like(
         parts, point, normal, lean=LARGEST_LEAN, reach=reach, margin=NEARER * body.radius

@@ -56,15 +56,7 @@ def run(
     progress: Progress | None,
     workers: Workers | None = None,
 ) -> Iterator[Certified]:
-    """Yield each certified grasp in the order of the searches, on the standard object.
-
-    Args:
-        on: The object in standard order.
-        request: What is to be planned.
-        searches: The search of each method, which gathers what is found.
-        progress: Called after each quadruple that is tried.
-        workers: Processes that search parts for all grasps, made with `finder`.
-    """
+    """Yield each certified grasp in the order of the searches, on the standard object."""
     total, found = len(searches) * on.quadruples, 0
     work = Object(on, request)
     everything = request.searched is None

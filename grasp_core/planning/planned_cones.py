@@ -65,8 +65,7 @@ class PlannedCones:
     def widest(self, quads: Indices) -> Array:
         """Return upper bounds on the half-angles of any choice of force cones, (q,) [rad].
 
-        Args:
-            quads: Faces of each quadruple, (q, 4).
+        Takes `quads` (q, 4).
         """
         normals, thetas = self.normals[quads], self._thetas[quads]
         sines = span_sines(normals)
@@ -85,12 +84,8 @@ class PlannedCones:
         still never overlap: half the angle between their axes is above psi, so the true bound is
         below tan(psi / 2) / sin(psi) = 1 / (2 cos^2(psi / 2)), and the bound of w is above this.
 
-        Args:
-            quads: Faces of each quadruple, (q, 4).
-            widest: Upper bounds on the half-angles, (q,) [rad].
-
-        Returns:
-            Bounds in object radii, for cones that positively span.
+        Takes `quads` (q, 4); `widest` (q,) [rad]. Gives bounds in object radii, for cones that
+        positively span.
         """
         extent = float(np.linalg.norm(self._corners.points, axis=-1).max(initial=0.0))
         leaning = np.maximum(self._thetas[quads].max(axis=1, initial=0.0) - widest, 0.0)
@@ -100,12 +95,8 @@ class PlannedCones:
     def chosen(self, quads: Indices) -> tuple[Array, Array]:
         """Choose force cones for face quadruples, around the normals and tilted.
 
-        Args:
-            quads: Faces of each quadruple, (q, 4).
-
-        Returns:
-            Unit axes of both choices, (q, 2, 4, 3), and their half-angles, (q, 2) [rad], which are
-            not positive where the choice does not exist.
+        Takes `quads` (q, 4). Gives unit axes of both choices, (q, 2, 4, 3), and their half-angles,
+        (q, 2) [rad], which are not positive where the choice does not exist.
         """
         normals, thetas = self.normals[quads], self._thetas[quads]
         axes = [normals, normals]
@@ -119,13 +110,8 @@ class PlannedCones:
     def limits_of(self, quads: Indices, axes: Array, half_angles: Array) -> Array:
         """Return upper bounds on the discs for chosen cones, (q, 2, 4), see `disc_limits`.
 
-        Args:
-            quads: Faces of each quadruple, (q, 4).
-            axes: Unit axes of both choices, (q, 2, 4, 3).
-            half_angles: Half-angles of both choices, (q, 2) [rad].
-
-        Returns:
-            Bounds in object radii.
+        Takes `quads` (q, 4); `axes` (q, 2, 4, 3); `half_angles` (q, 2) [rad]. Gives bounds in
+        object radii.
         """
         limits = [
             disc_limits(self._corners, self.normals, quads, axes[:, kind], half_angles[:, kind])
@@ -161,13 +147,8 @@ class PlannedCones:
 def usable_half_angles(theta: float, spreads: Array) -> Array:
     """Compute half-angles that stay inside the friction cones all over a curved patch [rad].
 
-    Args:
-        theta: Half-angle of the friction cones to plan with [rad].
-        spreads: Largest angle of each patch to its plane, any shape [rad].
-
-    Returns:
-        Half-angles shaped like `spreads`; where the patch leans too far, a positive one too small
-        for any construction.
+    Takes `theta`, `spreads` [rad]. Gives half-angles shaped like `spreads`; where the patch leans
+    too far, a positive one too small for any construction.
     """
     return np.maximum(INSIDE_FRICTION * theta - spreads, 0.5 * LEAST_SPAN_ANGLE)
 
@@ -177,9 +158,7 @@ def cones_around(
 ) -> list[tuple[Cones, ...]]:
     """Choose tilted force cones: towards the faces' or the object's middle, or around the forces.
 
-    Args:
-        placed: Four pieces each, and the contacts placed on them.
-        theta: Half-angle of the friction cones to plan with [rad].
+    Takes `theta` [rad].
     """
     normals = np.array([[piece.normal for piece in pieces] for pieces, _ in placed])
     spreads = np.array([[piece.spread for piece in pieces] for pieces, _ in placed])

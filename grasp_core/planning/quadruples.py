@@ -47,9 +47,8 @@ class ConedQuadruples:
     def ranked(self, construction: Construction) -> tuple["ConedQuadruples", Array]:
         """Order the rows by their upper bounds on discs; for reguli, by the width of the cones.
 
-        Returns:
-            The quadruples worth a program, and a bound for each choice of cones and finger order,
-            (q, 2, orders) [object radii]: minus infinity where an attempt is not worth a program.
+        Gives the quadruples worth a program, and a bound for each choice of cones and finger order,
+        (q, 2, orders) [object radii]: minus infinity where an attempt is not worth a program.
         """
         bounds = self._bounds(construction)
         best = bounds.max(axis=(1, 2), initial=-np.inf)
@@ -81,11 +80,7 @@ class ConedQuadruples:
     def attempts(self, row: int, construction: Construction, bounds: Array) -> tuple[Attempt, ...]:
         """List the attempts to make on the quadruple in one row.
 
-        Args:
-            row: Row of the table.
-            construction: Gives the orders of the fingers.
-            bounds: Upper bound for each choice of cones and finger order, (2, orders); attempts
-                with a bound of minus infinity are left out.
+        Takes `bounds` (2, orders).
         """
         found: list[Attempt] = []
         made = cache(partial(self._cones, row))
@@ -144,13 +139,8 @@ class WideQuadruples:
     def ranked(self, construction: Construction, worth: float) -> tuple["WideQuadruples", Array]:
         """Order the rows by the discs that their widest cones allow; drop those below `worth`.
 
-        Args:
-            construction: The construction to be tried on them.
-            worth: The merit that placements must exceed.
-
-        Returns:
-            The quadruples, and upper bounds on their discs, (q,) [object radii]; infinite for
-            reguli, which have none.
+        Gives the quadruples, and upper bounds on their discs, (q,) [object radii]; infinite for
+        reguli, which have none.
         """
         rooms, bounds = self.rooms, np.full(len(self), np.inf)
         promise = self.widest

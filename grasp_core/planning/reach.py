@@ -68,15 +68,8 @@ def reach(
 ) -> Reach:
     """Find straight lines on which all fingers reach their contacts without a collision.
 
-    Args:
-        body: The object.
-        faces: The face that each finger touches.
-        positions: Contacts, (k, 3) [m].
-        normals: Unit vectors into the object, (k, 3).
-        finger: Size of the fingers.
-
-    Returns:
-        Directions that are free together, or the reason why none were found.
+    Takes `positions` (k, 3) [m]; `normals` (k, 3). Gives directions that are free together, or the
+    reason why none were found.
     """
     slack = TOUCHING * body.radius
     tips = positions - finger.radius_m * normals
@@ -176,10 +169,7 @@ def _apart(tips: Array, ways: list[list[Array]], finger: Finger, slack: float) -
 def segment_distances(start: Array, end: Array, triangles: Array) -> Array:
     """Compute the distance of a segment from each triangle, (t,) [m].
 
-    Args:
-        start: One end of the segment, (3,) [m].
-        end: The other end, (3,) [m].
-        triangles: Corners, (t, 3, 3) [m].
+    Takes `start`, `end` (3,) [m]; `triangles` (t, 3, 3) [m].
     """
     after = np.roll(triangles, -1, axis=1)
     edges = [_between(start, end, triangles[:, k], after[:, k]) for k in range(3)]

@@ -77,11 +77,7 @@ def methods_for(body: Polyhedron) -> tuple[Method, ...]:
 
 
 def check_request(body: Polyhedron, request: PlanRequest) -> None:
-    """Refuse keywords out of range, and objects with too many faces for the request.
-
-    Raises:
-        InputError: A keyword is out of range, or the object has too many faces.
-    """
+    """Refuse keywords out of range, and objects with too many faces for the request."""
     check_body(body)
     coefficient(request.friction)
     _check_angle(request)

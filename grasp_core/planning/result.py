@@ -76,12 +76,7 @@ class Tally:
         self._counts[what] += number
 
     def exclude(self, candidates: int, choices: int) -> None:
-        """Count candidates whose bounds prove that they have no grasp.
-
-        Args:
-            candidates: Number of such candidates.
-            choices: Number of choices of convex pieces that were bounded for this.
-        """
+        """Count candidates whose bounds prove that they have no grasp."""
         self.count("tried", candidates)
         self.count("infeasible", candidates)
         self.count("solved", choices)

@@ -35,11 +35,6 @@ def chosen(
     By radius, families take turns: the best of each, then the second of each, and so on. By another
     measure all grasps compete. `diverse` begins with the largest discs and goes on with the grasp
     that is farthest from all before it.
-
-    Args:
-        body: The object.
-        lists: Grasps of each method, the best first.
-        request: How many are wanted, and what makes one better.
     """
     every = _largest_first(chain.from_iterable(lists))
     if request.rank_by == "radius":
@@ -77,15 +72,7 @@ def carried(
 ) -> float:
     """Return what a planned grasp carries under one squeeze, as grasps are ranked by it.
 
-    Args:
-        body: The object.
-        grasp: A grasp of it.
-        friction: Coulomb coefficient.
-        rank_by: `payload` for a mass [kg], `first-slip` for a multiple of the object's weight.
-        finger: The finger that was planned for, if any.
-
-    Returns:
-        The mass or the multiple; 0 if no squeeze holds the object stably.
+    Takes `rank_by` [kg]. Gives the mass or the multiple; 0 if no squeeze holds the object stably.
     """
     loads = any_direction(_mass(body, rank_by))
     tip = _tip_radius(body, finger)

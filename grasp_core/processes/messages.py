@@ -21,11 +21,7 @@ def send(pipe: IO[bytes], value: Any) -> None:
 
 
 def receive(pipe: IO[bytes]) -> bytes:
-    """Receive the bytes of one value, for `unpacked`.
-
-    Raises:
-        EOFError: The other process has ended.
-    """
+    """Receive the bytes of one value, for `unpacked`."""
     (length,) = LENGTH.unpack(_exactly(pipe, LENGTH.size))
     return _exactly(pipe, length)
 

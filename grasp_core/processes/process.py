@@ -19,15 +19,7 @@ class Process:
     """A process with the pipes to it and from it."""
 
     def __init__(self, make: Callable[..., Callable[[Any], Any]], *arguments: Any) -> None:
-        """Start a process.
-
-        Args:
-            make: A function that can be imported by name; it returns the function that does a task.
-            arguments: Arguments of `make`, which can be pickled.
-
-        Raises:
-            OSError: The system starts no more processes, or Python is part of another program.
-        """
+        """Start a process."""
         if not can_start():
             raise OSError("no Python program can be started beside this one")
         # not -m alone: the current folder must not come before the installed packages
@@ -41,12 +33,7 @@ class Process:
         self._start = (make, arguments)
 
     def ask(self, task: Any) -> bytes:
-        """Have a task done; return a pickled pair of result and error.
-
-        Raises:
-            EOFError: The process has ended.
-            OSError: The process has ended.
-        """
+        """Have a task done; return a pickled pair of result and error."""
         if self._start:
             send(self.tasks, self._start)
             self._start = ()

@@ -70,16 +70,7 @@ class Workers:
     def in_order(
         self, tasks: Iterable[Task], here: Callable[[Task], Result], ahead: int = AHEAD
     ) -> Generator[Result]:
-        """Yield the result of each task, in their order.
-
-        Args:
-            tasks: Tasks that can be pickled.
-            here: Does a task in this process, with the result that the others would give.
-            ahead: Number of tasks per process that are handed out before the first is done.
-
-        Raises:
-            Exception: What the first task that fails raises, in the place of its result.
-        """
+        """Yield the result of each task, in their order."""
         coming, line = iter(tasks), deque[_Place]()
         try:
             while self._line_up(coming, line, ahead):
@@ -174,12 +165,7 @@ def working(
 ) -> Generator[Workers | None]:
     """Let processes work beside this one during a `with` block; None if there are none.
 
-    Args:
-        count: Largest number of processes beside this one.
-        make: A function that can be imported by name; it returns the function that does a task.
-        arguments: Arguments of `make`, which can be pickled.
-        patience_s: How long this process works alone before others are started, and then only as
-            many as have work for that long [s].
+    Takes `patience_s` [s].
     """
     if count < 1 or not can_start():
         yield None

@@ -59,14 +59,8 @@ class Limits(NamedTuple):
 def grow(cones: Cones, edges: Array, limits: Limits) -> tuple[int, Array, Indices, Array, Array]:
     """Grow a polytope inside the set of wrenches, around zero if that is inside.
 
-    Args:
-        cones: Cones of the contact forces.
-        edges: Local forces whose wrenches span what the set spans, one a row, contiguous.
-        limits: When to stop.
-
-    Returns:
-        How it ended; local forces of the points, (p, 3k); corners, (m, 6), and normals, (m, 6), of
-        the simplices; the direction of least support found, (6,).
+    Gives how it ended; local forces of the points, (p, 3k); corners, (m, 6), and normals, (m, 6),
+    of the simplices; the direction of least support found, (6,).
     """
     weakest, upper = np.zeros(D), np.inf
     forces, points = np.empty((limits.points, edges.shape[1])), np.empty((limits.points, D))
@@ -139,8 +133,7 @@ def _wrench(G: Array, force: Array, point: Array) -> None:
 def _begin(G: Array, edges: Array, limits: Limits, forces: Array, points: Array) -> float:
     """Choose seven points, each as far as possible from the affine hull of those before.
 
-    Returns:
-        The height from which on points see a simplex; -1 if all points are flat.
+    Gives the height from which on points see a simplex; -1 if all points are flat.
     """
     wrenches, rest, mean = np.empty((len(edges), D)), np.empty((len(edges), D)), np.zeros(D)
     for i in range(len(edges)):

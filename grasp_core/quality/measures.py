@@ -62,17 +62,8 @@ class Measure(ByValue):
     def of(cls, name: str, wrenches: ArrayLike | None, radius: float) -> "Measure":
         """Make a measure from a user's words and wrenches.
 
-        Args:
-            name: The measure's name.
-            wrenches: External (force, torque) of a task, torque about the centre of mass, (m, 6)
-                [N, N m]; None for other measures.
-            radius: The object's radius [m].
-
-        Returns:
-            The measure, with torques over the radius.
-
-        Raises:
-            InputError: There is no such measure, or the wrenches do not fit it.
+        Takes `wrenches` (force, torque) or (m, 6) [N, N m]; `radius` [m]. Gives the measure, with
+        torques over the radius.
         """
         one_of(name, get_args(MeasureName), "measure")
         if name != "task":
@@ -143,12 +134,7 @@ class Measure(ByValue):
         return np.where(supports < 0.0, supports / np.maximum(demands, SMALL_DEMAND), allowed)
 
     def keeps(self, maps: Array, slack: float) -> NDArray[np.bool_]:
-        """Return which orthogonal matrices (g, 3, 3) map the loads to themselves, (g,).
-
-        Args:
-            maps: The matrices, about the centre of mass.
-            slack: Largest distance between a mapped load and another, over the longest one.
-        """
+        """Return which orthogonal matrices (g, 3, 3) map the loads to themselves, (g,)."""
         if self.name != "task":
             return np.ones(len(maps), dtype=np.bool_)
         # a reflection turns torques the other way round

@@ -39,11 +39,7 @@ UNREACHABLE = 1e-9
 
 
 def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
-    """Compute wrenches of pyramid edges inscribed in friction cones, (k edges, 6).
-
-    Raises:
-        InputError: There are fewer than three edges, or more than ten thousand.
-    """
+    """Compute wrenches of pyramid edges inscribed in friction cones, (k edges, 6)."""
     circle = _circle(edges)
     slopes = wrenches.friction
     each = circle * np.array([np.ones_like(slopes), slopes, slopes]).T[:, None]
@@ -52,11 +48,7 @@ def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
 
 
 def _circle(edges: int) -> Array:
-    """Compute the edges (normal, tangent, tangent) of a pyramid for friction one, (edges, 3).
-
-    Raises:
-        InputError: There are fewer than three edges, or more than ten thousand.
-    """
+    """Compute the edges (normal, tangent, tangent) of a pyramid for friction one, (edges, 3)."""
     whole(edges, "edges", least=FEWEST_EDGES, most=MOST_EDGES)
     turns = 2.0 * np.pi * np.arange(edges) / edges
     return np.column_stack([np.ones(edges), np.cos(turns), np.sin(turns)])

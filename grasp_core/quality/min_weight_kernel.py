@@ -20,11 +20,7 @@ from grasp_core.solvers.lp_kernel import OPTIMAL, Rows, Vertex, solve
 def vertices(wrenches: Array, twists: Array, multipliers: Array, rows: Indices) -> None:
     """Find a best vertex of the min-weight program of each grasp.
 
-    Args:
-        wrenches: Wrenches of each grasp, (g, N, 6).
-        twists: Filled with the vertices, (g, 6); NaN where none is found.
-        multipliers: Filled with the multipliers of the rows, (g, 6).
-        rows: Filled with the rows that meet in the vertex, (g, 6).
+    Takes `twists`, `multipliers`, `rows` (g, 6).
     """
     count = wrenches.shape[1]
     At, b, norms = np.empty((WRENCH, count)), np.ones(count), np.empty(count)

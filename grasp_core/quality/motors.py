@@ -142,11 +142,7 @@ def _each(value: ArrayLike, joints: int) -> Array:
 
 
 def motors_for(motors: Motors | None, contacts: int) -> Motors:
-    """Check that motors are those of so many contacts; None gives a hand without joints.
-
-    Raises:
-        InputError: They are not, or their fields make no sense.
-    """
+    """Check that motors are those of so many contacts; None gives a hand without joints."""
     if motors is None:
         return Motors(np.zeros((0, 3 * contacts)), np.zeros(0), np.zeros(0))
     instance(motors, Motors, "motors", "gc.Motors.of makes one")

@@ -96,8 +96,7 @@ class ResistedLoads(ByValue):
 
         They hold to within 1e-12 of the longest wrench.
 
-        Returns:
-            Whether both are proved; only the upper one where the lower one is -1.
+        Gives whether both are proved; only the upper one where the lower one is -1.
         """
         with np.errstate(all="ignore"):
             sound = (
@@ -143,16 +142,7 @@ def thin(wrenches: WrenchSet) -> WrenchSet:
 def resisted_loads(wrenches: WrenchSet, measure: Measure, gap: float = GAP) -> ResistedLoads:
     """Bound the largest multiple of a set of loads that contacts resist.
 
-    Args:
-        wrenches: The wrenches of the contacts (`l1`), with torques over the object's radius.
-        measure: The loads, other than those of the Ferrari-Canny quality.
-        gap: Wanted relative gap between the bounds, for the weight.
-
-    Returns:
-        Both bounds with their proofs.
-
-    Raises:
-        SolverError: A program's answer failed its check.
+    Gives both bounds with their proofs.
     """
     if measure.name == "weight":
         ball = wrench_set_quality(thin(wrenches), gap)
@@ -233,11 +223,7 @@ class TaskLimit(NamedTuple):
 
 
 def task_limits(wrenches: WrenchSet, measure: Measure) -> list[TaskLimit]:
-    """Find the largest multiple of each load of a task that contacts in force closure resist.
-
-    Raises:
-        SolverError: A program's answer failed its check.
-    """
+    """Find the largest multiple of each load of a task that contacts in force closure resist."""
     return [_limit(wrenches, load) for load in measure.loads]
 
 

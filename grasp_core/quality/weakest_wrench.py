@@ -31,13 +31,8 @@ def weakest_from(
 ) -> WrenchLimit:
     """Search for a wrench of unit size that is locally the hardest to resist.
 
-    Args:
-        body: The wrenches that the contacts can apply.
-        limits: Limits of wrenches of unit size; the weakest of these are followed.
-        torque_scale: Length that makes a torque comparable with a force [m].
-
-    Returns:
-        The weakest limit found: its wrench has |(force, torque / torque_scale)| = 1.
+    Takes `torque_scale` [m]. Gives the weakest limit found: its wrench has |(force, torque /
+    torque_scale)| = 1.
     """
     scale = np.array([1.0] * 3 + [torque_scale] * 3)
     every = list(limits)

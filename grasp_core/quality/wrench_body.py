@@ -60,16 +60,8 @@ class WrenchBody:
     ) -> None:  # fmt: skip
         """Set up the conic program; its last column will hold the wrench in question.
 
-        Args:
-            arms: Contact points from the centre of torques, (k, 3) [m].
-            normals: Unit vectors into the object, (k, 3).
-            friction: Coulomb coefficients, (k,).
-            max_normal_force: Largest normal force of each contact [N].
-            motors: Joints that the forces load; None for none.
-            torsions: Torsional coefficients, (k,) [m], without motors; None for hard fingers.
-
-        Raises:
-            InputError: The motors are not those of so many contacts.
+        Takes `arms` (k, 3) [m]; `normals` (k, 3); `friction` (k,); `max_normal_force` [N];
+        `torsions` (k,) [m].
         """
         self.max_normal_force = positive(max_normal_force, "max_normal_force")
         self.count = k = len(arms)
@@ -113,15 +105,8 @@ class WrenchBody:
     def largest(self, wrench: Array, carried: Array) -> Farthest:
         """Find the largest multiple of a wrench that is resisted while joints carry as many times.
 
-        Args:
-            wrench: External wrench, (6,).
-            carried: Torques q that each joint has to add for one wrench, (joints,) [N m].
-
-        Returns:
-            The multiple, and a facet with m.q - y.w = 1, so that none above (3) is resisted.
-
-        Raises:
-            SolverError: The program's answer failed its check, or its facet bounds nothing.
+        Takes `wrench` (6,); `carried` (joints,) [N m]. Gives the multiple, and a facet with m.q -
+        y.w = 1, so that none above (3) is resisted.
         """
         unit = self.about_middle(wrench)
         length = float(np.linalg.norm(unit))
@@ -166,10 +151,7 @@ class WrenchBody:
     def holds(self, shares: Array, loads: Array, slack: float | Array) -> bool:
         """Return whether forces are in their cones, no larger than allowed, and balance loads.
 
-        Args:
-            shares: Local forces over the largest normal force, (n, 3k) or (n, 4k).
-            loads: External wrenches over it, scaled and about the contacts' mean, (n, 6).
-            slack: By how much they may miss each, in the same units, one for all or one each, (n,).
+        Takes `shares` (n, 3k) or (n, 4k); `loads` (n, 6); `slack` (n,).
         """
         left = np.linalg.norm(shares @ self.G.T + loads, axis=1)
         return bool((left <= slack).all()) and self.bounded.holds(shares, slack)

@@ -119,11 +119,7 @@ def body_of(
     arms: Array, normals: Array, friction: ArrayLike, max_normal_force: float,
     motors: Motors | None, torsion_m: ArrayLike,
 ) -> WrenchBody:  # fmt: skip
-    """Make the body of contacts; arms (k, 3) [m] start at the centre of torques.
-
-    Raises:
-        InputError: The arguments do not describe contacts, or torsion is given with motors.
-    """
+    """Make the body of contacts; arms (k, 3) [m] start at the centre of torques."""
     mu = contact_frictions(friction, len(arms))
     torsions = contact_torsions(torsion_m, mu)
     if torsions is not None and motors is not None:
@@ -135,11 +131,7 @@ def body_of(
 
 
 def limit_of(body: WrenchBody, wrench: Array) -> WrenchLimit:
-    """Find the largest multiple of an external wrench, (6,), that a body holds, with its proof.
-
-    Raises:
-        SolverError: The program's answer failed its check.
-    """
+    """Find the largest multiple of an external wrench, (6,), that a body holds, with its proof."""
     found = body.largest(wrench, np.zeros(len(body.levers)))
     limit = max(found.multiple, 0.0)
     return WrenchLimit(

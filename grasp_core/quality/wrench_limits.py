@@ -111,18 +111,8 @@ def many_limits(  # noqa: PLR0913 - all that limits depend on
     Compiled code finds them, and a wrench whose two bounds are farther apart than `CLOSE` is
     solved for by itself.
 
-    Args:
-        positions: Contact points, (k, 3) [m].
-        normals: Unit vectors into the object, (k, 3).
-        friction: Coulomb coefficient of all contacts.
-        wrenches: External (force, torque), (n, 6) [N, N m], torque about `center`.
-        inside: Balanced contact forces strictly inside the cones, as `force_closure` gives them,
-            (k, 3).
-        max_normal_force: Largest normal force of each contact [N].
-        center: Point about which torques are taken, (3,) [m].
-
-    Raises:
-        SolverError: A program's answer failed its check.
+    Takes `positions` (k, 3) [m]; `normals`, `inside` (k, 3); `wrenches` (force, torque) or (n, 6)
+    [N, N m]; `max_normal_force` [N]; `center` (3,) [m].
     """
     _check_sizes(wrenches, "wrenches")
     mu = np.full(len(positions), friction)
@@ -141,9 +131,8 @@ def _compiled_limits(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Find limits of unit loads (n, 6) on hard contacts without motors, by the compiled code.
 
-    Returns:
-        The limits over the largest normal force, (n,), and whether both bounds of each are close
-        to each other, (n,).
+    Gives the limits over the largest normal force, (n,), and whether both bounds of each are close
+    to each other, (n,).
     """
     local = np.einsum("kij,ki->kj", body.frames, inside)
     start = (HALF / local[:, 0].max() * local).ravel()
@@ -174,8 +163,7 @@ def _check_sizes(loads: Array, name: str) -> None:
 def axis_wrenches(torque_scale: float) -> Array:
     """Return the twelve unit wrenches along and against each axis, (12, 6) [N, N m].
 
-    Args:
-        torque_scale: Torque that goes with a force of one newton [m].
+    Takes `torque_scale` [m].
     """
     scale = np.array([1.0] * 3 + [torque_scale] * 3)
     return np.vstack([np.eye(6), -np.eye(6)]) * scale

@@ -56,12 +56,7 @@ class Newton(NamedTuple):
 def limits(contacts: Contacts, loads: Array, found: Array, forces: Array, facets: Array) -> None:
     """Find the largest multiple t with G f = -t w for each wrench w, as far as rounding allows.
 
-    Args:
-        contacts: The contacts.
-        loads: The wrenches, (n, 6), of length about one.
-        found: Filled with the multiples, (n,).
-        forces: Filled with the forces f, (n, 3k).
-        facets: Filled with the twists y, y.w = -1, (n, 6).
+    Takes `loads`, `facets` (n, 6); `found` (n,); `forces` (n, 3k).
     """
     count = len(contacts.friction)
     newton = Newton(

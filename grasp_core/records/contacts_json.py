@@ -123,9 +123,6 @@ def contact_sets_from_json(text: str, overrides: Overrides = Overrides()) -> tup
     Without a centre in the file, torques are taken about the mean contact (about the centre of mass
     for a `grasps.json`). Without a torque scale, the largest distance of a contact from that centre
     makes torques comparable with forces (the object's radius for a `grasps.json`).
-
-    Raises:
-        InputError: The text is neither, or no friction is given; the message names the field.
     """
     found = value_of(text)
     if isinstance(found, dict) and "schema" in found and "contacts" not in found:

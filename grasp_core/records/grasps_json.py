@@ -96,11 +96,7 @@ def surface_record(surface: Surface) -> dict[str, object]:
 
 
 def surface_of_record(record: "SurfaceRecord") -> Surface:
-    """Return what a record says of a surface.
-
-    Raises:
-        InputError: A number is out of range.
-    """
+    """Return what a record says of a surface."""
     return Surface(
         closed=record.closed,
         caps=np.array(record.caps, dtype=np.int64),
@@ -153,12 +149,7 @@ def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:
 
 
 def grasps_from_json(text: str) -> SavedGrasps:
-    """Read the text of a `grasps.json`.
-
-    Raises:
-        InputError: The text is not a `grasps.json`; the message names the field.
-        MeshError: The mesh in it is not a solid.
-    """
+    """Read the text of a `grasps.json`."""
     record = _record_of(text)
     body = _body_of(record)
     return SavedGrasps(
@@ -171,10 +162,6 @@ def plan_from_json(text: str) -> Plan:
 
     A file keeps neither times nor what is known of face quadruples without grasps: `absences`,
     `undecided` and `unreached` are empty. Written again, the plan gives the same text.
-
-    Raises:
-        InputError: The text is not a `grasps.json`; the message names the field.
-        MeshError: The mesh in it is not a solid.
     """
     record = _record_of(text)
     body, counts = _body_of(record), record.counts

@@ -187,11 +187,7 @@ class CertifiedRegions(ByValue):
 
 
 def _check_parts(found: CertifiedRegions) -> None:
-    """Refuse fields of the wrong type, number or sign.
-
-    Raises:
-        InputError: A field is not a region, a cover or a length, or one is missing.
-    """
+    """Refuse fields of the wrong type, number or sign."""
     each = partial(instance, kind=ContactRegion, name="regions")
     count = len(several(found.regions, each, "regions", "ContactRegion values"))
     if not count == len(found.borders) == FINGERS:

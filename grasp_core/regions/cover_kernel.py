@@ -206,14 +206,7 @@ def orthants(rays: Array, sites: Sites, axes: Array, motions: Array, cones: Indi
 def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> tuple[int, int]:
     """Divide cones until each is covered, a twist is unresisted, or there are too many cones.
 
-    Args:
-        sites: Where contacts may be.
-        axes: Twists of the first rays as rows, (6, 6).
-        needs: Largest number of cones, and the result of `Sites.clear`, (k,).
-        tree: Filled with the outcome for each cone.
-
-    Returns:
-        How the search ended, and the number of cones.
+    Takes `axes` (6, 6); `needs` (k,). Gives how the search ended, and the number of cones.
     """
     most, clear = needs
     rays = np.zeros((2 * RAYS + most, RAYS))

@@ -30,10 +30,7 @@ class Searched:
 def search_cover(sites: Sites, axes: Array, cones: int) -> Searched:
     """Search for a cover that proves force closure for all contacts in given sites.
 
-    Args:
-        sites: Where contacts may be.
-        axes: Twists of the first rays, as rows, (6, 6).
-        cones: Largest number of cones; the 64 orthants are always tried.
+    Takes `axes` (6, 6).
     """
     # the search sees sites on a grid, so that it ends alike on all machines
     kernel, told = compiled(KERNEL), sites.on_grid()

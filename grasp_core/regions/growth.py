@@ -41,11 +41,7 @@ GROWING = 4
 def shared_out(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> list[Array]:
     """Grow polygons around sites as far as their proof allows, in the planes, (c, 2) each.
 
-    Args:
-        grounds: The pieces that contacts may stand on.
-        ys: Points of the sites in plane coordinates, (k, 2).
-        sites: Sites that the cover proves.
-        cover: Their proof.
+    Takes `ys` (k, 2).
     """
     polygons = list[Array]()
     for _ in range(SHARINGS):

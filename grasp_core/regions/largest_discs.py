@@ -138,10 +138,7 @@ def reach_of(grounds: Grounds, ys: Array) -> float:
 def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> Proved | None:
     """Find the largest equal discs, up to whole faces, that a cover proves, or None.
 
-    Args:
-        grounds: The pieces that contacts may stand on.
-        ys: Centres in plane coordinates of the pieces, (k, 2).
-        first: The radius to try first.
+    Takes `ys` (k, 2).
     """
     search = _Search(grounds, ys)
     search.widen(grounds.cones // COARSE, first, FAST, SLOW - 1.0)

@@ -90,11 +90,7 @@ class TwistCover(ByValue):
             raise InputError(f"cover.codes must be whole numbers from 0 to {LEAF}")
 
     def leaves(self) -> Iterator[tuple[slice, Array]]:
-        """Yield the undivided cones by levels: their slice of `forces`, and their rays, (m, 6, 6).
-
-        Raises:
-            InputError: The codes do not describe a tree.
-        """
+        """Yield undivided cones by levels: their slice of `forces`, and their rays, (m, 6, 6)."""
         cones, at, begun = orthants(), 0, 0
         while len(cones):
             codes = self.codes[at : at + len(cones)]
@@ -117,10 +113,7 @@ class TwistCover(ByValue):
 
         The answer is False for arguments that are not regions, normals or friction.
 
-        Args:
-            regions: Corners of each contact's convex region, about the origin of points, (c, 3).
-            normals: Inward unit normals, (k, 3).
-            friction: Coulomb coefficients, (k,).
+        Takes `regions` (c, 3); `normals` (k, 3); `friction` (k,).
         """
         k = self.forces.shape[1]
         if not (are_units(normals, k, 3, slack=SLACK) and are_frictions(friction, k)):
@@ -173,8 +166,7 @@ def power_of(F: Array, twists: Array) -> tuple[Array, Array]:
 
     It is linear in x: slope times x plus a constant.
 
-    Returns:
-        The slopes F x b, (m, r, 3), and the constants F.a, (m, r).
+    Gives the slopes F x b, (m, r, 3), and the constants F.a, (m, r).
     """
     return np.cross(F[:, None], twists[..., 3:]), np.einsum("mi,mri->mr", F, twists[..., :3])
 

@@ -72,20 +72,14 @@ class Sites(NamedTuple):
     def lowest(self, i: int, slopes: Array) -> Array:
         """Find the least values of linear functions over a contact's polygon and disc, (...,).
 
-        Args:
-            i: Index of the contact.
-            slopes: Slopes of the functions along the tangents, (..., 2).
+        Takes `slopes` (..., 2).
         """
         lengths = np.sqrt(np.einsum("...j,...j->...", slopes, slopes))
         return (slopes @ self.corners[i].T).min(axis=-1) - self.radii[i] * lengths
 
 
 def stacked_corners(polygons: list[Array]) -> Array:
-    """Put polygons (c, 2) into one array, with the last corners of shorter ones repeated.
-
-    Raises:
-        InputError: A polygon has no corners, so that nothing would be asked of its contact.
-    """
+    """Put polygons (c, 2) into one array, with the last corners of shorter ones repeated."""
     if min(map(len, polygons)) == 0:
         raise InputError("the site of each contact must have at least one corner, got none")
     most = max(map(len, polygons))

@@ -28,8 +28,7 @@ def _depth_in_cone(v: Array, i: int) -> float:
 def scale_to_middle(pair: Array, W: Array, middle: Array) -> bool:
     """Fill in symmetric maps W_i of K and their inverses: W_i z_i = inverse(W_i) s_i = middle_i.
 
-    Returns:
-        False if rounding has put the point outside the cones.
+    Gives false if rounding has put the point outside the cones.
     """
     s, z = pair[0], pair[1]
     for i in range(len(s)):

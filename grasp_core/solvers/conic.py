@@ -61,11 +61,7 @@ class ConicSolution:
 
 
 def minimize(program: ConicProgram) -> ConicSolution:
-    """Solve a conic program that is feasible and bounded.
-
-    Raises:
-        SolverError: Every answer failed the check, as it does where the program is infeasible.
-    """
+    """Solve a conic program that is feasible and bounded."""
     failure = SolverError("Clarabel was not called with any settings")
     for change in WAYS:
         try:

@@ -87,11 +87,7 @@ class Below:
 
 
 def maximize(program: LinearProgram) -> Optimum | Infeasible:
-    """Solve a linear program, or prove that it has no feasible point.
-
-    Raises:
-        SolverError: The solver's answer failed the check, or the program is unbounded.
-    """
+    """Solve a linear program, or prove that it has no feasible point."""
     found = maximize_above(program, -math.inf)
     if isinstance(found, Below):
         raise SolverError(
@@ -101,15 +97,7 @@ def maximize(program: LinearProgram) -> Optimum | Infeasible:
 
 
 def maximize_above(program: LinearProgram, cutoff: float) -> Optimum | Infeasible | Below:
-    """Solve a linear program like `maximize`, but stop once a bound below a cutoff is proved.
-
-    Args:
-        program: Program whose data are of order one.
-        cutoff: Smallest value that is of interest.
-
-    Raises:
-        SolverError: The solver's answer failed the check, or the program is unbounded.
-    """
+    """Solve a linear program like `maximize`, but stop once a bound below a cutoff is proved."""
     try:
         return _by_simplex(program, cutoff)
     except (SolverError, np.linalg.LinAlgError):

@@ -71,14 +71,7 @@ class Vertex(NamedTuple):
 def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int]:
     """Find a best vertex of a program, or a row that contradicts others.
 
-    Args:
-        c: Objective, (n,).
-        rows: Rows of the program.
-        cutoff: Stop as soon as the optimum is known to be smaller.
-        vertex: Filled with the last basis and its vertex.
-
-    Returns:
-        How it ended, and the row that contradicts the basis, if one does.
+    Takes `c` (n,). Gives how it ended, and the row that contradicts the basis, if one does.
     """
     n, count, idle = len(c), len(rows.b), 0
     basis, y, x = vertex

@@ -49,11 +49,7 @@ def least_distance(C: Array, D: Array, *, accuracy: float = EXACT) -> Array:
 
     A row of the answer does not depend on the other rows of D, except for rounding.
 
-    Args:
-        C: Normals of all polyhedra, (m, v).
-        D: Right-hand sides of each polyhedron, (n, m).
-        accuracy: Violation of the conditions that is accepted, relative to x; active rows that are
-            nearly parallel need more than `EXACT`.
+    Takes `C` (m, v); `D` (n, m).
     """
     X = np.zeros((len(D), C.shape[1]))
     outside = np.flatnonzero(D.min(axis=1) < 0.0)
@@ -73,9 +69,8 @@ def _by_kernel(
 ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """Find points by the compiled method, (n, v).
 
-    Returns:
-        The points; which of them are proved, (n,); and which polyhedra are proved to be empty or
-        farther than `FARTHEST` from the origin, (n,).
+    Gives the points; which of them are proved, (n,); and which polyhedra are proved to be empty or
+    farther than `FARTHEST` from the origin, (n,).
     """
     X, U = np.zeros((len(D), C.shape[1])), np.zeros(D.shape)
     compiled(KERNEL).solve(np.array(C, order="C"), np.array(D, order="C"), X, U)

@@ -59,12 +59,7 @@ class Active(NamedTuple):
 def solve(C: Array, D: Array, X: Array, U: Array) -> None:
     """Find the nearest point of each polyhedron.
 
-    Args:
-        C: Normals, (m, v), contiguous like all of these arrays.
-        D: Right-hand sides, (n, m).
-        X: Filled with the points, (n, v); with zeros where none was found.
-        U: Zeros, filled with the points' multipliers, (n, m); where none was found, with weights of
-            rows that contradict each other, if some do.
+    Takes `C` (m, v); `D`, `U` (n, m); `X` (n, v).
     """
     m, v = C.shape
     norms = np.empty(m)

@@ -64,11 +64,7 @@ class QuadraticProgram:
 
 
 def minimize(program: QuadraticProgram) -> Array | None:
-    """Solve a quadratic program, (n,); None where ProxQP returns no numbers.
-
-    Raises:
-        SolverError: ProxQP cannot be loaded.
-    """
+    """Solve a quadratic program, (n,); None where ProxQP returns no numbers."""
     solver = _qpsolvers()
     equations = (program.A, program.b) if len(program.b) else (None, None)
     asked = solver.Problem(

@@ -55,12 +55,7 @@ def graded(values: float, digits: int = SAME_DIGITS) -> float: ...
 @overload
 def graded(values: Array, digits: int = SAME_DIGITS) -> Array: ...
 def graded(values: float | Array, digits: int = SAME_DIGITS) -> float | Array:
-    """Number the cells of a grid in which values lie, of any shape; equal values share a cell.
-
-    Args:
-        values: Numbers to grade; infinite ones lie in infinite cells.
-        digits: Digits after the point that a cell spans.
-    """
+    """Number the cells of a grid in which values lie, of any shape; equal values share a cell."""
     cells = np.floor(np.asarray(values, dtype=np.float64) * 10.0**digits + SHIFT)
     return cells if cells.ndim else float(cells)
 
@@ -92,9 +87,7 @@ def few_digits(number: float, share: float) -> float:
 def ranks(values: ArrayLike, share: float = SAME_SHARE) -> Indices:
     """Rank numbers, (n,): 0 for the smallest and all that equal it, 1 for the next, and so on.
 
-    Args:
-        values: Numbers to rank, (n,).
-        share: Neighbours are equal if their gap is a smaller share of the larger one in size.
+    Takes `values` (n,).
     """
     numbers = np.asarray(values, dtype=np.float64)
     order = np.argsort(numbers, kind="stable")
@@ -121,9 +114,7 @@ def largest_first(values: ArrayLike) -> list[int]:
 def first_best(values: ArrayLike, margin: float | None = None) -> int:
     """Find the index of the first value that equals the largest one within a margin.
 
-    Args:
-        values: Numbers to compare, (n,), at least one.
-        margin: By how much less counts as equal; by default a share of the largest one.
+    Takes `values` (n,).
     """
     numbers = np.asarray(values, dtype=np.float64)
     best = float(numbers.max())
@@ -140,14 +131,8 @@ def surpassing(best: float) -> float:
 def nearest_optimum(program: LinearProgram, optimum: Optimum, share: float = SAME_VALUE) -> Array:
     """Find the optimum of a program that is nearest to the origin, (n,).
 
-    Args:
-        program: Program whose data are of order one.
-        optimum: One of its optima.
-        share: Part of the value that may be given up, as a share of 1 + |value|.
-
-    Returns:
-        A point that meets all rows with such a value; the optimum itself if the nearest one cannot
-        be found.
+    Gives a point that meets all rows with such a value; the optimum itself if the nearest one
+    cannot be found.
     """
     G, h = program.stacked()
     kept = optimum.value - share * (1.0 + abs(optimum.value))

@@ -30,14 +30,7 @@ def in_words(
     added: Sequence[int] = (),
     numbers: Mapping[int, int] | None = None,
 ) -> str:
-    """Say in one line which faces moved, the farthest first, and which have another outline.
-
-    Args:
-        changes: What became of each face.
-        added: Faces of the changed part that succeed no old one.
-        numbers: Numbers by which faces are called, by their numbers in `changes`; None for these
-            themselves. A face without such a number is called a newer one.
-    """
+    """Say in one line which faces moved, the farthest first, and which have another outline."""
     listed = list(changes)
     names = {each.old: each.old for each in listed} if numbers is None else numbers
     moved = sorted(
@@ -62,12 +55,7 @@ def in_words(
 
 
 def common_shift(changes: Sequence[FaceChange], added: Sequence[int] = ()) -> Array | None:
-    """Find the shift that explains all moves of faces, (3,) [m]; None if no shift does.
-
-    Args:
-        changes: What became of each face of the old part.
-        added: Faces of the changed part that succeed no old one.
-    """
+    """Find the shift that explains all moves of faces, (3,) [m]; None if no shift does."""
     if added or any(each.new is None or each.turn > TURNED or each.reshaped for each in changes):
         return None
     if sum(each.moved for each in changes) <= 1:

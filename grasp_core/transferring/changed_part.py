@@ -38,16 +38,6 @@ def load_changed_part(
 
     A centre of mass that was given for the old part is kept; otherwise it is that of uniform
     density.
-
-    Args:
-        path: The mesh file.
-        old: The part before.
-        unit: Unit of length of the file.
-        limits: Largest size of the file, and largest cost of reading it.
-        scale: Factor on the coordinates of the file, besides its unit.
-
-    Raises:
-        MeshError: The file is not a solid; its `reason` says why.
     """
     center = given_center(old)
     return load_polyhedron(
@@ -74,18 +64,7 @@ def growth(old: Polyhedron, new: Polyhedron) -> float:
 def fitting_unit(
     path: Path, old: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS, *, scale: float = 1.0
 ) -> str:
-    """Find the unit in which a mesh file holds a part about as large as the old one.
-
-    Args:
-        path: The mesh file.
-        old: The part before.
-        limits: Largest size of the file, and largest cost of reading it.
-        scale: Factor on the coordinates of the file, besides its unit.
-
-    Raises:
-        InputError: The size fits in no unit.
-        MeshError: The file cannot be read.
-    """
+    """Find the unit in which a mesh file holds a part about as large as the old one."""
     size = scale * _times(path, old, limits)
     off = {unit: abs(math.log(size * length)) if size > 0.0 else math.inf
            for unit, length in UNITS_M.items()}  # fmt: skip
@@ -105,14 +84,6 @@ def fitting_lengths(
     """Find a unit and a scale at which a mesh file is as large as the body that was read from it.
 
     Unless the scale is 1, the unit is the metre, and the scale has nine digits.
-
-    Args:
-        path: The mesh file.
-        body: The solid.
-        limits: Largest size of the file, and largest cost of reading it.
-
-    Raises:
-        MeshError: The file cannot be read.
     """
     length = float(f"{1.0 / _times(path, body, limits):.9g}")
     same = (unit for unit, metres in UNITS_M.items() if math.isclose(length, metres, rel_tol=SAME))

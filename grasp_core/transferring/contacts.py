@@ -52,14 +52,7 @@ class CarriedContact(ByValue):
 def carried_contacts(
     old: Polyhedron, new: Polyhedron, grasp: Grasp, rule: Likeness
 ) -> tuple[CarriedContact, ...]:
-    """Carry the four contacts of a grasp over to a changed part, in finger order.
-
-    Args:
-        old: The part before, with planar faces.
-        new: The changed part, with planar faces.
-        grasp: A grasp of the old part.
-        rule: How near, and how little turned, the face of a carried contact must be.
-    """
+    """Carry the four contacts of a grasp over to a changed part, in finger order."""
     return tuple(
         _carried((old, new), finger, face, contact, rule)
         for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True))

@@ -121,13 +121,7 @@ def _motions(change: FaceChange) -> Iterable[str]:
 
 
 def face_changes(old: Polyhedron, new: Polyhedron, rule: Likeness) -> tuple[FaceChange, ...]:
-    """Find the successor of each face of an old part, in the order of the old faces.
-
-    Args:
-        old: The old part, with planar faces.
-        new: The changed part, in the same frame.
-        rule: How near, and how little turned, a successor must be.
-    """
+    """Find the successor of each face of an old part, in the order of the old faces."""
     reach = rule.distance + rule.same
     near = [_successor(face, new, range(len(new.faces)), rule, reach) for face in old.faces]
     free = sorted({*range(len(new.faces))} - {*near})

@@ -34,9 +34,7 @@ def face_in_words(face: Face) -> str:
 def place_in_words(normal: Triple, center: Triple) -> str:
     """Say where a face is, such as `facing +x at x = 60 mm`.
 
-    Args:
-        normal: Its inward unit normal.
-        center: Its centroid [m].
+    Takes `center` [m].
     """
     outward = [-each for each in normal]
     axis = max(range(3), key=lambda index: abs(outward[index]))

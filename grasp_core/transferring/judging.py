@@ -59,17 +59,7 @@ class Judged:
 
 
 def judged(body: Polyhedron, seated: Seated, friction: float, name: str) -> Judged:
-    """Judge contacts on the faces of a part.
-
-    Args:
-        body: The part.
-        seated: Contacts on its faces.
-        friction: Coulomb coefficient.
-        name: The id of the grasp that they may make.
-
-    Raises:
-        UndecidedError: Force closure is too close to call.
-    """
+    """Judge contacts on the faces of a part."""
     found = grasp_of(seated, friction, name)
     if isinstance(found, ClosureCertificate):
         critical = critical_friction(found.positions, found.normals)
@@ -83,8 +73,7 @@ def with_general_witness(body: Polyhedron, grasp: Grasp, friction: float) -> Gra
 
     The forces of a certificate may all meet, as at the face centres of a regular solid.
 
-    Returns:
-        The grasp; None if the friction cones leave too little room for skew lines.
+    Gives the grasp; None if the friction cones leave too little room for skew lines.
     """
     center, size = body.center_of_mass, body.radius
     pieces = [
@@ -111,13 +100,7 @@ def reached(body: Polyhedron, grasp: Grasp, finger: Finger) -> Grasp | str:
 
 
 def compared(old: GraspFigures, new: GraspFigures, friction: float) -> tuple[Change, str]:
-    """Say how the figures of a grasp that is still closed have changed, and which ones.
-
-    Args:
-        old: What the grasp reached on the old part.
-        new: What it reaches on the changed one.
-        friction: Coulomb coefficient of both.
-    """
+    """Say how the figures of a grasp that is still closed have changed, and which ones."""
     if old.closure_margin <= 0.0:
         return "better", f"not in force closure before, at friction {friction:g}"
     rise = new.critical_friction - old.critical_friction

@@ -56,13 +56,7 @@ class Likeness:
 def likeness(old: Polyhedron, distance: float | None, angle_deg: float) -> Likeness:
     """Build the rule for an old part.
 
-    Args:
-        old: The part that the grasps were planned on.
-        distance: Largest distance by which a contact may move [m]; None for `SHARE_OF_SIZE`.
-        angle_deg: Largest angle between the two normals [deg].
-
-    Raises:
-        InputError: A number is out of range.
+    Takes `distance` [m]; `angle_deg` [deg].
     """
     where = f", the part's radius in m, or None for {SHARE_OF_SIZE:g} of it"
     usual = SHARE_OF_SIZE * old.radius
@@ -75,12 +69,7 @@ def likeness(old: Polyhedron, distance: float | None, angle_deg: float) -> Liken
 
 
 def check_planar(body: Polyhedron, name: str) -> None:
-    """Refuse a value that is no part, or a part whose faces are patches of a curved surface.
-
-    Raises:
-        InputError: The value is no `Polyhedron`, or its faces are patches: they have no single
-            plane that could have moved.
-    """
+    """Refuse a value that is no part, or a part whose faces are patches of a curved surface."""
     instance(body, Polyhedron, name, "gc.load_polyhedron reads one from a mesh file")
     if body.patches is not None:
         raise InputError(
@@ -92,11 +81,7 @@ def check_planar(body: Polyhedron, name: str) -> None:
 def place_of(new: Polyhedron, point: Array, normal: Array, rule: Likeness) -> Nearest | None:
     """Find the point of a changed part that takes the place of an old one; None if there is none.
 
-    Args:
-        new: The changed part.
-        point: A point of the old surface, (3,) [m].
-        normal: Its inward unit normal, (3,).
-        rule: How near, and how little turned, a face must be.
+    Takes `point` (3,) [m]; `normal` (3,).
     """
     return _nearest(_parts(new), point, normal, rule, rule.distance + rule.same)
 

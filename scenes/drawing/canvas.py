@@ -143,12 +143,7 @@ def _draw(axes: Any, mark: Mark, zorder: int) -> None:
 
 @in_style
 def encoded(figure: Any, form: str) -> bytes:
-    """Encode a figure as the bytes of a picture file; equal figures give equal bytes.
-
-    Args:
-        figure: A figure from `new_figure`.
-        form: A format from `FORMATS`.
-    """
+    """Encode a figure as the bytes of a picture file; equal figures give equal bytes."""
     stream = io.BytesIO()
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     options = {"pil_kwargs": OPTIONS[form]} if form in OPTIONS else {}
@@ -159,15 +154,7 @@ def encoded(figure: Any, form: str) -> bytes:
 def write_frames(
     figure: Any, draw: Callable[[int], None], count: int, rate: float, path: Path
 ) -> Path:
-    """Write an animated picture, frame by frame.
-
-    Args:
-        figure: A figure from `new_figure`.
-        draw: Draws the frame of a given number into the figure.
-        count: Number of frames.
-        rate: Frames per second.
-        path: File to write, gif or webp.
-    """
+    """Write an animated picture, frame by frame."""
     animation: Any = _part("animation")
     writer = animation.PillowWriter(fps=rate)
     with replacing(path) as temporary, writer.saving(figure, str(temporary), dpi=DOTS_PER_INCH):
@@ -178,31 +165,19 @@ def write_frames(
 
 
 def write_figure(figure: Any, path: Path) -> Path:
-    """Write a figure to a file; the ending of the file's name selects the format.
-
-    Raises:
-        InputError: The ending is unknown.
-    """
+    """Write a figure to a file; the ending of the file's name selects the format."""
     return write_parts(path, [encoded(figure, format_of(path))])
 
 
 def write_sheet(sheet: Sheet, path: Path) -> Path:
-    """Write a sheet on white ground to a file; the ending of the file's name selects the format.
-
-    Raises:
-        InputError: The ending is unknown.
-    """
+    """Write a sheet on white ground to a file; the ending of the file's name selects the format."""
     if format_of(path) == "svg":
         return write_parts(path, [svg_of(sheet, paper=True).encode()])
     return write_figure(figure_of(sheet), path)
 
 
 def format_of(path: Path) -> str:
-    """Return the picture format that the ending of a file's name stands for.
-
-    Raises:
-        InputError: The ending is unknown.
-    """
+    """Return the picture format that the ending of a file's name stands for."""
     form = path.suffix.lower().removeprefix(".").replace("jpeg", "jpg")
     if form not in FORMATS:
         raise InputError(f"{path}: a picture's name must end in .{', .'.join(FORMATS)}")

@@ -56,18 +56,7 @@ def write_clip(
 ) -> Path:
     """Draw the motion of a scene, one frame for each sample.
 
-    Args:
-        scene: The simulated scene.
-        joints: Position and quaternion of the object's frame, then the slides of the fingertips
-            along the axes of their contacts, (n, 7 + 3k) [m].
-        path: File to write, gif or webp.
-        caption: Text written into the picture.
-        angles_deg: Azimuth and elevation of the camera as seen from the object, (2,), or (n, 2) to
-            give them for each frame.
-
-    Raises:
-        InputError: The file's name does not end in gif or webp.
-        GraphicsError: No graphics library draws here; the message quotes it.
+    Takes `joints` (n, 7 + 3k) [m]; `angles_deg` (2,) or (n, 2).
     """
     shown = _reach(scene, joints)
     return _written(path, xml=scene.xml, joints=joints, radius=shown, caption=caption,
@@ -80,18 +69,7 @@ def write_held_clip(
 ) -> Path:  # fmt: skip
     """Draw the motion of a held object and its palm, one frame for each sample.
 
-    Args:
-        scene: The simulated scene.
-        joints: Positions of the object, the palm and the fingertips, as the scene's joints, (n, 13
-            + 3k).
-        path: File to write, gif or webp.
-        caption: Text written into the picture.
-        table: Position (3,) and quaternion (4,) of the table, if one is in the trial.
-        up: Unit direction that points up in the picture, (3,).
-
-    Raises:
-        InputError: The file's name does not end in gif or webp.
-        GraphicsError: No graphics library draws here; the message quotes it.
+    Takes `joints` (n, 13 + 3k); `table` (3,) or (4,); `up` (3,).
     """
     layout = scene.layout
     rotation: Any = importlib.import_module("scipy.spatial.transform").Rotation
@@ -130,14 +108,7 @@ def _written(path: Path, **job_parts: Any) -> Path:
 
 
 def drawn_by_first(pairs: Sequence[tuple[Path, Path]]) -> None:
-    """Draw pictures in another process, with the first graphics library that works.
-
-    Args:
-        pairs: For each picture the file that says what to draw, and the file to write.
-
-    Raises:
-        GraphicsError: No graphics library draws here; the message quotes it.
-    """
+    """Draw pictures in another process, with the first graphics library that works."""
     said = ""
     for graphics in _graphics():
         said = _drawn(pairs, graphics)
@@ -158,21 +129,13 @@ def _reach(scene: Scene, joints: Array) -> float:
 
 
 def require_clip(path: Path) -> None:
-    """Refuse a file name that does not end like a clip's.
-
-    Raises:
-        InputError: The name does not end in gif or webp.
-    """
+    """Refuse a file name that does not end like a clip's."""
     if path.suffix.lower() not in FORMATS:
         raise InputError(f"{path}: a clip's name must end in {' or '.join(FORMATS)}")
 
 
 def available_graphics() -> str:
-    """Return the name of the graphics library that MuJoCo can draw with here.
-
-    Raises:
-        GraphicsError: No library works; the message says what was tried.
-    """
+    """Return the name of the graphics library that MuJoCo can draw with here."""
     said = list[str]()
     for graphics in _graphics():
         trouble = _run_frames(graphics, [])
@@ -237,13 +200,9 @@ def _run_frames(graphics: str, arguments: list[str]) -> str:
 def magnified(joints: Array, scene: Scene) -> tuple[Array, float]:
     """Magnify motions until they can be seen.
 
-    Args:
-        joints: Joint positions as for `write_clip`, (n, 7 + 3k).
-        scene: The scene that moved.
-
-    Returns:
-        Joint positions that begin at the planned pose, with every motion since the first sample
-        multiplied by one factor, and that factor: a number of one significant digit, at least 1.
+    Takes `joints` (n, 7 + 3k). Gives joint positions that begin at the planned pose, with every
+    motion since the first sample multiplied by one factor, and that factor: a number of one
+    significant digit, at least 1.
     """
     center, size = scene.layout.center, scene.layout.grasp_size_m
     rotation: Any = importlib.import_module("scipy.spatial.transform").Rotation

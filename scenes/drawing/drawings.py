@@ -50,16 +50,7 @@ MOST_TRIANGLES = 2500
 def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, ...]:
     """List the shapes that show an object with a grasp.
 
-    Args:
-        body: The object.
-        grasp: A grasp on the faces of `body`.
-        friction: Coulomb coefficient of the friction cones.
-
-    Returns:
-        Shapes in the object's frame, without force cones wider than this friction allows.
-
-    Raises:
-        InputError: The friction is not positive, or the grasp is not on this object.
+    Gives shapes in the object's frame, without force cones wider than this friction allows.
     """
     coefficient(friction)
     check_on_faces(body, grasp)
@@ -73,17 +64,7 @@ def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, 
 def drawing_with_hand(
     body: Polyhedron, grasp: Grasp, friction: float, held: PosedHand
 ) -> tuple[Shape, ...]:
-    """List the shapes that show an object in a hand: no bars, and cones where the hand touches.
-
-    Args:
-        body: The object.
-        grasp: A grasp on the faces of `body`.
-        friction: Coulomb coefficient of the friction cones.
-        held: The hand in its pose.
-
-    Raises:
-        InputError: The friction is not positive, or the grasp is not on this object.
-    """
+    """List the shapes that show an object in a hand: no bars, and cones where the hand touches."""
     coefficient(friction)
     check_on_faces(body, grasp)
     shapes = [*glass(body)]
@@ -141,9 +122,7 @@ def coarse(vertices: Array, triangles: Indices) -> Array:
     A fine surface is simplified by joining vertices on a grid, without tearing it. Each vertex
     moves to the mean of the vertices in its cell. Triangles that then have no area are dropped.
 
-    Args:
-        vertices: Vertices, (n, 3) [m].
-        triangles: Vertex indices, (t, 3).
+    Takes `vertices` (n, 3) [m]; `triangles` (t, 3).
     """
     if len(triangles) <= MOST_TRIANGLES:
         return vertices[triangles]

@@ -52,13 +52,7 @@ def html_of(value: object) -> str | None:
 
 
 def card(drawing: str, title: str, rows: Iterable[Row]) -> str:
-    """Put a title and a table beside a drawing.
-
-    Args:
-        drawing: An SVG element, or nothing.
-        title: Text of the title.
-        rows: Texts of the cells, one row after the other; a single cell is as wide as the table.
-    """
+    """Put a title and a table beside a drawing."""
     cells = "".join(f"<tr>{_cells(row)}</tr>" for row in rows)
     return (
         '<div style="display:flex;flex-wrap:wrap;gap:1em;align-items:center">'
@@ -77,11 +71,7 @@ def picture(
 ) -> str:
     """Draw shapes as a small SVG element; nothing where there are too many of them.
 
-    Args:
-        shapes: What is drawn.
-        extent: Place and size of the object.
-        view: The view to draw from.
-        numbers: Where the number of each finger is written, (k, 3) [m]; None for no fingers.
+    Takes `numbers` (k, 3) [m].
     """
     if sum(len(shape.vertices()) for shape in shapes) > MOST_CORNERS:
         return ""

@@ -116,12 +116,7 @@ def outline(surface: Surface, camera: Array) -> Array:
 
 
 def joined(surface: Surface, chosen: Array) -> tuple[Array, ...]:
-    """Join polygons of a surface that meet, and return the loops around them, each (k, 3) [m].
-
-    Args:
-        surface: The surface.
-        chosen: Whether each polygon is one of those to join.
-    """
+    """Join polygons of a surface that meet, and return the loops around them, each (k, 3) [m]."""
     following = surface.following()
     places = np.flatnonzero(chosen[surface.owners])
     first, second = surface.names[places], surface.names[following[places]]

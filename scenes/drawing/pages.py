@@ -18,13 +18,7 @@ MILLION = 1e6
 
 
 def filled(template: str, folder: Path = ASSETS, **values: object) -> str:
-    """Fill a page template with values.
-
-    Args:
-        template: File name of the template.
-        folder: Folder of the template, which may include templates of this package.
-        values: Values that the template uses, by name.
-    """
+    """Fill a page template with values."""
     return str(_environment(folder).get_template(template).render(**values))
 
 

@@ -102,9 +102,6 @@ def write_object_picture(body: Polyhedron, path: Path) -> Path:
     """Draw an object without fingers, and write the picture to a file.
 
     Up to `MOST_NUMBERED` planar faces have their numbers on them where they face the viewer.
-
-    Raises:
-        InputError: The ending of the file's name is unknown.
     """
     format_of(path)
     view = View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, body)
@@ -154,20 +151,7 @@ def grasp_sheet(  # noqa: PLR0913 - one keyword for each thing that may be asked
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
     legend: bool = False, steady: bool = False, held: PosedHand | None = None,
 ) -> Sheet:  # fmt: skip
-    """Draw a grasp in the style of the paper, or with the hand in it.
-
-    Args:
-        body: The object.
-        grasp: A grasp on the faces of `body`.
-        friction: Coulomb coefficient of the friction cones.
-        view: The view to draw from; None chooses the best one.
-        legend: Whether a key stands below the picture.
-        steady: Whether to choose a scale that suits every view, as clips that turn need.
-        held: The hand to draw in place of straight fingers; None for none.
-
-    Raises:
-        InputError: The grasp does not lie on the body, or the friction is out of range.
-    """
+    """Draw a grasp in the style of the paper, or with the hand in it."""
     check_drawn(body, grasp, friction, view)
     switch(legend, "legend")
     name = f"Grasp {grasp.id} of {body.name}"
@@ -191,15 +175,7 @@ def sheet_of(  # noqa: PLR0913 - what a drawing consists of
 ) -> Sheet:  # fmt: skip
     """Draw shapes on a square sheet.
 
-    Args:
-        shapes: What is drawn.
-        extent: Place and size of the object.
-        view: The view to draw from.
-        name: What the picture shows.
-        numbers: Where the number of each finger is written, (k, 3) [m]; None for no fingers.
-        side: Width and height of the sheet [pixels].
-        steady: Whether to choose a scale that suits every view.
-        labels: Text and colour of each number, as many as places at least.
+    Takes `numbers` (k, 3) [m]; `side` [pixels].
     """
     places = np.empty((0, 3)) if numbers is None else numbers
     low, high = frame_around(shapes, places, extent, None if steady else view)
@@ -244,12 +220,7 @@ def _together(marks: Iterable[Mark]) -> Iterable[Mark]:
 
 
 def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | None) -> None:
-    """Refuse an object, grasp, friction or view that cannot be drawn.
-
-    Raises:
-        InputError: The grasp does not lie on the body, the friction is out of range, or `view` is
-            no view.
-    """
+    """Refuse an object, grasp, friction or view that cannot be drawn."""
     check_on_faces(body, grasp)
     coefficient(friction)
     if view is not None:
@@ -257,11 +228,7 @@ def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | No
 
 
 def held_by(hand: Hand | None, reach: "HandReach | None", grasp: Grasp) -> PosedHand | None:
-    """Take a hand in its pose from what a user gave; None if nothing was given.
-
-    Raises:
-        InputError: Only one of the two is given, or they do not fit each other and the grasp.
-    """
+    """Take a hand in its pose from what a user gave; None if nothing was given."""
     if hand is None and reach is None:
         return None
     if hand is None or reach is None:

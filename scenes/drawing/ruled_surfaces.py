@@ -23,14 +23,8 @@ squared reach."""
 def rulings(points: Array, directions: Array, center: Array, reach: float) -> tuple[Array, ...]:
     """Cut the transversals of three lines to segments inside a ball.
 
-    Args:
-        points: A point on each line, (k, 3) [m]; only the first three lines count.
-        directions: Unit vectors along the lines, (k, 3).
-        center: Centre of the ball, (3,) [m].
-        reach: Radius of the ball [m].
-
-    Returns:
-        Ends of each segment, (2, 3) [m], with neighbouring segments next to each other.
+    Takes `points` (k, 3) [m]; `directions` (k, 3); `center` (3,) [m]; `reach` [m]. Gives ends of
+    each segment, (2, 3) [m], with neighbouring segments next to each other.
     """
     segments = list[Array]()
     for along in np.linspace(-reach, reach, RULINGS):

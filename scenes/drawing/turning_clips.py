@@ -15,17 +15,7 @@ ELEVATION_DEG = 25.0
 
 
 def write_turning_clip(body: Polyhedron, grasp: Grasp, path: Path, friction: float) -> Path:
-    """Draw a grasp from all sides and write the pictures as a clip that turns around once.
-
-    Args:
-        body: The object.
-        grasp: A grasp on the faces of `body`.
-        path: File to write, gif or webp.
-        friction: Coulomb coefficient of the friction cones.
-
-    Raises:
-        InputError: The file's name does not end in gif or webp.
-    """
+    """Draw a grasp from all sides and write the pictures as a clip that turns around once."""
     require_clip(path)
     figure = new_figure(SIDE, SIDE)
     views = [View.of_angles(360.0 * frame / FRAMES, ELEVATION_DEG, body) for frame in range(FRAMES)]

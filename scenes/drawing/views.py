@@ -108,9 +108,7 @@ def best_view(body: Polyhedron, grasp: Grasp) -> View:
 def edge_on(body: Polyhedron, axes: Array) -> Array:
     """Return the share of an object's surface that is seen nearly as lines in each view, (n,).
 
-    Args:
-        body: The object.
-        axes: Axes of the views, (n, 3, 3).
+    Takes `axes` (n, 3, 3).
     """
     areas = np.array([face.area for face in body.faces])
     return (np.abs(axes[:, 2] @ body.normals.T) < EDGE_ON) @ areas / areas.sum()

@@ -23,9 +23,7 @@ class Surface:
     def __init__(self, corners: Array, radius: float) -> None:
         """Sort the triangles by their middles.
 
-        Args:
-            corners: Corners of the triangles, (t, 3, 3) [m].
-            radius: Radius of the object [m].
+        Takes `corners` (t, 3, 3) [m]; `radius` [m].
         """
         self.corners, self.slack = corners, TOUCHING * radius
         middles = corners.mean(axis=1)

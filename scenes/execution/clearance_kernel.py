@@ -19,13 +19,8 @@ def clear_depth(
 ) -> float:
     """Return the largest of depth, depth / 2, ... at which a pyramid and triangles are separated.
 
-    Args:
-        base: Corners of the pyramid's base, (n, 3) [m].
-        inward: Unit normal of the base towards the apex, (3,).
-        depth: Depth to start from, of the apex below the middle of the base [m].
-        triangles: Corners of triangles, (t, 3, 3) [m].
-        near: Indices of the triangles that may reach the pyramid, (m,).
-        slack: How far the two may overlap along an axis and count as touching [m].
+    Takes `base` (n, 3) [m]; `inward` (3,); `depth`, `slack` [m]; `triangles` (t, 3, 3) [m]; `near`
+    (m,).
     """
     n = len(base)
     solid, along = np.empty((n + 1, 3)), np.empty((2 * n, 3))

@@ -139,18 +139,14 @@ class HeldLayout:
     def joints(self, reached: Array) -> Array:
         """Find where the joints of the fingers are.
 
-        Args:
-            reached: Displacements of the fingertips along their springs, (k, 3) [m].
+        Takes `reached` (k, 3) [m].
         """
         return reached.ravel()
 
     def commands(self, shares: Array, reached: Array | None) -> Array:
         """Find what the fingers are told, (n, joints).
 
-        Args:
-            shares: Share of the squeeze, (n, 1), or of each finger's part of it, (n, k).
-            reached: Displacements of the fingertips from which commands count, (k, 3) [m]; None for
-                none.
+        Takes `shares` (n, 1) or (n, k); `reached` (k, 3) [m].
         """
         base = 0.0 if reached is None else reached
         told = base + shares[:, :, None] * (self.pushes / self.stiffness)
@@ -159,10 +155,7 @@ class HeldLayout:
     def fingers_seen(self, joints: Array, loads: Array, turned: Array) -> FingersSeen:
         """See what fingers did.
 
-        Args:
-            joints: Positions of their joints, (n, joints) [m].
-            loads: What contacts load these joints with, (n, joints) [N].
-            turned: Orientation of the object as the palm sees it, (n, 3, 3).
+        Takes `joints` (n, joints) [m]; `loads` (n, joints) [N]; `turned` (n, 3, 3).
         """
         shape = (len(turned), *self.stiffness.shape)
         return FingersSeen(joints.reshape(shape), -loads.reshape(shape), None)
@@ -217,16 +210,7 @@ def held_layout(
 ) -> HeldLayout:  # fmt: skip
     """Place an object of a given mass between the springs of a grip.
 
-    Args:
-        body: The object; its inertia is that of its shape with a uniform density.
-        grip: Contacts, squeeze and springs (see `gc.grip`), of this object.
-        mass_kg: Mass of the object [kg].
-        settings: Masses and damping of the fingers, and the direction of gravity.
-        reach_m: Distance from the contacts up to which the surface is there to be touched; None for
-            the object's radius [m].
-
-    Raises:
-        InputError: The mass or the reach is out of range, or a fingertip has no size.
+    Takes `mass_kg` [kg]; `reach_m` [m].
     """
     check_body(body)
     check_grip(grip)

@@ -28,13 +28,8 @@ THIN = 1e-5
 def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, ...]:
     """Return the corners of each convex solid that fingertips may touch, (n, 3) each [m].
 
-    Args:
-        body: The object.
-        near: Points on the surface from the centre of mass, (k, 3) [m].
-        reach: Distance from these points beyond which nothing is touched [m].
-
-    Returns:
-        Corners from the centre of mass. A convex object is its own only solid.
+    Takes `near` (k, 3) [m]; `reach` [m]. Gives corners from the centre of mass. A convex object is
+    its own only solid.
     """
     if is_convex(body):
         return (body.vertices - body.center_of_mass,)

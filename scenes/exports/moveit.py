@@ -24,11 +24,7 @@ WIDTH = 120
 
 
 def yaml_text(body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> str:
-    """Return the text of a YAML file; equal grasps give equal text.
-
-    Raises:
-        InputError: PyYAML is not installed.
-    """
+    """Return the text of a YAML file; equal grasps give equal text."""
     try:
         yaml: Any = importlib.import_module("yaml")
     except ImportError as error:

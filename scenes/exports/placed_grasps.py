@@ -46,10 +46,7 @@ class PlacedGrasp:
 def placed_grasps(plan: Plan, fingertip_radius_m: float | None) -> tuple[PlacedGrasp, ...]:
     """Place every grasp of a plan, in order.
 
-    Args:
-        plan: The grasps.
-        fingertip_radius_m: Radius of all fingertips [m]; None takes the planned one, or one that
-            fits each grasp.
+    Takes `fingertip_radius_m` [m].
     """
     radius, length = fingertip_radius_m, ROD_LENGTH * plan.body.radius
     if plan.finger is not None:

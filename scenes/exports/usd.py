@@ -24,11 +24,7 @@ ROOT, MESH = "/grasps", "/object"
 
 
 def write_usd(path: Path, body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> None:
-    """Write a USD file, as text (usda) or binary (usdc, usd) by the ending of its path.
-
-    Raises:
-        InputError: usd-core is not installed.
-    """
+    """Write a USD file, as text (usda) or binary (usdc, usd) by the ending of its path."""
     try:
         names = ("Usd", "UsdGeom", "Gf", "Sdf")
         Usd, Geom, Gf, Sdf = (importlib.import_module(f"pxr.{name}") for name in names)

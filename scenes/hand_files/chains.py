@@ -43,16 +43,7 @@ class Chains:
 
 
 def chains(model: HandModel, fingertips: tuple[str, ...], name: str) -> Chains:
-    """Find the palm and the fingers.
-
-    Args:
-        model: The compiled model.
-        fingertips: Names of sites, geoms or bodies, one for each finger.
-        name: What to call the file in a message.
-
-    Raises:
-        InputError: A name is unknown, or the fingers are no chains of hinges of their own.
-    """
+    """Find the palm and the fingers."""
     tips = tuple(_tip(model, each, name) for each in fingertips)
     paths = [path_of_body(model, tip.body) for tip in tips]
     shared = 0
@@ -104,11 +95,7 @@ def _tip(model: HandModel, name: str, file: str) -> Tip:
 
 
 def _nearest(model: HandModel, body: int, name: str, file: str) -> int:
-    """Return the geom of a link whose box is nearest to a body of the link that has no geom.
-
-    Raises:
-        InputError: The link has none either.
-    """
+    """Return the geom of a link whose box is nearest to a body of the link that has no geom."""
     links = _owners(model, WORLD, set(range(len(model.joint_bodies))))
     own = [g for g in _solid(model) if links[int(model.geom_bodies[g])] == links[body]]
     if not own:

@@ -38,17 +38,7 @@ class Followers:
 
 
 def followers(model: HandModel, found: Chains, name: str) -> Followers:
-    """Find which joints follow others.
-
-    Args:
-        model: The compiled model.
-        found: The hand's fingers in it.
-        name: What to call the file in a message.
-
-    Raises:
-        InputError: Joints are held by rules that are not linear, contradict each other or close
-            loops.
-    """
+    """Find which joints follow others."""
     used = {joint for chain in found.joints for joint in chain}
     _refuse_loops(model, used, name)
     lines = _lines(model, used, name)
@@ -72,11 +62,7 @@ def followers(model: HandModel, found: Chains, name: str) -> Followers:
 
 
 def _lines(model: HandModel, used: set[int], name: str) -> dict[int, Line]:
-    """Follow each rule to a joint that follows none, or to a constant.
-
-    Raises:
-        InputError: A rule is not linear, a joint has two, or they go round in a circle.
-    """
+    """Follow each rule to a joint that follows none, or to a constant."""
     rules = {rule.joint: rule for rule in model.joint_rules}
     if len(rules) < len(model.joint_rules):
         listed_twice = [rule.joint for rule in model.joint_rules]
@@ -139,11 +125,7 @@ def _moving(model: HandModel, body: int) -> set[int]:
 
 
 def _refuse(model: HandModel, joints: set[int], name: str, why: str) -> None:
-    """Refuse joints, if there are any.
-
-    Raises:
-        InputError: There are.
-    """
+    """Refuse joints, if there are any."""
     if joints:
         named = [model.joint_names[j] or f"joint{j}" for j in sorted(joints - {-1})]
         raise InputError(

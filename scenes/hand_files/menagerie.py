@@ -8,15 +8,7 @@ from grasp_core.errors import InputError
 
 
 def model_path(name: str) -> Path:
-    """Return the path of a model's own file, which the package may download first.
-
-    Args:
-        name: Name of a model, such as "wonik_allegro", or with one of its files,
-            "wonik_allegro/left_hand.xml".
-
-    Raises:
-        InputError: The package is not installed, or has no such model or file.
-    """
+    """Return the path of a model's own file, which the package may download first."""
     try:
         menagerie: Any = importlib.import_module("mujoco_menagerie")
     except ImportError as error:

@@ -111,15 +111,7 @@ class HandModel(NamedTuple):
 
 
 def compiled_hand(text: ModelText, name: str) -> HandModel:
-    """Compile a hand's text.
-
-    Args:
-        text: The text and the files that it names.
-        name: What to call the file in a message.
-
-    Raises:
-        InputError: MuJoCo refuses it.
-    """
+    """Compile a hand's text."""
     try:
         with unlogged(), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about textures and the like

@@ -65,12 +65,7 @@ class ModelText:
 
 
 def model_text(path: Path) -> ModelText:
-    """Read a model's text and the files that it names.
-
-    Raises:
-        InputError: The file cannot be read, is no XML, holds what is refused, or names files that
-            are missing, too large, or outside its folder.
-    """
+    """Read a model's text and the files that it names."""
     raw = _bytes(path, LARGEST_TEXT, path)
     if b"<!DOCTYPE" in raw or b"<!ENTITY" in raw:
         raise InputError(f"{path}: a hand's file must not declare entities; remove <!DOCTYPE ...>")
@@ -97,11 +92,7 @@ def model_text(path: Path) -> ModelText:
 
 
 def _check_followed(path: Path, root: Any) -> None:
-    """Refuse URDF joints that follow one which does not move: MuJoCo would take them as free.
-
-    Raises:
-        InputError: There are some.
-    """
+    """Refuse URDF joints that follow one which does not move: MuJoCo would take them as free."""
     kinds = {joint.get("name"): joint.get("type") for joint in root.findall("joint")}
     for joint in root.findall("joint"):
         mimic = joint.find("mimic")
@@ -115,8 +106,7 @@ def _check_followed(path: Path, root: Any) -> None:
 def _with_shapes(root: Any) -> tuple[str, ...]:
     """Let the visual shapes of a URDF link collide where it has no others, and drop all others.
 
-    Returns:
-        Notes about the links whose visual shapes collide, and those that have none to be read.
+    Gives notes about the links whose visual shapes collide, and those that have none to be read.
     """
     lent, bare = list[str](), list[str]()
     for link in root.findall("link"):
@@ -144,11 +134,7 @@ def listed(names: list[str]) -> str:
 
 
 def _check_element(path: Path, element: Any) -> None:
-    """Refuse an element that reads, runs or makes what the file does not hold.
-
-    Raises:
-        InputError: It does.
-    """
+    """Refuse an element that reads, runs or makes what the file does not hold."""
     if element.tag in REFUSED:
         raise InputError(
             f"{path}: <{element.tag}> is not read in a hand's file; write out what it stands for"
@@ -206,11 +192,7 @@ def _places(path: Path, elements: list[Any]) -> list[Path]:
 
 
 def _found(path: Path, given: str, places: list[Path]) -> Path:
-    """Find a named file in the folder of the model, or in the package that the name begins with.
-
-    Raises:
-        InputError: It is missing or outside these folders.
-    """
+    """Find a named file in the folder of the model, or in the package that the name begins with."""
     home, package = path.parent.resolve(), PACKAGE.match(given)
     name = given[package.end() :] if package else given
     tried = [(home, place / name) for place in places]
@@ -259,11 +241,7 @@ def _is_called(folder: Path, package: str) -> bool:
 
 
 def _bytes(path: Path, most: int, model: Path) -> bytes:
-    """Read a file of a size up to `most`.
-
-    Raises:
-        InputError: It cannot be read, or is larger.
-    """
+    """Read a file of a size up to `most`."""
     try:
         with path.open("rb") as file:
             content = file.read(most + 1)

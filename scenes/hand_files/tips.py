@@ -46,14 +46,7 @@ class TipBall:
 def tip_ball(model: HandModel, tip: Tip, joint: Array, name: str) -> TipBall:
     """Find the ball of a fingertip.
 
-    Args:
-        model: The compiled model.
-        tip: What the fingertip's name stands for.
-        joint: Origin of the last joint in the frame of the tip's body, (3,) [m].
-        name: What to call the file in a message.
-
-    Raises:
-        InputError: A site has no size.
+    Takes `joint` (3,) [m].
     """
     if tip.site is not None:
         radius = float(model.site_radii[tip.site])

@@ -149,13 +149,7 @@ def add_servo(
 ) -> None:  # fmt: skip
     """Add the servo of a joint.
 
-    Args:
-        actuators: The scene's actuators.
-        joint: Name of the joint, and of its servo.
-        stiffness: Torque per angle from the command [N m/rad].
-        damping: Torque per speed [N m s/rad].
-        limit: Largest torque either way [N m]; None for none.
-        span: Least and largest command [rad]; None for any.
+    Takes `stiffness` [N m/rad]; `damping` [N m s/rad]; `limit` [N m]; `span` [rad].
     """
     servo = {
         "name": joint, "joint": joint, "kp": stiffness, "kv": damping,

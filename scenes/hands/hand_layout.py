@@ -87,8 +87,7 @@ class HandLayout(Layout):
     def tips(self, joints: Array) -> Array:
         """Compute where the centres of the fingertips are, (n, k, 3) [m].
 
-        Args:
-            joints: Angles of the joints beyond those of the pose, (n, j) [rad].
+        Takes `joints` (n, j) [rad].
         """
         found = places(self.hand, self.joints + joints, self.palm_pose)
         return found.tips[:, list(self.used_fingers)]
@@ -96,8 +95,7 @@ class HandLayout(Layout):
     def commands(self, forces: Array) -> Array:
         """Compute what servos are told to make fingertips push with forces: (1), (n, j) [rad].
 
-        Args:
-            forces: Contact forces on the object, (n, k, 3) [N], world axes.
+        Takes `forces` (n, k, 3) [N].
         """
         torques = forces.reshape(len(forces), -1) @ self.motors.levers.T + self.motors.gravity
         return to_digits(torques) / self.servo_n_m_per_rad
@@ -109,18 +107,7 @@ def hand_layout(
 ) -> HandLayout:  # fmt: skip
     """Place an object and a hand that stands in a grasp of it.
 
-    Args:
-        hand: The hand, with a torque limit for each joint.
-        body: The object.
-        reach: The pose in which the hand stands (see `gc.reach_with`).
-        friction: Coulomb coefficient at every contact.
-        down: Direction of gravity in the object's frame, which pulls at the links; None for none.
-
-    Returns:
-        The layout, with the joints turned by as much as fingertips were off their faces.
-
-    Raises:
-        InputError: The hand, the object or the pose do not belong together.
+    Gives the layout, with the joints turned by as much as fingertips were off their faces.
     """
     check_body(body)
     stance = stance_of(uncoupled(hand, SIMULATION), reach)
@@ -150,9 +137,7 @@ def hand_layout(
 def touching(stance: Stance, centers: Array) -> Array:
     """Turn the joints by the least angles that put fingertips on their places, (j,) [rad].
 
-    Args:
-        stance: The hand, with the fingertips nearly there.
-        centers: Where the middles of fingertips belong, (k, 3) [m], in the frame of the pose.
+    Takes `centers` (k, 3) [m].
     """
     joints, used = stance.joints, list(stance.fingers)
     for _ in range(REFINED):

@@ -191,15 +191,7 @@ class HeldHandLayout(HeldLayout):
 
 
 def finger_springs(motors: Motors, stiffness_n_per_m: float) -> Array:
-    """Compute the stiffness (1) of each finger of a hand, (k, 3, 3) [N/m].
-
-    Args:
-        motors: The hand's joints in its pose.
-        stiffness_n_per_m: Stiffness K that sets the servos': k_q = K l^2.
-
-    Raises:
-        InputError: A finger is rigid in some direction.
-    """
+    """Compute the stiffness (1) of each finger of a hand, (k, 3, 3) [N/m]."""
     servo, size = servo_stiffness(motors, stiffness_n_per_m), mean_lever(motors)
     levers = motors.levers.reshape(len(motors.limits), -1, 3).transpose(1, 0, 2)
     least = np.sqrt(np.maximum(np.linalg.eigvalsh(levers.transpose(0, 2, 1) @ levers)[:, 0], 0.0))
@@ -219,12 +211,7 @@ def servo_stiffness(motors: Motors, stiffness_n_per_m: float) -> float:
 
 
 def strong_motors(hand: Hand, reach: HandReach) -> Motors:
-    """Return the motors of a pose, which carry the links in any orientation if they weigh.
-
-    Raises:
-        InputError: A joint has no torque limit or follows another, or a motor cannot carry the
-            links.
-    """
+    """Return the motors of a pose, which carry the links in any orientation if they weigh."""
     weighs = all(link.mass_kg is not None and link.center_of_mass is not None
                  for link in hand.links)  # fmt: skip
     return hand_motors(uncoupled(hand, EXECUTION), reach, any_orientation=weighs)
@@ -236,17 +223,7 @@ def held_hand_layout(  # noqa: PLR0913, PLR0917 - a hand, an object, and how the
 ) -> HeldHandLayout:  # fmt: skip
     """Place an object of a given mass in a hand.
 
-    Args:
-        hand: The hand, with a torque limit for each joint.
-        body: The object.
-        reach: The pose in which the hand stands.
-        grip: The pose's contacts with their squeeze, on the servos of `servo_stiffness`.
-        mass_kg: Mass of the object [kg].
-        settings: Masses and damping of the fingers, and the direction of gravity.
-        reach_m: See `held_layout`.
-
-    Raises:
-        InputError: The mass is out of range.
+    Takes `mass_kg` [kg].
     """
     base = held_layout(body, grip, mass_kg, settings, reach_m)
     stance, motors = stance_of(hand, reach), strong_motors(hand, reach)

@@ -33,16 +33,7 @@ def fingertip_scene(
 ) -> TestedScene:  # fmt: skip
     """Make the scene of a grasp, or of contacts of any origin.
 
-    Args:
-        body: The object.
-        grasp: The contacts.
-        friction: Coulomb coefficient at every contact.
-        mass_kg: Mass of the object [kg].
-        physics: Simulation settings, with the torsional coefficient.
-        fingers: Radius and stiffness of fingertips, and the largest normal force of the squeeze.
-
-    Raises:
-        InputError: A number is out of range.
+    Takes `mass_kg` [kg].
     """
     base = arrange(body, grasp, friction, fingers, physics.torsion_m)
     mass, inertia = mass_properties(body, mass_kg)

@@ -105,9 +105,6 @@ def planned_postures(
 
     The hand is open in its pregrasp, if it has one, and squeezes with the balanced forces of the
     pose, as hard as closure tests do: 0.6 of what the motors can.
-
-    Raises:
-        InputError: The hand, the object or the pose do not belong together.
     """
     layout = hand_layout(hand, body, reach, friction)
     told = replace(layout, servo_n_m_per_rad=stiffness_n_m_per_rad)
@@ -127,14 +124,7 @@ def hand_scene(  # noqa: PLR0913, PLR0917 - the hand at the object, and what a t
 ) -> TestedScene:  # fmt: skip
     """Make the scene of a hand that closes on an object.
 
-    Args:
-        hand: The hand.
-        body: The object.
-        postures: Where the hand is open, touches and squeezes.
-        friction: Coulomb coefficient at every contact.
-        mass_kg: Mass of the object [kg].
-        physics: Simulation settings, with the torsional coefficient.
-        servos: What drives the hand, and what it hangs on.
+    Takes `mass_kg` [kg].
     """
     mass, weights = mass_properties(body, mass_kg), {**hand_inertials(hand), **servos.inertials}
     root, world = begun(body, friction, mass, physics)

@@ -70,14 +70,7 @@ def mass_properties(body: Polyhedron, mass_kg: float) -> tuple[float, Array]:
 def begun(
     body: Polyhedron, friction: float, mass: tuple[float, Array], physics: PhysicsSettings,
 ) -> tuple[Element, Element]:  # fmt: skip
-    """Begin a scene: return its root, with the meshes of the surface, and its world.
-
-    Args:
-        body: The object.
-        friction: Coulomb coefficient of its surface.
-        mass: Its mass and inertia, as `mass_properties` returns them.
-        physics: Simulation settings, with the torsional coefficient.
-    """
+    """Begin a scene: return its root, with the meshes of the surface, and its world."""
     root = element("mujoco", {"model": printable(body.name)})
     add_comment(root, COMMENT)
     add_element(root, "compiler", COMPILER)
@@ -120,10 +113,7 @@ def _object(
 def ended(root: Element, opened: Array, told: int = 0) -> str:
     """Add the keyframe `open` and write the scene.
 
-    Args:
-        root: The scene.
-        opened: Commands with which the fingers are open, (u,); joints stand there.
-        told: How many of the first ones are no commands of servos, but the pose of a weld's body.
+    Takes `opened` (u,).
     """
     place = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], opened])
     key = {"name": "open", "qpos": place, "ctrl": opened[told:]}

@@ -39,15 +39,7 @@ def baseline_to_json(baseline: Baseline) -> str:
 
 
 def baseline_from_json(text: str, path: str) -> Baseline:
-    """Parse the text of a baseline.
-
-    Args:
-        text: Text of the file.
-        path: Path of the file, for messages.
-
-    Raises:
-        InputError: The text is not a baseline of this version; the message names the field.
-    """
+    """Parse the text of a baseline."""
     try:
         return _from_text(text)
     except InputError as error:
@@ -77,30 +69,18 @@ def _from_text(text: str) -> Baseline:
 
 
 def read_baseline(path: Path) -> Baseline:
-    """Read the baseline in a file.
-
-    Raises:
-        InputError: The file is missing or refused.
-    """
+    """Read the baseline in a file."""
     return baseline_from_json(read_text(path), str(path))
 
 
 def write_baseline(path: Path, baseline: Baseline) -> None:
-    """Write a baseline to a new file, or over another baseline.
-
-    Raises:
-        InputError: The path holds another kind of file.
-    """
+    """Write a baseline to a new file, or over another baseline."""
     check_writable(path)
     write_text(path, baseline_to_json(baseline))
 
 
 def check_writable(path: Path) -> None:
-    """Refuse a path where a file stands that is not a baseline of any version.
-
-    Raises:
-        InputError: The path holds another kind of file.
-    """
+    """Refuse a path where a file stands that is not a baseline of any version."""
     if path.exists() and MARK not in read_text(path):
         raise InputError(
             f"{path}: this file is not a baseline and will not be overwritten; choose another path"

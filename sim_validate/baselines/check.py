@@ -31,17 +31,7 @@ def check(
 ) -> Checked:
     """Simulate grasps again and compare them with a baseline.
 
-    Args:
-        before: The baseline.
-        now: The present grasps, on the part as it is now, compared `against` the baseline's.
-        where: Path of the grasps from the baseline's folder.
-        how: How trials are simulated, and which ones.
-        processors: Number of processors to use; no result depends on it.
-        report: Called with (done, total) after each grasp.
-
-    Raises:
-        InputError: The file of grasps is empty.
-        UnfaithfulError: The simulator fails its checks on cases with known answers.
+    Takes `report` (done, total).
     """
     now = now.first(before.limit)
     how = with_planned_fingers(how, before, now.saved)

@@ -135,15 +135,7 @@ def compare(
     before: Baseline, after: Baseline, refused: Mapping[str, str] | None = None,
     carried: Carried | None = None,
 ) -> tuple[Finding, ...]:  # fmt: skip
-    """Compare each grasp of two baselines, sorted by id.
-
-    Args:
-        before: The baseline.
-        after: The baseline measured now.
-        refused: Reasons why grasps could not be simulated, by id.
-        carried: How the part has changed since the grasps were planned; None if it has not. Then
-            another part is no reason not to compare.
-    """
+    """Compare each grasp of two baselines, sorted by id."""
     bands, _ = bands_between(before, after, carried)
     other_part = _is_other_part(before, after)
     changed = tuple(_changed(before, after, carried))

@@ -54,11 +54,7 @@ class Demands:
 
 
 def demands_of(asked: Mapping[str, Any]) -> Demands:
-    """Build the demands from the arguments of a test.
-
-    Raises:
-        InputError: An argument is unknown, or its value is refused.
-    """
+    """Build the demands from the arguments of a test."""
     known = [each.name for each in fields(Demands)]
     for name in asked:
         if name not in known:
@@ -69,16 +65,7 @@ def demands_of(asked: Mapping[str, Any]) -> Demands:
 def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:
     """Simulate a grasp, and say in what it falls short of the demands.
 
-    Args:
-        case: The grasp on its object, and the friction.
-        demands: What the grasp must reach.
-
-    Returns:
-        The verdict, and sentences on what the grasp lacks, empty if it meets all demands.
-
-    Raises:
-        InputError: The grasp or a setting is refused.
-        UnfaithfulError: The simulator fails its checks on cases with known answers.
+    Gives the verdict, and sentences on what the grasp lacks, empty if it meets all demands.
     """
     agenda = Agenda(
         random_wrenches=demands.random_wrenches,
@@ -117,17 +104,7 @@ def survival(
 ) -> tuple[GraspCase, ExecutedGrasp, str]:
     """Execute a grasp, and say why it does not survive.
 
-    Args:
-        given: A case, or object, grasp and perhaps a friction; then the settings, unless named.
-        friction: Friction in place of the case's own.
-        settings: How the grasp is executed, if that is not the last of `given`.
-
-    Returns:
-        The case, its execution, and sentences on what went wrong, empty if the object survived.
-
-    Raises:
-        InputError: The arguments, the grasp or a setting are refused.
-        UnfaithfulError: The simulator fails its checks.
+    Gives the case, its execution, and sentences on what went wrong, empty if the object survived.
     """
     if settings is None and given:
         given, settings = given[:-1], given[-1]

@@ -53,13 +53,7 @@ class Difference:
 
 
 def differences(one: Entry, other: Entry, bands: Bands) -> tuple[Difference, ...]:
-    """List every difference between two verdicts on a grasp.
-
-    Args:
-        one: What the baseline recorded.
-        other: What was measured now.
-        bands: How far numbers may differ without counting.
-    """
+    """List every difference between two verdicts on a grasp."""
     return (
         *_of_wrenches(one, other),
         *_of_controls(one, other, bands),

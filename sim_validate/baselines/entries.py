@@ -165,11 +165,7 @@ def entry_of(
 ) -> Entry:
     """Summarise a verdict as an entry of a baseline.
 
-    Args:
-        grasp: The grasp.
-        verdict: What simulation says about it.
-        radius_m: Radius of the object [m].
-        executed: What its execution found; None if it was not executed.
+    Takes `radius_m` [m].
     """
     weakest = next(trial for trial in verdict.wrenches if trial.name == WEAKEST)
     predicted, simulated = _limits(weakest, radius_m)

@@ -103,8 +103,7 @@ def tried_execution(job: ExecutionJob) -> ExecutedGrasp | str:
 def not_survived(grasp: ExecutedGrasp) -> str:
     """Say why a grasp does not survive its execution: trials, numbers, predictions.
 
-    Returns:
-        Lines about the grasp; empty if it survived every trial and every control slipped.
+    Gives lines about the grasp; empty if it survived every trial and every control slipped.
     """
     found = grasp.execution
     if found is None:

@@ -15,13 +15,7 @@ from sim_validate.validation.wrench_verdict import WrenchVerdict
 
 
 def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
-    """Explain how a grasp has changed: prediction, simulation, baseline, and commands to run next.
-
-    Args:
-        done: The check of this grasp alone.
-        files: Paths of the baseline and the grasps.
-        now: The grasps on their part as it is now.
-    """
+    """Explain a change: prediction, simulation, baseline, and commands to run next."""
     (finding,) = done.findings
     verdict, how = done.verdicts.get(finding.id), done.how
     executed = done.measured.executions.get(finding.id)
@@ -39,12 +33,7 @@ def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
 
 
 def passing(done: Checked, now: Present) -> str:
-    """Say in one short line what became of a grasp that passes; empty if there is nothing to say.
-
-    Args:
-        done: The check of this grasp alone.
-        now: The grasps on their part as it is now.
-    """
+    """Say in one short line what became of a grasp that passes, if anything."""
     (finding,) = done.findings
     if not now.change and finding.status is not Status.IMPROVED:
         return ""
@@ -59,13 +48,7 @@ def passing(done: Checked, now: Present) -> str:
 
 
 def written(path: Path, baseline: Baseline, now: Present) -> str:
-    """Say which baseline was written, where, and with how many grasps.
-
-    Args:
-        path: Path of the baseline.
-        baseline: What it holds.
-        now: The grasps on their part as it is now.
-    """
+    """Say which baseline was written, where, and with how many grasps."""
     held = sum(entry.held for entry in baseline.entries)
     said = f"wrote {path}: {held} of {counted(len(baseline.entries), 'grasp')} held"
     gone = len(now.gone)
@@ -74,14 +57,7 @@ def written(path: Path, baseline: Baseline, now: Present) -> str:
 
 
 def _next_steps(name: str, at: str | None, files: tuple[Path, Path], now: Present) -> Iterator[str]:
-    """Yield the commands that show a grasp, and that check all of them.
-
-    Args:
-        name: Id of the grasp.
-        at: The first wrench that was not held; empty if all were, None if nothing was simulated.
-        files: Paths of the baseline and the grasps.
-        now: The grasps on their part as it is now.
-    """
+    """Yield the commands that show a grasp, and that check all of them."""
     baseline, grasps = (shlex.quote(str(path)) for path in files)
     chosen = f" --wrench={shlex.quote(at)}" if at else ""
     check = f"  all of them: graspproof baseline check {baseline} --grasps {grasps}"

@@ -37,16 +37,7 @@ class GraspCase:
 def case_of(
     given: Sequence[Any], friction: float | None, asking: str = "assert_stable"
 ) -> GraspCase:
-    """Build a case from a test's arguments: a case, or object and grasp, perhaps with a friction.
-
-    Args:
-        given: A case, or an object, a grasp and perhaps a friction, in that order.
-        friction: Friction in place of the case's own.
-        asking: Name of the fixture, for messages.
-
-    Raises:
-        InputError: The arguments are of other types.
-    """
+    """Build a case from a test's arguments: a case, or object, grasp and perhaps friction."""
     kinds: list[type[Any]] = [type(each) for each in given]
     if kinds == [GraspCase]:
         case: GraspCase = given[0]
@@ -63,18 +54,7 @@ def case_of(
 
 
 def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) -> list[GraspCase]:
-    """Read or plan the grasps that a pytest marker asks for.
-
-    Args:
-        folder: Folder in which relative paths start.
-        args: Path of a grasps.json; if empty, grasps are planned.
-        settings: `object` (a mesh file or a built-in object), `unit`, `scale`, and the arguments of
-            `plan`; with a file, `friction`, and `changed_part` with the fields of `IfChanged`.
-
-    Raises:
-        InputError: A setting is unknown, missing or refused, no grasp was found, or the mesh that
-            the grasps were planned on has changed and that is refused or cannot be judged.
-    """
+    """Read or plan the grasps that a pytest marker asks for."""
     if len(args) > 1 or not all(isinstance(each, str) for each in args):
         raise InputError(
             f"@pytest.mark.grasp takes the path of one file of grasps, got {list(args)}"

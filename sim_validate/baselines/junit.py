@@ -8,13 +8,7 @@ from sim_validate.baselines.entries import fields_of, properties_of
 
 
 def junit_text(name: str, findings: Iterable[Finding], *, strict: bool) -> str:
-    """Write a JUnit file with a case for each grasp.
-
-    Args:
-        name: Name of the suite.
-        findings: How each grasp has changed.
-        strict: Whether improved grasps fail, too.
-    """
+    """Write a JUnit file with a case for each grasp."""
     listed = list(findings)
     suite = ElementTree.Element("testsuite", name=_printable(name), tests=str(len(listed)))
     failures = errors = 0

@@ -44,16 +44,7 @@ def measured(
 ) -> Measured:  # fmt: skip
     """Simulate grasps and make a baseline of their verdicts.
 
-    Args:
-        saved: The grasps.
-        about: Path of the grasps, relative to the baseline's folder, and how many to simulate.
-        how: How trials are simulated, and which.
-        processors: Number of processors to use; no result depends on it.
-        report: Called with (done, total) after each grasp, and again after each execution.
-
-    Raises:
-        InputError: The file of grasps is empty, or the object's mass is out of range.
-        UnfaithfulError: The simulator fails its checks on cases with known answers.
+    Takes `report` (done, total).
     """
     chosen = saved.grasps[: about[1]]
     if not chosen:
@@ -127,15 +118,7 @@ def _try(job: Job) -> Verdict | str:
 
 
 def complete(found: Measured, now: Present) -> Baseline:
-    """Return the baseline of a measurement in which every grasp could be simulated.
-
-    Args:
-        found: The measurement.
-        now: The grasps on their part as it was measured.
-
-    Raises:
-        InputError: A grasp could not be simulated.
-    """
+    """Return the baseline of a measurement in which every grasp could be simulated."""
     if found.refused:
         raise InputError("; ".join(found.refused.values()))
     unit, scale = now.file_lengths

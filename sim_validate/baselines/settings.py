@@ -79,15 +79,7 @@ def settings_of(how: How) -> dict[str, Any]:
 
 
 def of_settings(settings: Mapping[str, Any], path: str) -> How:
-    """Read how the grasps of a baseline are simulated.
-
-    Args:
-        settings: Settings as `settings_of` writes them.
-        path: Path of the file with the settings, for messages.
-
-    Raises:
-        InputError: A setting is missing, unknown or refused.
-    """
+    """Read how the grasps of a baseline are simulated."""
     try:
         given = _Settings.model_validate_json(json.dumps(settings))
     except ValidationError as error:
@@ -109,11 +101,7 @@ def of_settings(settings: Mapping[str, Any], path: str) -> How:
 
 
 def noise_from_table(given: Mapping[str, Any]) -> Noise:
-    """Build noise settings from some of their fields.
-
-    Raises:
-        InputError: A field is unknown, or its value is refused.
-    """
+    """Build noise settings from some of their fields."""
     known = [each.name for each in fields(Noise)]
     for name, value in given.items():
         if name not in known:
@@ -126,10 +114,6 @@ def noise_from_table(given: Mapping[str, Any]) -> Noise:
 
 
 def setup_for(saved: SavedGrasps, path: Path | None) -> Setup:
-    """Build the setup of grasps: with their planned fingertips, then with a settings file.
-
-    Raises:
-        InputError: The file is missing or refused.
-    """
+    """Build the setup of grasps: with their planned fingertips, then with a settings file."""
     setup = Setup(fingers=with_planned_radius(FingerSettings(), saved.finger))
     return setup if path is None else setup_from_file(path, setup)

@@ -80,20 +80,12 @@ class Suite:
 
     @cached_property
     def saved(self) -> SavedGrasps:
-        """Read the grasps that the suite is about.
-
-        Raises:
-            InputError: The file of grasps is missing or refused.
-        """
+        """Read the grasps that the suite is about."""
         return read_grasps(self.grasps)
 
     @cached_property
     def source(self) -> Source:
-        """Find the mesh file that the grasps were planned from.
-
-        Raises:
-            InputError: A file is refused.
-        """
+        """Find the mesh file that the grasps were planned from."""
         folders = [self.path.parent]
         return source_of(self.saved, self.grasps, folders, self.object, self.asked.scale)
 
@@ -111,30 +103,17 @@ class Suite:
 
     @cached_property
     def present(self) -> Present:
-        """Carry the grasps over to their part as it is now.
-
-        Raises:
-            InputError: The part has changed, and that is refused or cannot be judged, or a file is
-                refused.
-        """
+        """Carry the grasps over to their part as it is now."""
         return present(self.saved, self.grasps, self.source, self.asked)
 
     @cached_property
     def compared(self) -> Present:
-        """Return the grasps on their part as it is now, compared with the part of the baseline.
-
-        Raises:
-            InputError: The baseline is missing, or a file or a changed part is refused.
-        """
+        """Return the grasps on their part as it is now, compared with the part of the baseline."""
         return self.present.against(self.kept.shape)
 
     @cached_property
     def kept(self) -> Baseline:
-        """Read the baseline of the suite.
-
-        Raises:
-            InputError: The baseline is missing or refused.
-        """
+        """Read the baseline of the suite."""
         if not self.baseline.is_file():
             raise InputError(
                 f"{self.baseline}: this baseline does not exist yet; write it with pytest "
@@ -144,11 +123,7 @@ class Suite:
 
     @property
     def ids(self) -> list[str]:
-        """List the ids of all grasps that are in the file or in the baseline.
-
-        Raises:
-            InputError: A file is missing or refused.
-        """
+        """List the ids of all grasps that are in the file or in the baseline."""
         kept = self.kept if self.baseline.is_file() else None
         ours = {grasp.id for grasp in self.saved.grasps[: kept and kept.limit]}
         return sorted(ours if kept is None else ours | {entry.id for entry in kept.entries})
@@ -159,24 +134,13 @@ class Suite:
         return seen_from(self.baseline, self.grasps)
 
     def tested(self, name: str) -> Checked:
-        """Simulate one grasp again, and compare the result with the baseline.
-
-        Raises:
-            InputError: A file or a changed part is refused.
-            UnfaithfulError: The simulator fails its checks on cases with known answers.
-        """
+        """Simulate one grasp again, and compare the result with the baseline."""
         now, before = self.compared, self.kept
         done = check_one(before, now, self.where, self._how(before), name)
         return demanded(done) if self.survives else done
 
     def bless(self) -> Baseline:
-        """Simulate all grasps and write the results as the new baseline.
-
-        Raises:
-            InputError: A file, a grasp or a changed part is refused, or no grasp could be carried
-                over to it.
-            UnfaithfulError: The simulator fails its checks on cases with known answers.
-        """
+        """Simulate all grasps and write the results as the new baseline."""
         now = self.present
         check_writable(self.baseline)
         before = self._kept_if_any()
@@ -190,11 +154,7 @@ class Suite:
         return found
 
     def _kept_if_any(self) -> Baseline | None:
-        """Read the baseline that will be overwritten, if it exists.
-
-        Raises:
-            InputError: The baseline is refused.
-        """
+        """Read the baseline that will be overwritten, if it exists."""
         try:
             return self.kept if self.baseline.is_file() else None
         except InputError as error:
@@ -203,11 +163,7 @@ class Suite:
             ) from error
 
     def _how(self, before: Baseline | None) -> How:
-        """Take the baseline's settings, or the default ones, replaced by those of the file.
-
-        Raises:
-            InputError: Grasps must survive, but nothing says how they are executed.
-        """
+        """Take the baseline's settings, or the default ones, replaced by those of the file."""
         if before is None:
             how = How(setup_for(self.saved, None), Agenda(seed=self.saved.seed))
         else:
@@ -230,20 +186,12 @@ class Suite:
 
 
 def suite_from_toml(path: Path) -> Suite:
-    """Read a `*.grasps.toml` file; paths in it are relative to its folder.
-
-    Raises:
-        InputError: The file is invalid; the message names the setting.
-    """
+    """Read a `*.grasps.toml` file; paths in it are relative to its folder."""
     return suite_from_tables(read_tables(path), path)
 
 
 def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
-    """Build a suite from the settings of a `*.grasps.toml` file.
-
-    Raises:
-        InputError: A setting is unknown, missing or refused.
-    """
+    """Build a suite from the settings of a `*.grasps.toml` file."""
     _check(given, path)
     usual = path.name.removesuffix(ENDING) + ".baseline.json"
     settings: dict[str, Any] = {"baseline": usual, **given}

@@ -14,16 +14,7 @@ COMMAND_WORDS = {"dataset": 2, "baseline": 2}
 
 
 def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]:
-    """Put the settings of `--config FILE.toml` before the flags, which then override them.
-
-    Args:
-        arguments: Words of a command line.
-        commands: Classes of flags, by the names of commands.
-
-    Raises:
-        FlagsError: No file follows --config, or the file names an unknown flag.
-        InputError: The file is missing, or it is not TOML.
-    """
+    """Put the settings of `--config FILE.toml` before the flags, which then override them."""
     words = [part for word in arguments for part in _split_config(word)]
     if "--config" not in words:
         return arguments
@@ -37,11 +28,7 @@ def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]
 
 
 def flags_from(settings: dict[str, Any]) -> list[str]:
-    """Turn named settings into the words of an equivalent command line.
-
-    Raises:
-        InputError: A value is a table.
-    """
+    """Turn named settings into the words of an equivalent command line."""
     for name, value in settings.items():
         if any(isinstance(part, dict) for item in _items(value) for part in _items(item)):
             raise InputError(f"{place([name])}: expected a value or a list, got a table")

@@ -72,11 +72,7 @@ def _end(up_to: float) -> str:
 
 
 def check(flags: object) -> None:
-    """Check the flags of a command and of its groups against their bounds.
-
-    Raises:
-        InputError: A value is refused; the message names the flag.
-    """
+    """Check the flags of a command and of its groups against their bounds."""
     for name, kind in get_type_hints(type(flags), include_extras=True).items():
         value = getattr(flags, name)
         if is_dataclass(value):

@@ -87,15 +87,7 @@ def _present(
     given: baseline_flags.ChangedPart,
     recorded_scale: float | None = None,
 ) -> Present:
-    """Carry grasps over to their part as it is now, as the flags about changed parts ask for.
-
-    Args:
-        saved: The grasps.
-        grasps: Path of their file.
-        baseline: Path of the baseline, beside which the part may lie.
-        given: The flags.
-        recorded_scale: Scale of the part's file that the baseline holds, if any.
-    """
+    """Carry grasps over to their part as it is now, as the flags about changed parts ask for."""
     asked = IfChanged(
         refuse=given.refuse_changed_part,
         unit=given.unit,

@@ -72,11 +72,7 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
 
 
 def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
-    """Start the processes or the cluster that compute the dataset.
-
-    Raises:
-        InputError: Ray or Dask is not installed, or no cluster answers.
-    """
+    """Start the processes or the cluster that compute the dataset."""
     if work.engine != "local":
         start = ray_workers if work.engine == "ray" else dask_workers
         return start(work.jobs, work.address)
@@ -128,11 +124,7 @@ def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
 
 
 def _asked(command: dataset_flags.Build) -> DatasetConfig:
-    """Read a TOML file or flags that say which objects and grasps a dataset consists of.
-
-    Raises:
-        InputError: A setting or the file is refused, or flags are given beside a file.
-    """
+    """Read a TOML file or flags that say which objects and grasps a dataset consists of."""
     first = Path(command.objects[0]) if command.objects else Path()
     if first.suffix == ".toml":
         unsaid = (dataset_flags.Planning(), dataset_flags.Settings(), dataset_flags.Learned())
@@ -168,11 +160,7 @@ def is_mesh(path: Path) -> bool:
 
 
 def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
-    """List names of objects, with each folder replaced by the mesh files in it.
-
-    Raises:
-        InputError: A folder holds no mesh file.
-    """
+    """List names of objects, with each folder replaced by the mesh files in it."""
     found: list[str] = []
     if not names:
         raise InputError(

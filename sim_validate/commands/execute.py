@@ -84,20 +84,7 @@ def execute_grasps(
 ) -> tuple[Exit, str]:  # fmt: skip
     """Execute grasps, show the results, and write them even if the run is interrupted.
 
-    Args:
-        saved: The grasps.
-        settings: How they are executed.
-        jobs: Largest number of processes.
-        folder: Where executions.json goes, if anywhere.
-        reporter: What shows the results.
-        physics: Settings of the simulator that differ from the usual ones, by name.
-
-    Returns:
-        The exit code, and the text of executions.json.
-
-    Raises:
-        InputError: A grasp is refused.
-        UnfaithfulError: The simulator fails its checks.
+    Gives the exit code, and the text of executions.json.
     """
     if folder:
         remove_executions(folder)

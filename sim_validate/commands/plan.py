@@ -43,11 +43,7 @@ CARRIED = {"payload": "payload kg", "first-slip": "first slip"}
 def plan_object(
     body: Polyhedron, planning: flag_groups.Planning, jobs: int, reporter: Reporter
 ) -> Plan:
-    """Plan the grasps of an object and, if asked for, improve them.
-
-    Raises:
-        InputError: A setting is refused.
-    """
+    """Plan the grasps of an object and, if asked for, improve them."""
     with reporter.progress("planning") as steps, compiled_beside(jobs) as left:
         found = plan(
             body,
@@ -144,11 +140,7 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
 
 
 def _task(command: command_flags.Plan) -> Array | None:
-    """Return the wrenches of a task, (m, 6), if it is to be done well.
-
-    Raises:
-        InputError: Flags do not fit each other, or the file of wrenches is refused.
-    """
+    """Return the wrenches of a task, (m, 6), if it is to be done well."""
     if not command.best and (command.measure != "ferrari-canny" or command.wrenches):
         raise FlagsError(
             "--measure and --wrenches say which grasp is best: give --best too, or leave them out"

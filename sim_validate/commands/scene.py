@@ -80,11 +80,7 @@ def _heavy(command: command_flags.Scene) -> bool:
 
 
 def _check(command: command_flags.Scene) -> None:
-    """Refuse flags that the scene asked for does not use, before any file is read.
-
-    Raises:
-        FlagsError: The flags contradict each other.
-    """
+    """Refuse flags that the scene asked for does not use, before any file is read."""
     check_mass(command.mass)
     if _heavy(command):
         if (command.fingers, command.surface) != (flag_groups.Fingers(), "pads"):

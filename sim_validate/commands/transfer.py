@@ -61,11 +61,7 @@ def transfer_file(command: transfer_flags.Transfer, reporter: Reporter) -> int:
 
 
 def _check_elsewhere(grasps: Path, out: Path | None) -> None:
-    """Refuse to write the new grasps over the old ones, from which they can be carried again.
-
-    Raises:
-        InputError: The folder for the results holds the old grasps under the same name.
-    """
+    """Refuse to write the new grasps over the old ones, from which they can be carried again."""
     if out is not None and (out / GRASPS).exists() and (out / GRASPS).samefile(grasps):
         raise InputError(
             f"{out}: the grasps of the old part are in this folder and would be overwritten; give "

@@ -54,12 +54,7 @@ def simulate_grasps(
 ) -> tuple[Exit, str]:  # fmt: skip
     """Simulate grasps, show the verdicts, and write them even if the run is interrupted.
 
-    Returns:
-        The exit code, and the text of verdicts.json.
-
-    Raises:
-        InputError: A grasp is refused.
-        UnfaithfulError: The simulator fails its checks, so no grasp is simulated.
+    Gives the exit code, and the text of verdicts.json.
     """
     gate = require_faithful(setup, saved.friction, saved.body.radius)
     for check in gate.checks:

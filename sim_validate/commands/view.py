@@ -69,11 +69,7 @@ def _scene(saved: SavedGrasps, grasp: Grasp, friction: float) -> Scene:
 
 
 def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
-    """Open MuJoCo's own viewer, and wait until it is closed.
-
-    Raises:
-        InputError: No display is connected.
-    """
+    """Open MuJoCo's own viewer, and wait until it is closed."""
     if not has_display():
         raise InputError(
             "there is no display for MuJoCo's viewer (neither DISPLAY nor WAYLAND_DISPLAY is set): "
@@ -126,12 +122,7 @@ def _written(
 
 
 def write_closing_clip(scene: Scene, grasp: Grasp, path: Path) -> Path:
-    """Write a clip in which fingers come in to their contacts while the camera moves around.
-
-    Raises:
-        InputError: The file's name does not end in gif or webp.
-        GraphicsError: No graphics library can render on this machine.
-    """
+    """Write a clip in which fingers come in to their contacts while the camera moves around."""
     joints = closing(scene)
     azimuths = np.linspace(0.0, SWING_DEG, len(joints))
     angles = np.column_stack([azimuths, np.full(len(joints), ELEVATION_DEG)])

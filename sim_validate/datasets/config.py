@@ -189,11 +189,7 @@ class DatasetConfig:
 
 
 def config_from_toml(path: Path) -> DatasetConfig:
-    """Read a configuration from a file.
-
-    Raises:
-        InputError: The file cannot be read, is not TOML, or a setting is unknown or refused.
-    """
+    """Read a configuration from a file."""
     given = read_tables(path)
     try:
         return config_from_settings(given)
@@ -202,11 +198,7 @@ def config_from_toml(path: Path) -> DatasetConfig:
 
 
 def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
-    """Build a configuration from named settings with the types that TOML has.
-
-    Raises:
-        InputError: A setting is unknown, missing, of another type, or refused.
-    """
+    """Build a configuration from named settings with the types that TOML has."""
     known = [each.name for each in fields(DatasetConfig)]
     if unknown := [name for name in given if name not in known]:
         raise InputError(f"{place(unknown[:1])}: no such setting; choose from {', '.join(known)}")

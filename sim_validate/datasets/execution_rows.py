@@ -56,13 +56,7 @@ def executed_by(
     execute: Callable[[ExecutionSettings], ExecutedGrasp], settings: ExecutionSettings,
     seeds: Sequence[int],
 ) -> ExecutedGrasp:  # fmt: skip
-    """Execute contacts, and once more for each seed with objects misplaced by it.
-
-    Args:
-        execute: Executes the contacts with settings.
-        settings: The settings of the first execution.
-        seeds: Seeds of further misplaced objects, whose trials are added to the first's.
-    """
+    """Execute contacts, and once more for each seed with objects misplaced by it."""
     first = execute(settings)
     if first.execution is None or MISPLACED not in settings.trials:
         return first
@@ -80,14 +74,7 @@ def executed_by(
 def execution_rows(
     name: str, executed: Executed, seeds: Sequence[int] = (), misplacements: int = 1
 ) -> Iterator[dict[str, Any]]:
-    """Yield a row for each trial of an execution.
-
-    Args:
-        name: Name of the grasp's row.
-        executed: What was executed, if anything was.
-        seeds: Seeds of the misplaced objects, that of the first execution first.
-        misplacements: Number of misplaced objects of each seed.
-    """
+    """Yield a row for each trial of an execution."""
     found = executed.execution if isinstance(executed, ExecutedGrasp) else None
     yield from _rows(name, found, seeds, misplacements) if found is not None else ()
 

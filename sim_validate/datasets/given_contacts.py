@@ -42,16 +42,7 @@ class GivenGrasp:
 
 
 def read_given(path: Path, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
-    """Read contacts made by other tools.
-
-    Args:
-        path: A contacts file (JSON, see docs/files.md), or an npz file of points and normals.
-        outward: Whether normals in the file point out of the object.
-
-    Raises:
-        InputError: The file cannot be read, or is not of that form; the message names the
-            field.
-    """
+    """Read contacts made by other tools."""
     try:
         data = read_bytes(path)
         text = contacts_text(data) if path.suffix == ".npz" else text_of(data)
@@ -81,12 +72,7 @@ def given_sha256(given: Sequence[GivenGrasp]) -> str:
 
 
 def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
-    """Parse contacts to judge from the text of a contacts file.
-
-    Raises:
-        InputError: The text is not a contacts file with four contacts per grasp and no friction;
-            the message names the field.
-    """
+    """Parse contacts to judge from the text of a contacts file."""
     sets = contact_sets_from_json(text, Overrides(NO_FRICTION, outward=outward))
     stated = value_of(text)
     planned = "schema" in stated  # graspproof planned these, and they may be judged at any friction
@@ -107,11 +93,7 @@ def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ..
 
 
 def contacts_text(data: bytes) -> str:
-    """Turn the bytes of an npz file into the text of a contacts file.
-
-    Raises:
-        InputError: The bytes are not an npz file of points and normals.
-    """
+    """Turn the bytes of an npz file into the text of a contacts file."""
     arrays = arrays_of(data, (POINTS, NORMALS, NAMES))
     for name in (POINTS, NORMALS):
         if name not in arrays:

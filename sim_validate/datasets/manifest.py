@@ -117,11 +117,7 @@ def manifest_to_json(manifest: Manifest) -> str:
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Read the manifest of a dataset.
-
-    Raises:
-        InputError: The folder has no manifest, or not one as this version writes it.
-    """
+    """Read the manifest of a dataset."""
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError(
@@ -136,11 +132,7 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def manifest_from_json(text: str) -> Manifest:
-    """Parse the text of a manifest.
-
-    Raises:
-        InputError: The text is not a manifest of this version; the message names the field.
-    """
+    """Parse the text of a manifest."""
     object_of(text, MANIFEST, schema=SCHEMA)
     try:
         found = TypeAdapter(Manifest).validate_json(text)

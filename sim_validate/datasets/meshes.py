@@ -33,21 +33,12 @@ def mesh_text(body: Polyhedron) -> str:
 
 
 def mesh_path(folder: Path, object_id: str) -> Path:
-    """Return the path of an object's mesh in a dataset.
-
-    Raises:
-        InputError: The object's name cannot be that of a file.
-    """
+    """Return the path of an object's mesh in a dataset."""
     return path_inside(folder, f"{FOLDER}/{object_id}.obj")
 
 
 def stored_surface(folder: Path, object_id: str) -> MeshFile:
-    """Read the triangles of an object of a dataset [m].
-
-    Raises:
-        MeshError: The mesh is missing or cannot be read.
-        InputError: The mesh is that of another object.
-    """
+    """Read the triangles of an object of a dataset [m]."""
     path = mesh_path(folder, object_id)
     mesh = read_triangles(path, DEFAULT_LIMITS)
     if (found := content_hash(mesh.vertices, mesh.triangles)) != object_id:
@@ -59,18 +50,7 @@ def stored_surface(folder: Path, object_id: str) -> MeshFile:
 
 
 def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Polyhedron:
-    """Read an object of a dataset from its canonical mesh.
-
-    Args:
-        folder: Folder of the dataset.
-        object_id: Hash of the object's mesh.
-        name: Name to give the object.
-        faces: How the object's faces were found.
-
-    Raises:
-        MeshError: The mesh is missing or is not a solid.
-        InputError: The mesh is that of another object, or what it says of its surface is wrong.
-    """
+    """Read an object of a dataset from its canonical mesh."""
     path, mesh = mesh_path(folder, object_id), stored_surface(folder, object_id)
     said, known = mesh.data.partition(b"\n")[0].decode("utf-8", "replace"), None
     try:

@@ -30,11 +30,7 @@ class Selection:
         return self.manifest.tables
 
     def paths(self, name: Name) -> list[Path]:
-        """List the files of a table, each checked to be unchanged.
-
-        Raises:
-            InputError: A file is missing, or differs from what was written.
-        """
+        """List the files of a table, each checked to be unchanged."""
         return [self._whole(each) for each in self._listed(name)]
 
     def counts(self) -> dict[Name, int]:
@@ -42,20 +38,12 @@ class Selection:
         return {name: sum(each.rows or 0 for each in self._listed(name)) for name in self.tables}
 
     def rows(self, name: Name) -> Iterator[dict[str, Any]]:
-        """Yield the rows of a table without holding all of them in memory.
-
-        Raises:
-            InputError: A file is damaged, or its number of rows differs from the manifest's.
-        """
+        """Yield the rows of a table without holding all of them in memory."""
         for batch in self.batches(name):
             yield from batch.to_pylist()
 
     def batches(self, name: Name) -> Iterator[Any]:
-        """Yield the rows of a table as Arrow's record batches.
-
-        Raises:
-            InputError: A file is damaged, or its number of rows differs from the manifest's.
-        """
+        """Yield the rows of a table as Arrow's record batches."""
         for each in self._listed(name):
             found = 0
             for batch in each_batch(path_inside(self.folder, each.path), name, self.tables):
@@ -86,19 +74,11 @@ class Selection:
         return [each for each in self.manifest.of_table(name) if self.split in (None, each.split)]
 
     def config(self) -> DatasetConfig:
-        """Read the configuration of the dataset.
-
-        Raises:
-            InputError: The dataset's config.toml is damaged.
-        """
+        """Read the configuration of the dataset."""
         return config_from_toml(self.folder / "config.toml")
 
     def facts(self) -> dict[str, str]:
-        """Versions and settings that made the dataset, and statements on its origin, by name.
-
-        Raises:
-            InputError: The dataset's config.toml is damaged.
-        """
+        """Versions and settings that made the dataset, and statements on its origin, by name."""
         config, manifest = self.config(), self.manifest
         stated = {name: str(getattr(config, name)) for name in CREDITS}
         return {
@@ -111,15 +91,7 @@ class Selection:
 
 
 def select(folder: Path, split: str | None = None) -> Selection:
-    """Open a dataset or one of its splits.
-
-    Args:
-        folder: Folder of the dataset.
-        split: `train`, `validation` or `test`; all splits if not given.
-
-    Raises:
-        InputError: The split is unknown, or the folder holds no finished dataset.
-    """
+    """Open a dataset or one of its splits."""
     splits = [name for name, _ in SPLITS]
     if split is not None:
         one_of(split, splits, "split")

@@ -38,11 +38,7 @@ PAGES: Mapping[str, Any] = {
 
 
 def pyarrow() -> Any:
-    """Import pyarrow, the library that reads and writes Parquet.
-
-    Raises:
-        InputError: The library is not installed.
-    """
+    """Import pyarrow, the library that reads and writes Parquet."""
     try:
         return importlib.import_module("pyarrow")
     except ImportError as error:
@@ -71,18 +67,7 @@ def arrow_table(
     name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[str, str],
     tables: Tables = TABLES,
 ) -> Any:  # fmt: skip
-    """Make an Arrow table of rows.
-
-    Args:
-        name: Name of the table.
-        rows: Rows as cells by column. Missing cells and numbers that are not finite become null.
-            The rows are sorted here by the table's key.
-        about: Metadata of the file: text by name.
-        tables: Tables of the dataset, with their columns.
-
-    Raises:
-        InputError: Two rows have the same key, or a cell is not of its column's type.
-    """
+    """Make an Arrow table of rows."""
     arrow = pyarrow()
     listed = sorted(rows, key=lambda row: _key(name, row))
     for one, other in itertools.pairwise(listed):
@@ -112,46 +97,25 @@ def as_read(
 def read_rows(
     path: Path, name: Name | None = None, tables: Tables | None = None
 ) -> list[dict[str, Any]]:
-    """Read the rows of a file and check all of its checksums.
-
-    Raises:
-        InputError: The file does not hold the table, or is damaged.
-    """
+    """Read the rows of a file and check all of its checksums."""
     return read_table(path, name, tables).to_pylist()
 
 
 def each_batch(path: Path, name: Name, tables: Tables | None = None) -> Iterator[Any]:
-    """Yield the rows of a file as Arrow's record batches, without holding all of them in memory.
-
-    Raises:
-        InputError: The file does not hold the table, or is damaged.
-    """
+    """Yield the rows of a file as Arrow's record batches, without holding all of them in memory."""
     with _opened(path, name, tables) as file:
         yield from file.iter_batches(GROUP_ROWS)
 
 
 def read_table(path: Path, name: Name | None = None, tables: Tables | None = None) -> Any:
-    """Read a file as an Arrow table and check all of its checksums.
-
-    Args:
-        path: Path of the file.
-        name: Name of its table; any table if None.
-        tables: Tables of its dataset; those with or without executions if None.
-
-    Raises:
-        InputError: The file does not hold the table, or is damaged.
-    """
+    """Read a file as an Arrow table and check all of its checksums."""
     with _opened(path, name, tables) as file:
         return file.read()
 
 
 @contextmanager
 def _opened(path: Path, name: Name | None, tables: Tables | None) -> Generator[Any]:
-    """Open a file of one of the tables; any damage is raised as an `InputError`.
-
-    Raises:
-        InputError: The file holds no table, has other columns, or is damaged.
-    """
+    """Open a file of one of the tables; any damage is raised as an `InputError`."""
     arrow, parquet = pyarrow(), pyarrow_parquet()
     try:
         with parquet.ParquetFile(path, page_checksum_verification=True) as file:
@@ -202,9 +166,6 @@ def read_columns(paths: Sequence[Path], name: Name, tables: Tables = TABLES) -> 
     Null is NaN in columns of floats, and -1 in columns of whole numbers. Text is an object, with
     None for null. Truth values are bool where none is null. Otherwise they are 1.0, 0.0 and NaN:
     floats refuse `~` and `&`, which would give wrong answers for objects without a word.
-
-    Raises:
-        InputError: A file is damaged.
     """
     rows = [row for path in paths for row in read_rows(path, name, tables)]
     return {column.name: _as_array(column, rows) for column in tables[name]}

@@ -30,11 +30,7 @@ def left_out_text(units: Iterable[LeftOut]) -> str:
 
 
 def read_left_out(path: Path) -> list[LeftOut]:
-    """Read `quarantine.jsonl`: the units of work that have no rows.
-
-    Raises:
-        InputError: The file cannot be read, or a line is invalid; the message names line and key.
-    """
+    """Read `quarantine.jsonl`: the units of work that have no rows."""
     text = read_text(path)
     try:
         return left_out_from(text)
@@ -43,11 +39,7 @@ def read_left_out(path: Path) -> list[LeftOut]:
 
 
 def left_out_from(text: str) -> list[LeftOut]:
-    """Parse the text of `quarantine.jsonl`.
-
-    Raises:
-        InputError: A line is invalid.
-    """
+    """Parse the text of `quarantine.jsonl`."""
     lines = text.removesuffix("\n").split("\n") if text else []
     return [_read(line, number) for number, line in enumerate(lines, start=1)]
 

@@ -46,11 +46,7 @@ class TableFiles:
             part.abandon()
 
     def add(self, name: Name, split: str, paths: Iterable[Path]) -> None:
-        """Add the rows of some files; their keys must come after all that were added before.
-
-        Raises:
-            InputError: A file is damaged, or two rows have the same key.
-        """
+        """Add the rows of some files; their keys must come after all that were added before."""
         arrow, keys = pyarrow(), list(KEYS[name])
         table = arrow.concat_tables([read_table(path, name, self._tables) for path in paths])
         table = table.sort_by([(key, "ascending") for key in keys])

@@ -100,11 +100,7 @@ def shared_settings(config: DatasetConfig) -> dict[str, object]:
 
 
 def units_of(config: DatasetConfig) -> list[WorkUnit]:
-    """Split a configuration into units of work, each one object at one friction, sorted by name.
-
-    Raises:
-        InputError: An object is neither a readable file nor built in, or the contacts are refused.
-    """
+    """Split a configuration into units of work, each one object at one friction, sorted by name."""
     hashes = {name: _source_sha256(name) for name in config.objects}
     paths = {name: Path(name).resolve() if is_mesh_file(name) else None for name in hashes}
     units = [
@@ -133,12 +129,7 @@ def _parts(config: DatasetConfig) -> list[tuple[GivenGrasp, ...]]:
 
 
 def body_of(unit: WorkUnit) -> Polyhedron:
-    """Load the object of a unit.
-
-    Raises:
-        MeshError: The mesh is not a solid.
-        WorkerError: The file is missing, or has changed since the build began.
-    """
+    """Load the object of a unit."""
     length, scale = unit.config.lengths_of(unit.object)
     if unit.path is None:
         return _scaled(example_object(unit.object), scale, unit.config.faces)

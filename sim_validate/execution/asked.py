@@ -43,26 +43,14 @@ class AskedExecution:
             positive(self.density_kg_m3, DENSITY)
 
     def settings_for(self, body: Polyhedron) -> ExecutionSettings:
-        """Return the settings with the mass of an object.
-
-        Raises:
-            InputError: The object's mass is out of range.
-        """
+        """Return the settings with the mass of an object."""
         if self.density_kg_m3 is None:
             return self.settings
         return replace(self.settings, mass_kg=body.mass_at(self.density_kg_m3))
 
 
 def asked_execution(table: object) -> AskedExecution:
-    """Read the table `[execution]` of a settings file.
-
-    Args:
-        table: Values as TOML gives them: fields of `ExecutionSettings`, or `density_kg_m3` in
-            place of `mass_kg`.
-
-    Raises:
-        InputError: A setting is unknown or out of range, or there is not one of mass and density.
-    """
+    """Read the table `[execution]` of a settings file."""
     if not isinstance(table, Mapping):
         raise InputError(f"{TABLE}: expected a table of settings, got {shown(table)}")
     given = {**cast("Mapping[str, Any]", table)}

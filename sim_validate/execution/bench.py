@@ -106,16 +106,7 @@ class HeldBench:
     ) -> None:  # fmt: skip
         """Compile a scene.
 
-        Args:
-            scene: What to simulate.
-            threads: Number of the simulator's threads; results do not depend on it.
-            sample_s: Duration of a sample, rounded to whole steps [s].
-            lost_m: Distance of the object from its place in the hand at which it is lost and its
-                trial ends: it stays there, and nothing touches it [m].
-            step_s: Length of a step; None for that of the scene [s].
-
-        Raises:
-            InputError: The simulator refuses the scene, or a sample is not a number of its steps.
+        Takes `sample_s`, `step_s` [s]; `lost_m` [m].
         """
         self.scene, self.threads, self.lost_m = scene, threads, lost_m
         self.model = compiled(scene.xml)
@@ -139,13 +130,7 @@ class HeldBench:
     ) -> tuple[HeldMotion, ...]:  # fmt: skip
         """Simulate trials, all from the same state or from their own start.
 
-        Args:
-            drives: What is applied in each trial.
-            start: State in a sample of an earlier motion, (size,) for all trials or (n, size); None
-                for fingertips at their contacts, or where the drive says, that do not push yet.
-            friction: Coulomb coefficient of each contact, (k,) for all trials or (n, k); None for
-                those of the scene.
-            lost: Where the object of each trial is lost; None for the distance of the bench.
+        Takes `start` (size,) or (n, size); `friction` (k,) or (n, k).
         """
         trials = self._begun(drives, start, friction)
         if lost is None:
@@ -160,12 +145,8 @@ class HeldBench:
     def touched(self, reached: Array) -> tuple[Array, Array]:
         """Find what each fingertip touches before anything moves.
 
-        Args:
-            reached: Displacements of the fingertips along their springs, (k, 3) [m].
-
-        Returns:
-            Normals into the object, (k, 3), and depths, (k,) [m]; NaN for a fingertip that has not
-            exactly one contact.
+        Takes `reached` (k, 3) [m]. Gives normals into the object, (k, 3), and depths, (k,) [m]; NaN
+        for a fingertip that has not exactly one contact.
         """
         data = mujoco.MjData(self.model)
         data.qpos[PALM + 1 :] = self.scene.layout.joints(reached)

@@ -51,14 +51,7 @@ def run_again(
     bench: HeldBench, trials: Sequence[Trial], motions: Sequence[HeldMotion],
     settings: ExecutionSettings,
 ) -> Iterator[HeldMotion]:  # fmt: skip
-    """Yield motions in which trials are simulated with short steps from before their trouble on.
-
-    Args:
-        bench: A bench with short steps.
-        trials: The trials to run again.
-        motions: Their motions with steps of the usual length.
-        settings: How far an object may move and turn until it is lost.
-    """
+    """Yield motions in which trials are simulated with short steps from before their trouble on."""
     begins = [_begin(trial, motion, bench) for trial, motion in zip(trials, motions, strict=True)]
     again = bench.run(
         [_rest(trial, begin) for trial, begin in zip(trials, begins, strict=True)],

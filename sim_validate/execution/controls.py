@@ -138,10 +138,7 @@ def _sure(weaker: Grip, load: Array) -> float:
 def idle(grip: Grip, finger: int, push: Array) -> Grip:
     """Return the squeeze that is left by (1) where a finger does not push.
 
-    Args:
-        grip: The squeezed contacts.
-        finger: Index of the finger.
-        push: What its command would push with, (3,) [N].
+    Takes `push` (3,) [N].
     """
     maps = grasp_map(grip.arms).reshape(len(grip.elastic_stiffness), -1, 3).transpose(1, 0, 2)
     motion = np.asarray(np.linalg.solve(grip.elastic_stiffness, -maps[finger] @ push), dtype=float)

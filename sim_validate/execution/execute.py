@@ -95,12 +95,7 @@ def executed(
     body: Polyhedron, settings: ExecutionSettings, choose: Choose, scene_of: SceneOf, *,
     threads: int, enough: bool,
 ) -> Execution:  # fmt: skip
-    """Choose the squeeze, simulate its trials, and find what would be enough where they are lost.
-
-    Raises:
-        NoForcesError: No squeeze carries the weight, or the grip is unstable under the best one.
-        UnfaithfulError: The simulator fails on a case with a known answer.
-    """
+    """Choose the squeeze, simulate its trials, and find what would be enough if they are lost."""
     try:
         best = choose(settings, None)
     except NoForcesError as error:
@@ -117,11 +112,7 @@ def executed(
 def simulated(
     body: Polyhedron, best: BestSqueeze, scene: HeldScene, settings: ExecutionSettings, threads: int
 ) -> Execution:
-    """Simulate the trials of a scene with the squeeze that was chosen for it, and judge each.
-
-    Raises:
-        UnfaithfulError: The simulator fails on a case with a known answer.
-    """
+    """Simulate the trials of a scene with the squeeze that was chosen for it, and judge each."""
     require_faithful_execution(scene.layout, scene.physics, settings.hand, settings.push_n)
     lost_m = max(LOST * body.radius, 2.0 * settings.most_m)
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
@@ -160,10 +151,6 @@ def chosen_squeeze(
     """Choose the squeeze that carries the most of the weight in any direction.
 
     With loads it is the one of the least push that survives them, however hard fingers may push.
-
-    Raises:
-        InputError: A number is out of range.
-        NoForcesError: No squeeze carries any weight, or the grip is unstable under the best one.
     """
     contacts = _contacts(body, grasp)
     radius = tip_radius(body, contacts, settings)
@@ -181,11 +168,7 @@ def chosen_squeeze(
 
 
 def _contacts(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> tuple[Contact, ...]:
-    """Return the contacts of a grasp, or those that are given.
-
-    Raises:
-        InputError: They are no contacts, fewer than two, or those of another object.
-    """
+    """Return the contacts of a grasp, or those that are given."""
     check_body(body)
     if isinstance(grasp, Grasp):
         check_on_faces(body, grasp)
@@ -198,11 +181,7 @@ def _contacts(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> tuple[Conta
 
 
 def tip_radius(body: Polyhedron, contacts: Sequence[Contact], settings: ExecutionSettings) -> float:
-    """Return the radius of the fingertips: as in the settings, or one that fits the contacts [m].
-
-    Raises:
-        InputError: The contacts are not finite.
-    """
+    """Return the radius of the fingertips [m]: as in the settings, or one that fits."""
     if settings.tip_radius_m is not None:
         return settings.tip_radius_m
     return fitting_radius(body, *contact_arrays(*stacked(contacts)))

@@ -43,18 +43,7 @@ def _loss(trial: ExecutionTrial) -> tuple[bool, float]:
 
 
 def film(job: ExecutionJob, name: str, path: Path) -> Path:
-    """Simulate one trial of an execution again and draw it.
-
-    Args:
-        job: The execution: object, grasp, friction, and settings of trials and simulator.
-        name: Name of the trial, as `Execution.trials` has it.
-        path: File to write, gif or webp.
-
-    Raises:
-        InputError: No trial has this name, or the settings of the simulator do not fit the scene.
-        NoForcesError: No squeeze carries the weight.
-        GraphicsError: No graphics library draws here; the message quotes it.
-    """
+    """Simulate one trial of an execution again and draw it."""
     body, settings = job.body, job.settings
     best = chosen_squeeze(body, job.grasp, job.friction, settings)
     scene = held_scene(body, best.grip, settings, physics_of(job))

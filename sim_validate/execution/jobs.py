@@ -83,29 +83,14 @@ def best_executed(grasps: Iterable[ExecutedGrasp]) -> ExecutedGrasp | None:
 
 
 def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[ExecutedGrasp]:
-    """Yield one result per job, in order; the number of processors does not change the results.
-
-    Args:
-        jobs: The grasps to execute.
-        processors: How many processors to use: as processes, and as threads of the simulator where
-            there are too few grasps for that many processes.
-
-    Raises:
-        InputError: A grasp or a setting is refused.
-        UnfaithfulError: The simulator fails its checks.
-    """
+    """Yield one result per job, in order; the number of processors does not change the results."""
     count = processes(len(jobs), processors)
     threads = max(1, processors // count)
     return each(executed_grasp, [replace(job, threads=threads) for job in jobs], jobs=count)
 
 
 def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
-    """Execute one grasp; a grasp without a squeeze is a result with a reason.
-
-    Raises:
-        InputError: The grasp or a setting is refused.
-        UnfaithfulError: The simulator fails its checks.
-    """
+    """Execute one grasp; a grasp without a squeeze is a result with a reason."""
     grasp = job.grasp
     about = grasp.id, grasp.family, contacts_sha256(grasp.contacts)
     try:
@@ -127,12 +112,8 @@ def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
 def physics_of(job: ExecutionJob) -> PhysicsSettings | None:
     """Return the usual settings for the grasp's springs and masses with the job's changes.
 
-    Returns:
-        The settings; None where the job changes nothing, and the usual ones are taken, or where no
-        squeeze carries the weight.
-
-    Raises:
-        InputError: The grasp or a setting is refused.
+    Gives the settings; None where the job changes nothing, and the usual ones are taken, or where
+    no squeeze carries the weight.
     """
     if not job.physics:
         return None

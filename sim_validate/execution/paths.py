@@ -75,9 +75,7 @@ def closing(after_s: float = REST_S) -> Drive:
 def loaded(share: Array, gravity: Array) -> Drive:
     """Return the drive in which a squeezed object comes under its weight.
 
-    Args:
-        share: Share of the load, (n,).
-        gravity: Full gravity, (3,) or (n, 3) [m/s^2].
+    Takes `share` (n,); `gravity` (3,) or (n, 3) [m/s^2].
     """
     count = len(share)
     weight = share[:, None] * np.broadcast_to(gravity, (count, 3))
@@ -87,8 +85,7 @@ def loaded(share: Array, gravity: Array) -> Drive:
 def turned_weight(slowest_rad_per_s: float) -> Drive:
     """Return the drive of `weight`: gravity turned through all directions.
 
-    Args:
-        slowest_rad_per_s: Lowest natural frequency of the held object [rad/s].
+    Takes `slowest_rad_per_s` [rad/s].
     """
     speed = float(np.clip(SLOW * slowest_rad_per_s, *TURNING))
     turns = math.pi / SPACING
@@ -120,10 +117,7 @@ def held_weight(gravity: Array, rest_s: float = RISE_S) -> Drive:
 def shake(gravity: Array, axis: Array, frequency_hz: float) -> Drive:
     """Return the drive of a shake under weight.
 
-    Args:
-        gravity: Acceleration of gravity, (3,) [m/s^2].
-        axis: Largest acceleration of the palm, (6,) [m/s^2, rad/s^2].
-        frequency_hz: Frequency of the sinusoid [Hz].
+    Takes `gravity` (3,) [m/s^2]; `axis` (6,); `frequency_hz` [Hz].
     """
     rate = 2.0 * math.pi * frequency_hz
     grow, hold = 1.0 / frequency_hz, CYCLES / frequency_hz
@@ -142,11 +136,7 @@ def shake(gravity: Array, axis: Array, frequency_hz: float) -> Drive:
 def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive:
     """Return the drive of a stop under weight.
 
-    Args:
-        gravity: Acceleration of gravity, (3,) [m/s^2].
-        way: Unit direction of the motion before, (3,).
-        deceleration: Largest deceleration [m/s^2].
-        speed: Speed before [m/s].
+    Takes `gravity` (3,) [m/s^2]; `way` (3,); `deceleration` [m/s^2]; `speed` [m/s].
     """
     rest = samples(REST_S)
     whole = speed / deceleration / SAMPLE_S  # samples at the full deceleration
@@ -167,10 +157,7 @@ def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive
 def knock(gravity: Array, impulse: Array, point: Array) -> Drive:
     """Return the drive of a knock under weight.
 
-    Args:
-        gravity: Acceleration of gravity, (3,) [m/s^2].
-        impulse: Force over time, (3,) [N s].
-        point: Where it strikes, from the centre of mass, (3,) [m].
+    Takes `gravity` (3,) [m/s^2]; `impulse` (3,) [N s]; `point` (3,) [m].
     """
     strike, rest = samples(STRIKE_S), samples(REST_S)
     wrenches = np.zeros((WEIGHING + strike + rest, 6))
@@ -185,12 +172,7 @@ def knock(gravity: Array, impulse: Array, point: Array) -> Drive:
 def lift(up: Array, height: float, duration_s: float, give_m: float = 0.0) -> tuple[Drive, int]:
     """Return the drive of a lift from a table, and the sample at which it begins.
 
-    Args:
-        up: Unit vector against gravity, (3,).
-        height: Height of the lift [m].
-        duration_s: Its duration [s].
-        give_m: Rise of the palm by which the fingers take the weight from the table: as far as the
-            weight bends their springs.
+    Takes `up` (3,); `height` [m]; `duration_s` [s].
     """
     laid = samples(LAY_S)
     before, count, rest = laid + samples(CLOSE_S + REST_S), samples(duration_s), samples(REST_S)

@@ -113,15 +113,7 @@ def predicted_losses(
 ) -> tuple[Array, Array]:  # fmt: skip
     """Return the multiples of each drive's load of the first slip, and of loss, (drives,) each.
 
-    Args:
-        dynamics: The held object.
-        drives: What is applied.
-        turning: Whether the load keeps turning, so that the first slip counts as a loss, for each.
-        most_m: Displacement from which on the object is lost [m].
-        most_rad: Turn from which on it is [rad].
-
-    Returns:
-        Both, zero where the grip is unstable at rest.
+    Takes `most_m` [m]; `most_rad` [rad]. Gives both, zero where the grip is unstable at rest.
     """
     if not drives or not dynamics.grip.stable:
         return np.zeros(len(drives)), np.zeros(len(drives))

@@ -60,10 +60,7 @@ def rests(body: Polyhedron) -> tuple[Rest, ...]:
 def resting(body: Polyhedron, tips: Array, radii: Array) -> Rest | None:
     """Return the likeliest rest in which no fingertip meets the table; None if there is none.
 
-    Args:
-        body: The object.
-        tips: Centres of the fingertips from the centre of mass, (k, 3) [m].
-        radii: Their radii, (k,) [m].
+    Takes `tips` (k, 3) [m]; `radii` (k,) [m].
     """
     for rest in rests(body):
         if (tips @ rest.down + radii).max() <= rest.height - CLEAR * body.radius:

@@ -102,12 +102,7 @@ def outcome(
 ) -> Outcome:
     """Say what became of the object since a sample of a trial.
 
-    Args:
-        motion: The motion in the trial.
-        layout: Layout of the scene.
-        drive: What was applied.
-        friction: Coulomb coefficient of each contact, (k,).
-        begun: Index of the sample in which the object is at rest, before the load comes.
+    Takes `friction` (k,).
     """
     found = seen(motion, layout)
     relative = found.turned[begun:] @ found.turned[begun].T
@@ -180,13 +175,7 @@ def _first_slip(
 ) -> float:
     """Return the multiple of the load at first slip.
 
-    Args:
-        found: The motion.
-        shares: Share of the load in each sample, (n,).
-        friction: Coulomb coefficient of each contact, (k,).
-        begun: Index of the sample in which the object is at rest.
-        leaving: Displacements of the points of contact since then, in object radii, where the
-            object leaves a table, (n - begun, k, 3); None for other trials.
+    Takes `shares` (n,); `friction` (k,).
     """
     pushing, on_cone = _on_cone(found, friction, begun)
     if not pushing.any():

@@ -54,11 +54,7 @@ def trials_of(
 ) -> tuple[tuple[Trial, ...], tuple[Skipped, ...]]:
     """Return the trials that are asked for, and the kinds that are left out with the reasons.
 
-    Args:
-        body: The object.
-        layout: Layout of its scene.
-        settings: Which trials, and how large.
-        lowest_frequency: Lowest natural frequency of the held object [rad/s].
+    Takes `lowest_frequency` [rad/s].
     """
     every = [
         each

@@ -138,12 +138,7 @@ class Execution(ByValue):
 
 
 def ended(trial: ExecutionTrial, settings: ExecutionSettings | None = None) -> str:
-    """Say what became of the object, and where it was kept and still failed, why.
-
-    Args:
-        trial: The trial.
-        settings: How far an object may move and turn; if None, it is left open which it was.
-    """
+    """Say what became of the object, and where it was kept and still failed, why."""
     if trial.survived or trial.fate in LOST:
         return trial.fate
     ways = list[str]()

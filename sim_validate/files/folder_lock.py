@@ -26,10 +26,6 @@ def alone_in(folder: Path | None) -> Generator[None]:
 
     Enter this context before work begins, so that a folder that takes no files is refused at once,
     and not after the work. Without a folder it does nothing.
-
-    Raises:
-        InputError: The folder cannot be made, no file can be written there, or another command is
-            writing to it.
     """
     if folder is None:
         yield

@@ -32,11 +32,7 @@ LARGEST_LETTER, FIRST_HALF, LAST_HALF = 0x10FFFF, 0xD800, 0xDFFF
 
 
 def read_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:
-    """Read the named arrays of an npz file that exist; nothing in the file is executed.
-
-    Raises:
-        InputError: The file cannot be read, is too large, or holds anything but plain arrays.
-    """
+    """Read the named arrays of an npz file that exist; nothing in the file is executed."""
     data = read_bytes(path, MOST_BYTES)
     try:
         return arrays_of(data, names)
@@ -45,11 +41,7 @@ def read_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:
 
 
 def arrays_of(data: bytes, names: Collection[str]) -> dict[str, NDArray[Any]]:
-    """Read the named arrays that exist from the bytes of an npz file.
-
-    Raises:
-        InputError: The file is too large, or holds anything but plain arrays.
-    """
+    """Read the named arrays that exist from the bytes of an npz file."""
     if not data.startswith(BEGINNING):
         raise InputError(
             "expected an npz file, which begins as a zip archive does; save it with numpy.savez"

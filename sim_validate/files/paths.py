@@ -10,15 +10,7 @@ LONGEST = 500
 
 
 def require_inside(name: object, field: str) -> str:
-    """Check that a path is relative and has no `..`.
-
-    Args:
-        name: The path as a file has it, with slashes.
-        field: Field of the file that holds the path, for messages.
-
-    Raises:
-        InputError: The value is not a path, or leads out of the folder.
-    """
+    """Check that a path is relative and has no `..`."""
     if not isinstance(name, str) or not name or len(name) > LONGEST:
         raise InputError(f"{field}: expected the path of a file, got {shown(name)}")
     parts = PurePosixPath(name).parts
@@ -30,11 +22,7 @@ def require_inside(name: object, field: str) -> str:
 
 
 def path_inside(folder: Path, name: str) -> Path:
-    """Return the path of a file in a folder, after a check that no link leads out of it.
-
-    Raises:
-        InputError: The path leads out of the folder.
-    """
+    """Return the path of a file in a folder, after a check that no link leads out of it."""
     path = folder / require_inside(name, "path")
     if not path.resolve().is_relative_to(folder.resolve()):
         raise InputError(f"{path}: this link leads out of {folder}; copy the file into the folder")

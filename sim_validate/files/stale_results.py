@@ -78,13 +78,7 @@ def remove_judgements(folder: Path) -> None:
 
 
 def _of_grasps(folder: Path, suffix: str, mark: bytes) -> list[Path]:
-    """List the files in a folder that are about grasps.
-
-    Args:
-        folder: The folder.
-        suffix: Ending of the files.
-        mark: What each of them holds, by which one with an id of people's own is known.
-    """
+    """List the files in a folder that are about grasps."""
     return [
         path for path in folder.glob(f"*{suffix}")
         if ID.fullmatch(path.stem) or (path.is_file() and mark in path.read_bytes())
@@ -97,11 +91,7 @@ def _remove(paths: Iterable[Path]) -> None:
 
 
 def require_report_folder(folder: Path) -> None:
-    """Refuse to write pages into a folder that is neither empty nor a report.
-
-    Raises:
-        InputError: The folder holds other files.
-    """
+    """Refuse to write pages into a folder that is neither empty nor a report."""
     if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
         raise InputError(
             f"{folder}: this folder holds other files than a report; give another --out"

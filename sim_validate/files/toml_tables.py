@@ -23,12 +23,7 @@ number: two minutes for a hundred kilobytes."""
 
 
 def read_tables(path: Path) -> dict[str, Any]:
-    """Read the tables of a TOML file.
-
-    Raises:
-        InputError: The file cannot be read, or is not TOML; the message names the file and the
-            line.
-    """
+    """Read the tables of a TOML file."""
     text = read_text(path, MOST_LETTERS)
     try:
         return tables_of_toml(text)
@@ -37,11 +32,7 @@ def read_tables(path: Path) -> dict[str, Any]:
 
 
 def tables_of_toml(text: str) -> dict[str, Any]:
-    """Parse the tables of a TOML text.
-
-    Raises:
-        InputError: The text is not TOML, or holds a value that no setting can have.
-    """
+    """Parse the tables of a TOML text."""
     if LONG_KEY.search(ASIDE.sub(lambda found: "q" if found[0][0] != "#" else "", text)):
         raise InputError(f"a key of the TOML file has more than {DEEPEST} parts; use shorter keys")
     try:

@@ -42,11 +42,7 @@ def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
 
 @contextmanager
 def whole_folder(folder: Path) -> Generator[Path]:
-    """Yield a temporary folder that becomes `folder` on success, and is removed on failure.
-
-    Raises:
-        InputError: The folder exists and is not empty.
-    """
+    """Yield a temporary folder that becomes `folder` on success, and is removed on failure."""
     if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
         raise InputError(f"{folder}: exists and is not an empty folder; give another --out")
     named = folder.resolve()

@@ -89,11 +89,7 @@ def execute_hand(  # noqa: PLR0913 - `mass_kg` is the one setting that has no de
 def hand_execution_settings(mass_kg: float) -> ExecutionSettings:
     """Return the usual settings for hands, in which motors alone limit how hard fingers push.
 
-    Args:
-        mass_kg: Mass of the object [kg].
-
-    Raises:
-        InputError: The mass is out of range.
+    Takes `mass_kg` [kg].
     """
     return ExecutionSettings(mass_kg=mass_kg, push_n=MOST_PUSH_N)
 
@@ -105,10 +101,6 @@ def hand_squeeze(
     """Choose the squeeze within the motors' torques that carries most of the weight.
 
     With loads it is the one of the least push within these torques that survives them.
-
-    Raises:
-        InputError: Hand, object and pose do not belong together, or a number is out of range.
-        NoForcesError: No squeeze carries any weight, or the grip is unstable under the best one.
     """
     check_body(body)
     stance = stance_of(hand, reach)

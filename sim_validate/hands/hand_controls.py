@@ -70,13 +70,7 @@ class HandCase:
 def hand_controls(
     case: HandCase, weakest: PlannedLoad, names: tuple[str, ...]
 ) -> tuple[HandControl, ...]:
-    """Make the negative controls that exist for a hand, at most one of each kind.
-
-    Args:
-        case: The hand in its grasp.
-        weakest: The load whose limit is smallest.
-        names: Names of the joints.
-    """
+    """Make the negative controls that exist for a hand, at most one of each kind."""
     at_limit = weakest.limit.wrench
     kinds = (
         _overloaded(case, at_limit),

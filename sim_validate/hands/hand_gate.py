@@ -55,15 +55,7 @@ GENTLE = 0.1
 
 
 def require_faithful_hands(setup: Setup, friction: float) -> tuple[Check, ...]:
-    """Check the simulator on the known hand, and refuse settings under which a check fails.
-
-    Args:
-        setup: How trials are simulated.
-        friction: Coulomb coefficient under test.
-
-    Raises:
-        UnfaithfulError: A check failed; nothing simulated with this setup would count.
-    """
+    """Check the simulator on the known hand, and refuse settings under which a check fails."""
     plain = replace(setup, threads=1, timeout_s=math.inf)
     checks = known_hand(plain, float(f"{friction:.1e}"))
     failed = "; ".join(str(check) for check in checks if not check.passed)

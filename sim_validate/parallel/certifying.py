@@ -46,12 +46,7 @@ def certified(
 ) -> Iterator[Found]:  # fmt: skip
     """Yield each grasp, in order, with its certified regions or the reason why it has none.
 
-    Args:
-        body: The object.
-        grasps: Grasps on the faces of `body`.
-        asked: How regions are certified.
-        jobs: Largest number of processes.
-        progress: Called with (done, total) after each grasp.
+    Takes `progress` (done, total).
     """
     tasks = [_Task(body, grasp, asked) for grasp in grasps]
     for done, found in enumerate(zip(grasps, each(_certify, tasks, jobs=jobs), strict=True)):

@@ -64,15 +64,7 @@ class DaskCluster:
 
 @contextmanager
 def ray_workers(workers: int, address: str | None) -> Generator[RayCluster]:
-    """Start or join a Ray cluster.
-
-    Args:
-        workers: Number of workers to start here, if no address is given.
-        address: Address of a running cluster, such as `auto` or `ray://head:10001`.
-
-    Raises:
-        InputError: Ray is not installed, or no cluster answers.
-    """
+    """Start or join a Ray cluster."""
     with _environment(RAY_SETTINGS):  # read when Ray is imported, and by the programs it starts
         yield from _ray(workers, address)
 
@@ -111,11 +103,7 @@ def _environment(settings: Mapping[str, str]) -> Generator[None]:
 
 
 def _require_listener(address: str) -> None:
-    """Refuse a host and port where nothing listens, because Ray itself retries for minutes.
-
-    Raises:
-        InputError: No program listens at the address; addresses such as `auto` are left to Ray.
-    """
+    """Refuse a host and port where nothing listens, because Ray itself retries for minutes."""
     host, colon, port = address.split("://")[-1].rpartition(":")
     if not (colon and port.isdigit()):
         return
@@ -127,16 +115,7 @@ def _require_listener(address: str) -> None:
 
 @contextmanager
 def dask_workers(workers: int, address: str | None) -> Generator[DaskCluster]:
-    """Start or join a Dask cluster.
-
-    Args:
-        workers: Number of workers to start here, if no address is given.
-        address: Address of a running scheduler, such as `tcp://head:8786`, or a scheduler file. Its
-            workers must have one thread each, because limits of time end a whole process.
-
-    Raises:
-        InputError: Dask is not installed, no scheduler answers, or a worker has several threads.
-    """
+    """Start or join a Dask cluster."""
     distributed = _imported("distributed", "dask")
     with _dask_client(distributed, workers, address) as client:
         threads: dict[str, int] = client.nthreads()

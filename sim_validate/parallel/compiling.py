@@ -74,14 +74,8 @@ def compiled_beside(jobs: int, calls: Calls | None = None) -> Generator[int]:
 
     The first use of such a loop in the block waits until that process has compiled it.
 
-    Args:
-        jobs: Largest number of processes; below two, nothing is compiled beside the block.
-        calls: For each kernel, a function of a module that compiles it, in the order in which the
-            block needs them; None for those of a plan.
-
-    Yields:
-        The number of processes that the block may use: one while loops are compiled, as others
-        would compile the same loops.
+    Gives the number of processes that the block may use: one while loops are compiled, as others
+    would compile the same loops.
     """
     wanted = BESIDE if calls is None else calls
     missing = {name: call for name, call in wanted.items() if jobs > 1 and not is_kept(name)}

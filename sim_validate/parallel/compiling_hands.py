@@ -32,14 +32,7 @@ def must_compile() -> bool:
 
 
 def compile_for_hands(hand: Hand, body: Polyhedron, seed: int, jobs: int) -> None:
-    """Compile the loops, in two processes where that is allowed; loops that are kept are loaded.
-
-    Args:
-        hand: The hand.
-        body: The object.
-        seed: Seed of the postures, which are kept.
-        jobs: Largest number of processes.
-    """
+    """Compile the loops, in two processes where that is allowed; loops that are kept are loaded."""
     with compiled_beside(jobs, BESIDE_REACHING):
         compile_checks(hand, body, seed)
         compiled(POSING)  # waits for the other process

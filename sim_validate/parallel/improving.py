@@ -38,13 +38,7 @@ def improved(
 
     The plan keeps only one of several grasps that end at the same contacts.
 
-    Args:
-        body: The object.
-        found: A plan for it.
-        finger_radius: How far contacts stay from edges [m].
-        parts: How many cases to look at for a bound of the best quality; None for no bound.
-        jobs: Largest number of processes.
-        progress: Called with (done, total, how many are raised) after each grasp.
+    Takes `finger_radius` [m]; `progress` (done, total, how many are raised).
     """
     tasks = [
         _Task(body, grasp, found.friction, finger_radius, found.seed, parts)

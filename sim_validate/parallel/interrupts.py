@@ -19,12 +19,7 @@ _noted = threading.Event()
 
 @contextmanager
 def noted() -> Generator[None, None, None]:
-    """Record interrupts, besides raising them, while the context is open.
-
-    Raises:
-        KeyboardInterrupt: The context ends with an error after an interrupt. A library that
-            swallows an interrupt half-way may fail later because of that.
-    """
+    """Record interrupts, besides raising them, while the context is open."""
     if threading.current_thread() is not threading.main_thread():
         yield  # Python handles signals in its main thread only
         return
@@ -54,11 +49,7 @@ def _note(_: int, __: FrameType | None) -> None:
 
 
 def check() -> None:
-    """Raise an interrupt that was recorded, where a library may have swallowed it.
-
-    Raises:
-        KeyboardInterrupt: An interrupt was recorded.
-    """
+    """Raise an interrupt that was recorded, where a library may have swallowed it."""
     if _noted.is_set():
         _noted.clear()
         raise KeyboardInterrupt

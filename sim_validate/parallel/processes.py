@@ -49,11 +49,6 @@ def each(
 
     This process works with the others, which start where there is work for them for longer than a
     start takes.
-
-    Args:
-        function: A function that can be imported by name and depends only on its argument.
-        units: The arguments, one for each call.
-        jobs: Largest number of processes.
     """
     others = min(jobs, len(units)) - 1
     with working(others, _itself, function, patience_s=START_S) as workers:

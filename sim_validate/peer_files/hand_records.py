@@ -191,9 +191,6 @@ def recorded_postures(reach: RecordedReach, hand: Hand, servo_n_m_per_rad: float
 
     The pushes are those with which fingertips, all of them taken to touch, best explain the
     squeeze's torques.
-
-    Raises:
-        InputError: The hand is not the recorded one.
     """
     if reach.hand != hand.name:
         raise InputError(f"hand must be the recorded one, {reach.hand}, got {hand.name}")

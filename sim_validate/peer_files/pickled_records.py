@@ -111,9 +111,6 @@ def read_pickled(path: Path) -> Any:
     """Read the value in a `.npy` file, or the list of values if it is an array of them.
 
     Arrays in it are `Numbers`.
-
-    Raises:
-        InputError: The file cannot be read, is too large, or holds anything but plain values.
     """
     data = read_bytes(path, MOST_BYTES)
     try:

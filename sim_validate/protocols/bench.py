@@ -51,10 +51,7 @@ class TestBench:
     def run(self, runs: Sequence[Timeline], starts: Array, began: Array) -> tuple[Motion, ...]:
         """Simulate runs, each from the same fingers.
 
-        Args:
-            runs: What is told and applied.
-            starts: Pose of the object at the start of each, (n, 7).
-            began: Commands at whose positions the joints start, (u,).
+        Takes `starts` (n, 7); `began` (u,).
         """
         count = len(runs)
         trials = batch.Batch(self.model, max(count, 2), self.threads)

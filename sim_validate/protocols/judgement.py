@@ -87,14 +87,7 @@ class Judgement(ByValue):
 def judged_run(
     numbered: tuple[int, int], motion: Motion, run: Timeline, passing: Passing
 ) -> RunVerdict:
-    """Judge one run at its looks, up to the first that does not pass.
-
-    Args:
-        numbered: Number of the run, and of the copy.
-        motion: What the object did.
-        run: The run, with its looks.
-        passing: When a look passes.
-    """
+    """Judge one run at its looks, up to the first that does not pass."""
     number, copy = numbered
     moved, turned, counts, reason = 0.0, 0.0, [len(each) for each in motion.touching], motion.fault
     seen: list[int] = []

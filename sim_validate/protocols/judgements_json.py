@@ -27,14 +27,7 @@ from sim_validate.records.verdicts_json import finite, object_record
 def judgements_to_json(
     body: Polyhedron, friction: float, judgements: Iterable[Judgement], *, complete: bool
 ) -> str:
-    """Write the text of `judgements.json`; equal judgements give equal texts.
-
-    Args:
-        body: The object.
-        friction: Coulomb coefficient of our verdicts and of the predictions.
-        judgements: The results, one for each grasp and test.
-        complete: Whether every grasp that was asked for was judged.
-    """
+    """Write the text of `judgements.json`; equal judgements give equal texts."""
     listed = list(judgements)
     tests = {each.protocol.name: each.protocol for each in listed}
     document: JudgementsFile = {

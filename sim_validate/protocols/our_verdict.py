@@ -50,14 +50,7 @@ def our_verdict(  # noqa: PLR0913, PLR0917 - all that loads are planned from
 ) -> OurVerdict:
     """Predict the least multiple of forces that contacts resist, and hold the forces in simulation.
 
-    Args:
-        body: The object.
-        contacts: The contacts.
-        friction: Coulomb coefficient at every contact.
-        forces: Forces on the object at its centre of mass, (3,) each [N].
-        setup: How our trials are simulated, and the largest normal force.
-        scene: Makes the scene of our trials; asked only where there is closure.
-        motors: Joints that the contact forces load, of a hand.
+    Takes `forces` (3,) [N].
     """
     if not force_closure(contacts, friction=friction, torsion_m=setup.torsion_m).closed:
         told = f"the contacts are proved not to be in force closure at friction {friction:g}"

@@ -17,14 +17,7 @@ AT_REST = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 def their_verdict(
     protocol: PublishedProtocol, scene: TestedScene, seed: int = 0, threads: int = 1
 ) -> tuple[RunVerdict, ...]:
-    """Simulate all runs of a test and judge each.
-
-    Args:
-        protocol: The test.
-        scene: The object between the fingers.
-        seed: Seed of the noise of tests that have some.
-        threads: Number of the simulator's threads; results do not depend on it.
-    """
+    """Simulate all runs of a test and judge each."""
     runs = [timeline(protocol, scene, run) for run in protocol.runs]
     starts = [start for copy in range(protocol.copies) for start in [_start(protocol, seed, copy)]]
     began = scene.opened if protocol.close_s else scene.shut

@@ -15,14 +15,7 @@ from sim_validate.contact_analysis import Analysis, Bounds, Outcome, Question, R
 def analyses_to_document(
     source: str, question: Question, analyses: Sequence[Analysis], *, complete: bool
 ) -> dict[str, object]:
-    """Build the JSON document of all analyses of a file; equal analyses give equal documents.
-
-    Args:
-        source: The name of the file that the contacts were read from.
-        question: The questions that were asked.
-        analyses: One analysis per grasp.
-        complete: Whether every grasp of the file was analysed.
-    """
+    """Build the JSON document of all analyses of a file; equal analyses give equal documents."""
     return {
         "source": source,
         "max_normal_force_n": question.max_normal_force,

@@ -89,15 +89,7 @@ def executions_to_json(
     body: Polyhedron, friction: float, settings: ExecutionSettings,
     grasps: Iterable[ExecutedGrasp], *, complete: bool,
 ) -> str:  # fmt: skip
-    """Write the text of `executions.json`; equal executions give equal texts.
-
-    Args:
-        body: The object.
-        friction: Coulomb coefficient.
-        settings: How the grasps were executed.
-        grasps: The results, one per grasp.
-        complete: Whether every grasp that was asked for was executed.
-    """
+    """Write the text of `executions.json`; equal executions give equal texts."""
     listed = list(grasps)
     document: ExecutionsFile = {
         "schema": SCHEMA,
@@ -200,11 +192,7 @@ def load_executions(path: str | Path) -> Executions:
 
 
 def executions_from_json(text: str) -> Executions:
-    """Read the text of an `executions.json`.
-
-    Raises:
-        InputError: The text is no such file; the message names the field.
-    """
+    """Read the text of an `executions.json`."""
     record = record_of(ExecutionsFile, text, EXECUTIONS, schema=SCHEMA)
     settings = _filled(ExecutionSettings, record["settings"], ("settings",))
     grasps = tuple(
@@ -221,11 +209,7 @@ def executions_from_json(text: str) -> Executions:
 
 
 def _check_summary(summary: ExecutionsSummary | None, grasps: Iterable[ExecutedGrasp]) -> None:
-    """Refuse a summary that contradicts the executions.
-
-    Raises:
-        InputError: A count differs from that of the executions.
-    """
+    """Refuse a summary that contradicts the executions."""
     if summary is None:
         return
     for name, count in executions_summary(grasps).items():
@@ -268,11 +252,7 @@ def _grasp(record: ExecutionRecord, settings: ExecutionSettings, where: Where) -
 
 
 def enough_of(record: EnoughRecord | None, where: Where) -> Enough | None:
-    """Make the push that would be enough from its record.
-
-    Raises:
-        InputError: The fields contradict each other.
-    """
+    """Make the push that would be enough from its record."""
     if record is None:
         return None
     push, loss = record["push_n"], record["predicted_loss"]

@@ -14,11 +14,7 @@ NAMED = 5
 
 
 def read_grasps(path: Path) -> SavedGrasps:
-    """Read the grasps of a `grasps.json`.
-
-    Raises:
-        InputError: The file is missing or invalid; the message names the file and the field.
-    """
+    """Read the grasps of a `grasps.json`."""
     text = read_text(path)
     try:
         return grasps_from_json(text)
@@ -27,12 +23,7 @@ def read_grasps(path: Path) -> SavedGrasps:
 
 
 def grasp_with_id(path: Path, saved: SavedGrasps | Plan, wanted: str | None) -> Grasp:
-    """Find the grasp with an id; the id may be left out if the file has one grasp only.
-
-    Raises:
-        InputError: The file has no such grasp; the message begins with the path and lists some
-            that it has.
-    """
+    """Find the grasp with an id; the id may be left out if the file has one grasp only."""
     if wanted is None and len(saved.grasps) == 1:
         return saved.grasps[0]
     found = next((grasp for grasp in saved.grasps if grasp.id == wanted), None)

@@ -118,11 +118,7 @@ def couplings_record(hand: Hand) -> list[CouplingRecord]:
 def hand_of_model(
     name: str, record: ModelRecord, sources: list[str], torque_source: str
 ) -> Hand:  # fmt: skip
-    """Make the hand that a record describes.
-
-    Raises:
-        InputError: A number of the record is none that a hand can have.
-    """
+    """Make the hand that a record describes."""
     fingers = tuple(
         HandFinger(
             each["name"],

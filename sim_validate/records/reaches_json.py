@@ -51,18 +51,7 @@ def reaches_to_json(  # noqa: PLR0913 - the parts of the file
     hand: Hand, body: Polyhedron, friction: float, asked: AskedRecord, found: Sequence[HandReach],
     *, complete: bool, grasps: Sequence[Grasp], tried: HandTrials | None = None,
 ) -> str:  # fmt: skip
-    """Write the text of `reaches.json`; equal results give equal texts.
-
-    Args:
-        hand: The hand.
-        body: The object.
-        friction: Coulomb coefficient.
-        asked: What was asked for.
-        found: The results, one per grasp.
-        complete: Whether every grasp that was asked for was looked at.
-        grasps: The grasps that were asked for.
-        tried: What the hand carries and did in simulation; None for nothing.
-    """
+    """Write the text of `reaches.json`; equal results give equal texts."""
     planned = {grasp.id: contacts_sha256(grasp.contacts) for grasp in grasps}
     document: ReachesFile = {
         "schema": SCHEMA,

@@ -59,14 +59,7 @@ def write_regions(
 ) -> "RegionsFile":
     """Write each proof when it is ready, then `regions.json`; write nothing if `folder` is None.
 
-    Args:
-        folder: Folder for regions.json and the proofs, or None.
-        body: The object.
-        asked: How regions were certified.
-        found: Each grasp with its regions.
-
-    Returns:
-        The content of regions.json.
+    Gives the content of regions.json.
     """
     records = [_record(grasp, proved, body, folder) for grasp, proved in found]
     document: RegionsFile = {
@@ -176,11 +169,7 @@ def load_regions(path: str | Path) -> CertifiedRegions:
 
 
 def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
-    """Build regions and their proof from arrays by name; nothing is verified yet.
-
-    Raises:
-        InputError: An array is missing, or has another shape.
-    """
+    """Build regions and their proof from arrays by name; nothing is verified yet."""
     if missing := [name for name in SHAPES if name not in kept]:
         raise InputError(
             f"the array {missing[0]} is missing; certify again with `graspproof regions`"

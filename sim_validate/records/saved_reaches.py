@@ -76,11 +76,7 @@ class SavedReaches:
 
 
 def read_reaches(path: Path) -> tuple[SavedReaches, ReachesFile]:
-    """Read the poses of a hand, and the record that holds them.
-
-    Raises:
-        InputError: The file cannot be read, or a field of it is wrong.
-    """
+    """Read the poses of a hand, and the record that holds them."""
     try:
         return reaches_from_json(read_text(path))
     except InputError as error:
@@ -88,11 +84,7 @@ def read_reaches(path: Path) -> tuple[SavedReaches, ReachesFile]:
 
 
 def reaches_from_json(text: str) -> tuple[SavedReaches, ReachesFile]:
-    """Read the poses of a hand from the text of `reaches.json`, and the record that holds them.
-
-    Raises:
-        InputError: A field is wrong, or contradicts another one.
-    """
+    """Read the poses of a hand from the text of `reaches.json`, and the record that holds them."""
     record = record_of(ReachesFile, text, "reaches.json", schema=SCHEMA)
     return _saved(record), record
 
@@ -125,11 +117,7 @@ def _saved(record: ReachesFile) -> SavedReaches:
 
 
 def _reach(hand: HandRecord, record: ReachRecord, clearance_m: float) -> HandReach:
-    """Make the value of what was found for one grasp.
-
-    Raises:
-        InputError: The record contradicts itself.
-    """
+    """Make the value of what was found for one grasp."""
     pose, name = record["pose"], record["id"]
     if not record["reached"] == (pose is not None) == (record["reason"] == ""):
         raise InputError(
@@ -174,11 +162,7 @@ def _array(values: Sequence[float] | None) -> Array | None:
 
 
 def _hand(record: HandRecord, reached: Sequence[HandReach]) -> tuple[Hand | None, str]:
-    """Return the hand of a file, or None and the reason why it cannot be drawn.
-
-    Raises:
-        InputError: The parts of the hand in the file are none that a hand can have.
-    """
+    """Return the hand of a file, or None and the reason why it cannot be drawn."""
     name = record["name"]
     if "model" in record:
         hand = _modelled(name, record, record["model"])

@@ -132,12 +132,7 @@ def _verdict(record: VerdictRecord) -> SavedVerdict:
 
 
 def verdicts_of(text: str) -> VerdictsFile:
-    """Read the text of a `verdicts.json`.
-
-    Raises:
-        InputError: The text is no such file, or a part of it contradicts another one; the message
-            names the field.
-    """
+    """Read the text of a `verdicts.json`."""
     record = record_of(VerdictsFile, text, "verdicts.json", schema=SCHEMA)
     verdicts = record["verdicts"]
     for number, verdict in enumerate(verdicts):

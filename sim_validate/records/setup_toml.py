@@ -36,29 +36,12 @@ OF_USERS = {
 
 
 def setup_from_file(path: Path, setup: Setup) -> Setup:
-    """Read settings from a file and put them in place of those in `setup`.
-
-    Args:
-        path: A TOML file.
-        setup: The setup whose numbers stay where the file has none.
-
-    Raises:
-        InputError: The file is missing or invalid; the message names the field.
-    """
+    """Read settings from a file and put them in place of those in `setup`."""
     return setup_from_tables(read_tables(path), setup, str(path))
 
 
 def setup_from_tables(tables: Mapping[str, Any], setup: Setup, path: str) -> Setup:
-    """Put the settings in TOML tables in place of those in `setup`.
-
-    Args:
-        tables: The settings by table.
-        setup: The setup whose numbers stay where the tables have none.
-        path: Where the tables come from, for messages.
-
-    Raises:
-        InputError: A setting is unknown, or its value is refused.
-    """
+    """Put the settings in TOML tables in place of those in `setup`."""
     for name, given in tables.items():
         if name not in OF_USERS or not isinstance(given, dict):
             raise InputError(f"{path}: expected tables {', '.join(OF_USERS)}, got {shown(name)}")
@@ -72,14 +55,7 @@ def setup_from_tables(tables: Mapping[str, Any], setup: Setup, path: str) -> Set
 
 
 def physics_from_file(path: Path) -> dict[str, Any]:
-    """Read the settings in the table `physics` of a file, by name.
-
-    Args:
-        path: A TOML file with no other table.
-
-    Raises:
-        InputError: The file is missing or invalid, or sets gravity, whose direction is a flag.
-    """
+    """Read the settings in the table `physics` of a file, by name."""
     given: dict[str, Any] = {}
     for name, table in read_tables(path).items():
         if name != "physics" or not isinstance(table, dict):

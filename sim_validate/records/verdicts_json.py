@@ -36,15 +36,7 @@ from sim_validate.validation.wrench_verdict import WrenchVerdict
 def verdicts_to_json(
     body: Polyhedron, friction: float, verdicts: Iterable[Verdict], gate: Gate, *, complete: bool
 ) -> str:
-    """Write the text of `verdicts.json`; equal verdicts give equal texts.
-
-    Args:
-        body: The object.
-        friction: Coulomb coefficient tested.
-        verdicts: One per grasp.
-        gate: The checks of the simulator.
-        complete: Whether every grasp of the plan was tested.
-    """
+    """Write the text of `verdicts.json`; equal verdicts give equal texts."""
     listed = list(verdicts)
     document: VerdictsFile = {
         "schema": SCHEMA,

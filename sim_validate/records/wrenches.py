@@ -38,11 +38,7 @@ class _WrenchFile(BaseModel):
 
 
 def wrenches_from_file(path: Path) -> tuple[NamedWrench, ...]:
-    """Read the wrenches of a file.
-
-    Raises:
-        InputError: The file is missing or invalid, or a wrench is refused.
-    """
+    """Read the wrenches of a file."""
     text = read_text(path)
     try:
         return wrenches_from_json(text)
@@ -51,11 +47,7 @@ def wrenches_from_file(path: Path) -> tuple[NamedWrench, ...]:
 
 
 def wrenches_from_json(text: str) -> tuple[NamedWrench, ...]:
-    """Parse the wrenches in the text of a file.
-
-    Raises:
-        InputError: The text is invalid, or a wrench is refused; the message names the field.
-    """
+    """Parse the wrenches in the text of a file."""
     given = record_of(_WrenchFile, text, "wrench file", nulls=False).wrenches
     names = set[str]()
     for number, each in enumerate(given):
@@ -80,9 +72,7 @@ def weights(
 ) -> tuple[NamedWrench, ...]:
     """Turn the object's weight into wrenches, one for each direction of gravity.
 
-    Args:
-        weight_n: The weight [N].
-        downs: Directions of gravity, of any length; if there are none, along and against each axis.
+    Takes `weight_n` [N].
     """
     ways = [np.array(down) for down in downs] or [*np.eye(3), *-np.eye(3)]
     return tuple(

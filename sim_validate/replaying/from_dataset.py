@@ -16,11 +16,7 @@ from sim_validate.simulation.setup import Agenda, Setup
 
 
 def from_dataset(folder: Path, wanted: Wanted) -> Recorded:
-    """Read a grasp or a negative control from the tables of a dataset.
-
-    Raises:
-        InputError: The dataset is damaged, or has no such row.
-    """
+    """Read a grasp or a negative control from the tables of a dataset."""
     chosen = select(folder)
     if wanted.grasp is None or wanted.trial is not None or wanted.grasps is not None:
         raise InputError(

@@ -15,11 +15,7 @@ from sim_validate.validation.controls import negative_controls
 
 
 def grasps_behind(path: Path, content_sha256: str, friction: float) -> SavedGrasps:
-    """Read the grasps that recorded results are about, at the friction that they were tested at.
-
-    Raises:
-        InputError: The file of grasps is missing, or is about another object.
-    """
+    """Read the grasps that recorded results are about, at the friction that they were tested at."""
     if not path.is_file():
         raise InputError(
             f"{path}: this file of grasps is missing; say with --grasps where the file is"
@@ -70,11 +66,7 @@ def of_grasp(
 
 
 def require_contacts(path: Path, grasp: Grasp, known: str) -> None:
-    """Refuse a grasp whose contacts differ from those that recorded results are about.
-
-    Raises:
-        InputError: The hash of the contacts differs from the recorded hash.
-    """
+    """Refuse a grasp whose contacts differ from those that recorded results are about."""
     if contacts_sha256(grasp.contacts) != known:
         raise InputError(
             f"{path}: the contacts of {grasp.id} have changed since these results were recorded; "
@@ -83,11 +75,7 @@ def require_contacts(path: Path, grasp: Grasp, known: str) -> None:
 
 
 def require_repeat(path: Path, trial: int, trials: int) -> None:
-    """Refuse the number of a repeat with noise that a file does not hold.
-
-    Raises:
-        InputError: The file holds fewer repeats.
-    """
+    """Refuse the number of a repeat with noise that a file does not hold."""
     if trial >= trials:
         said = f"choose from 0 to {trials - 1}" if trials else "it was recorded without --trials"
         raise InputError(f"{path}: the file has no repeat with noise numbered {trial}; {said}")

@@ -26,16 +26,7 @@ GRASPS = "grasps.json"
 
 
 def from_verdicts(path: Path, text: str, wanted: Wanted) -> Recorded:
-    """Read a grasp, a negative control or a repeat with noise from a `verdicts.json`.
-
-    Args:
-        path: Path of the file, for messages; the grasps are beside it unless `wanted` names others.
-        text: Text of the file.
-        wanted: Which contact set to read.
-
-    Raises:
-        InputError: The file is not as `validate` writes it, or lacks the wanted contact set.
-    """
+    """Read a grasp, a negative control or a repeat with noise from a `verdicts.json`."""
     try:
         record = verdicts_of(text)
     except InputError as error:
@@ -54,17 +45,7 @@ def from_verdicts(path: Path, text: str, wanted: Wanted) -> Recorded:
 def of_verdict(
     path: Path, saved: SavedGrasps, verdict: Mapping[str, Any], wanted: Wanted
 ) -> Recorded:
-    """Read a contact set from the verdict on one grasp.
-
-    Args:
-        path: Path of the verdict's file, for messages.
-        saved: The grasps that the file of verdicts is about.
-        verdict: An entry of the file.
-        wanted: Which contact set to read, with the grasp's id.
-
-    Raises:
-        InputError: The verdict is about other contacts, or lacks the wanted contact set.
-    """
+    """Read a contact set from the verdict on one grasp."""
     grasp = grasp_with_id(path, saved, wanted.grasp)
     require_contacts(path, grasp, verdict["contacts_sha256"])
     setup, agenda = _asked(path, verdict)

@@ -67,16 +67,7 @@ class _Case:
 
 
 def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
-    """Simulate one trial of a recorded contact set again.
-
-    Args:
-        recorded: The contact set of a file.
-        wrench: Name of the wrench; None for the first that was not held, or else the hardest to
-            hold.
-
-    Raises:
-        InputError: The wrench is unknown, or a finger misses its face so that no trial exists.
-    """
+    """Simulate one trial of a recorded contact set again."""
     case = _case(recorded)
     name = wrench or recorded.usual or _likeliest(recorded, case)
     if name not in case.loads:

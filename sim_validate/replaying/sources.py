@@ -31,16 +31,7 @@ VERDICTS = "verdicts.json"
 
 
 def recorded_in(source: Path, wanted: Wanted) -> Recorded:
-    """Read a contact set from a file or folder.
-
-    Args:
-        source: The file or folder.
-        wanted: Which contact set to read.
-
-    Raises:
-        InputError: The source is of no known kind, or lacks the wanted contact set; the message
-            lists the contact sets that the source has.
-    """
+    """Read a contact set from a file or folder."""
     if wanted.trial is not None and wanted.control is not None:
         raise InputError(
             "--trial chooses a repeat of the grasp with noise, --control a negative control: "

@@ -47,11 +47,7 @@ class Possible:
 
 
 def read_possible(path: Path) -> Possible:
-    """Read `best.json`.
-
-    Raises:
-        InputError: The file is invalid; the message names the field.
-    """
+    """Read `best.json`."""
     text = read_text(path)
     schema = object_of(text, path.name).get("schema")
     if schema == OTHER:

@@ -140,12 +140,7 @@ def certified(grasp: Grasp, record: Record | None) -> Grasp:
 
 
 def draw(task: Task) -> Drawn:
-    """Draw one grasp and write its pictures and charts.
-
-    Raises:
-        InputError: The verdict is about other contacts than those of the grasp, or the execution
-            has a trial or settings that do not fit the grasp.
-    """
+    """Draw one grasp and write its pictures and charts."""
     body, grasp = task.saved.body, task.grasp
     view = best_view(body, grasp)
     path = task.folder / PICTURES / f"{task.name}.svg"

@@ -56,13 +56,7 @@ def said_of_both(
 ) -> tuple[str, str]:
     """Say in words how a grasp ended in the test of its closure and, if any was, in its execution.
 
-    Args:
-        verdict: Verdict on the grasp's closure; None if it was not simulated.
-        executions: Executions of the run's grasps; None if there are none.
-        found: That of the grasp; None if it was not executed.
-
-    Returns:
-        The words, and the tone: good, bad or neither; bad if either ending is.
+    Gives the words, and the tone: good, bad or neither; bad if either ending is.
     """
     closure, tone = said_of(verdict)
     if executions is None:
@@ -155,11 +149,6 @@ def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
     """Write the shell command that executes a grasp again, with the same settings.
 
     The simulator's own settings are no flags, so the command takes the usual ones.
-
-    Args:
-        executions: The friction and the settings.
-        path: Path of the file with the grasp.
-        grasp_id: Id of the grasp.
     """
     words = ["graspproof", "execute", path, "--grasp", grasp_id]
     words += ["--friction", repr(executions.friction)]

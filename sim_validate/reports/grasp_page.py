@@ -105,16 +105,7 @@ def grasp_page(
     run: RunFolder, grasp: Grasp, drawn: Drawn | None, object_script: str, neighbours: Neighbours,
     kin: Kin = Kin(),
 ) -> str:  # fmt: skip
-    """Write the text of the page about one grasp.
-
-    Args:
-        run: The run that the grasp is from.
-        grasp: The grasp.
-        drawn: Paths of its pictures; None for a copy, whose page leads to those of the first.
-        object_script: Name of the script with the object's drawing.
-        neighbours: Pages before and after this one.
-        kin: Its copies by symmetry, or the grasp of which it is a copy.
-    """
+    """Write the text of the page about one grasp."""
     verdict = run.verdicts.get(grasp.id)
     shown = certified(grasp, run.shaded.get(grasp.id))
     said, tone = said_of_both(verdict, run.executions, run.executed(grasp.id))

@@ -55,12 +55,7 @@ def cards_of(run: RunFolder, *, every_copy: bool) -> tuple[Copies, ...]:
     Only grasps whose tests ended alike share a card, so that no problem is hidden behind another
     grasp.
 
-    Args:
-        run: The run.
-        every_copy: Whether every grasp gets a card of its own.
-
-    Returns:
-        Places of the grasps in the run, by card, in the order of the cards' first grasps.
+    Gives places of the grasps in the run, by card, in the order of the cards' first grasps.
     """
     grasps = run.saved.grasps
     if every_copy:
@@ -83,13 +78,7 @@ def cards_of(run: RunFolder, *, every_copy: bool) -> tuple[Copies, ...]:
 
 
 def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int = 0) -> str:
-    """Write the text of the report's first page.
-
-    Args:
-        runs: The runs.
-        shown: Cards of the gallery.
-        waiting: Number of cards that are still being drawn.
-    """
+    """Write the text of the report's first page."""
     verdicts = all_verdicts(runs)
     cards = [_card(each) for each in shown]
     found = agreements(verdicts)

@@ -10,12 +10,7 @@ ASSETS = Path(__file__).parent / "assets"
 
 
 def page(template: str, **values: object) -> str:
-    """Fill a template of a report with values.
-
-    Args:
-        template: File name of the template.
-        values: Values that the template uses, by name.
-    """
+    """Fill a template of a report with values."""
     return pages.filled(template, ASSETS, **values)
 
 

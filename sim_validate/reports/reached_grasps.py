@@ -42,8 +42,7 @@ WAY = "over 60 mm, with open fingers and nothing in the way"
 def held_in(reaches: "SavedReaches | None", grasp: Grasp) -> PosedHand | None:
     """Return the hand in the pose in which it stands in a grasp.
 
-    Returns:
-        None where no hand was asked for, it does not reach the grasp, or it cannot be drawn.
+    Gives None where no hand was asked for, it does not reach the grasp, or it cannot be drawn.
     """
     reach = reach_of(reaches, grasp)
     if reaches is None or reaches.hand is None or reach is None or not reach.reached:
@@ -191,13 +190,7 @@ def _found(value: object) -> str:
 
 
 def reach_commands(reaches: "SavedReaches | None", grasp: Grasp, path: str) -> Sequence[str]:
-    """Write the shell command that seeks the pose again; none for a hand from a file.
-
-    Args:
-        reaches: What was asked for.
-        grasp: The grasp.
-        path: Path of the file with the grasp.
-    """
+    """Write the shell command that seeks the pose again; none for a hand from a file."""
     if reaches is None or reaches.hand_name not in HANDS or grasp.id not in reaches.found:
         return []
     asked = reaches.asked

@@ -97,11 +97,7 @@ def folder_of(path: Path) -> Path:
 
 
 def runs_in(folder: Path) -> tuple[RunFolder, ...]:
-    """Read the run in a folder, or the runs in its subfolders.
-
-    Raises:
-        InputError: The folder holds no run, or a file is invalid.
-    """
+    """Read the run in a folder, or the runs in its subfolders."""
     folder = folder_of(folder)
     if not folder.is_dir():
         raise InputError(
@@ -154,15 +150,7 @@ def _possible(path: Path, saved: SavedGrasps) -> Possible | None:
 def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
     """Read where a hand stands in grasps from the folder of their file.
 
-    Args:
-        grasps: The file with the grasps.
-        saved: What it holds.
-
-    Returns:
-        None if the folder has no reaches.json.
-
-    Raises:
-        InputError: The file is invalid, or about another object or other grasps.
+    Gives None if the folder has no reaches.json.
     """
     path = grasps.with_name(REACHES)
     if not path.is_file():
@@ -187,16 +175,7 @@ def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping
 
 
 def _check_contacts(path: Path, listed: Sequence[tuple[str, str]], saved: SavedGrasps) -> None:
-    """Refuse a file that lists a grasp twice, or with other contacts than its own.
-
-    Args:
-        path: The file.
-        listed: Id and hash of the contacts of each grasp that the file lists.
-        saved: The grasps beside it.
-
-    Raises:
-        InputError: The file is about other grasps.
-    """
+    """Refuse a file that lists a grasp twice, or with other contacts than its own."""
     contacts = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
     for name, found in listed:
         if contacts.get(name) != found:

@@ -13,12 +13,7 @@ MOST_TOLD = 40
 
 
 def sections(lines: Sequence[Line]) -> list[tuple[str, list[str]]]:
-    """Write the sections of the terminal, each a title and at least one line.
-
-    Args:
-        lines: How each grasp ended: `mesh_note`, and if not empty `told`, a line about it, and
-            `wrote`, a sentence about the baseline that it was written to.
-    """
+    """Write the sections of the terminal, each a title and at least one line."""
     notes = sorted({line["mesh_note"] for line in lines if line["mesh_note"]})
     meshes = [text for note in notes for text in (note, *_told(lines, note, "  "))]
     found = [

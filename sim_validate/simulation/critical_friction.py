@@ -52,16 +52,7 @@ def released_friction(
 ) -> CriticalFriction:  # fmt: skip
     """Measure the critical friction of a grasp whose scene is compiled, whatever friction it has.
 
-    Args:
-        bench: The compiled scene whose fingertips stand at the contacts.
-        positions: Contact points, (k, 3) [m].
-        normals: Unit normals into the object, (k, 3).
-        predicted: The critical friction that the analysis predicts.
-        setup: How trials are simulated.
-        whole: Whether all trials have the protocol's full length (see `early_ends`).
-
-    Raises:
-        UndecidedError: No balanced forces in which every finger pushes were found.
+    Takes `positions` (k, 3) [m]; `normals` (k, 3).
     """
     protocol = setup.friction
     high = protocol.settling_friction * max(predicted, protocol.least_friction)
@@ -113,9 +104,6 @@ def forces_just_above(
 
     These are the forces nearest to the critical friction with which every finger pushes enough. If
     there are none, they are the forces for the largest friction in `ABOVE` that has any.
-
-    Raises:
-        UndecidedError: No balanced forces in which every finger pushes were found.
     """
     forces = None
     for above in ABOVE:

@@ -95,12 +95,7 @@ class EarlyEnds:
     ) -> None:  # fmt: skip
         """Begin to look at trials.
 
-        Args:
-            layout: The simulated layout.
-            trials: The trials, of equal length, with loads that are constant in the end.
-            sample_s: Duration of a sample [s].
-            thresholds: The displacements that answer the trials.
-            start: Joint positions from which all trials start; None for the planned ones.
+        Takes `sample_s` [s].
         """
         self.layout, self.thresholds, self.sample_s = layout, thresholds, sample_s
         self.resting = np.array([trial.resting for trial in trials])
@@ -124,15 +119,9 @@ class EarlyEnds:
     ) -> tuple[Mask, Mask]:
         """Look at trials after a sample: have they settled, and are they answered?
 
-        Args:
-            places: Numbers of the n trials that still run.
-            samples: The sample of each trial's schedule that was just simulated, (n,).
-            joints: Joint positions as in `Motion.joints`, (n, 7 + 3k).
-            speeds: Velocities of the joints, (n, 6 + 3k).
-
-        Returns:
-            Whether each trial need not settle any longer before friction is lowered, and whether
-            its answer is known, (n,) each.
+        Takes `samples` (n,); `joints` (n, 7 + 3k); `speeds` (n, 6 + 3k). Gives whether each trial
+        need not settle any longer before friction is lowered, and whether its answer is known, (n,)
+        each.
         """
         settled = answered = np.zeros(len(places), dtype=np.bool_)
         with np.errstate(all="ignore"):  # what diverges is neither settled nor answered
@@ -250,13 +239,8 @@ class _Springs:
     ) -> Mask:  # fmt: skip
         """Tell whether all contacts stay inside the cones of a friction for a time, (n,).
 
-        Args:
-            commands: Planned forces along the axes of the contacts, (n, 3k) [N].
-            friction: Friction coefficients, (n,).
-            joints: Joint positions, (n, 7 + 3k).
-            speeds: Velocities of the joints, (n, 6 + 3k).
-            reach: B of (3), (n,) [m].
-            left_s: The time for which creep lasts [s].
+        Takes `commands` (n, 3k) [N]; `friction` (n,); `joints` (n, 7 + 3k); `speeds` (n, 6 + 3k);
+        `reach` (n,) [m]; `left_s` [s].
         """
         pushes = commands - self.spring * joints[:, 7:] - self.damper * speeds[:, 6:]
         pushes = pushes.reshape(len(pushes), -1, 3)

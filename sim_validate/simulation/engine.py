@@ -21,11 +21,7 @@ STATE = ("time", "qpos", "qvel", "ctrl", "xfrc_applied")
 
 
 def compiled(xml: str) -> mujoco.MjModel:
-    """Compile the text of a scene.
-
-    Raises:
-        InputError: The simulator refuses the text.
-    """
+    """Compile the text of a scene."""
     try:
         with unlogged():
             return mujoco.MjModel.from_xml_string(xml)
@@ -66,14 +62,8 @@ def step(
 def touched(model: mujoco.MjModel, data: mujoco.MjData, tips: Sequence[int]) -> tuple[Array, Array]:
     """Find what each fingertip touches in a state of a scene.
 
-    Args:
-        model: The compiled scene.
-        data: The state; what follows from its positions is computed here.
-        tips: Numbers of the fingertips' geoms.
-
-    Returns:
-        Normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a fingertip
-        that has not exactly one contact.
+    Gives normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a
+    fingertip that has not exactly one contact.
     """
     with unlogged():
         mujoco.mj_forward(model, data)

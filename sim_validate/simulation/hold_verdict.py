@@ -56,13 +56,7 @@ class HoldVerdict(ByValue):
 
 
 def judge(trace: Trace, layout: Layout, protocol: HoldProtocol) -> HoldVerdict:
-    """Judge a trial: compare its motion with the thresholds of a protocol.
-
-    Args:
-        trace: Motion from the moment friction was lowered.
-        layout: The simulated layout; thresholds are relative to its grasp size.
-        protocol: The thresholds.
-    """
+    """Judge a trial: compare its motion with the thresholds of a protocol."""
     failing = _failing(trace, layout.grasp_size_m, protocol)
     first = int(failing[0]) if failing.size else None
     outcome, reason = _outcome(trace, layout, protocol, first)

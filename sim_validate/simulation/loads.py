@@ -49,17 +49,7 @@ def planned_loads(  # noqa: PLR0913 - all that loads are planned from
     *,
     motors: Motors | None = None,
 ) -> tuple[PlannedLoad, ...]:
-    """Plan all wrenches to test, in order: along axes, weakest, random, the user's own.
-
-    Args:
-        body: The object.
-        contacts: Contacts in force closure at this friction.
-        friction: Coulomb coefficient at every contact.
-        idle: The load without a wrench: only the forces with which fingers squeeze gently.
-        agenda: The choice of wrenches to test.
-        setup: Settings that hold the largest normal force and the share of the limit to apply.
-        motors: Joints that the contact forces load, of a hand that holds the object.
-    """
+    """Plan all wrenches to test, in order: along axes, weakest, random, the user's own."""
     resisted = resisted_by(body, contacts, friction, setup, motors)
     need, share = _Need.of(body, contacts, setup), setup.hold.load_share
     relative = [
@@ -83,14 +73,7 @@ def loads_as_they_are(  # noqa: PLR0913 - all that loads are planned from
 ) -> tuple[PlannedLoad, ...]:
     """Plan finger forces for wrenches that are applied as given, not at a share of a limit.
 
-    Args:
-        body: The object.
-        contacts: Contacts in force closure at this friction.
-        friction: Coulomb coefficient at every contact.
-        idle: The load without a wrench: only the forces with which fingers squeeze gently.
-        wrenches: Named wrenches to test, (6,) each [N, N m].
-        setup: Settings that hold the largest normal force.
-        motors: Joints that the contact forces load, of a hand that holds the object.
+    Takes `wrenches` (6,) [N, N m].
     """
     resisted = resisted_by(body, contacts, friction, setup, motors)
     need = _Need.of(body, contacts, setup)
@@ -161,12 +144,6 @@ class _Need:
         """Compute the friction that forces need: the largest ratio of tangential to normal.
 
         With torsion, the normal force counts as far as the torque of the contact leaves it.
-
-        Args:
-            load: The wrench, and the forces planned for it.
-            found: The limit of the wrench.
-            idle: The load without a wrench.
-            share: Share of the forces at the limit in those of the load.
         """
         along, across = normal_and_tangential(load.forces, self.normals)
         pushing = along > NO_PUSH * along.max()

@@ -71,15 +71,7 @@ class Disturbed:
 def disturbed(
     body: Polyhedron, grasp: Grasp, friction: float, noise: Noise, draw: tuple[int, int]
 ) -> Disturbed:
-    """Disturb a grasp by one draw of noise.
-
-    Args:
-        body: The object.
-        grasp: A grasp on the faces of `body`.
-        friction: Coulomb coefficient that was planned with.
-        noise: The standard deviations.
-        draw: The seed, and the number of the trial.
-    """
+    """Disturb a grasp by one draw of noise."""
     seed, number = draw
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(STREAM, number)))
     shift, turn = noise.shift * body.radius * rng.normal(size=3), rng.normal(size=3)

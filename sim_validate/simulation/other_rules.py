@@ -64,11 +64,7 @@ RULES = {
 
 
 def rules_named(names: Sequence[str]) -> tuple[Rule, ...]:
-    """Look up acceptance rules of other validators by name.
-
-    Raises:
-        InputError: No acceptance rule has one of the names.
-    """
+    """Look up acceptance rules of other validators by name."""
     unknown = [name for name in names if name not in RULES]
     if unknown:
         raise InputError(

@@ -54,14 +54,7 @@ class Rig:
         self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None, *,
         whole: bool = False,
     ) -> tuple[Trace, ...]:  # fmt: skip
-        """Simulate a hold under each load, and trace it from the moment friction is lowered.
-
-        Args:
-            loads: The loads to hold.
-            settling_frictions: Friction of each load until then; None for the protocol's multiple
-                of the friction to hold at.
-            whole: Whether these trials have the protocol's full length, whatever others have.
-        """
+        """Simulate a hold under each load, and trace it from the moment friction is lowered."""
         protocol, size = self.setup.hold, self.bench.scene.layout.grasp_size_m
         limits = Thresholds(protocol.hold_threshold * size, protocol.total_threshold * size)
         return self._traces(self._holds(loads, settling_frictions), None if whole else limits)
@@ -119,11 +112,7 @@ class Rig:
     ) -> tuple[Trace, ...]:
         """Lower the friction of the unloaded object to several values, and trace its motion.
 
-        Args:
-            settling_friction: Friction until then.
-            frictions: The values.
-            threshold_m: Displacement that answers a trial, which then may end early [m]; None for
-                trials of full length.
+        Takes `threshold_m` [m].
         """
         limits = None if threshold_m is None else Thresholds(threshold_m)
         return self._traces(self._releases(settling_friction, frictions), limits)
@@ -171,13 +160,8 @@ class Rig:
 def pushes(planned: Array, joints: Array, layout: Layout) -> Array:
     """Compute the forces of the servos: the planned forces, less what their springs gave way.
 
-    Args:
-        planned: Forces that the fingers are commanded to apply, (n, k, 3) [N], world axes.
-        joints: Joint positions as in `Motion.joints`, (n, 7 + 3k) [m].
-        layout: Layout of the scene, with fingertips on slides.
-
-    Returns:
-        Forces along the axes of the contacts, (n, k, 3) [N]; at rest they are the contact forces.
+    Takes `planned` (n, k, 3) [N]; `joints` (n, 7 + 3k) [m]. Gives forces along the axes of the
+    contacts, (n, k, 3) [N]; at rest they are the contact forces.
     """
     local = np.einsum("kij,nki->nkj", layout.frames, planned)
     forces = local - layout.drive.stiffness_n_per_m * joints[:, 7:].reshape(local.shape)
@@ -191,12 +175,7 @@ def squeezed(
 ) -> Rig:  # fmt: skip
     """Close the fingers of a compiled scene on the unloaded object.
 
-    Args:
-        bench: A compiled scene with fingers driven by servos.
-        setup: How trials are simulated.
-        forces: Planned forces, (k, 3) [N].
-        friction: Friction at which the object is to be held.
-        settling_friction: Friction while closing; None for a multiple of `friction`.
+    Takes `forces` (k, 3) [N].
     """
     high = settling_friction or setup.hold.settling_friction * friction
     (closed,) = bench.run([schedules.squeeze(forces, high, bench.clock, setup.hold)])

@@ -75,8 +75,7 @@ def ramp(
     The load rises to the first share of the limit as in `hold`, then slowly to the second. The
     forces balance the load all the way, whether the fingers can apply them or not.
 
-    Returns:
-        The schedule, and the share of the limit that is applied in each watched sample.
+    Gives the schedule, and the share of the limit that is applied in each watched sample.
     """
     hold_protocol, limit_protocol = protocols
     rise, rest = clock.samples(hold_protocol.load_s), clock.samples(hold_protocol.settle_s)
@@ -94,13 +93,7 @@ def release(
 ) -> Schedule:  # fmt: skip
     """Schedule a release: lower the friction of a squeezed object without load, and watch.
 
-    Args:
-        forces: Planned forces, (k, 3) [N].
-        settling_friction: Friction until then.
-        friction: Friction under test.
-        clock: The duration of a sample.
-        protocol: The durations.
-        settled: Whether the object has settled already, as `settle` schedules it.
+    Takes `forces` (k, 3) [N].
     """
     rest = 0 if settled else clock.samples(protocol.settle_s)
     shares = np.ones(rest + clock.samples(protocol.hold_s))

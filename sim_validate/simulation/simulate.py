@@ -93,10 +93,7 @@ class Bench:
     def __init__(self, scene: Scene, *, threads: int = 1, timeout_s: float = math.inf) -> None:
         """Compile a scene.
 
-        Args:
-            scene: What to simulate.
-            threads: Number of the simulator's threads; results do not depend on it.
-            timeout_s: Time from now after which trials that still run are stopped [s].
+        Takes `timeout_s` [s].
         """
         self.scene, self.threads = scene, threads
         self.deadline = time.monotonic() + timeout_s
@@ -119,14 +116,7 @@ class Bench:
     def run(
         self, schedules: Sequence[Schedule], start: Array | None = None, ends: Ends | None = None
     ) -> tuple[Motion, ...]:
-        """Simulate trials of equal length, all from the same state.
-
-        Args:
-            schedules: What is applied in each trial.
-            start: State at the end of an earlier motion; None puts fingertips at their contacts, at
-                rest.
-            ends: What ends trials before their schedules do; None for their full length.
-        """
+        """Simulate trials of equal length, all from the same state."""
         trials = self._trials(len(schedules))
         if start is not None:
             trials.state[: len(schedules)] = start
@@ -205,8 +195,7 @@ class Bench:
     def _applied(self, schedules: Sequence[Schedule]) -> tuple[Array, Array, Array]:
         """Return what is applied in each of n samples of m trials, as the simulator takes it.
 
-        Returns:
-            External wrenches, (m, n, 6), commands of the servos, (m, n, q), frictions, (m, n).
+        Gives external wrenches, (m, n, 6), commands of the servos, (m, n, q), frictions, (m, n).
         """
         layout = self.scene.layout
         wrenches = np.array([schedule.wrenches for schedule in schedules])
@@ -239,12 +228,8 @@ class _Ran:
 def first_touch(scene: Scene) -> tuple[Array, Array]:
     """Find what each fingertip touches before anything moves.
 
-    Args:
-        scene: A scene with rigid fingertips that are put into the object.
-
-    Returns:
-        Normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a fingertip
-        that has not exactly one contact.
+    Gives normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a
+    fingertip that has not exactly one contact.
     """
     model = compiled(scene.xml)
     tips = [model.geom(f"finger{finger}").id for finger in range(len(scene.layout.contacts))]
@@ -254,13 +239,8 @@ def first_touch(scene: Scene) -> tuple[Array, Array]:
 def acceleration(scene: Scene, wrenches: Array) -> Array:
     """Compute the object's first acceleration under several wrenches, with unloaded fingers.
 
-    Args:
-        scene: A scene with rigid fingertips that touch the object.
-        wrenches: (n, 6) [N, N m], torque about the centre of mass, world axes.
-
-    Returns:
-        Force and torque that are not opposed, which is mass times acceleration, (n, 6), torque
-        about the centre of mass.
+    Takes `wrenches` (n, 6) [N, N m]. Gives force and torque that are not opposed, which is mass
+    times acceleration, (n, 6), torque about the centre of mass.
     """
     model = compiled(scene.xml)
     data = mujoco.MjData(model)

@@ -76,15 +76,7 @@ def traces(
     motions: Sequence[Motion], layout: Layout, watched: Sequence[int],
     earlier: Motion | None = None,
 ) -> tuple[Trace, ...]:  # fmt: skip
-    """Measure displacements, slips and gaps in motions, all together, which takes less time.
-
-    Args:
-        motions: Motion of each trial.
-        layout: The simulated layout.
-        watched: For each trial, the index of the first sample in which the object had to stay where
-            it was.
-        earlier: The motion from whose end these started; None for the planned pose.
-    """
+    """Measure displacements, slips and gaps in motions, all together, which takes less time."""
     firsts = [
         min(first, len(motion.joints)) for motion, first in zip(motions, watched, strict=True)
     ]
@@ -136,10 +128,7 @@ def _start(motion: Motion, first: int, earlier: Motion | None) -> Array:
 def displaced(poses: Array, starts: Array, layout: Layout) -> Array:
     """Measure displacements of n poses from a start each, (n,) [m].
 
-    Args:
-        poses: Positions and quaternions of the object's frame, (n, 7).
-        starts: The poses from which displacements count, (n, 7).
-        layout: The simulated layout.
+    Takes `poses`, `starts` (n, 7).
     """
     shifts, turns = moved(poses, starts, layout)
     return shifts + layout.grasp_size_m * turns
@@ -148,9 +137,7 @@ def displaced(poses: Array, starts: Array, layout: Layout) -> Array:
 def strayed(poses: Array, layout: Layout) -> Array:
     """Measure displacements of n poses from the planned one, (n,) [m]: as `displaced`, but faster.
 
-    Args:
-        poses: Positions and quaternions of the object's frame, (n, 7).
-        layout: The simulated layout.
+    Takes `poses` (n, 7).
     """
     shifts = poses[:, :3] + rotated(poses[:, 3:], layout.center) - layout.center
     turns = 2.0 * np.arctan2(_lengths(poses[:, 4:]), np.abs(poses[:, 3]))
@@ -160,10 +147,7 @@ def strayed(poses: Array, layout: Layout) -> Array:
 def moved(poses: Array, starts: Array, layout: Layout) -> tuple[Array, Array]:
     """Measure motion of the point between the contacts [m] and rotation [rad], (n,) each.
 
-    Args:
-        poses: Positions and quaternions of the object's frame, (n, 7).
-        starts: The poses from which motion counts, (n, 7).
-        layout: The simulated layout.
+    Takes `poses`, `starts` (n, 7).
     """
     ahead = poses[:, :3] + rotated(poses[:, 3:], layout.center)
     shifts = _lengths(ahead - starts[:, :3] - rotated(starts[:, 3:], layout.center))

@@ -78,15 +78,7 @@ class Bounds:
 def independent_bounds(
     body: Polyhedron, grasp: Grasp, critical: float, rig: Rig, limits: Sequence[Load]
 ) -> Bounds:
-    """Measure bounds with rigid fingertips, with a fixed squeeze, and in the first instant.
-
-    Args:
-        body: The object.
-        grasp: A grasp on the faces of `body`.
-        critical: The grasp's predicted critical friction.
-        rig: The object squeezed by servos with the forces of a gentle grasp.
-        limits: The wrenches at their predicted limits.
-    """
+    """Measure bounds with rigid fingertips, with a fixed squeeze, and in the first instant."""
     slipped, stayed = _rigid_friction(body, grasp, critical, rig.setup)
     return Bounds(
         friction_at_most=stayed,

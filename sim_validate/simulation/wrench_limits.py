@@ -43,12 +43,7 @@ class SimulatedLimit:
 
 
 def ramped_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:
-    """Find by slowly rising loads the shares of the limits at which the object lets go.
-
-    Args:
-        rig: The squeezed object.
-        limits: The wrench at each predicted limit, and the forces that balance it.
-    """
+    """Find by slowly rising loads the shares of the limits at which the object lets go."""
     threshold = rig.setup.limit.ramp_threshold * rig.bench.scene.layout.grasp_size_m
 
     def search(chosen: Sequence[Load], span: float) -> list[SimulatedLimit | None]:
@@ -96,12 +91,7 @@ def _onset(trace: Trace, shares: Array, threshold: float) -> SimulatedLimit | No
 
 
 def bisected_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:
-    """Find the shares of the limits at which the object lets go, by bisection.
-
-    Args:
-        rig: The squeezed object.
-        limits: The wrench at each predicted limit, and the forces that balance it.
-    """
+    """Find the shares of the limits at which the object lets go, by bisection."""
 
     def search(chosen: Sequence[Load], span: float) -> list[SimulatedLimit | None]:
         held, let_go = np.full(len(chosen), 1.0 - span), np.full(len(chosen), 1.0 + span)
@@ -132,13 +122,7 @@ def _ends(rig: Rig, limits: Sequence[Load], shares: Array) -> Indices:
 
 
 def part(idle: Load, limit: Load, share: float) -> Load:
-    """Return a share of a wrench, with forces between those without load and those at the limit.
-
-    Args:
-        idle: The forces that squeeze the unloaded object, without a wrench.
-        limit: The largest wrench that is resisted, and the forces that balance it.
-        share: Share of that wrench to apply.
-    """
+    """Return a share of a wrench, with forces between those without load and those at the limit."""
     planned = min(float(share), OVERLOAD)
     wrench = idle.wrench + share * (limit.wrench - idle.wrench)
     return Load(wrench, (1.0 - planned) * idle.forces + planned * limit.forces)

@@ -81,14 +81,7 @@ class ControlVerdict(ByValue):
 
 
 def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup) -> ControlVerdict:
-    """Simulate a negative control under the loads that it must not hold.
-
-    Args:
-        body: The object.
-        control: The contact set with its proof.
-        agenda: Rules of other tools that also judge the control, and whether traces are kept.
-        setup: How trials are simulated.
-    """
+    """Simulate a negative control under the loads that it must not hold."""
     rig, loads = control_case(body, control, setup)
     rules = rules_named(agenda.rules)
     pulls = _pulls(body, control, setup) if rules else ()
@@ -116,13 +109,7 @@ def _held(rig: Rig, loads: Sequence[ControlLoad], *, whole: bool = False) -> tup
 def control_case(
     body: Polyhedron, control: Control, setup: Setup
 ) -> tuple[Rig, tuple[ControlLoad, ...]]:
-    """Close fingers on a control, and find the loads that it must not hold.
-
-    Args:
-        body: The object.
-        control: The contact set with its proof.
-        setup: How trials are simulated.
-    """
+    """Close fingers on a control, and find the loads that it must not hold."""
     # Other contacts than the grasp's may lack room for its fingertips or lie off the mesh.
     fingers = replace(setup.fingers, radius_m=None)
     on_pads = replace(setup, fingers=fingers, surface="pads")

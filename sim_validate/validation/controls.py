@@ -63,12 +63,7 @@ def negative_controls(
     on their faces, which takes them out of the grasp's region, and the paper's uncorrected
     constructions on the same faces. With torsion all of them are proved open as soft fingers.
 
-    Args:
-        body: The object.
-        grasp: A grasp in force closure, with its critical friction at this torsion.
-        friction: Coulomb coefficient at every contact.
-        seed: Seed of the displacements that are tried.
-        torsion_m: Torsional coefficient at every contact [m].
+    Takes `torsion_m` [m].
     """
     rng = np.random.default_rng(seed)
     candidates = (

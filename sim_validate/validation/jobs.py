@@ -43,17 +43,7 @@ def _arrived(body: Shared[Polyhedron], *rest: Any) -> Job:
 
 
 def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
-    """Yield one verdict per job, in order; the number of processors does not change the results.
-
-    Args:
-        jobs: The grasps to validate.
-        processors: How many processors to use: as processes, and as threads of the simulator where
-            there are too few grasps for that many processes.
-
-    Raises:
-        InputError: A grasp is refused.
-        UnfaithfulError: The simulator fails its checks on cases with known answers.
-    """
+    """Yield one verdict per job, in order; the number of processors does not change the results."""
     count = processes(len(jobs), processors)
     return each(verdict_of, prepared(jobs, processors), jobs=count)
 
@@ -71,12 +61,7 @@ def prepared(jobs: Sequence[Job], processors: int) -> list[Job]:
 
 
 def verdict_of(job: Job) -> Verdict:
-    """Validate one grasp.
-
-    Raises:
-        InputError: The grasp is refused.
-        UnfaithfulError: The simulator fails its checks on cases with known answers.
-    """
+    """Validate one grasp."""
     if job.gate is not None:
         remember_gate(job.gate, job.setup, job.friction, job.body.radius)
     return validate(job.body, job.grasp, job.friction, agenda=job.agenda, setup=job.setup)

@@ -58,15 +58,8 @@ def uncorrected_contacts(
 ) -> Iterator[tuple[float, Array, Array]]:
     """Yield contacts that the printed programs take for grasps, with the friction they suppose.
 
-    Args:
-        body: The object.
-        faces: Indices of the four faces, in any order; the programs try all their pairs.
-        friction: Friction whose cones the programs may use, as far as the faces' normals span with
-            them.
-
-    Yields:
-        The friction that is supposed; positions of several sets of contacts, (g, 4, 3) [m]; and the
-        normals of all these sets, (4, 3).
+    Gives the friction that is supposed; positions of several sets of contacts, (g, 4, 3) [m]; and
+    the normals of all these sets, (4, 3).
     """
     pieces = _first_pieces(body)
     normals = np.array([body.faces[face].normal for face in faces])

@@ -15,10 +15,6 @@ class Renamed:
         self.old = name
 
     def __get__(self, value: object, owner: type | None = None) -> NoReturn:
-        """Refuse to be read.
-
-        Raises:
-            AttributeError: Always.
-        """
+        """Refuse to be read."""
         of = (owner or type(value)).__name__
         raise AttributeError(f"{of}.{self.old} is now called {self.new}: read {self.new}")

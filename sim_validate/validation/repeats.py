@@ -90,16 +90,7 @@ def robustness(
     body: Polyhedron, grasp: Grasp, friction: float, loads: Sequence[NamedLoad],
     agenda: Agenda, setup: Setup,
 ) -> Robustness:  # fmt: skip
-    """Repeat the holds of a grasp with noise.
-
-    Args:
-        body: The object.
-        grasp: A grasp in force closure at this friction.
-        friction: Coulomb coefficient that was planned with.
-        loads: The loads that each repeat must hold.
-        agenda: The agenda with the number of repeats, the noise and the seed.
-        setup: How trials are simulated, as returned by `for_repeats`.
-    """
+    """Repeat the holds of a grasp with noise."""
     trials = tuple(
         noisy_trial(body, disturbed_in(body, grasp, friction, agenda, number), loads, number, setup)
         for number in range(agenda.trials)
@@ -172,14 +163,7 @@ def _held_loads(
 def noisy_case(
     body: Polyhedron, case: Disturbed, loads: Sequence[NamedLoad], setup: Setup
 ) -> tuple[Rig, tuple[PlannedLoad, ...]]:
-    """Close fingers on the contacts of a repeat, and plan forces for its loads.
-
-    Args:
-        body: The object.
-        case: The disturbed grasp, whose contacts are in force closure.
-        loads: The loads to hold, before the mass scales them.
-        setup: How trials are simulated.
-    """
+    """Close fingers on the contacts of a repeat, and plan forces for its loads."""
     scene = heavier(setup.scene(body, case.contacts, case.friction), case.mass)
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     rig = squeezed(bench, setup, scene.layout.squeeze_forces, case.friction)
@@ -212,12 +196,7 @@ CONFIDENCE = 0.95
 
 
 def interval(count: int, of: int) -> tuple[float, float]:
-    """The 95 % confidence interval of a share, by Clopper and Pearson's exact method.
-
-    Args:
-        count: Number of successes.
-        of: Number of trials, at least one.
-    """
+    """The 95 % confidence interval of a share, by Clopper and Pearson's exact method."""
     found = _stats().binomtest(count, of).proportion_ci(CONFIDENCE, method="exact")
     return float(found.low), float(found.high)
 

@@ -82,19 +82,7 @@ def validate(
 def validated(
     body: Polyhedron, grasp: Grasp, friction: float, gate: Gate, agenda: Agenda, setup: Setup
 ) -> Verdict:
-    """Test a grasp whose closure is proved, with a simulator that was checked before.
-
-    Args:
-        body: The object.
-        grasp: A grasp in force closure at this friction, with its critical friction.
-        friction: Coulomb coefficient at every contact.
-        gate: Checks of the simulator, perhaps at another friction.
-        agenda: Which trials to run.
-        setup: How trials are simulated.
-
-    Raises:
-        InputError: On the mesh of the object, fingertips do not touch where they should.
-    """
+    """Test a grasp whose closure is proved, with a simulator that was checked before."""
     require_touch(body, grasp.contacts, setup)
     scene = setup.scene(body, grasp, friction)
     trial = _Bout(body, grasp, friction, scene, agenda, setup)
@@ -149,11 +137,7 @@ def simulated_critical_friction(
 
 
 def asked_for(agenda: Agenda | None, setup: Setup | None) -> tuple[Agenda, Setup]:
-    """Check which trials are asked for and how they are simulated; None stands for the defaults.
-
-    Raises:
-        InputError: One of them is of another class.
-    """
+    """Check which trials are asked for and how they are simulated; None stands for the defaults."""
     return _given(agenda, Agenda(), "agenda"), _given(setup, Setup(), "setup")
 
 

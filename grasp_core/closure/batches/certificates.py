@@ -41,14 +41,9 @@ def closing_margins(positions: Array, normals: Array, friction: float) -> Array:
 
     Each is, up to rounding, the margin of the certificate that `force_closure` gives.
 
-    Args:
-        positions: Contact points, (g, k, 3) [m].
-        normals: Inward unit normals, (g, k, 3).
-        friction: Coulomb coefficient of all contacts.
-
-    Returns:
-        Proved margins, above zero; NaN where compiled code does not prove closure, which tells
-        nothing: `force_closure` decides such contacts.
+    Takes `positions` (g, k, 3) [m]; `normals` (g, k, 3). Gives proved margins, above zero; NaN
+    where compiled code does not prove closure, which tells nothing: `force_closure` decides such
+    contacts.
     """
     decided = _decided(positions, normals, friction)
     return np.where(decided.closed, decided.margins, math.nan)
@@ -59,14 +54,8 @@ def certificates(
 ) -> list[ClosureCertificate | None]:
     """Find the certificates that `force_closure` gives for many sets of contacts.
 
-    Args:
-        positions: Contact points, (g, k, 3) [m].
-        normals: Inward unit normals, (g, k, 3).
-        friction: Coulomb coefficient of all contacts.
-
-    Returns:
-        A certificate for each set, as `ClosureCertificate.verify` accepts it; None leaves the set
-        undecided.
+    Takes `positions` (g, k, 3) [m]; `normals` (g, k, 3). Gives a certificate for each set, as
+    `ClosureCertificate.verify` accepts it; None leaves the set undecided.
     """
     decided = _decided(positions, normals, friction)
     points, units, forces, wrenches = (

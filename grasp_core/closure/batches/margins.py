@@ -20,15 +20,8 @@ def proved_margins(
 
     `proved_margin` explains them; friction has to be positive, and one for all contacts.
 
-    Args:
-        forces: Nearly balanced contact forces, (g, k, 3).
-        arms: Contacts at unit size, (g, k, 3).
-        normals: Inward unit normals, (g, k, 3).
-        friction: Coulomb coefficient.
-        caution: Factor on the length c of the correction.
-
-    Returns:
-        Lower bounds of the optima of the margin programs; minus infinity where there is none.
+    Takes `forces`, `arms`, `normals` (g, k, 3). Gives lower bounds of the optima of the margin
+    programs; minus infinity where there is none.
     """
     maps = grasp_map(arms)
     if not maps.size:
@@ -54,12 +47,7 @@ def margin_ceilings(
 
     `margin_ceiling` explains the bounds.
 
-    Args:
-        twists: Velocities at the mean contact and angular velocities, (g, 6).
-        arms: Contacts at unit size, (g, k, 3).
-        normals: Inward unit normals, (g, k, 3).
-        friction: Coulomb coefficient.
-        caution: Factor on the rounding that is allowed for.
+    Takes `twists` (g, 6); `arms`, `normals` (g, k, 3).
     """
     every = np.full((len(twists), 1), friction)
     velocities = twists[:, None, :3] + cross(twists[:, None, 3:], arms)

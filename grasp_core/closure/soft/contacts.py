@@ -41,13 +41,7 @@ LOCAL = 4
 def contact_torsions(torsion_m: ArrayLike, friction: Array) -> Array | None:
     """Return one checked torsional coefficient for each contact; None if no contact has any.
 
-    Args:
-        torsion_m: One coefficient for all contacts or one each, (k,) [m].
-        friction: Checked Coulomb coefficients, (k,).
-
-    Raises:
-        InputError: The shape differs, a coefficient is negative or too large, or a contact has
-            torsion and no friction.
+    Takes `torsion_m` (k,) [m]; `friction` (k,).
     """
     mu_t = frozen(frozen_each(torsion_m, len(friction), "torsion_m"), friction.shape, "torsion_m")
     if not mu_t.any():
@@ -104,11 +98,7 @@ class SoftContacts:
     ) -> "SoftContacts":
         """Set up contacts from checked arrays.
 
-        Args:
-            positions: Contact points, (k, 3) [m].
-            normals: Inward unit normals, (k, 3).
-            friction: Coulomb coefficients, (k,).
-            torsions: Torsional coefficients, (k,) [m].
+        Takes `positions` (k, 3) [m]; `normals` (k, 3); `friction` (k,); `torsions` (k,) [m].
         """
         arms, center, size = unit_size(positions)
         frames, reach = contact_frames(normals), torsions / size
@@ -165,9 +155,8 @@ class SoftContacts:
     def missed(self, forces: Array, torques: Array) -> float:
         """Compute by how much forces and torques miss balance, or what contacts can transmit.
 
-        Returns:
-            The largest component of a wrench at unit size, or of a part that friction or torsion of
-            zero does not allow.
+        Gives the largest component of a wrench at unit size, or of a part that friction or torsion
+        of zero does not allow.
         """
         local = self.local(forces, torques)
         kept, turned = self.in_space(local)

@@ -105,13 +105,7 @@ class SoftInterval:
 
 
 def needed_friction(contacts: SoftContacts, forces: Array, torques: Array) -> float:
-    """Compute the friction (1) that forces (k, 3) and torques (k,) need; infinite if none allows.
-
-    Args:
-        contacts: The contacts, at any friction.
-        forces: Contact forces.
-        torques: Torques about the normals, with lengths in metres.
-    """
+    """Compute the friction (1) that forces (k, 3), torques (k,) need; infinite if none allows."""
     local = contacts.at_friction(1.0).local(forces, torques)
     room = np.maximum(local[:, 0], 0.0) ** 2 - local[:, 3] ** 2
     across = np.hypot(local[:, 1], local[:, 2])
@@ -121,13 +115,7 @@ def needed_friction(contacts: SoftContacts, forces: Array, torques: Array) -> fl
 
 
 def friction_interval(contacts: SoftContacts, highest: float) -> SoftInterval:
-    """Find the interval of the critical friction, as narrow as accuracy or proofs allow.
-
-    Args:
-        contacts: Soft contacts at any positive friction.
-        highest: A friction from which on the contacts are closed without torsion; infinite if there
-            is none. The upper end is not sought above it.
-    """
+    """Find the interval of the critical friction, as narrow as accuracy or proofs allow."""
     found = SoftInterval(contacts, 0.0, math.inf)
     start = 2.0 * highest if highest < 0.5 * LARGEST_FRICTION else LARGEST_FRICTION
     _try(found, start)

@@ -70,9 +70,7 @@ def decide(contacts: SoftContacts) -> SoftAnswer:
 def margin_program(balance: Array, shares: Array) -> tuple[float, Array, Array]:
     """Solve (1) for the margin, local coordinates (k, 4), and the twist of the dual program.
 
-    Args:
-        balance: Matrix on the stacked local coordinates whose product must vanish, (m, 4k).
-        shares: The r_i, (k,).
+    Takes `balance` (m, 4k); `shares` (k,).
     """
     k, m = len(shares), len(balance)
     n = LOCAL * k

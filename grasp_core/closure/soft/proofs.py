@@ -40,13 +40,8 @@ def depths(local: Array) -> Array:
 def proved_margin(contacts: SoftContacts, local: Array, caution: float = 1.0) -> float:
     """Compute the margin (1) that forces and torques prove.
 
-    Args:
-        contacts: The contacts.
-        local: Nearly balanced local coordinates, (k, 4).
-        caution: Factor on the length c of the correction.
-
-    Returns:
-        A lower bound of the optimum of the margin program; minus infinity if there is none.
+    Takes `local` (k, 4). Gives a lower bound of the optimum of the margin program; minus infinity
+    if there is none.
     """
     matrix = contacts.matrix
     if not (np.isfinite(matrix).all() and np.isfinite(local).all()) or matrix.shape[1] < WRENCH:
@@ -66,14 +61,8 @@ def proved_margin(contacts: SoftContacts, local: Array, caution: float = 1.0) ->
 def margin_ceiling(contacts: SoftContacts, twist: Array, caution: float = 1.0) -> float:
     """Bound the margin of closure from above by (2), with a twist that separates the contacts.
 
-    Args:
-        contacts: The contacts.
-        twist: Velocity at the mean contact and angular velocity, at unit size, (6,).
-        caution: Factor on the rounding that is allowed for.
-
-    Returns:
-        The bound, below zero; zero where the largest support M is zero to within rounding; infinity
-        where M is more, and the twist proves nothing.
+    Takes `twist` (6,). Gives the bound, below zero; zero where the largest support M is zero to
+    within rounding; infinity where M is more, and the twist proves nothing.
     """
     length = float(np.linalg.norm(twist))
     if not 0.0 < length < math.inf:

@@ -29,14 +29,7 @@ def place(
 ) -> None:
     """Place a focus and the largest four equal discs for each attempt.
 
-    Args:
-        faces: The faces of the object.
-        attempts: Faces in finger order, with their force cones.
-        turns: Cosines and sines of the directions in which a pyramid's facets lean, (m, 2).
-        patterns: Sides of the focus by (4) that are tried in turn, (p, 4); a later one has to
-            offer larger discs.
-        least: Least radius of the discs of each attempt, (a,).
-        placed: Filled with the placements.
+    Takes `turns` (m, 2); `patterns` (p, 4); `least` (a,).
     """
     x = np.empty(VARIABLES)
     for a in range(len(least)):

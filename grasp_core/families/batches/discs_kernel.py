@@ -40,13 +40,7 @@ class Program(NamedTuple):
 def largest_discs(program: Program, least: float, x: Array) -> tuple[int, float]:
     """Find the largest four equal discs, then enlarge each.
 
-    Args:
-        program: The rows of the program.
-        least: Least radius of the discs; smaller ones count as none.
-        x: Filled with the variables, (n,), if there are discs.
-
-    Returns:
-        How it ended, and the largest value of the smallest radius.
+    Takes `x` (n,). Gives how it ended, and the largest value of the smallest radius.
     """
     A, b, radii, smallest = program
     count, n = len(b) - 2, len(x)
@@ -76,15 +70,8 @@ def largest_discs(program: Program, least: float, x: Array) -> tuple[int, float]
 def optimum(c: Array, A: Array, b: Array, cutoff: float, x: Array) -> tuple[int, float]:
     """Maximise c.x subject to A x <= b, with the checks of `solvers.lp`.
 
-    Args:
-        c: Objective, (n,).
-        A: Rows, (rows, n).
-        b: Limits, (rows,).
-        cutoff: Smallest value that is of interest.
-        x: Filled with a best point, (n,).
-
-    Returns:
-        `PLACED` and the optimum; `NONE` where a bound below the cutoff is proved; or `LEFT`.
+    Takes `c`, `x` (n,); `A` (rows, n); `b` (rows,). Gives `PLACED` and the optimum; `NONE` where a
+    bound below the cutoff is proved; or `LEFT`.
     """
     count, n = A.shape
     rows = Rows(np.empty((n, count)), np.empty(count), np.empty(count), 0)

@@ -25,12 +25,7 @@ def footprints(
 ) -> None:
     """Cut the faces of each placed attempt to where a line in the force cone meets the focus.
 
-    Args:
-        faces: The faces of the object.
-        attempts: Faces in finger order, with their force cones.
-        turns: Cosines and sines of the directions in which a pyramid's facets lean, (m, 2).
-        placed: The placements.
-        cut: Filled with the regions, with room for all edges of a face and facets of a pyramid.
+    Takes `turns` (m, 2).
     """
     polygons, counts, radii = cut
     most = polygons.shape[2]

@@ -31,12 +31,7 @@ def place(
 ) -> None:
     """Place two foci and the largest four equal discs for each attempt.
 
-    Args:
-        faces: The faces of the object.
-        attempts: Faces in finger order, with their force cones; the pencils are (0, 1) and (2, 3).
-        least_gap: Least distance of the foci.
-        least: Least radius of the discs of each attempt, (a,).
-        placed: Filled with the placements.
+    Takes `attempts` (0, 1) or (2, 3); `least` (a,).
     """
     x = np.empty(VARIABLES)
     C, s = np.zeros((FINGERS, 2, VARIABLES)), np.zeros((FINGERS, VARIABLES + 1))
@@ -77,13 +72,7 @@ def _discs(
 ) -> None:
     """Fill in depths and disc centres by (1), as linear functions of the variables.
 
-    Args:
-        faces: The faces of the object.
-        attempts: The attempts.
-        place: The attempt, the sign of k u in the first focus, and u.
-        C: Filled with the linear part of the centres in their planes, (4, 2, variables).
-        s: Filled with the linear part of the depths, and last their constant, (4, variables + 1).
-        q: Filled with the constant part of the centres, (4, 2).
+    Takes `C` (4, 2, variables); `s` (4, variables + 1); `q` (4, 2).
     """
     a, cell, u = place
     for finger in range(FINGERS):

@@ -55,12 +55,7 @@ class ManyPlacements:
     """The piece of each face; None for faces without room."""
 
     def of(self, construction: Construction, asked: Sequence[Ask]) -> list[Known | None]:
-        """Place contacts for each attempt; None where that is left to the construction itself.
-
-        Args:
-            construction: The construction to try; reguli are always left.
-            asked: The attempts, on faces that have room.
-        """
+        """Place contacts for each attempt; None where that is left to the construction itself."""
         if construction.limits is None or not asked:
             return [None] * len(asked)
         attempts = Attempts(

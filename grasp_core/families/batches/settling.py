@@ -70,12 +70,7 @@ class Settling:
     shapes: Shapes
 
     def of(self, attempts: Sequence[Attempt], least: float) -> list[End]:
-        """Place contacts for each attempt, with regions, on the true surface.
-
-        Args:
-            attempts: Which faces each finger touches, and with which force cones.
-            least: The merit that placements must exceed.
-        """
+        """Place contacts for each attempt, with regions, on the true surface."""
         ends = [End(least) for _ in attempts]
         going = list(zip(attempts, ends, strict=True))
         for choice in range(max((len(each.cones) for each in attempts), default=0)):

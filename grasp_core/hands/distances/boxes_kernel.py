@@ -24,13 +24,9 @@ def point_triangle(p: Array, T: Array, near: Array, weights: Array) -> float:
 
     The last two corners may be one point.
 
-    Args:
-        p: The point, (3,).
-        T: Corners of the triangle.
-        near: Filled with the nearest point, (3,).
-        weights: Filled with the weights of the last two corners in it, (2,).
-
     Source: C. Ericson, Real-Time Collision Detection, section 5.1.5 (regions of Voronoi).
+
+    Takes `p`, `near` (3,); `weights` (2,).
     """
     ab, ac, ap = T[1] - T[0], T[2] - T[0], p - T[0]
     d1, d2 = dotted(ab, ap), dotted(ac, ap)
@@ -160,10 +156,7 @@ def box_triangle(  # noqa: C901 - loops that are written out
 ) -> float:
     """Return the signed distance of the box |x_i| <= h_i from a triangle, (3, 3) in its frame.
 
-    Args:
-        h: Half-sizes, (3,).
-        T: Corners of the triangle.
-        limit: Distance above which some number above it is returned.
+    Takes `h` (3,).
     """
     axis, unit, sides = np.empty(3), np.zeros(3), np.empty((CORNERS, 3))
     for k in range(CORNERS):
@@ -225,14 +218,7 @@ def box_box(  # noqa: C901, PLR0913, PLR0917 - two boxes, and where they are nea
 ) -> float:  # fmt: skip
     """Return the signed distance of the box |x_i| <= h_i from another box.
 
-    Args:
-        h: Half-sizes, (3,).
-        g: Half-sizes of the other box, (3,).
-        R: Axes of the other box (columns) in the frame of the first, (3, 3).
-        middle: Its middle, (3,).
-        limit: Distance above which some number above it is returned, and nothing is filled in.
-        way: Filled with the unit vector along which the other box moves away soonest, (3,).
-        point: Filled with the point of the other box that is nearest or deepest, (3,).
+    Takes `h`, `g`, `middle`, `way`, `point` (3,); `R` (3, 3).
     """
     others = np.empty((8, 3))
     corners_of(g, R, middle, others)

@@ -48,14 +48,7 @@ def clearances(  # noqa: PLR0913, PLR0917 - a hand, where it is, and what is aro
 ) -> Clearances:
     """Measure the distances of a hand from itself, an object and a table.
 
-    Args:
-        hand: The hand.
-        body: The object.
-        joints: Joint angles, (j,) [rad].
-        palm_pose: Pose of the palm in the object's frame, (4, 4).
-        fingers: Fingers whose tips touch the object.
-        up: Unit normal of the table, (3,); None for no table.
-        height: Its height along it [m].
+    Takes `joints` (j,) [rad]; `palm_pose` (4, 4); `up` (3,); `height` [m].
     """
     arrays, tree = hand_arrays(hand), surface_tree(body)
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
@@ -90,12 +83,7 @@ def tip_gaps(
 ) -> TipGaps:
     """Measure how far fingertips are from an object.
 
-    Args:
-        hand: The hand.
-        body: The object.
-        joints: Joint angles, (j,) [rad].
-        palm_pose: Pose of the palm in the object's frame, (4, 4).
-        fingers: The fingers, (k,).
+    Takes `joints` (j,) [rad]; `palm_pose` (4, 4); `fingers` (k,).
     """
     arrays, tree = hand_arrays(hand), surface_tree(body)
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
@@ -116,12 +104,7 @@ def tip_distances(
 ) -> Array:
     """Measure how far points are from fingertips: zero where these touch them, (k,) [m].
 
-    Args:
-        hand: The hand.
-        joints: Joint angles, (j,) [rad].
-        palm_pose: Pose of the palm, (4, 4).
-        fingers: The fingers, (k,).
-        points: A point for each, (k, 3) [m].
+    Takes `joints` (j,) [rad]; `palm_pose` (4, 4); `fingers` (k,); `points` (k, 3) [m].
     """
     arrays, kernel = hand_arrays(hand), compiled("grasp_core.hands.distances.collisions_kernel")
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
@@ -145,9 +128,7 @@ def _shapes(hand: Hand, arrays: HandArrays, joints: Array, palm_pose: Array) -> 
 def overlapping_pairs(hand: Hand, joints: Array) -> set[tuple[str, str]]:
     """Return the names of links, in order of the alphabet, that overlap at some joint angles.
 
-    Args:
-        hand: The hand.
-        joints: Joint angles, (j,) [rad].
+    Takes `joints` (j,) [rad].
     """
     arrays, kernel = hand_arrays(hand), compiled("grasp_core.hands.distances.collisions_kernel")
     turned, middles = _shapes(hand, arrays, joints, np.eye(POSE))

@@ -36,11 +36,7 @@ def place_shapes(  # noqa: PLR0913, PLR0917 - poses in, poses out
 def near_links(hand: HandArrays, middles: Array, limit: float, near: NDArray[np.bool_]) -> None:
     """Fill in which links, the palm first, may be as near to each other as a limit, by their balls.
 
-    Args:
-        hand: The hand.
-        middles: Middles of its shapes, (s, 3).
-        limit: The distance.
-        near: Filled in both ways round, (j + 1, j + 1).
+    Takes `middles` (s, 3); `near` (j + 1, j + 1).
     """
     for a in range(len(hand.link_shapes)):
         for b in range(a):
@@ -58,12 +54,7 @@ def may_be_near(middles: Array, reaches: Array, i: int, j: int, limit: float) ->
 
     A call with few arguments costs less than one with a whole hand.
 
-    Args:
-        middles: Middles of the shapes, (s, 3).
-        reaches: Radii of the balls, (s,).
-        i: The first shape.
-        j: The second.
-        limit: The distance.
+    Takes `middles` (s, 3); `reaches` (s,).
     """
     square = 0.0
     for k in range(3):
@@ -103,11 +94,7 @@ def core_in(hand: HandArrays, R: Array, middle: Array, s: int) -> tuple[Array, f
 
     For a shape that covers a block they are the block's.
 
-    Args:
-        hand: The hand.
-        R: The shape's axes in some frame (columns), (3, 3).
-        middle: Its middle there, (3,).
-        s: Number of the shape.
+    Takes `R` (3, 3); `middle` (3,).
     """
     if not is_block(hand, s):
         corners = np.empty((8, 3))
@@ -170,15 +157,7 @@ def pair_distance(  # noqa: C901, PLR0913, PLR0917 - two shapes, and where they 
 ) -> float:  # fmt: skip
     """Return the signed distance of two shapes of a hand.
 
-    Args:
-        hand: The hand.
-        turned: Axes of its shapes, (s, 3, 3).
-        middles: Their middles, (s, 3).
-        i: The first shape.
-        j: The second.
-        limit: Distance above which some number above it is returned, and nothing is filled in.
-        way: Filled with the unit vector along which the second moves away soonest, (3,).
-        point: Filled with a point between the two, (3,).
+    Takes `turned` (s, 3, 3); `middles` (s, 3); `way`, `point` (3,).
     """
     both = hand.shape_radii[i] + hand.shape_radii[j]
     h, g = hand.shape_sizes[i], hand.shape_sizes[j]
@@ -213,12 +192,7 @@ def of_itself(
 ) -> float:
     """Return the least distance between shapes of a hand that must not overlap.
 
-    Args:
-        hand: The hand.
-        turned: Axes of its shapes, (s, 3, 3).
-        middles: Their middles, (s, 3).
-        need: Distance above which the exact one does not matter.
-        worst: Filled with the two shapes that are nearest, (2,); -1 if none is below `need`.
+    Takes `turned` (s, 3, 3); `middles` (s, 3); `worst` (2,).
     """
     best, way, point = np.nextafter(need, np.inf), np.empty(3), np.empty(3)
     near = np.empty((len(hand.link_shapes), len(hand.link_shapes)), np.bool_)
@@ -246,14 +220,7 @@ def tip_surface(  # noqa: PLR0913, PLR0917 - a hand's tip, a surface, and where 
 
     The tip touches where the distance is its rounding.
 
-    Args:
-        hand: The hand.
-        turned: Axes of its shapes, (s, 3, 3).
-        middles: Their middles, (s, 3).
-        tree: The surface.
-        finger: Number of the finger.
-        near: Filled with the hull's nearest point, (3,).
-        other: Filled with the surface's, (3,).
+    Takes `turned` (s, 3, 3); `middles` (s, 3); `near`, `other` (3,).
     """
     s, square = hand.tip_shapes[finger], 0.0
     if is_block(hand, s):
@@ -272,11 +239,7 @@ def tip_surface(  # noqa: PLR0913, PLR0917 - a hand's tip, a surface, and where 
 def deepest(corners: Array, tree: SurfaceTree, near: Array, other: Array) -> float:
     """Return the signed distance from a surface of the corner that is deepest in it.
 
-    Args:
-        corners: The corners, (m, 3).
-        tree: The surface.
-        near: Filled with the corner, (3,).
-        other: Filled with the surface's point nearest to it, (3,).
+    Takes `corners` (m, 3); `near`, `other` (3,).
     """
     best, at = np.inf, np.empty(3)
     for c in range(len(corners)):
@@ -294,12 +257,7 @@ def deepest(corners: Array, tree: SurfaceTree, near: Array, other: Array) -> flo
 def tip_point(hand: HandArrays, turned: Array, middles: Array, finger: int, point: Array) -> float:
     """Return the distance of a point from a fingertip, negative within it by its rounding at most.
 
-    Args:
-        hand: The hand.
-        turned: Axes of its shapes, (s, 3, 3).
-        middles: Their middles, (s, 3).
-        finger: Number of the finger.
-        point: The point, (3,).
+    Takes `turned` (s, 3, 3); `middles` (s, 3); `point` (3,).
     """
     s = hand.tip_shapes[finger]
     corners, rounding = core_in(hand, turned[s], middles[s], s)
@@ -314,13 +272,7 @@ def of_object(
 ) -> float:  # fmt: skip
     """Return the least distance of shapes from a surface, beyond what each of them needs.
 
-    Args:
-        hand: The hand.
-        turned: Axes of its shapes, (s, 3, 3).
-        middles: Their middles, (s, 3).
-        tree: The surface.
-        needs: Least distance of each shape, (s,).
-        worst: Filled with the shape that lacks most, (1,); -1 if none does.
+    Takes `turned` (s, 3, 3); `middles` (s, 3); `needs` (s,); `worst` (1,).
     """
     best, near, other = np.inf, np.empty(3), np.empty(3)
     worst[0] = -1
@@ -359,13 +311,7 @@ def of_table(
 ) -> float:  # fmt: skip
     """Return the least height of a hand's shapes over a plane.
 
-    Args:
-        hand: The hand.
-        turned: Axes of its shapes, (s, 3, 3).
-        middles: Their middles, (s, 3).
-        up: Unit normal of the plane, (3,).
-        height: The plane's height along it.
-        worst: Filled with the lowest shape, (1,).
+    Takes `turned` (s, 3, 3); `middles` (s, 3); `up` (3,); `worst` (1,).
     """
     best = np.inf
     for s in range(len(hand.shape_links)):

@@ -51,8 +51,7 @@ def _holds_origin(S: Array, w: Array) -> bool:
 def _nearer(S: Array, w: Array, at: Array) -> int:
     """Choose the corner of a triangle S that the point w replaces, and fill in the nearest point.
 
-    Returns:
-        The corner's number, or -1 if no such triangle is nearer to the origin than `at`.
+    Gives the corner's number, or -1 if no such triangle is nearer to the origin than `at`.
     """
     tried, zero, chosen, least = np.empty((3, 3)), np.zeros(3), -1, dotted(at, at)
     near, weights = np.empty(3), np.empty(2)
@@ -80,12 +79,7 @@ def hull_hull(  # noqa: C901 - loops that are written out
 
     It is that of two planes between which no hull is, so that rounding never makes it too large.
 
-    Args:
-        corners: Corners of the first hull, (m, 3).
-        others: Corners of the second, (n, 3).
-        limit: Distance above which some number above it is returned, and nothing is filled in.
-        near: Filled with the first hull's nearest point, (3,).
-        other: Filled with the second's, (3,).
+    Takes `corners` (m, 3); `others` (n, 3); `near`, `other` (3,).
     """
     at, S, w, zero = corners[0] - others[0], np.empty((3, 3)), np.empty(3), np.zeros(3)
     pairs, weights, apart = np.zeros((3, 2), np.int64), np.empty(2), 0.0
@@ -130,18 +124,8 @@ def hull_surface(  # noqa: C901, PLR0913, PLR0917 - the arrays of a tree
 ) -> float:  # fmt: skip
     """Return the distance of the hull of corners (m, 3) from a surface, zero where they overlap.
 
-    Args:
-        hull: The hull's corners.
-        within: Distance beyond which nothing is looked for.
-        corners: See `SurfaceTree`, as for the next three.
-        middles: (n, 3).
-        radii: (n,).
-        links: (n, 2).
-        near: Filled with the hull's nearest point, (3,).
-        other: Filled with the surface's, (3,).
-
-    Returns:
-        The distance, or infinity if the surface is not within the given one.
+    Takes `middles` (n, 3); `radii` (n,); `links` (n, 2); `near`, `other` (3,). Gives the distance,
+    or infinity if the surface is not within the given one.
     """
     stack, gaps, depth, gap2 = np.empty(DEEPEST, np.int64), np.empty(DEEPEST), 1, np.empty(2)
     best, found, p, s, middle = within, np.inf, np.empty(3), np.empty(3), np.empty((1, 3))

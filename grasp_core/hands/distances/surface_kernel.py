@@ -23,17 +23,8 @@ def nearest(  # noqa: C901, PLR0913, PLR0917 - the arrays of a tree
 ) -> int:  # fmt: skip
     """Fill in the point of a surface nearest to a point, and return its triangle.
 
-    Args:
-        p: The point, (3,).
-        within: Distance beyond which nothing is looked for.
-        corners: See `SurfaceTree`, as for the next three.
-        middles: (n, 3).
-        radii: (n,).
-        links: (n, 2).
-        near: Filled with the nearest point, (3,).
-
-    Returns:
-        The triangle's place in the tree, or -1 if none is within the distance.
+    Takes `p`, `near` (3,); `middles` (n, 3); `radii` (n,); `links` (n, 2). Gives the triangle's
+    place in the tree, or -1 if none is within the distance.
     """
     stack, gaps, found, depth = np.empty(DEEPEST, np.int64), np.empty(DEEPEST), -1, 1
     best, at, gap2, weights = within * within, np.empty(3), np.empty(2), np.empty(2)
@@ -70,15 +61,7 @@ def box_surface(  # noqa: PLR0913, PLR0917 - the arrays of a tree
 ) -> float:  # fmt: skip
     """Return the signed distance of a box from a surface, or some number above the limit.
 
-    Args:
-        h: Half-sizes, (3,).
-        R: Axes of the box (columns), (3, 3).
-        middle: Its middle, (3,).
-        limit: Distance above which the exact one does not matter.
-        corners: See `SurfaceTree`, as for the next three.
-        middles: (n, 3).
-        radii: (n,).
-        links: (n, 2).
+    Takes `h`, `middle` (3,); `R` (3, 3); `middles` (n, 3); `radii` (n,); `links` (n, 2).
     """
     stack, depth, local, T = np.empty(DEEPEST, np.int64), 1, np.empty(3), np.empty((3, 3))
     best = np.nextafter(limit, np.inf)

@@ -30,15 +30,9 @@ class ContactChoices:
 def contact_choices(grasp: Grasp, friction: float, fingers: int) -> ContactChoices:
     """Choose contacts for the fingers of a hand.
 
-    Args:
-        grasp: The grasp.
-        friction: Coulomb coefficient at every contact.
-        fingers: Number of the hand's fingers.
-
-    Returns:
-        All contacts, if there is a finger for each. Otherwise the choices of as many contacts as
-        there are fingers which alone are in force closure, the largest margin first; equal ones, by
-        `solvers.ties`, stay in the order of their indices.
+    Gives all contacts, if there is a finger for each. Otherwise the choices of as many contacts as
+    there are fingers which alone are in force closure, the largest margin first; equal ones, by
+    `solvers.ties`, stay in the order of their indices.
     """
     if fingers >= FINGERS:
         return ContactChoices((tuple(range(FINGERS)),))
@@ -61,10 +55,7 @@ def contact_choices(grasp: Grasp, friction: float, fingers: int) -> ContactChoic
 def proved_closure(points: Array, normals: Array, friction: float) -> ClosureCertificate | None:
     """Prove that contacts are in force closure, or that they are not; None if neither succeeds.
 
-    Args:
-        points: Contacts, (k, 3) [m].
-        normals: Unit vectors into the object, (k, 3).
-        friction: Coulomb coefficient at every contact.
+    Takes `points` (k, 3) [m]; `normals` (k, 3).
     """
     try:
         return force_closure(points, normals, friction)

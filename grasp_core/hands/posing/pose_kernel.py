@@ -141,18 +141,7 @@ def settle(  # noqa: PLR0913, PLR0917 - a hand, an object and what is asked
 ) -> int:  # fmt: skip
     """Move a hand, changing `pose` in place, until it touches and overlaps no more.
 
-    Args:
-        hand: The hand.
-        tree: The object's surface.
-        targets: Where fingertips are to touch.
-        wanted: What is asked for.
-        pose: The pose; `palm`, `origin` and `q` are where it starts.
-        sums: The sums, filled in.
-        most_steps: Largest number of steps.
-        good: Distance from touching at which the steps end if nothing overlaps [mm].
-
-    Returns:
-        The number of steps.
+    Takes `good` [mm]. Gives the number of steps.
     """
     A, step, new = np.empty_like(sums.H), np.empty_like(sums.g), empty_pose(hand, len(pose.tips))
     tried = empty_sums(hand, targets)
@@ -190,16 +179,8 @@ def lay(
     line to it from the tip's nearest point, which is to touch it. The plane of a block whose hull
     overlaps the surface is moved back.
 
-    Args:
-        hand: The hand.
-        tree: The object's surface.
-        targets: Where fingertips are to touch; `origins`, `normals` and `touching` are changed in
-            place.
-        pose: The pose, whose parts are placed.
-        points: Filled with the nearest points of the surface, (k, 3) [m].
-
-    Returns:
-        The largest distance of a fingertip from touching the surface [m].
+    Takes `points` (k, 3) [m]. Gives the largest distance of a fingertip from touching the surface
+    [m].
     """
     place(hand, targets, pose)
     off = 0.0

@@ -68,13 +68,7 @@ def _ahead(  # noqa: C901 - loops that are written out
 
         M = sum of w (c - p) ((c - p) x n)' / s.                                           (2)
 
-    Args:
-        hand: The hand.
-        R: Axes of the last link, (3, 3).
-        targets: Where fingertips are to touch.
-        k: The contact.
-        point: Filled with the point in the last link's frame, (3,), unless it is known.
-        roll: Filled with M, (3, 3); zeros where the point is known.
+    Takes `R`, `roll` (3, 3); `point` (3,).
     """
     finger, n, way, arm = targets.fingers[k], targets.normals[k], np.empty(3), np.empty(3)
     first, count = hand.tip_firsts[finger], hand.tip_firsts[finger + 1] - hand.tip_firsts[finger]
@@ -201,11 +195,7 @@ def _touching(  # noqa: C901 - loops that are written out
 def _outward(center: Array, need: float, tree: SurfaceTree, along: Array) -> float:
     """Return the signed distance of a point from a surface, and fill in the way out.
 
-    Args:
-        center: The point, (3,).
-        need: Distance above which some number above it is returned.
-        tree: The surface.
-        along: Filled with the unit vector along which the distance grows, (3,).
+    Takes `center`, `along` (3,).
     """
     near, square = np.empty(3), 0.0
     for j in range(3):
@@ -292,14 +282,7 @@ def _farthest(  # noqa: PLR0913, PLR0917 - a shape and a plane
 ) -> float:  # fmt: skip
     """Return how far a shape reaches beyond a plane, and fill in its corner there.
 
-    Args:
-        hand: The hand.
-        pose: Its pose.
-        s: The shape.
-        origin: A point of the plane, (3,).
-        way: Unit vector across it, (3,).
-        left_out: Where a corner does not count: an end of a capsule that is the fingertip, (3,).
-        x: Filled with the corner, (3,).
+    Takes `origin`, `way`, `left_out`, `x` (3,).
     """
     (corners, rounding), farthest = core_in(hand, pose.turned[s], pose.middles[s], s), -np.inf
     for c in range(len(corners)):

@@ -102,13 +102,7 @@ class NoPose:
 
 
 def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | NoPose:
-    """Look for a pose from one start after the other.
-
-    Args:
-        asked: What a pose is sought for.
-        choices: Indices of contacts at which fingers may stand; later ones are tried where no pose
-            was found for those before.
-    """
+    """Look for a pose from one start after the other."""
     tally: Counter[str] = Counter()
     for chosen in choices:
         used = np.array(chosen, np.int64)
@@ -158,8 +152,7 @@ def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Target
 
     Which point of a block touches is only known then, so that its region is asked for again.
 
-    Returns:
-        The planes that are touched and the contacts, (k, 3); None if fingertips do not rest.
+    Gives the planes that are touched and the contacts, (k, 3); None if fingertips do not rest.
     """
     arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
     kernel = compiled("grasp_core.hands.posing.pose_kernel")
@@ -186,12 +179,7 @@ def _are_within(aims: Targets, points: Array, slack: float) -> tuple[bool, ...]:
 def blocking(asked: Asked, pose: Pose, fingers: Indices | None, clearance: float) -> str:
     """Return what a placed hand overlaps: `self`, `object`, `table`, or nothing.
 
-    Args:
-        asked: The hand and what is around it.
-        pose: The pose, with its shapes placed.
-        fingers: Fingers whose tips touch the object; None if none may.
-        clearance: Least distance of everything else [m]; links whose tips touch need none from the
-            object.
+    Takes `clearance` [m].
     """
     arrays, worst = hand_arrays(asked.hand), np.empty(2, np.int64)
     kernel = compiled("grasp_core.hands.distances.collisions_kernel")

@@ -15,16 +15,8 @@ def free_postures(  # noqa: C901 - loops that are written out
 ) -> int:
     """Choose joint angles at which a hand is free of itself and its fingertips are near each other.
 
-    Args:
-        hand: The hand.
-        angles: Joint angles to try, (n, j) [rad].
-        apart: Least distance between links [m].
-        widest: Largest distance of a fingertip from the middle of all [m].
-        kept: Filled with the numbers of those chosen, (m,).
-        tips: Filled with the middles of their fingertips in the palm's frame, (m, f, 3) [m].
-
-    Returns:
-        How many were chosen, at most m.
+    Takes `angles` (n, j) [rad]; `apart`, `widest` [m]; `kept` (m,); `tips` (m, f, 3) [m]. Gives how
+    many were chosen, at most m.
     """
     count, fingers, found = len(hand.axes), len(hand.tip_radii), 0
     R, p, W = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty((count, 3))

@@ -69,8 +69,7 @@ class Start:
 def postures(hand: Hand, seed: int) -> Postures:
     """Choose postures of a hand at random; equal hands and seeds share them.
 
-    Returns:
-        At most `POSTURES` of them; none if the hand is nowhere free of itself.
+    Gives at most `POSTURES` of them; none if the hand is nowhere free of itself.
     """
     arrays, rng = hand_arrays(hand), np.random.default_rng(seed)
     low, high = arrays.ranges.T
@@ -85,12 +84,7 @@ def postures(hand: Hand, seed: int) -> Postures:
 def starts(hand: Hand, positions: Array, normals: Array, *, seed: int, count: int) -> list[Start]:
     """Choose where to start from, best first.
 
-    Args:
-        hand: The hand.
-        positions: Contacts, (k, 3) [m].
-        normals: Unit vectors into the object, (k, 3).
-        seed: Seed of the postures.
-        count: Largest number of starts.
+    Takes `positions` (k, 3) [m]; `normals` (k, 3).
     """
     found, arrays = postures(hand, seed), hand_arrays(hand)
     if not len(found.joints):

@@ -18,12 +18,7 @@ SHORT = 1e-9
 def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: float) -> Targets:
     """Say where fingertips are to touch, with finger k at the k-th of the contacts that are used.
 
-    Args:
-        grasp: The grasp.
-        used: Indices of its contacts at which fingers are to stand, (k,).
-        regions: Whether to aim at regions where there are some.
-        up: Unit normal of the table, (3,).
-        height: Its height along it; minus infinity for none [m].
+    Takes `used` (k,); `up` (3,); `height` [m].
     """
     normals, own = grasp.normals[used], [grasp.regions[int(contact)] for contact in used]
     aimed = [regions and _is_wide(region) for region in own]
@@ -66,11 +61,7 @@ def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
 def is_within(targets: Targets, contact: int, position: Array, slack: float) -> bool:
     """Return whether a position is in the region that one finger aimed at.
 
-    Args:
-        targets: Where fingertips were to touch.
-        contact: Number of the contact.
-        position: The position, (3,) [m].
-        slack: How far outside it may be [m].
+    Takes `position` (3,) [m]; `slack` [m].
     """
     if targets.pinned[contact] > 0.0:
         return bool(np.linalg.norm(position - targets.origins[contact]) <= slack)

@@ -93,9 +93,7 @@ def _thumb(tip: float) -> HandFinger:
 def allegro(name: str = "allegro", tips: tuple[float, float] = TIPS) -> Hand:
     """Return the right Allegro hand.
 
-    Args:
-        name: Its name.
-        tips: Places of the fingertips' balls along the last links, of fingers and of the thumb [m].
+    Takes `tips` [m].
     """
     finger, thumb = tips
     return Hand(

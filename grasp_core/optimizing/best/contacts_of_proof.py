@@ -16,11 +16,6 @@ def are_contacts_of(grasp: Grasp, wrenches: WrenchSet, proof: CutTree) -> bool:
     """Return whether a grasp has the contacts of a wrench set, and these lie on a proof's polygons.
 
     The grasp is in the object's frame and size, the others about its centre of mass in radii.
-
-    Args:
-        grasp: The grasp.
-        wrenches: Its wrench set (`l1`), sound.
-        proof: A proof with sound polygons.
     """
     if not (is_a(grasp, Grasp) and wrenches.norm == "l1" and len(wrenches.friction) == FINGERS):
         return False

@@ -88,13 +88,7 @@ class Grounds(ByValue):
 def grounds_of(body: Polyhedron, clearance: float) -> Grounds:
     """Return where contacts may be on an object.
 
-    Args:
-        body: The object.
-        clearance: Distance from the edges of a face [m], or half the radius of the largest disc in
-            it where that is less.
-
-    Raises:
-        InputError: There is no room on any face, or the faces have too many pieces.
+    Takes `clearance` [m].
     """
     pieces: list[FacePiece] = []
     for face, rooms in enumerate(pieces_by_face(body)):
@@ -110,11 +104,7 @@ def grounds_of(body: Polyhedron, clearance: float) -> Grounds:
 
 
 def grounds_on(pieces: Sequence[FacePiece]) -> tuple[Grounds, Indices]:
-    """Return convex pieces as polygons of few corners, and the place of each one's piece, (p,).
-
-    Raises:
-        InputError: There is no piece, or there are too many.
-    """
+    """Return convex pieces as polygons of few corners, and the place of each one's piece, (p,)."""
     parts = [(k, part) for k, piece in enumerate(pieces) for part in _small(piece.corners)]
     if not 0 < len(parts) <= MOST_PIECES:
         raise InputError(

@@ -40,10 +40,7 @@ pieces end in several local optima."""
 def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Found | None:
     """Return good contacts, or None if no random ones are in force closure.
 
-    Args:
-        searching: The search that they are for.
-        twists: Twists that bound qualities, (n, 6).
-        rng: For the random contacts.
+    Takes `twists` (n, 6).
     """
     alike, climbs = Counter[tuple[int, ...]](), 0
     best: Found | None = None

@@ -32,12 +32,7 @@ SMALL = {"deeds": np.uint8, "asked": np.int32, "faces": np.int32, "counts": np.i
 
 
 def write_proof(path: Path, proof: CutTree) -> Path:
-    """Write a proof to an npz file.
-
-    Raises:
-        InputError: The proof is only about contacts on four given faces.
-        OSError: The file cannot be written; the error names it.
-    """
+    """Write a proof to an npz file."""
     if proof.owners is not None:
         raise InputError(
             f"{path}: expected a proof about all contacts of an object, as best_grasp makes, got "
@@ -57,11 +52,7 @@ def write_proof(path: Path, proof: CutTree) -> Path:
 
 
 def read_proof(path: Path) -> CutTree:
-    """Read a proof that `write_proof` has written; `CutTree.verify` then checks what it claims.
-
-    Raises:
-        InputError: The file is missing, too large, or no such proof.
-    """
+    """Read a proof that `write_proof` has written; `CutTree.verify` then checks what it claims."""
     arrays = _arrays(path)
     schemas = [kind for kind in (USUAL, OTHER) if np.array_equal(arrays["schema"], kind)]
     if str(arrays["format"]) != FORMAT or not schemas:

@@ -99,15 +99,8 @@ def first_nodes(
 
     Without symmetries there is one, in which every finger may be anywhere, or on its own pieces.
 
-    Args:
-        grounds: The pieces.
-        maps: Symmetries that are used, the identity first, (g, 3, 3).
-        owners: The finger that may be on each piece, (p,), with the identity alone; None where any
-            may.
-
-    Returns:
-        Corners of each finger's polygons, (c, 4, p, 24, 2); how many, (c, 4, p); whether fingers
-        are fresh, (c, 4).
+    Takes `maps` (g, 3, 3); `owners` (p,). Gives corners of each finger's polygons, (c, 4, p, 24,
+    2); how many, (c, 4, p); whether fingers are fresh, (c, 4).
     """
     pieces = len(grounds.counts)
     if owners is not None:

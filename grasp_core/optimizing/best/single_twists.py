@@ -29,12 +29,7 @@ ROUNDED_UP = 1e-6
 def lowered_twists(searching: Searching, rng: np.random.Generator) -> Array:
     """Return twists in which all polygons together resist little, and let the search know them.
 
-    Args:
-        searching: The search that they are for.
-        rng: For the random twists.
-
-    Returns:
-        Unit twists, (n, 6).
+    Gives unit twists, (n, 6).
     """
     grounds, loads = searching.grounds, searching.measure.loads
     points = [grounds.places(p, at) for p, at in enumerate(grounds.polygons())]
@@ -60,11 +55,7 @@ def refuted_by_one(
 ) -> tuple[Steps, float]:
     """Return the tree that asks a single twist, and the least threshold that it refutes.
 
-    Args:
-        searching: The search.
-        cases: Number of the first nodes, each of which asks the twist.
-        slack: What the search leaves for rounding.
-        twists: Unit twists to choose from, (n, 6).
+    Takes `twists` (n, 6).
     """
     support, slopes = compiled(CUTS).support, compiled(CUTS).slopes
     pieces, at = searching.pieces, np.empty(6)

@@ -110,14 +110,7 @@ class Slack(NamedTuple):
 
     @classmethod
     def of(cls, friction: float, maps: int, measure: Measure, more: float = 0.0) -> "Slack":
-        """Return the slack of proofs about a measure.
-
-        Args:
-            friction: Coulomb coefficient.
-            maps: How many symmetries are used, the identity included.
-            measure: The loads; only the Ferrari-Canny quality raises the bound.
-            more: What is left in addition, over 1 + mu.
-        """
+        """Return the slack of proofs about a measure."""
         lost = ROUNDING + (INEXACT if maps > 1 else 0.0)
         slack = (1.0 + friction) * lost + (1.0 + friction) * more
         return cls(slack, 0.0) if measure.is_usual else cls(0.0, slack)

@@ -60,9 +60,7 @@ the first ones. They are so many at most, as each is a program more in every ste
 def climbs_for_weight(faces: ContactFaces, y: Array) -> Iterator[Array]:
     """Yield where contacts in force closure come to by climbing for the weight, (k, 2) each.
 
-    Args:
-        faces: The faces.
-        y: Plane coordinates of the contacts, (k, 2).
+    Takes `y` (k, 2).
     """
     forces = _spread()
     for _ in range(ROUNDS):
@@ -101,10 +99,7 @@ def _weakest(found: ResistedLoads) -> Array:
 def climbed_for_task(faces: ContactFaces, measure: Measure, y: Array) -> Array:
     """Move contacts in force closure uphill to a local optimum, and return where they are.
 
-    Args:
-        faces: The faces.
-        measure: The task.
-        y: Plane coordinates of the contacts, (k, 2).
+    Takes `y` (k, 2).
     """
     reach, found = FIRST_REACH, _planes(faces, measure, y)
     for _ in range(MOST_STEPS):

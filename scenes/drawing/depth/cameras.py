@@ -68,14 +68,7 @@ class Lens:
 def around(center: Array, distance: float, count: int, rng: np.random.Generator) -> Array:
     """Place cameras on a sphere, evenly: a spiral of points that is turned at random.
 
-    Args:
-        center: The point at which all cameras look, (3,) [m].
-        distance: Their distance from it [m].
-        count: Number of cameras.
-        rng: Source of the random turn of the spiral, and of each camera about its own axis.
-
-    Returns:
-        Poses of the cameras' frames, (count, 4, 4).
+    Takes `center` (3,) [m]; `distance` [m]. Gives poses of the cameras' frames, (count, 4, 4).
     """
     heights = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
     across, turns = np.sqrt(1.0 - heights**2), GOLDEN * np.arange(count)
@@ -90,14 +83,8 @@ def around(center: Array, distance: float, count: int, rng: np.random.Generator)
 def above(center: Array, distance: float, ups: Array, rng: np.random.Generator) -> Array:
     """Place cameras above a table, each upright, as likely at any azimuth.
 
-    Args:
-        center: The point at which all cameras look, (3,) [m].
-        distance: Their distance from it [m].
-        ups: Unit normal of the table for each camera, (n, 3).
-        rng: Source of azimuths, and of elevations between `LOWEST` and `HIGHEST`.
-
-    Returns:
-        Poses of the cameras' frames, (n, 4, 4).
+    Takes `center` (3,) [m]; `distance` [m]; `ups` (n, 3). Gives poses of the cameras' frames, (n,
+    4, 4).
     """
     poses = list[Array]()
     for up in ups:
@@ -112,13 +99,7 @@ def above(center: Array, distance: float, ups: Array, rng: np.random.Generator) 
 def looking(place: Array, way: Array, up: Array) -> Array:
     """Return the pose of a camera that stands at a place and looks along a unit direction.
 
-    Args:
-        place: Where it stands, (3,) [m].
-        way: Unit direction of its z axis, (3,).
-        up: Any direction that points up in the image, not along `way`, (3,).
-
-    Returns:
-        Pose of the camera's frame, (4, 4).
+    Takes `place` (3,) [m]; `way`, `up` (3,). Gives pose of the camera's frame, (4, 4).
     """
     right = np.cross(way, up)
     right = right / np.linalg.norm(right)

@@ -54,14 +54,7 @@ class DepthImages:
 
 
 def depth_images(asked: Sequence[Views]) -> list[DepthImages]:
-    """Draw depth images of objects, all in one process.
-
-    Args:
-        asked: What to draw.
-
-    Raises:
-        GraphicsError: No graphics library draws here; the message quotes it.
-    """
+    """Draw depth images of objects, all in one process."""
     with tempfile.TemporaryDirectory() as folder:
         pairs = list[tuple[Path, Path]]()
         for number, views in enumerate(asked):

@@ -18,8 +18,7 @@ HARDEST = 9
 def png_of(levels: Indices) -> bytes:
     """Write an image.
 
-    Args:
-        levels: Level of the ramp of each pixel, (rows, columns), from the top; -1 for clear ones.
+    Takes `levels` (rows, columns).
     """
     rows, columns = levels.shape
     names = np.where(levels < 0, LEVELS, levels).astype(np.uint8)

@@ -32,13 +32,7 @@ Look: TypeAlias = tuple[tuple[str, str], ...]
 
 
 def svg_of(sheet: Sheet, *, alone: bool = False, paper: bool = False) -> str:
-    """Write a sheet as an SVG element.
-
-    Args:
-        sheet: The drawing.
-        alone: Whether the text is a file of its own, which holds its rules for dark screens.
-        paper: Whether the ground is white, so that rules for dark screens are not needed.
-    """
+    """Write a sheet as an SVG element."""
     runs = [
         (plain, list(marks))
         for plain, marks in groupby(sheet.marks, key=lambda mark: isinstance(mark, Words | Image))

@@ -90,11 +90,7 @@ class PosedHand:
 
 
 def posed_hand(hand: Hand, reach: "HandReach", grasp: Grasp) -> PosedHand:
-    """Take the pose from what `reach_with` found.
-
-    Raises:
-        InputError: The result has no pose, or is about another hand or another grasp.
-    """
+    """Take the pose from what `reach_with` found."""
     from grasp_core.hands.reach import HandReach  # drawings without a hand need no search for one
 
     instance(hand, Hand, "hand", "load_hand makes one")
@@ -176,10 +172,7 @@ def hand_shapes(held: PosedHand) -> tuple[Shape, ...]:
 def _pieces(half: Array, radius: float, least: float) -> Iterator[tuple[Array, ...]]:
     """Yield the sides of a rounded box, cut into pieces about as long as the box is thick.
 
-    Args:
-        half: Half-sizes of the box, (3,) [m].
-        radius: Distance from the box to the surface [m].
-        least: Least length of a piece [m].
+    Takes `half` (3,) [m]; `radius`, `least` [m].
     """
     lengths = 2.0 * (half + radius)
     piece = max(LONG * float(lengths.min()), least)

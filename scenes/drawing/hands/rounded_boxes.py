@@ -31,16 +31,8 @@ Ends: TypeAlias = tuple[bool, bool, bool]
 def rounded_box(low: Array, high: Array, radius: float, outer: Truths) -> tuple[Array, ...]:
     """Make the sides of a rounded box, or of a piece of one that is cut across its axes.
 
-    Args:
-        low: The box's corner with the least coordinates, in its own axes, (3,) [m].
-        high: The opposite corner, (3,) [m].
-        radius: Distance from the box to the surface [m].
-        outer: Whether each end is round, lower ends in the first row, (2, 3); a piece has no side
-            where it is cut.
-
-    Returns:
-        Flat sides in the axes of the box, (k, 3) each [m], corners counter-clockwise as seen from
-        outside.
+    Takes `low`, `high` (3,) [m]; `radius` [m]; `outer` (2, 3). Gives flat sides in the axes of the
+    box, (k, 3) each [m], corners counter-clockwise as seen from outside.
     """
     first, last = _ends(outer[0]), _ends(outer[1])
     sides = _sides(_ends(high > low), radius > 0.0, first, last)
@@ -62,14 +54,7 @@ def _corners(low: Array, high: Array, radius: float, first: Ends, last: Ends) ->
 
 @cache
 def _sides(long: Ends, rounded: bool, first: Ends, last: Ends) -> tuple[Indices, ...]:
-    """Return the corners of each side that has an area and is not a cut.
-
-    Args:
-        long: Whether the box has a length along each axis.
-        rounded: Whether the radius is above zero.
-        first: Whether each lower end is round or, if not, a cut.
-        last: The same of the upper ends.
-    """
+    """Return the corners of each side that has an area and is not a cut."""
     # which corners coincide does not depend on sizes, so that a box of size 1 tells
     high = np.array(long, dtype=float)
     corners = _corners(-high, high, float(rounded), first, last)
@@ -107,9 +92,8 @@ def _without_repeats(side: Indices, corners: Array) -> Indices:
 def _grid() -> tuple[Array, Truths]:
     """Return the points of a ball, from its upper pole to its lower one, and their octants.
 
-    Returns:
-        Unit vectors, (rows, columns, 3), and whether each belongs to the upper half along each
-        axis, of the same shape.
+    Gives unit vectors, (rows, columns, 3), and whether each belongs to the upper half along each
+    axis, of the same shape.
     """
     quarter = np.linspace(0.0, 0.5 * np.pi, STEPS + 1)
     heights = np.concatenate([quarter[::-1], -quarter])

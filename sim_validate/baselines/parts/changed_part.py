@@ -159,9 +159,6 @@ class Present:
         """Measure how faces moved from where they were when a baseline was written.
 
         If the baseline does not hold the part, it was written on the planned one.
-
-        Raises:
-            InputError: The baseline's mesh is refused.
         """
         planned, part, now = self.planned, before.part, self.saved.body
         found = replace(self, recorded_unit=before.unit)
@@ -177,17 +174,7 @@ class Present:
 
 
 def present(saved: SavedGrasps, path: Path, source: Source, asked: IfChanged = CARRY) -> Present:
-    """Carry grasps over to their part as it is now; they stay as they are if it has not changed.
-
-    Args:
-        saved: The grasps of a file.
-        path: Path of that file, for messages.
-        source: Their mesh file.
-        asked: What to do if it has changed.
-
-    Raises:
-        ChangedPartError: The part has changed, and that is refused or cannot be judged.
-    """
+    """Carry grasps over to their part as it is now; they stay as they are if it has not changed."""
     if source.note and asked.missing == FAIL:
         raise ChangedPartError(
             f"{path}: the mesh file that its grasps were planned from, {saved.body.name!r} with "
@@ -208,11 +195,7 @@ def present(saved: SavedGrasps, path: Path, source: Source, asked: IfChanged = C
 
 
 def _carried(saved: SavedGrasps, path: Path, file: Path, asked: IfChanged) -> tuple[str, Transfer]:
-    """Read the changed part, in the unit that is returned, and carry the grasps over to it.
-
-    Raises:
-        ChangedPartError: The part cannot be read, or is curved.
-    """
+    """Read the changed part, in the unit that is returned, and carry the grasps over to it."""
     try:
         check_planar(saved.body, "the old part")
         scale = asked.scale or 1.0
@@ -239,15 +222,7 @@ def _tested(saved: SavedGrasps, carried: Transfer) -> SavedGrasps:
 
 
 def testable(now: Present, limit: int | None) -> SavedGrasps:
-    """Return the grasps that a new baseline is about.
-
-    Args:
-        now: The grasps on the part as it is now.
-        limit: Number of grasps of the file to keep, the first ones; None for all.
-
-    Raises:
-        ChangedPartError: None of them could be carried over to the changed part.
-    """
+    """Return the grasps that a new baseline is about."""
     first = now.first(limit)
     if first.gone and not first.saved.grasps:
         name, why = next(iter(first.gone.items()))

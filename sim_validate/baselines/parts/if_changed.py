@@ -62,11 +62,7 @@ KNOWN = tuple(each.name for each in fields(IfChanged))
 
 
 def if_changed(table: object) -> IfChanged:
-    """Read the table `[changed_part]` of a `*.grasps.toml` file, or the same given by a marker.
-
-    Raises:
-        InputError: A setting is unknown or out of range.
-    """
+    """Read the table `[changed_part]` of a `*.grasps.toml` file, or the same given by a marker."""
     if not isinstance(table, Mapping):
         raise InputError(f"{TABLE}: expected a table of settings, got {shown(table)}")
     given = {**cast("Mapping[str, Any]", table)}

@@ -33,11 +33,7 @@ class Moves:
         return in_words(self.faces, self.added, self.numbers)
 
     def touched(self, faces: Iterable[int]) -> str:
-        """Say which of some faces moved, such as `face 3, which moved`; empty if none did.
-
-        Args:
-            faces: Their numbers on the planned part.
-        """
+        """Say which of some faces moved, such as `face 3, which moved`; empty if none did."""
         wanted = {*faces}
         names = (
             change.old if self.numbers is None else self.numbers.get(change.old)
@@ -57,14 +53,7 @@ def moves_since_planning(carried: Transfer) -> Moves:
 def moves_since_baseline(
     then: Polyhedron, planned: Polyhedron, now: Polyhedron, rule: Likeness
 ) -> Moves:
-    """Compare a part with what it was when its baseline was written.
-
-    Args:
-        then: The part of the baseline.
-        planned: The part that the grasps were planned on.
-        now: The part as it is now.
-        rule: How near, and how little turned, a face must be to be the same one.
-    """
+    """Compare a part with what it was when its baseline was written."""
     numbers = {
         change.new: change.old
         for change in face_changes(planned, then, rule)

@@ -36,15 +36,7 @@ class RecordedPart:
     """What is known of them."""
 
     def body(self, name: str, content_sha256: str) -> Polyhedron:
-        """Build the part, with planar faces.
-
-        Args:
-            name: Name of the object.
-            content_sha256: Hash of its mesh, as the baseline says it.
-
-        Raises:
-            InputError: The mesh is no solid, or has another hash.
-        """
+        """Build the part, with planar faces."""
         try:
             found = polyhedron_from_mesh(
                 self.vertices_m,
@@ -76,12 +68,7 @@ class RecordedShape:
 
 
 def recorded_part(planned: Polyhedron, tested: Polyhedron) -> RecordedPart | None:
-    """Record the part that a baseline is written on; None if it is the planned one.
-
-    Args:
-        planned: The part that the grasps were planned on.
-        tested: The part that they were tested on.
-    """
+    """Record the part that a baseline is written on; None if it is the planned one."""
     if planned.content_sha256 == tested.content_sha256:
         return None
     rows = tested.vertices.tolist()

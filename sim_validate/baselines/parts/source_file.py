@@ -43,16 +43,6 @@ def source_of(
     """Find the mesh file that grasps were planned from.
 
     Of several files with the object's name, an unchanged one is taken, or else the first.
-
-    Args:
-        saved: The grasps.
-        grasps: Path of the file of grasps, for messages; its folder is searched first.
-        folders: Further folders in which a mesh file with the object's name is searched.
-        named: The mesh file if the user names it; then nothing else is searched.
-        scale: Factor on the coordinates of the file, besides its unit; None for 1.
-
-    Raises:
-        InputError: The named file is missing, or the grasps were not planned from a file.
     """
     body = saved.body
     if body.source_sha256 == body.content_sha256:

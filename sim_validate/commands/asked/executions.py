@@ -24,11 +24,7 @@ Down = tuple[float, float, float]
 
 
 def check_mass(given: Mass) -> None:
-    """Refuse a mass beside a density, before any file is read.
-
-    Raises:
-        FlagsError: Both are given.
-    """
+    """Refuse a mass beside a density, before any file is read."""
     if given.mass_kg is not None and given.density_kg_m3 is not None:
         raise FlagsError("--mass-kg and --density-kg-m3 exclude each other: leave one of them out")
 
@@ -41,11 +37,7 @@ def mass_of(body: Polyhedron, given: Mass) -> float:
 
 
 def holding(saved: SavedGrasps, mass: Mass, tips: Tips, down: Down) -> ExecutionSettings:
-    """Build the settings of what holds and is held; trials are the usual ones.
-
-    Raises:
-        InputError: The object's mass is out of range.
-    """
+    """Build the settings of what holds and is held; trials are the usual ones."""
     planned = None if saved.finger is None else saved.finger.radius_m
     return ExecutionSettings(
         mass_kg=mass_of(saved.body, mass),
@@ -61,18 +53,7 @@ def holding(saved: SavedGrasps, mass: Mass, tips: Tips, down: Down) -> Execution
 def execution_settings(
     saved: SavedGrasps, given: Executing, trials: tuple[str, ...], down: Down
 ) -> ExecutionSettings:
-    """Build the settings of executions.
-
-    Args:
-        saved: The object, whose volume gives its mass where only a density is known; the seed of
-            the directions of misplaced objects; and the fingers that were planned for.
-        given: The flags.
-        trials: Values of the flag that names trials; all trials if empty.
-        down: Direction of gravity in the object's frame.
-
-    Raises:
-        InputError: The object's mass is out of range.
-    """
+    """Build the settings of executions."""
     named = {word for text in trials for word in trials_in(text)} or set(TRIALS)
     return replace(
         holding(saved, given.mass, given.tips, down),
@@ -94,11 +75,7 @@ def execution_settings(
 
 
 def check_executing(command: Run) -> None:
-    """Refuse flags about executions where none are asked for, before any file is read.
-
-    Raises:
-        FlagsError: The flags contradict each other.
-    """
+    """Refuse flags about executions where none are asked for, before any file is read."""
     check_mass(command.executing.mass)
     given = (command.executing, command.execute_trials, command.execute_down)
     if not command.execute and given != (Executing(), (), UPRIGHT):
@@ -109,11 +86,7 @@ def check_executing(command: Run) -> None:
 
 
 def execution_of_run(command: Run, body: Polyhedron) -> ExecutionSettings | None:
-    """Build the settings of the executions that `run` is asked for; None if it is not.
-
-    Raises:
-        InputError: The object's mass is out of range.
-    """
+    """Build the settings of the executions that `run` is asked for; None if it is not."""
     if not command.execute:
         return None
     planning = command.planning

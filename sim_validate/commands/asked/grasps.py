@@ -12,9 +12,6 @@ def saved_grasps(path: Path, reporter: Reporter) -> SavedGrasps | None:
     """Read a `grasps.json`, and warn of what was changed in its mesh.
 
     None, with a word about it, if the file holds no grasp.
-
-    Raises:
-        InputError: The file is missing or invalid; the message names the field.
     """
     saved = read_grasps(path)
     for note in saved.body.surface.notes():

@@ -56,11 +56,7 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
 
 
 def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter) -> Polyhedron:
-    """Load the object and check that the planning flags fit it.
-
-    Raises:
-        InputError: The object or a setting is refused.
-    """
+    """Load the object and check that the planning flags fit it."""
     if planning.ceiling is not None and not planning.optimize:
         raise InputError(
             "--ceiling needs --optimize, because it bounds the quality that moved contacts can "

@@ -25,11 +25,7 @@ def finger_settings(given: flag_groups.Fingers) -> FingerSettings:
 
 
 def noise_of(given: flag_groups.Repeats) -> Noise:
-    """Build noise settings from the flags.
-
-    Raises:
-        FlagsError: Flags set the noise, but ask for no repeats with noise.
-    """
+    """Build noise settings from the flags."""
     plain = flag_groups.Repeats()
     if not given.trials and given != plain:
         raise FlagsError(
@@ -48,17 +44,7 @@ def noise_of(given: flag_groups.Repeats) -> Noise:
 def prepared(
     testing: flag_groups.Testing, planned: Finger | None, seed: int, folder: Path | None
 ) -> tuple[Setup, Agenda]:
-    """Build the settings and the choice of trials from flags and files, before anything runs.
-
-    Args:
-        testing: The flags.
-        planned: The fingers that the grasps are planned for.
-        seed: Seed of everything random.
-        folder: Where results go, if anywhere.
-
-    Raises:
-        InputError: A flag or a file is refused, or flags contradict each other.
-    """
+    """Build the settings and the choice of trials from flags and files, before anything runs."""
     return _setup(testing, planned), _agenda(testing, seed, folder)
 
 

@@ -28,12 +28,6 @@ def best_to_document(
 
     Measures other than the Ferrari-Canny quality are newtons of weight, or multiples of wrenches,
     so that their keys have no unit.
-
-    Args:
-        body: The object.
-        best: What the search found.
-        planned: Grasps that were planned, to be compared with it.
-        proof: Name of the file that holds the proof, or None.
     """
     grasp, quality, usual = best.grasp, best.quality, best.proof.measure.is_usual
     unit = "_n" if usual else ""

@@ -40,14 +40,7 @@ def search_best(
 ) -> BestGrasp:  # fmt: skip
     """Search for the best grasp, and show how the gap closes.
 
-    Args:
-        body: The object.
-        command: The flags.
-        wrenches: Those of a task, (m, 6) [N, N m]; None for other measures.
-        reporter: Shows the progress.
-
-    Raises:
-        InputError: A setting is refused, or there is no grasp.
+    Takes `wrenches` (m, 6) [N, N m].
     """
     planning = command.planning
     with reporter.progress("bounding") as steps:

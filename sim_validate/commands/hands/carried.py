@@ -17,9 +17,8 @@ COLUMN = "payload kg"
 def carried(hand: Hand, saved: SavedGrasps, found: Sequence[HandReach]) -> dict[str, HandPayload]:
     """Find the largest mass in any orientation, by the ids of the grasps that are reached.
 
-    Returns:
-        Nothing for a hand whose motors or links are not known well enough, and none for grasps in
-        which motors cannot carry their links.
+    Gives nothing for a hand whose motors or links are not known well enough, and none for grasps in
+    which motors cannot carry their links.
     """
     unknown = any(link.mass_kg is None or link.center_of_mass is None for link in hand.links)
     if unknown or any(joint.torque_limit_n_m is None for joint in hand.free_joints):

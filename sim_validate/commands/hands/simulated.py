@@ -18,12 +18,7 @@ COLUMNS = ("grasp", "weakest wrench N", "held", "controls let go")
 
 
 def with_motors(hand: Hand, command: hand_flags.Reach) -> Hand:
-    """Return the hand with the torque limits that the command gives.
-
-    Raises:
-        InputError: A simulation is asked for, and a joint has no torque limit or follows another;
-            or a published test is asked for without a simulation.
-    """
+    """Return the hand with the torque limits that the command gives."""
     if command.torque_limit_n_m is not None:
         hand = hand.with_torque_limits(command.torque_limit_n_m, GIVEN)
     if command.protocol and not command.simulate:

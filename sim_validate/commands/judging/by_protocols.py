@@ -26,8 +26,7 @@ def judge_grasps(
 ) -> tuple[Exit, str]:  # fmt: skip
     """Judge the grasps of a file by tests with four fingertips.
 
-    Returns:
-        The exit code, and the text of judgements.json.
+    Gives the exit code, and the text of judgements.json.
     """
     cases = [
         GraspCase(name, saved.body, grasp, saved.friction, setup, saved.seed)
@@ -43,8 +42,7 @@ def judge_hands(  # noqa: PLR0913 - the hand, its poses, and where results go
 ) -> tuple[Exit, str]:  # fmt: skip
     """Judge the poses of a hand in the grasps of a file by tests.
 
-    Returns:
-        The exit code, and the text of judgements.json.
+    Gives the exit code, and the text of judgements.json.
     """
     cases = [
         HandCase(name, hand, saved.body, each, saved.friction, seed)

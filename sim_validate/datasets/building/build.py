@@ -55,19 +55,7 @@ def build(
 ) -> Built:
     """Build a dataset, or resume an interrupted build.
 
-    Args:
-        config: What the dataset is made of.
-        folder: Folder of the dataset; it may hold an unfinished or finished dataset of the same
-            configuration.
-        engine: What computes the units of work: processes of this machine, or a cluster.
-        report: Called with (finished, total) after each unit.
-        limits: Time and memory for each unit; not for an engine that computes in this process.
-
-    Raises:
-        InputError: An object does not exist, the folder holds other files, or another command is
-            writing to it.
-        UnfaithfulError: The simulator fails its checks on cases with known answers.
-        WorkerError: A worker process cannot compute units of work.
+    Takes `report` (finished, total).
     """
     pyarrow()  # before any work, so that a missing library is named at once
     units = units_of(config)
@@ -103,11 +91,7 @@ def _refuse_sources_inside(units: Sequence[WorkUnit], config: DatasetConfig, fol
 
 
 def _refuse_others(folder: Path, config: DatasetConfig) -> None:
-    """Refuse a folder with other files, and remove half-written files of a killed build.
-
-    Raises:
-        InputError: The folder holds other files, or a dataset of another configuration.
-    """
+    """Refuse a folder with other files, and remove half-written files of a killed build."""
     stated = folder / CONFIG
     own = OWN if stated.is_file() else ()
     half_written = tuple(f".{name}." for name in OWN)
@@ -127,12 +111,7 @@ def _refuse_others(folder: Path, config: DatasetConfig) -> None:
 
 
 def _as_built(folder: Path, units: Sequence[WorkUnit], made: int = 0) -> Built:
-    """Describe a finished dataset, after a check that it is the one asked for.
-
-    Raises:
-        InputError: The dataset was made from other meshes or contacts, or by other versions, or is
-            damaged.
-    """
+    """Describe a finished dataset, after a check that it is the one asked for."""
     manifest = read_manifest(folder)
     if manifest.units_sha256 != units_sha256(units):
         raise InputError(

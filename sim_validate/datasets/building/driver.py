@@ -49,17 +49,7 @@ def drive(
 ) -> None:
     """Have all units computed; each one is kept or quarantined in the end.
 
-    Args:
-        units: The units to compute.
-        staging: The folder of finished units.
-        engine: The engine that computes them.
-        report: Called with (finished, total) when units finish.
-        limits: Time and memory for each unit.
-        work: The function that computes a unit.
-
-    Raises:
-        WorkerError: A worker process cannot compute units of work.
-        OSError: The rows of a unit cannot be written.
+    Takes `report` (finished, total).
     """
     own = dict(provenance())
     told = -1
@@ -102,12 +92,7 @@ def _try_alone(task: Task, engine: Engine) -> None:
 
 
 def _succeeded(future: "Future[None]", task: Task, engine: Engine) -> bool:
-    """Tell whether a unit was computed; False if its worker process died or was stopped.
-
-    Raises:
-        WorkerError: The worker process cannot compute units of work.
-        OSError: The unit's rows could not be written.
-    """
+    """Tell whether a unit was computed; False if its worker process died or was stopped."""
     error = future.exception()
     if error is None:
         if task.staging.finished(task.unit):

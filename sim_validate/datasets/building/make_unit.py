@@ -37,15 +37,7 @@ class Made:
 
 
 def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
-    """Plan the grasps of a unit or judge the given ones, simulate them, and make their rows.
-
-    Args:
-        unit: The unit to compute.
-        body: The object of the unit.
-
-    Raises:
-        GraspError: The simulator fails its checks on cases with known answers.
-    """
+    """Plan the grasps of a unit or judge the given ones, simulate them, and make their rows."""
     making = _Making(unit, body)
     if unit.given:
         making.judge()
@@ -107,12 +99,7 @@ class _Making:
                 self.found.add_untried(given, str(error))
 
     def _judge(self, given: GivenGrasp) -> None:
-        """Simulate a given grasp: as a grasp if force-closed, else as a negative control.
-
-        Raises:
-            InputError: A contact is not on the object, or fingertips find no room.
-            UndecidedError: Rounding does not let closure be decided.
-        """
+        """Simulate a given grasp: as a grasp if force-closed, else as a negative control."""
         friction = self.unit.friction
         seated = seat(self.body, given.points, given.normals)
         grasp = grasp_of(seated, friction, given.id)

@@ -89,11 +89,7 @@ class Staging:
         self._put(unit, {}, reason=reason)
 
     def result(self, unit: WorkUnit) -> Finished | str:
-        """Look up how a unit ended: with its object and split, or with a reason for no rows.
-
-        Raises:
-            InputError: The record of the unit is damaged.
-        """
+        """Look up how a unit ended: with its object and split, or with a reason for no rows."""
         record = self._record(unit)
         if record.reason is not None:
             return record.reason

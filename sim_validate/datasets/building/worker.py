@@ -38,12 +38,7 @@ Work: TypeAlias = Callable[[WorkUnit, Staging], None]
 
 
 def do_unit(unit: WorkUnit, staging: Staging) -> None:
-    """Compute the rows of a unit and keep them, or the reason why there are none.
-
-    Raises:
-        WorkerError: The worker process cannot see the unit's mesh.
-        OSError: The rows cannot be written.
-    """
+    """Compute the rows of a unit and keep them, or the reason why there are none."""
     try:
         staging.write(unit, made_of(unit, body_of(unit)))
     except WorkerError:
@@ -74,12 +69,7 @@ class Task:
 
 
 def do_task(task: Task) -> None:
-    """Compute a unit in a worker process, and keep its rows.
-
-    Raises:
-        WorkerError: The worker process has other packages, or cannot see the folder of the
-            dataset.
-    """
+    """Compute a unit in a worker process, and keep its rows."""
     _check_worker(task)
     if task.limits is None:
         task.work(task.unit, task.staging)

@@ -56,12 +56,7 @@ ADDRESS = re.compile(r"https?://[^\s<>\"'`\\|{}^]+")
 
 
 def card_text(config: DatasetConfig, manifest: Manifest) -> str:
-    """Write the README.md of a dataset.
-
-    Args:
-        config: What the dataset is made of.
-        manifest: The files of the dataset's tables, and the versions that made them.
-    """
+    """Write the README.md of a dataset."""
     sections = (
         _header(config, manifest),
         f"# {_as_markdown(config.title) or 'Grasps'}\n\n{summary(config, manifest)}\n"

@@ -63,11 +63,7 @@ class Stats:
 
 
 def stats_of(chosen: Selection) -> Stats:
-    """Count the rows of a dataset; memory holds one number per row and column.
-
-    Raises:
-        InputError: A file is damaged.
-    """
+    """Count the rows of a dataset; memory holds one number per row and column."""
     counts: dict[str, Counter[str]] = {}
     survival: dict[str, Counter[str]] = {}
     spreads = list[Spread]()

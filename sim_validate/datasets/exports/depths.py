@@ -77,18 +77,7 @@ def write_depths(
 ) -> int:
     """Write a file of depth images for each object, and an index of them.
 
-    Args:
-        out: Folder to make; it appears only when it is complete.
-        chosen: The dataset, or one of its splits.
-        asked: Which images are drawn.
-        report: Called with (drawn, total) after some objects.
-
-    Returns:
-        Number of objects.
-
-    Raises:
-        InputError: A file of the dataset is damaged, or the folder to make holds something.
-        GraphicsError: No graphics library draws here.
+    Takes `report` (drawn, total). Gives number of objects.
     """
     faces, total, listed = chosen.config().faces, chosen.counts()["objects"], list[Any]()
     with whole_folder(out) as folder:

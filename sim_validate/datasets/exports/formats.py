@@ -52,16 +52,7 @@ def export(
 ) -> Exported:
     """Write a dataset in another format; the same dataset gives the same bytes.
 
-    Args:
-        folder: Folder of the dataset.
-        to: The format.
-        out: Folder to make; it appears only when it is complete.
-        split: The split whose objects are written; all if None.
-        report: Called with (written, total) while writing.
-
-    Raises:
-        InputError: The dataset is missing, unfinished or damaged, the folder to make is inside it
-            or holds something, or a package that the format needs is not installed.
+    Takes `report` (written, total).
     """
     pyarrow()  # before any work, so that a missing library is named at once
     chosen = select(folder, split)

@@ -50,11 +50,7 @@ HEAD = """\
 def write_isaac(
     chosen: Selection, folder: Path, report: Callable[[int, int], None]
 ) -> dict[Name, int]:
-    """Write one file for the grasps of each object at each friction.
-
-    Raises:
-        InputError: The dataset is damaged.
-    """
+    """Write one file for the grasps of each object at each friction."""
     facts, total = chosen.facts(), chosen.counts()["objects"]
     objects = grasps = 0
     for each in grasped_objects(chosen):

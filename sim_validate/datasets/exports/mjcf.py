@@ -13,11 +13,7 @@ from sim_validate.datasets.open_dataset import Selection
 def write_mjcf(
     chosen: Selection, folder: Path, report: Callable[[int, int], None]
 ) -> dict[Name, int]:
-    """Write the MuJoCo scene of each grasp, rebuilt from its mesh and contacts.
-
-    Raises:
-        InputError: The dataset is damaged.
-    """
+    """Write the MuJoCo scene of each grasp, rebuilt from its mesh and contacts."""
     total = sum(map(is_grasp, chosen.rows("grasps")))
     objects = grasps = 0
     for each in grasped_objects(chosen):

@@ -44,11 +44,7 @@ class GraspedObject:
 
 
 def grasped_objects(chosen: Selection) -> Iterator[GraspedObject]:
-    """Yield all objects that have grasps, in the order of the tables.
-
-    Raises:
-        InputError: A table or a mesh is damaged, or a grasp's object is missing.
-    """
+    """Yield all objects that have grasps, in the order of the tables."""
     names = {row["object_id"]: row["source_name"] for row in chosen.rows("objects")}
     faces = chosen.config().faces
     planned = (row for row in chosen.rows("grasps") if is_grasp(row))
@@ -79,11 +75,7 @@ def _grasp(row: Mapping[str, Any]) -> StoredGrasp:
 
 
 def new_path(folder: Path, name: str, ending: str) -> Path:
-    """Make a path for a file with a given name, whatever characters the name has.
-
-    Raises:
-        InputError: A file of the same name exists.
-    """
+    """Make a path for a file with a given name, whatever characters the name has."""
     path = folder / f"{UNSAFE.sub('_', name).lstrip('.')[:LONGEST]}.{ending}"
     if path.exists():
         raise InputError(

@@ -46,14 +46,7 @@ def write_tables(
 ) -> dict[Name, int]:
     """Write a file for each table, and `about.json` with the dataset's origin and its columns.
 
-    Args:
-        write: Writes one table into a folder: `csv_file`, `json_lines` or `archive`.
-        chosen: The dataset, or the split to write.
-        folder: Folder to write into.
-        report: Called with (written, total) after each table.
-
-    Raises:
-        InputError: The dataset is damaged.
+    Takes `report` (written, total).
     """
     tables = chosen.tables
     for done, name in enumerate(tables, start=1):
@@ -95,11 +88,7 @@ def archive(chosen: Selection, name: Name, folder: Path) -> None:
 def write_hdf5(
     chosen: Selection, folder: Path, report: Callable[[int, int], None]
 ) -> dict[Name, int]:
-    """Write all tables into one file, a group per table, with units and meanings as attributes.
-
-    Raises:
-        InputError: The dataset is damaged, or h5py is not installed.
-    """
+    """Write all tables into one file, a group per table, with units and meanings as attributes."""
     try:
         h5py: Any = importlib.import_module("h5py")
     except ImportError as error:

@@ -106,12 +106,7 @@ GROUPS: Mapping[str, Group] = {
 
 
 def dataset_tables(*, executed: bool, groups: Mapping[str, int] | None = None) -> Tables:
-    """Return the tables of a dataset with their columns.
-
-    Args:
-        executed: Whether the dataset has executions.
-        groups: Groups of columns on request, with their sizes.
-    """
+    """Return the tables of a dataset with their columns."""
     tables = dict(base_tables(executed=executed))
     sizes = groups or {}
     for group, size in ((group, sizes[group]) for group in GROUPS if group in sizes):

@@ -125,13 +125,7 @@ def approach_cells(body: Polyhedron, grasp: Grasp) -> Cells:
 def symmetry_cells(
     body: Polyhedron, grasps: Sequence[Grasp], names: Sequence[str]
 ) -> Iterator[Cells]:
-    """Yield each grasp's class and multiplicity, in the order of the grasps.
-
-    Args:
-        body: The object.
-        grasps: All grasps of the object at one friction.
-        names: Names of their rows.
-    """
+    """Yield each grasp's class and multiplicity, in the order of the grasps."""
     firsts = np.empty(len(grasps), dtype=object)
     for copies in copies_of(body, grasps):
         firsts[list(copies.places)] = names[copies.first]

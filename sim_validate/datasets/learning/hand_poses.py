@@ -20,15 +20,7 @@ def hand_named(name: str) -> Hand:
 def hand_cells(
     hand: Hand, body: Polyhedron, grasp: Grasp, friction: float, seed: int
 ) -> Mapping[str, Any]:
-    """Look for a pose of a hand in a grasp, and return the cells that tell of it.
-
-    Args:
-        hand: The hand, with as many fingers or more as the grasp has contacts.
-        body: The object.
-        grasp: The grasp; fingertips may stand anywhere in its regions.
-        friction: Coulomb coefficient at every contact.
-        seed: Seed of the postures from which the search starts.
-    """
+    """Look for a pose of a hand in a grasp, and return the cells that tell of it."""
     found = reach_with(hand, body, grasp, friction, seed=seed)
     cells: dict[str, Any] = {"hand_reached": found.reached, "hand_reason": found.reason}
     return {**cells, **_pose_cells(found)} if found.reached else cells

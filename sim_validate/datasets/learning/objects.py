@@ -22,14 +22,7 @@ middle to the longest side of a long one; others are flat."""
 
 
 def object_cells(body: Polyhedron, name: str, asked: Learning, seed: int) -> Mapping[str, Any]:
-    """Return the cells of an object's row that are there on request.
-
-    Args:
-        body: The object.
-        name: A mesh file as it was given, or the name of a built-in object.
-        asked: What is asked for.
-        seed: Seed of the points.
-    """
+    """Return the cells of an object's row that are there on request."""
     cells: dict[str, Any] = {
         "shape_class": asked.classes.get(Path(name).name, shape_class(body)),
         "box_sides_m": box_sides(body).tolist(),

@@ -120,12 +120,7 @@ class Learning:
         return self.scales.get(Path(name).name, usual)
 
     def of_object(self, name: str, scale: float) -> "Learning":
-        """Return the settings of one object, whose size does not grow with the number of all.
-
-        Args:
-            name: A mesh file, or the name of a built-in object.
-            scale: The factor by which it is scaled.
-        """
+        """Return the settings of one object, whose size does not grow with the number of all."""
         own = Path(name).name
         kept = {
             table: {key: value for key, value in getattr(self, table).items() if key == own}
@@ -136,11 +131,7 @@ class Learning:
         return replace(self, **kept)
 
     def check_names(self, names: Sequence[str]) -> None:
-        """Refuse tables about objects that are not there.
-
-        Raises:
-            InputError: A name is that of no object.
-        """
+        """Refuse tables about objects that are not there."""
         for table in BY_NAME:
             if unknown := [name for name in getattr(self, table) if name not in names]:
                 raise InputError(
@@ -158,11 +149,7 @@ class Learning:
 
 
 def asked_learning(table: object) -> Learning:
-    """Read the table `[learning]` of a settings file.
-
-    Raises:
-        InputError: A setting is unknown or out of range.
-    """
+    """Read the table `[learning]` of a settings file."""
     if not isinstance(table, Mapping):
         raise InputError(f"{TABLE}: expected a table of settings, got {shown(table)}")
     given = cast("Mapping[str, Any]", table)

@@ -19,11 +19,6 @@ def assigned(classes: Mapping[str, str], by: str, seed: int) -> dict[str, SplitN
 
     Classes are whole in one split. Two classes leave none for validation, which then takes objects
     of the larger one; objects of a single class are divided one by one.
-
-    Args:
-        classes: Class of each object's shape, by the object's name.
-        by: `object` or `class`.
-        seed: Seed of the draw.
     """
     kinds = sorted(set(classes.values()))
     if by == "object" or len(kinds) < SPLIT_COUNT - 1:

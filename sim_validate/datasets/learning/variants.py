@@ -82,15 +82,7 @@ def ratio_of(friction: float, critical: float | None) -> float | None:
 def variants(
     body: Polyhedron, grasp: Grasp, friction: float, asked: Learning, seed: int
 ) -> Iterator[Variant]:
-    """Yield the varied grasps that are asked for, as far as they exist and can be decided.
-
-    Args:
-        body: The object.
-        grasp: A grasp in force closure.
-        friction: Coulomb coefficient of the grasp.
-        asked: How many of each kind.
-        seed: Seed of the draws.
-    """
+    """Yield the varied grasps that are asked for, as far as they exist and can be decided."""
     for kind in ("friction_below", "friction_near", "friction_above"):
         for number in range(getattr(asked, kind)):
             ratio = _ratio(kind, draws(seed, grasp.id, kind, number))
@@ -105,13 +97,7 @@ def variants(
 def with_mass(variant: Variant, lost_kg: float, rng: np.random.Generator) -> Variant | None:
     """Return a variant with a mass near the one at which the object is predicted to be lost.
 
-    Args:
-        variant: The grasp as it is.
-        lost_kg: Mass at which the object is predicted to be lost [kg].
-        rng: Draws the ratio of the masses.
-
-    Returns:
-        The variant; None if that mass is zero or infinite.
+    Takes `lost_kg` [kg]. Gives the variant; None if that mass is zero or infinite.
     """
     mass_kg = _short(_ratio("mass_near", rng) * lost_kg)
     if not 0.0 < mass_kg < math.inf:

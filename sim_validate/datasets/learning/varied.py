@@ -66,14 +66,7 @@ class Varying:
     def of(
         self, body: Polyhedron, grasp: Grasp, verdict: Verdict, executed: Executed
     ) -> Iterator[Tried]:
-        """Yield the varied grasps made from a grasp, with their trials.
-
-        Args:
-            body: The object.
-            grasp: The grasp.
-            verdict: Its trials, whose checks of the simulator also hold for varied grasps.
-            executed: Its execution.
-        """
+        """Yield the varied grasps made from a grasp, with their trials."""
         for each in variants(body, grasp, self.friction, self.asked, self.agenda.seed):
             try:
                 yield Tried(each, self._verdict(each, verdict.gate), self._executed(each))

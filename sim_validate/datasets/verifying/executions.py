@@ -37,16 +37,7 @@ CLAIMS = (
 
 
 def execution_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> Iterator[str]:
-    """Yield sentences on what is wrong with the executions of one object.
-
-    Args:
-        folder: Folder of the dataset.
-        config: Settings of the dataset.
-        rows: Rows of the object in all tables.
-
-    Raises:
-        InputError: The object's mesh is damaged.
-    """
+    """Yield sentences on what is wrong with the executions of one object."""
     asked = config.execution
     if asked is None:
         return

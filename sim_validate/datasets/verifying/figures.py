@@ -30,11 +30,7 @@ STEPS = 8
 
 
 def figure_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> Iterator[str]:
-    """Yield sentences on what is wrong with figures of the grasps of one object.
-
-    Raises:
-        InputError: The object's mesh is damaged.
-    """
+    """Yield sentences on what is wrong with figures of the grasps of one object."""
     if config.learning is None:
         return
     figures, asked = Figures(config.learning, config.execution), config.learning.hand

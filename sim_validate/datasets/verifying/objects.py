@@ -21,11 +21,7 @@ ON_IT = 1e-9
 
 
 def object_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> Iterator[str]:
-    """Yield sentences on what is wrong with the units, shapes, points and rests of objects.
-
-    Raises:
-        InputError: An object's mesh is damaged.
-    """
+    """Yield sentences on what is wrong with the units, shapes, points and rests of objects."""
     asked = config.learning
     for row in rows["objects"]:
         name = row["source_name"]
@@ -64,11 +60,7 @@ PLACES = ("down", "height_m", "likelihood")
 
 
 def split_faults(everything: Selection, config: DatasetConfig) -> Iterator[str]:
-    """Yield a sentence on each object that is in another split than counting puts it.
-
-    Raises:
-        InputError: A file is damaged.
-    """
+    """Yield a sentence on each object that is in another split than counting puts it."""
     if config.learning is None or not config.counts_splits:
         return
     rows = {row["object_id"]: row for row in everything.rows("objects")}

@@ -51,16 +51,7 @@ class Sample:
 
 
 def sample_faults(folder: Path, manifest: Manifest, sample: Sample) -> Iterator[str]:
-    """Compute a sample of a dataset again, and yield a sentence about each difference.
-
-    Args:
-        folder: Folder of the dataset.
-        manifest: The manifest of the dataset.
-        sample: Which part of the dataset to compute again.
-
-    Raises:
-        InputError: A file of the dataset is damaged.
-    """
+    """Compute a sample of a dataset again, and yield a sentence about each difference."""
     redoing = _Redoing(folder, manifest)
     everything = Selection(folder, manifest, None)
     units = [

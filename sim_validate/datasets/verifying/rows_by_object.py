@@ -26,11 +26,7 @@ BEGINNINGS: Mapping[Name, Callable[[Row], str]] = {
 
 
 def by_object(chosen: Selection) -> Iterator[ObjectRows]:
-    """Yield the rows of each object in turn.
-
-    Raises:
-        InputError: A file is damaged, or its number of rows differs from the manifest's.
-    """
+    """Yield the rows of each object in turn."""
     streams = {name: _groups(chosen, name) for name in chosen.tables}
     heads: dict[Name, Group | None] = {name: next(streams[name], None) for name in chosen.tables}
     while waiting := [head[0] for head in heads.values() if head is not None]:

@@ -48,13 +48,6 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
     for each contact set its normals, its closure (proved again), and that its trials agree with its
     row; for each execution what its squeeze carries (proved again), and that its trials agree with
     the row; and for a sample, whether planning and simulating again gives the same rows.
-
-    Args:
-        folder: Folder of the dataset.
-        sample: The sample to plan and simulate again; None for none.
-
-    Raises:
-        InputError: The folder holds no finished dataset, or pyarrow is not installed.
     """
     pyarrow()  # before any work, so that a missing library is named at once
     manifest = read_manifest(folder)
@@ -74,11 +67,7 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
 
 
 def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
-    """Yield sentences on what is wrong with rows and meshes, one object at a time.
-
-    Raises:
-        InputError: A file is damaged, or its number of rows differs from the manifest's.
-    """
+    """Yield sentences on what is wrong with rows and meshes, one object at a time."""
     config = config_from_toml(folder / CONFIG)
     for each in manifest.files:
         if each.table and not Path(each.path).name.startswith(f"{each.split}-"):

@@ -20,14 +20,7 @@ def require_faithful_execution(
 ) -> None:
     """Check the simulator on known cases, and refuse settings under which a check fails.
 
-    Args:
-        layout: Layout of the scene to be executed: its mass, size, springs and friction are tested.
-        physics: Settings of the simulator.
-        hand: Masses and damping of the fingers.
-        push_n: Largest push of a finger [N].
-
-    Raises:
-        UnfaithfulError: A check failed; no execution with these settings would count.
+    Takes `push_n` [N].
     """
     for case in cases_of(layout, physics, hand, push_n):
         failed = [check for check in measured_case(case).checks if not check.passed]

@@ -234,10 +234,7 @@ def ring_frequency(points: Array, about: float, sample_s: float) -> float:
 
     Points at equal times t obey x_2 = p x_1 - q x_0 + r with p = 2 sqrt(q) cos(w t).
 
-    Args:
-        points: Samples of the ring, (n,).
-        about: Its frequency, roughly [rad/s].
-        sample_s: Time between samples [s].
+    Takes `points` (n,); `about` [rad/s]; `sample_s` [s].
     """
     stride = max(1, int(RADIANS / (about * sample_s)))
     first, second, third = points[: -2 * stride], points[stride:-stride], points[2 * stride :]

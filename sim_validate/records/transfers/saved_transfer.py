@@ -117,11 +117,7 @@ def load_transfer(path: str | Path) -> SavedTransfer:
 
 
 def transfer_from_json(text: str) -> SavedTransfer:
-    """Read the text of a `transfer.json`.
-
-    Raises:
-        InputError: The text is no such file, or contradicts itself; the message names the field.
-    """
+    """Read the text of a `transfer.json`."""
     record = record_of(TransferFile, text, TRANSFER, schema=SCHEMA)
     found = SavedTransfer(
         old_sha256=record["old"]["content_sha256"],

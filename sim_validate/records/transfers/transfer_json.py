@@ -129,12 +129,7 @@ def _figures_record(found: GraspFigures) -> FiguresRecord:
 
 
 def carried_to_json(found: Transfer, saved: SavedGrasps) -> str:
-    """Write the carried grasps as the text of a `grasps.json` of the changed part.
-
-    Args:
-        found: The transfer.
-        saved: The grasps of the old part, whose seed and fingers are kept.
-    """
+    """Write the carried grasps as the text of a `grasps.json` of the changed part."""
     absence = None
     if not found.carried:
         absence = (

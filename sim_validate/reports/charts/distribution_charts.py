@@ -49,12 +49,7 @@ def histogram(name: str, unit: str, values: Array) -> Sheet:
 
 
 def shares(name: str, counts: Mapping[str, Mapping[str, int]]) -> Sheet:
-    """Draw a bar for each word, divided by outcome, with a key where there are several.
-
-    Args:
-        name: What the words are of.
-        counts: Number of rows by outcome, by word.
-    """
+    """Draw a bar for each word, divided by outcome, with a key where there are several."""
     longest = max(sum(each.values()) for each in counts.values())
     marks: list[Mark] = [Words(8.0, 14.0, name, bold=True)]
     long = WIDTH - LEFT - 60.0

@@ -25,11 +25,7 @@ LEAST_SHOWN = 0.5
 def fidelity_figure(agreements: Sequence[Agreement]) -> Any:
     """Draw simulated over predicted values on logarithmic axes.
 
-    Args:
-        agreements: Predicted and simulated values; each quantity gets a panel.
-
-    Returns:
-        A matplotlib figure.
+    Gives a matplotlib figure.
     """
     return figure_of(beside(fidelity_panels(agreements)))
 

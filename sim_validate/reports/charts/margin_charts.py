@@ -85,11 +85,7 @@ def margin_figure(
 def margin_panels(
     body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = USUAL_PUSH_N
 ) -> tuple[Sheet, Sheet]:
-    """Draw the panels of `margin_figure` as sheets of their own.
-
-    Raises:
-        InputError: The grasp does not lie on the body, or is not in force closure at this friction.
-    """
+    """Draw the panels of `margin_figure` as sheets of their own."""
     forces, torques = margins(body, grasp, friction, max_normal_force_n=max_normal_force_n)
     return _map(forces, "force", "N"), _map(torques, "torque", "mN m")
 
@@ -97,11 +93,7 @@ def margin_panels(
 def margins(
     body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = USUAL_PUSH_N
 ) -> tuple[Array, Array]:
-    """Compute the largest force [N] and torque [mN m] resisted, (LATITUDES, LONGITUDES) each.
-
-    Raises:
-        InputError: The grasp does not lie on the body, or is not in force closure at this friction.
-    """
+    """Compute the largest force [N] and torque [mN m] resisted, (LATITUDES, LONGITUDES) each."""
     check_drawn(body, grasp, friction, None)
     positive(max_normal_force_n, "max_normal_force_n")
     certificate = force_closure(grasp, friction=friction)

@@ -34,12 +34,8 @@ LEAST_PUSH = 1e-3
 def motion_figure(found: Replayed, threshold_m: float) -> Any:
     """Draw displacement, normal forces and use of friction over the time of one trial.
 
-    Args:
-        found: The replayed trial.
-        threshold_m: Displacement that counts as motion [m].
-
-    Returns:
-        A matplotlib figure. Friction is lowered to the one under test at time zero.
+    Takes `threshold_m` [m]. Gives a matplotlib figure. Friction is lowered to the one under test at
+    time zero.
     """
     return figure_of(beside(motion_panels(found, threshold_m)))
 
@@ -115,9 +111,7 @@ def _sheet(panel: Panel, title: str, marks: Sequence[Mark], entries: Sequence[En
 def friction_used(pushes: Array, friction: Array) -> Array:
     """Compute tangential over normal force, over friction, (n, k); NaN if fingers hardly push.
 
-    Args:
-        pushes: Forces along (normal, tangent, tangent), (n, k, 3) [N].
-        friction: Coulomb coefficients, (n,).
+    Takes `pushes` (normal, tangent, tangent) or (n, k, 3) [N]; `friction` (n,).
     """
     normal = pushes[..., 0]
     tangential = np.hypot(pushes[..., 1], pushes[..., 2])

@@ -146,11 +146,7 @@ def survival_sentence(executed: Sequence[Executions]) -> str:
 def survival_figure(executed: Sequence[Executions]) -> Any:
     """Draw the share of grasps that survives, by the acceleration of the palm.
 
-    Args:
-        executed: Executions of the grasps of one object or of several, with a grasp at least.
-
-    Returns:
-        A matplotlib figure.
+    Gives a matplotlib figure.
     """
     return figure_of(survival_sheet(executed))
 

@@ -65,11 +65,7 @@ def wrench_figure(
 def wrench_panels(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None
 ) -> tuple[Sheet, Sheet, Sheet]:
-    """Draw the panels of `wrench_figure` as sheets of their own.
-
-    Raises:
-        InputError: The grasp does not lie on the body, or the friction is out of range.
-    """
+    """Draw the panels of `wrench_figure` as sheets of their own."""
     check_drawn(body, grasp, friction, view)
     view = view or best_view(body, grasp)
     quality = ferrari_canny(
@@ -110,12 +106,7 @@ def shadow_of(wrenches: WrenchSet, plane: Array) -> Array:
     Each point of the border is the wrench of one contact alone, whose force is at the rim of its
     cone.
 
-    Args:
-        wrenches: The wrench set.
-        plane: Two unit wrenches, (2, 6), rows.
-
-    Returns:
-        Points of the border, (TURNS, 2), counter-clockwise.
+    Takes `plane` (2, 6). Gives points of the border, (TURNS, 2), counter-clockwise.
     """
     angles = np.linspace(0.0, 2.0 * np.pi, TURNS)
     ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)

@@ -36,11 +36,7 @@ Row = Mapping[str, Any]
 
 
 def drawn_rows(chosen: Selection, count: int, seed: int) -> list[Row]:
-    """Draw rows of the table of grasps, every row as likely; the seed alone decides which.
-
-    Raises:
-        InputError: A file is damaged.
-    """
+    """Draw rows of the table of grasps, every row as likely; the seed alone decides which."""
 
     def place(row: Row) -> bytes:
         return hashlib.sha256(f"{seed} {row['grasp_id']}".encode()).digest()
@@ -52,18 +48,7 @@ def drawn_rows(chosen: Selection, count: int, seed: int) -> list[Row]:
 def write_sample(folder: Path, chosen: Selection, title: str, count: int, seed: int) -> int:
     """Write a page with some rows of a dataset.
 
-    Args:
-        folder: Folder to write to; it is made if it does not exist.
-        chosen: The dataset, or one of its splits.
-        title: Title of the dataset.
-        count: Number of rows to draw.
-        seed: Seed of the draw.
-
-    Returns:
-        Number of rows on the page.
-
-    Raises:
-        InputError: A file of the dataset is damaged.
+    Gives number of rows on the page.
     """
     rows = drawn_rows(chosen, count, seed)
     text = page("sample.html", style=style(), title=title, rows=list(_shown(chosen, rows)))

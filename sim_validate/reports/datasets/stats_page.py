@@ -19,13 +19,7 @@ DIGITS = 4
 def write_stats(folder: Path, title: str, stats: Stats) -> Path:
     """Write what a dataset holds as a page and as JSON.
 
-    Args:
-        folder: Folder to write to; it is made if it does not exist.
-        title: Title of the dataset.
-        stats: What it holds.
-
-    Returns:
-        The path of the page.
+    Gives the path of the page.
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / DATA, json.dumps(stats.to_json(), indent=1) + "\n")

@@ -35,11 +35,7 @@ _KNOWN: dict[Case, Gate] = {}
 def require_faithful(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
-    """Check the simulator on known cases, and refuse settings under which a check fails.
-
-    Raises:
-        UnfaithfulError: A check failed; nothing simulated with this setup would count.
-    """
+    """Check the simulator on known cases, and refuse settings under which a check fails."""
     gate = measured_gate(setup, friction, radius_m)
     if not gate.passed:
         failed = "; ".join(str(check) for check in gate.checks if not check.passed)
@@ -55,10 +51,7 @@ def measured_gate(
 ) -> Gate:
     """Check the simulator on known cases, once per process for the same settings.
 
-    Args:
-        setup: How trials are simulated.
-        friction: Coulomb coefficient under test.
-        radius_m: Radius of the object under test [m], rounded to two digits for the known cases.
+    Takes `radius_m` [m].
     """
     case = _case(setup, friction, radius_m)
     return _KNOWN.get(case) or _kept(case, _measured(case))
@@ -67,11 +60,7 @@ def measured_gate(
 def remember_gate(gate: Gate, setup: Setup, friction: float, radius_m: float) -> None:
     """Take over what `measured_gate` returned in the process that started this one.
 
-    Args:
-        gate: What it returned, with the same packages on the same machine.
-        setup: How trials are simulated.
-        friction: Coulomb coefficient under test.
-        radius_m: Radius of the object under test [m].
+    Takes `radius_m` [m].
     """
     _kept(_case(setup, friction, radius_m), gate)
 

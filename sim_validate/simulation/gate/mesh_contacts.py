@@ -44,13 +44,7 @@ class Touch:
 
 
 def worst_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> Touch:
-    """Put fingertips a little into a mesh and find the contact that differs most from its face.
-
-    Args:
-        body: A convex object.
-        contacts: Contacts on the faces of `body`.
-        setup: How trials are simulated.
-    """
+    """Put fingertips a little into a mesh and find the contact that differs most from its face."""
     rigid = replace(setup, fingers=replace(setup.fingers, drive="rigid", indentation=0.0))
     size = rigid.scene(body, contacts, 1.0).layout.grasp_size_m
     depth = DEPTH * body.radius
@@ -67,11 +61,7 @@ def worst_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> 
 
 
 def require_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> None:
-    """Check that fingertips touch a mesh as its faces lie, where no pads are put between.
-
-    Raises:
-        UnfaithfulError: A contact differs from its face, so a simulation would prove nothing.
-    """
+    """Check that fingertips touch a mesh as its faces lie, where no pads are put between."""
     if setup.surface != "mesh":
         return
     worst = worst_touch(body, contacts, setup)

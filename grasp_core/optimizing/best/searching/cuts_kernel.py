@@ -67,16 +67,7 @@ def cut(  # noqa: C901 - loops that are written out
 ) -> int:
     """Fill in the corners of what is left of a polygon where the support reaches t.
 
-    Args:
-        corners: Corners in order, (MOST_CORNERS, 2).
-        count: How many there are.
-        at: What `slopes` gives for the twist and the polygon's piece, (6,).
-        friction: Coulomb coefficient.
-        t: Support that an answer reaches.
-        out: Array for the corners of the rest, (MOST_CORNERS, 2).
-
-    Returns:
-        How many corners the rest has: zero if no point answers.
+    Takes `at` (6,). Gives how many corners the rest has: zero if no point answers.
     """
     heights = np.empty(MOST_CORNERS)
     reached, runs = 0, 0
@@ -145,8 +136,7 @@ def _cross(low: Array, high: Array, at: Array, friction: float, t: float, out: A
 def clip(corners: Array, count: int, line: Array, side: float, out: Array) -> int:
     """Fill in the corners of the part of a polygon with side * (line0 a + line1 b - line2) <= 0.
 
-    Returns:
-        How many corners the part has; if there is no room for them, the polygon stays whole.
+    Gives how many corners the part has; if there is no room for them, the polygon stays whole.
     """
     kept, heights = 0, np.empty(MOST_CORNERS)
     for k in range(count):

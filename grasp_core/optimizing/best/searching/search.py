@@ -137,14 +137,8 @@ class Searching:
     ) -> tuple[Steps | None, list[Found]]:
         """Try to refute that contacts of the first nodes reach a threshold.
 
-        Args:
-            nodes: What `first_nodes` returns.
-            threshold: The quality, or the multiple of the loads.
-            known: One that contacts must surpass to be of interest.
-
-        Returns:
-            The tree, or None if it was stopped or contacts reach the threshold; contacts found that
-            surpass what is known.
+        Gives the tree, or None if it was stopped or contacts reach the threshold; contacts found
+        that surpass what is known.
         """
         corners, counts, fresh = nodes
         trunk = part_from((on_grid(corners, SEARCH_DIGITS), counts, fresh), self.pool)

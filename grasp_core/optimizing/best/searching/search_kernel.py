@@ -39,13 +39,7 @@ STEPS, CLOSE_STEPS = 40, 120
 
 @loop("numpy", beside=True)
 def run(search: Search, budget: int, part_depth: int) -> int:
-    """Search until one of the reasons to end occurs, and return it.
-
-    Args:
-        search: What it works with; its stack, pool, tree and work are changed.
-        budget: How many nodes to visit at most.
-        part_depth: Nodes at this depth become parts of their own.
-    """
+    """Search until one of the reasons to end occurs, and return it."""
     stack, tree = search.stack, search.tree
     search.work.changed[0] = ALL
     for _ in range(budget):

@@ -127,13 +127,7 @@ def multiple(support: float, asked: float) -> float:
 def highest(pieces: Pieces, points: Array, on: Indices, m: int, y: Array, slope: Array) -> float:
     """Return the largest support of contacts at points in a direction; fill in its wrench, (6,).
 
-    Args:
-        pieces: The pieces.
-        points: Points in space, (m, 3) or more.
-        on: The piece of each, (m,) or more.
-        m: How many count.
-        y: The direction, (6,).
-        slope: Array for the wrench that attains the support, (6,).
+    Takes `points` (m, 3); `on` (m,); `y`, `slope` (6,).
     """
     best, first = -np.inf, 0
     for i in range(m):
