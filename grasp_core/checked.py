@@ -59,7 +59,7 @@ SHOWN = 60
 """Largest number of characters of a refused value that a message shows."""
 
 
-def number(  # noqa: PLR0913 - the ways in which a range can end
+def number(
     value: Any,
     name: str,
     *,

@@ -96,7 +96,7 @@ class WrenchSet(ByValue):
     (`linf`)."""
 
     @classmethod
-    def of(  # noqa: PLR0913 - each is a quantity of its own
+    def of(
         cls,
         positions: ArrayLike | Grasp | Sequence[Contact],
         normals: ArrayLike | None,

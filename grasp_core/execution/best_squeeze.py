@@ -57,7 +57,7 @@ SMALLER_LOADS = "smaller loads, whose smaller pushes may leave it stable"
 """Advice where the best squeeze is unstable; commands and executions call the limit otherwise."""
 
 
-def best_squeeze(  # noqa: PLR0913 - each is a quantity of its own
+def best_squeeze(
     body: Polyhedron,
     contacts: Grasp | Iterable[Contact],
     friction: ArrayLike,

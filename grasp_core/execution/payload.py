@@ -145,7 +145,7 @@ class Payload(ByValue):
         return self.free.lower <= radius * (1.0 + ROUNDING)
 
 
-def payload(  # noqa: PLR0913 - each is a quantity of its own
+def payload(
     body: Polyhedron,
     contacts: Grasp | Iterable[Contact],
     friction: ArrayLike,

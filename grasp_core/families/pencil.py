@@ -141,7 +141,7 @@ class _Discs:
         return _Discs(self.C * turn, self.s * turn, self.s0, self.Q * turn, self.q)
 
 
-def _place_in_cell(  # noqa: PLR0913, PLR0917 - a program's data
+def _place_in_cell(
     pieces: Sequence[FacePiece],
     cones: Sequence[ForceCone],
     discs: _Discs,

@@ -26,7 +26,7 @@ from grasp_core.forces.force_programs import (
 from grasp_core.values import Contact, Grasp
 
 
-def contact_forces(  # noqa: PLR0913 - the contract's arguments
+def contact_forces(
     positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None,
     friction: ArrayLike,

@@ -89,7 +89,7 @@ class Polyhedron(ByValue, InNotebooks):
         instance(self.surface, Surface, "surface")
 
     @classmethod
-    def from_mesh(  # noqa: PLR0913 - one keyword for each way to take a mesh
+    def from_mesh(
         cls,
         vertices: ArrayLike,
         triangles: ArrayLike,

@@ -80,7 +80,7 @@ class QualityCeiling(ByValue):
         )
 
 
-def quality_ceiling(  # noqa: PLR0913 - each is a quantity of its own
+def quality_ceiling(
     body: Polyhedron,
     faces: FaceQuadruple,
     friction: float = 0.5,

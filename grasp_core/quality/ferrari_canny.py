@@ -124,7 +124,7 @@ def are_allowed(forces: Array, wrenches: WrenchSet) -> bool:
     return wrenches.holds(forces, CHECK_SLACK * longest / len(wrenches.friction))
 
 
-def ferrari_canny(  # noqa: PLR0913 - the contract's arguments
+def ferrari_canny(
     positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None = None,
     friction: ArrayLike = 0.5,

@@ -61,7 +61,7 @@ class WrenchLimit(ByValue):
     torques: Array | None = field(default=None, repr=False)
     """Torques about the inward normals that act with `forces`, (k,) [N m]; None without torsion."""
 
-    def verify(  # noqa: PLR0913 - each is a quantity of its own
+    def verify(
         self,
         positions: ArrayLike | Grasp | Sequence[Contact],
         normals: ArrayLike | None,

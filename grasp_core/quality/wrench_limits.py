@@ -27,7 +27,7 @@ HALF = 0.5
 largest as from zero, so that it starts inside both bounds."""
 
 
-def max_resisted_wrench(  # noqa: PLR0913 - each is a quantity of its own
+def max_resisted_wrench(
     positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None,
     friction: ArrayLike,
@@ -63,7 +63,7 @@ def max_resisted_wrench(  # noqa: PLR0913 - each is a quantity of its own
     )[0].limit  # fmt: skip
 
 
-def wrench_limits(  # noqa: PLR0913 - each is a quantity of its own
+def wrench_limits(
     positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None,
     friction: ArrayLike,
@@ -102,7 +102,7 @@ def wrench_limits(  # noqa: PLR0913 - each is a quantity of its own
     return tuple(limit_of(body, load) for load in loads)
 
 
-def many_limits(  # noqa: PLR0913 - all that limits depend on
+def many_limits(
     positions: Array, normals: Array, friction: float, wrenches: Array, inside: Array, *,
     max_normal_force: float, center: Array,
 ) -> Array:  # fmt: skip

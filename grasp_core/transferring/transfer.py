@@ -108,7 +108,7 @@ class Transfer(ByValue):
         return summary("Transfer", said, self.faces_in_words, friction=self.friction)
 
 
-def transfer(  # noqa: PLR0913 - one keyword for each rule
+def transfer(
     old: Polyhedron,
     new: Polyhedron,
     grasps: Iterable[Grasp],

@@ -66,7 +66,7 @@ WHOLE: tuple[Role, ...] = ("hand", "fingertip")
 """Roles that are drawn whole, however far from the object they are."""
 
 
-def write_picture(  # noqa: PLR0913 - one keyword for each thing that may be asked
+def write_picture(
     body: Polyhedron,
     grasp: Grasp,
     path: str | Path,
@@ -134,7 +134,7 @@ def _middle(face: Face) -> Array:
     return face.pieces[int(np.argmax(areas))].mean(axis=0)
 
 
-def grasp_figure(  # noqa: PLR0913 - one keyword for each thing that may be asked
+def grasp_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
     legend: bool = True, hand: Hand | None = None, reach: "HandReach | None" = None,
 ) -> Any:  # fmt: skip
@@ -147,7 +147,7 @@ def grasp_figure(  # noqa: PLR0913 - one keyword for each thing that may be aske
     return figure_of(grasp_sheet(body, grasp, friction, view=view, legend=legend, held=held))
 
 
-def grasp_sheet(  # noqa: PLR0913 - one keyword for each thing that may be asked
+def grasp_sheet(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
     legend: bool = False, steady: bool = False, held: PosedHand | None = None,
 ) -> Sheet:  # fmt: skip
@@ -168,7 +168,7 @@ def grasp_sheet(  # noqa: PLR0913 - one keyword for each thing that may be asked
     return Sheet(SIDE, SIDE + ROW * (rows + 0.5), sheet.name, (*sheet.marks, *marks))
 
 
-def sheet_of(  # noqa: PLR0913 - what a drawing consists of
+def sheet_of(
     shapes: Sequence[Shape], extent: Extent, view: View, name: str, *,
     numbers: Array | None = None, side: int, steady: bool = False,
     labels: Sequence[tuple[str, str]] = FINGER_LABELS,

@@ -217,7 +217,7 @@ def strong_motors(hand: Hand, reach: HandReach) -> Motors:
     return hand_motors(uncoupled(hand, EXECUTION), reach, any_orientation=weighs)
 
 
-def held_hand_layout(  # noqa: PLR0913, PLR0917 - a hand, an object, and how they meet
+def held_hand_layout(
     hand: Hand, body: Polyhedron, reach: HandReach, grip: Grip, mass_kg: float,
     settings: HeldSettings, reach_m: float | None = None,
 ) -> HeldHandLayout:  # fmt: skip

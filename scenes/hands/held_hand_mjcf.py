@@ -36,7 +36,7 @@ LIGHT_KG = 1e-5
 through them."""
 
 
-def held_hand_scene(  # noqa: PLR0913, PLR0917 - a hand, an object, and how they meet
+def held_hand_scene(
     hand: Hand, body: Polyhedron, reach: HandReach, grip: Grip, mass_kg: float,
     settings: HeldSettings, reach_m: float | None = None,
 ) -> HeldScene:  # fmt: skip

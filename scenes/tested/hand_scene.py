@@ -118,7 +118,7 @@ def planned_postures(
     )  # fmt: skip
 
 
-def hand_scene(  # noqa: PLR0913, PLR0917 - the hand at the object, and what a test states about it
+def hand_scene(
     hand: Hand, body: Polyhedron, postures: Postures, friction: float, mass_kg: float,
     physics: PhysicsSettings, servos: HandServos,
 ) -> TestedScene:  # fmt: skip

@@ -49,7 +49,7 @@ SPARE = 0.05
 """How much farther a curved surface is there than fingertips come, in object radii."""
 
 
-def execute(  # noqa: PLR0913 - `mass_kg` is the one setting that has no default
+def execute(
     body: Polyhedron,
     grasp: Grasp | Iterable[Contact],
     friction: ArrayLike,

@@ -29,7 +29,7 @@ from sim_validate.hands.validate_hand import MOST_PUSH_N
 from sim_validate.simulation.setup import MOST_THREADS
 
 
-def execute_hand(  # noqa: PLR0913 - `mass_kg` is the one setting that has no default
+def execute_hand(
     hand: Hand,
     body: Polyhedron,
     reach: HandReach,

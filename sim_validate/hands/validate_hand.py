@@ -46,7 +46,7 @@ def hand_setup() -> Setup:
     return Setup(fingers=fingers, physics=hand_physics())
 
 
-def validate_hand(  # noqa: PLR0913 - one keyword for each thing that may be asked
+def validate_hand(
     hand: Hand, body: Polyhedron, reach: HandReach, friction: float = 0.5, *,
     down: tuple[float, float, float] | None = None,
     agenda: Agenda | None = None, setup: Setup | None = None,

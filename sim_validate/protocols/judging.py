@@ -88,7 +88,7 @@ def judge_by(
     )  # fmt: skip
 
 
-def judge_hand_by(  # noqa: PLR0913 - the hand in its grasp, and how it is judged
+def judge_hand_by(
     protocol: str | PublishedProtocol,
     hand: Hand,
     body: Polyhedron,

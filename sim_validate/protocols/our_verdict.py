@@ -39,7 +39,7 @@ class OurVerdict:
     """Why it was not held; empty if it was."""
 
 
-def our_verdict(  # noqa: PLR0913, PLR0917 - all that loads are planned from
+def our_verdict(
     body: Polyhedron,
     contacts: Sequence[Contact],
     friction: float,

@@ -47,7 +47,7 @@ class HandTrials:
     """What came of executing the grasps with it."""
 
 
-def reaches_to_json(  # noqa: PLR0913 - the parts of the file
+def reaches_to_json(
     hand: Hand, body: Polyhedron, friction: float, asked: AskedRecord, found: Sequence[HandReach],
     *, complete: bool, grasps: Sequence[Grasp], tried: HandTrials | None = None,
 ) -> str:  # fmt: skip

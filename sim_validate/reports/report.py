@@ -72,7 +72,7 @@ class Report:
     """Number of grasps with pictures; the others are copies of these by symmetry."""
 
 
-def write_report(  # noqa: PLR0913 - what a user may choose
+def write_report(
     folder: str | Path,
     out: str | Path | None = None,
     *,

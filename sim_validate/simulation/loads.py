@@ -39,7 +39,7 @@ class PlannedLoad:
     """The friction coefficient that the planned forces need, with the torques of soft contacts."""
 
 
-def planned_loads(  # noqa: PLR0913 - all that loads are planned from
+def planned_loads(
     body: Polyhedron,
     contacts: Sequence[Contact],
     friction: float,
@@ -61,7 +61,7 @@ def planned_loads(  # noqa: PLR0913 - all that loads are planned from
     return (*relative, *own)
 
 
-def loads_as_they_are(  # noqa: PLR0913 - all that loads are planned from
+def loads_as_they_are(
     body: Polyhedron,
     contacts: Sequence[Contact],
     friction: float,

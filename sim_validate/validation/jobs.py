@@ -67,7 +67,7 @@ def verdict_of(job: Job) -> Verdict:
     return validate(job.body, job.grasp, job.friction, agenda=job.agenda, setup=job.setup)
 
 
-def validate_all(  # noqa: PLR0913 - what `validate` takes, and two more
+def validate_all(
     body: Polyhedron,
     grasps: Iterable[Grasp],
     friction: float = 0.5,

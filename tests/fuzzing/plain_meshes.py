@@ -81,7 +81,7 @@ PLY_CODES = {
 }  # fmt: skip
 
 
-def of_ply(data: bytes) -> list[Triangle]:  # noqa: C901 - one loop, as the format is
+def of_ply(data: bytes) -> list[Triangle]:
     data = unmarked(data)
     ended = re.search(rb"\n[ \t]*end_header[ \t]*\r?\n|\r[ \t]*end_header[ \t]*\r", data)
     header = [line.split() for line in data[: ended.start()].decode("latin-1").splitlines()]
@@ -126,7 +126,7 @@ def of_ply(data: bytes) -> list[Triangle]:  # noqa: C901 - one loop, as the form
     return [tuple(points[n] for n in each) for each in triangles]
 
 
-def of_glb(data: bytes) -> list[Triangle]:  # noqa: C901 - one tree, as the format is
+def of_glb(data: bytes) -> list[Triangle]:
     size = struct.unpack_from("<I", data, 12)[0]
     tree, binary = json.loads(data[20 : 20 + size]), data[28 + size :]
     found = []

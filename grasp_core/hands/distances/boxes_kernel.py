@@ -151,9 +151,7 @@ def _gap(axis: Array, h: Array, points: Array) -> float:
 
 
 @loop()
-def box_triangle(  # noqa: C901 - loops that are written out
-    h: Array, T: Array, limit: float
-) -> float:
+def box_triangle(h: Array, T: Array, limit: float) -> float:
     """Return the signed distance of the box |x_i| <= h_i from a triangle, (3, 3) in its frame.
 
     Takes `h` (3,).
@@ -213,7 +211,7 @@ def _try_axis(axis: Array, h: Array, points: Array, widest: float, best: Array) 
 
 
 @loop()
-def box_box(  # noqa: C901, PLR0913, PLR0917 - two boxes, and where they are nearest
+def box_box(
     h: Array, g: Array, R: Array, middle: Array, limit: float, way: Array, point: Array
 ) -> float:  # fmt: skip
     """Return the signed distance of the box |x_i| <= h_i from another box.
@@ -254,7 +252,7 @@ def box_box(  # noqa: C901, PLR0913, PLR0917 - two boxes, and where they are nea
 
 
 @loop()
-def _nearest_features(  # noqa: C901, PLR0913, PLR0917 - two boxes, and where they are nearest
+def _nearest_features(
     h: Array, g: Array, R: Array, middle: Array, others: Array, way: Array, point: Array
 ) -> float:  # fmt: skip
     """Compute the distance of two boxes that do not overlap, from corners and edges."""

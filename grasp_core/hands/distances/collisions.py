@@ -37,7 +37,7 @@ class Clearances:
     """From the table; `FAR` where there is none."""
 
 
-def clearances(  # noqa: PLR0913, PLR0917 - a hand, where it is, and what is around it
+def clearances(
     hand: Hand,
     body: Polyhedron,
     joints: Array,

@@ -19,7 +19,7 @@ ROUNDING = 1e-9
 
 
 @loop()
-def place_shapes(  # noqa: PLR0913, PLR0917 - poses in, poses out
+def place_shapes(
     hand: HandArrays, palm_rotation: Array, palm_position: Array, R: Array, p: Array, turned: Array,
     middles: Array,
 ) -> None:  # fmt: skip
@@ -108,7 +108,7 @@ def core_in(hand: HandArrays, R: Array, middle: Array, s: int) -> tuple[Array, f
 
 
 @loop()
-def _from_block(  # noqa: PLR0913, PLR0917 - two shapes, and where they are nearest
+def _from_block(
     hand: HandArrays, turned: Array, middles: Array, block: int, s: int, limit: float, way: Array,
     point: Array,
 ) -> float:  # fmt: skip
@@ -151,7 +151,7 @@ def relative_frame(
 
 
 @loop()
-def pair_distance(  # noqa: C901, PLR0913, PLR0917 - two shapes, and where they are nearest
+def pair_distance(
     hand: HandArrays, turned: Array, middles: Array, i: int, j: int, limit: float, way: Array,
     point: Array,
 ) -> float:  # fmt: skip
@@ -212,7 +212,7 @@ def of_itself(
 
 
 @loop()
-def tip_surface(  # noqa: PLR0913, PLR0917 - a hand's tip, a surface, and where they are nearest
+def tip_surface(
     hand: HandArrays, turned: Array, middles: Array, tree: SurfaceTree, finger: int, near: Array,
     other: Array,
 ) -> float:  # fmt: skip

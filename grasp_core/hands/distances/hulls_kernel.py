@@ -72,7 +72,7 @@ def _nearer(S: Array, w: Array, at: Array) -> int:
 
 
 @loop()
-def hull_hull(  # noqa: C901 - loops that are written out
+def hull_hull(
     corners: Array, others: Array, limit: float, near: Array, other: Array
 ) -> float:  # fmt: skip
     """Return the distance between the hulls of two sets of corners, zero where they overlap.
@@ -118,7 +118,7 @@ def hull_hull(  # noqa: C901 - loops that are written out
 
 
 @loop()
-def hull_surface(  # noqa: C901, PLR0913, PLR0917 - the arrays of a tree
+def hull_surface(
     hull: Array, within: float, corners: Array, middles: Array, radii: Array, links: Indices,
     near: Array, other: Array,
 ) -> float:  # fmt: skip

@@ -17,7 +17,7 @@ DEEPEST = 64
 
 
 @loop()
-def nearest(  # noqa: C901, PLR0913, PLR0917 - the arrays of a tree
+def nearest(
     p: Array, within: float, corners: Array, middles: Array, radii: Array, links: Indices,
     near: Array,
 ) -> int:  # fmt: skip
@@ -55,7 +55,7 @@ def nearest(  # noqa: C901, PLR0913, PLR0917 - the arrays of a tree
 
 
 @loop()
-def box_surface(  # noqa: PLR0913, PLR0917 - the arrays of a tree
+def box_surface(
     h: Array, R: Array, middle: Array, limit: float, corners: Array, middles: Array, radii: Array,
     links: Indices,
 ) -> float:  # fmt: skip

@@ -52,9 +52,7 @@ def empty_sums(hand: HandArrays, targets: Targets) -> Sums:
 
 
 @loop()
-def _solved(  # noqa: C901 - loops that are written out
-    H: Array, g: Array, step: Array
-) -> bool:
+def _solved(H: Array, g: Array, step: Array) -> bool:
     """Solve H step = -g by Cholesky's factors, from and into the lower half of H."""
     n = len(g)
     for i in range(n):
@@ -82,7 +80,7 @@ def _solved(  # noqa: C901 - loops that are written out
 
 
 @loop()
-def _step(  # noqa: PLR0913, PLR0917 - a pose and its sums
+def _step(
     hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums, damping: float, A: Array, step: Array
 ) -> bool:  # fmt: skip
     """Fill in the damped step from a pose, no longer than the largest; whether there is one."""
@@ -135,7 +133,7 @@ def _stepped(hand: HandArrays, pose: Pose, pivot: Array, step: Array, new: Pose)
 
 
 @loop()
-def settle(  # noqa: PLR0913, PLR0917 - a hand, an object and what is asked
+def settle(
     hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums,
     most_steps: int, good: float,
 ) -> int:  # fmt: skip

@@ -56,7 +56,7 @@ def place(hand: HandArrays, targets: Targets, pose: Pose) -> None:
 
 
 @loop()
-def _ahead(  # noqa: C901 - loops that are written out
+def _ahead(
     hand: HandArrays, R: Array, targets: Targets, k: int, point: Array, roll: Array
 ) -> int:  # fmt: skip
     """Return the corner of a contact's tip that reaches farthest, and fill in the point that does.
@@ -98,7 +98,7 @@ def _ahead(  # noqa: C901 - loops that are written out
 
 
 @loop()
-def _moves(  # noqa: C901, PLR0913, PLR0917 - a point and a direction
+def _moves(
     hand: HandArrays, pose: Pose, sums: Sums, link: int, x: Array, along: Array, sign: float,
     with_palm: bool,
 ) -> None:  # fmt: skip
@@ -137,7 +137,7 @@ def _add(sums: Sums, residual: float) -> None:
 
 
 @loop()
-def _tip(  # noqa: PLR0913, PLR0917 - a fingertip, a direction and a residual
+def _tip(
     hand: HandArrays, pose: Pose, sums: Sums, link: int, k: int, along: Array, weight: float,
     off: float,
 ) -> None:  # fmt: skip
@@ -159,9 +159,7 @@ def _tip(  # noqa: PLR0913, PLR0917 - a fingertip, a direction and a residual
 
 
 @loop()
-def _touching(  # noqa: C901 - loops that are written out
-    hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums
-) -> None:
+def _touching(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums) -> None:
     """Add the residuals of fingertips: their planes, contacts and regions."""
     for k in range(len(targets.fingers)):
         finger = targets.fingers[k]
@@ -223,7 +221,7 @@ def _outward(center: Array, need: float, tree: SurfaceTree, along: Array) -> flo
 
 
 @loop()
-def _keep_off(  # noqa: PLR0913, PLR0917 - a point, a direction and a residual
+def _keep_off(
     hand: HandArrays, pose: Pose, sums: Sums, link: int, x: Array, along: Array, sign: float,
     short: float,
 ) -> None:  # fmt: skip
@@ -277,7 +275,7 @@ def _links(hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums) -> None:
 
 
 @loop()
-def _farthest(  # noqa: PLR0913, PLR0917 - a shape and a plane
+def _farthest(
     hand: HandArrays, pose: Pose, s: int, origin: Array, way: Array, left_out: Array, x: Array
 ) -> float:  # fmt: skip
     """Return how far a shape reaches beyond a plane, and fill in its corner there.
@@ -297,9 +295,7 @@ def _farthest(  # noqa: PLR0913, PLR0917 - a shape and a plane
 
 
 @loop()
-def _last_links(  # noqa: C901 - loops that are written out
-    hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums
-) -> None:
+def _last_links(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums) -> None:
     """Add the residuals of last links: behind the planes that tips touch, and tips on the table.
 
     A block as a whole is behind the plane that it touches, and counts on the table.

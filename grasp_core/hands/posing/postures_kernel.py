@@ -10,7 +10,7 @@ from grasp_core.hands.loop_values import HandArrays
 
 
 @loop()
-def free_postures(  # noqa: C901 - loops that are written out
+def free_postures(
     hand: HandArrays, angles: Array, apart: float, widest: float, kept: Indices, tips: Array
 ) -> int:
     """Choose joint angles at which a hand is free of itself and its fingertips are near each other.

@@ -52,7 +52,7 @@ def _capsule(start: float, end: float) -> LinkShape:
     )
 
 
-def _finger(  # noqa: PLR0913, PLR0917 - the rows of the table
+def _finger(
     name: str, offsets: tuple[Triple, ...], base: Array, axes: tuple[Triple, ...],
     ranges: tuple[tuple[float, float], ...], shapes: tuple[tuple[LinkShape, ...], ...], tip: float,
 ) -> HandFinger:  # fmt: skip

@@ -44,7 +44,7 @@ SAME = 1e-9
 class Levels:
     """The levels of a search, with the best contacts and the best bound so far."""
 
-    def __init__(  # noqa: PLR0913, PLR0917 - each is a quantity of its own
+    def __init__(
         self, body: Polyhedron, friction: float, measure: Measure, clearance: float, seed: int,
         jobs: int, stop: Stop, progress: Callable[[GapAt], None] | None,
     ) -> None:  # fmt: skip

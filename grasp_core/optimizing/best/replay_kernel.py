@@ -32,7 +32,7 @@ class Planes(NamedTuple):
 
 
 @loop("numpy", beside=True)
-def replay(  # noqa: C901, PLR0913, PLR0917 - the arrays of a tree
+def replay(  # noqa: PLR0913, PLR0917 - the arrays of a tree
     planes: Planes, first: Array, first_counts: Indices, first_fresh: Indices,
     deeds: Indices, asked: Indices, twists: Array, answers: Array, lines: Array, most_cuts: int,
 ) -> bool:  # fmt: skip
@@ -134,7 +134,7 @@ def _copy(corners: Array, counts: Indices, fresh: Indices, source: int, place: i
 
 
 @loop("numpy")
-def _answered(  # noqa: C901, PLR0912, PLR0913, PLR0917 - the arrays of nodes
+def _answered(  # noqa: C901, PLR0912 - the arrays of nodes
     planes: Planes, corners: Array, counts: Indices, fresh: Indices, node: int, deed: int, y: Array,
     t: float,
 ) -> int:  # fmt: skip
@@ -202,7 +202,7 @@ def _cut(planes: Planes, p: int, corners: Array, count: int, y: Array, t: float)
 
 
 @loop("numpy")
-def _follow(  # noqa: PLR0913, PLR0917 - an edge, and what is asked
+def _follow(
     planes: Planes, p: int, low: Array, high: Array, y: Array, t: float, out: Array
 ) -> None:
     """Fill in a point of the edge at which s < t, as near as doubles tell to where s = t."""

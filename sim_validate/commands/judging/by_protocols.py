@@ -36,7 +36,7 @@ def judge_grasps(
     return _judged(saved, cases, jobs, folder, reporter)
 
 
-def judge_hands(  # noqa: PLR0913 - the hand, its poses, and where results go
+def judge_hands(
     saved: SavedGrasps, hand: Hand, found: Sequence[HandReach], names: Sequence[str], *,
     seed: int, jobs: int, folder: Path | None, reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip

@@ -62,9 +62,7 @@ def support(at: Array, a: float, b: float, friction: float) -> float:
 
 
 @loop("numpy")
-def cut(  # noqa: C901 - loops that are written out
-    corners: Array, count: int, at: Array, friction: float, t: float, out: Array
-) -> int:
+def cut(corners: Array, count: int, at: Array, friction: float, t: float, out: Array) -> int:
     """Fill in the corners of what is left of a polygon where the support reaches t.
 
     Takes `at` (6,). Gives how many corners the rest has: zero if no point answers.

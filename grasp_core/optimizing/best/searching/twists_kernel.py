@@ -163,7 +163,7 @@ def _velocity(x: Array, y: Array) -> tuple[float, float, float]:
 
 
 @loop("numpy")
-def descend(  # noqa: C901, PLR0913, PLR0917 - loops that are written out
+def descend(
     pieces: Pieces, demand: Demand, points: Array, on: Indices, m: int, y: Array, steps: int,
     spare: float,
 ) -> float:  # fmt: skip
@@ -213,7 +213,7 @@ def descend(  # noqa: C901, PLR0913, PLR0917 - loops that are written out
 
 
 @loop("numpy")
-def _steepest(  # noqa: PLR0913, PLR0917 - what a descent works with
+def _steepest(
     pieces: Pieces, demand: Demand, points: Array, on: Indices, m: int, y: Array, slope: Array,
     hardest: Array,
 ) -> float:  # fmt: skip
