@@ -49,7 +49,7 @@ Surface = Literal["pads", "mesh"]
 FEWEST_CONTACTS = 2
 SCALED = (
     "Masses and servos are scaled to suit the grasp: this scene is for tests of force closure. "
-    "`graspproof scene --mass-kg M` writes the object with its true mass, under gravity."
+    "The command `graspproof scene` with a mass writes the true one, under gravity."
 )
 """Comment at the top of every scene."""
 AXES = ("normal", "tangent1", "tangent2")
