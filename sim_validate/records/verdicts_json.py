@@ -95,7 +95,7 @@ def summary(verdicts: Iterable[Verdict]) -> Summary:
 
 
 def _verdict_record(body: Polyhedron, verdict: Verdict) -> VerdictRecord:
-    bounds, friction = verdict.bounds, verdict.critical_friction
+    friction = verdict.critical_friction
     return {
         "id": verdict.id,
         "contacts_sha256": contacts_sha256(verdict.contacts),
@@ -111,9 +111,7 @@ def _verdict_record(body: Polyhedron, verdict: Verdict) -> VerdictRecord:
         "controls": {
             control.control.name: _control_record(body, control) for control in verdict.controls
         },
-        "bounds": None if bounds is None else asdict(bounds),
         "robustness": _robustness_record(verdict.robustness),
-        "accepted_by": verdict.accepted_by,
         "settings": _settings(verdict),
         "versions": {**versions()},
     }
@@ -166,7 +164,6 @@ def _control_record(body: Polyhedron, verdict: ControlVerdict) -> ControlRecord:
             }
             for trial in verdict.tried
         ],
-        "accepted_by": verdict.accepted_by,
     }
 
 

@@ -111,7 +111,6 @@ class ControlRecord(TypedDict):
     closure_margin: NotRequired[Finite | None]
     separating_wrench: NotRequired[Wrench]
     wrenches: Annotated[list[ControlTrialRecord], Field(min_length=1)]
-    accepted_by: NotRequired[dict[str, bool]]
 
 
 class LostRecord(TypedDict):
@@ -172,9 +171,7 @@ class VerdictRecord(TypedDict):
     critical_friction: CriticalFrictionRecord
     wrenches: list[TrialRecord]
     controls: dict[str, ControlRecord]
-    bounds: NotRequired[dict[str, Any] | None]
     robustness: NotRequired[RobustnessRecord | None]
-    accepted_by: NotRequired[dict[str, bool]]
     settings: SettingsRecord
     versions: dict[str, str | None]
 

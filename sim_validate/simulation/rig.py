@@ -51,13 +51,12 @@ class Rig:
     known (see `early_ends`)."""
 
     def hold(
-        self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None, *,
-        whole: bool = False,
-    ) -> tuple[Trace, ...]:  # fmt: skip
+        self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None
+    ) -> tuple[Trace, ...]:
         """Simulate a hold under each load, and trace it from the moment friction is lowered."""
         protocol, size = self.setup.hold, self.bench.scene.layout.grasp_size_m
         limits = Thresholds(protocol.hold_threshold * size, protocol.total_threshold * size)
-        return self._traces(self._holds(loads, settling_frictions), None if whole else limits)
+        return self._traces(self._holds(loads, settling_frictions), limits)
 
     def watch(self, load: Load, settling_friction: float | None = None) -> Watched:
         """Simulate one whole hold, and keep all motion since the fingers closed."""

@@ -35,7 +35,6 @@ from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, Surface, build_scene
 from scenes.physics import PhysicsSettings
 from sim_validate.simulation.noise import Noise
-from sim_validate.simulation.other_rules import rules_named
 from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
 
 AXIS_NAMES = tuple(
@@ -162,11 +161,7 @@ class Agenda:
     """Whether to find the critical friction in simulation."""
     limits: LimitSearch = "none"
     """How the largest multiple of each wrench is found in simulation, if at all."""
-    independent: bool = False
-    """Whether to run the trials of `unplanned_bounds` too, which use no planned finger forces."""
     controls: bool = True
-    rules: tuple[str, ...] = ()
-    """Names of other validators' acceptance rules that also judge the same trials."""
     trials: int = 0
     """How many times all trials that hold a wrench are repeated with noise."""
     noise: Noise = field(default_factory=Noise)
@@ -181,11 +176,9 @@ class Agenda:
         whole(self.random_wrenches, "random_wrenches", most=MOST_RANDOM_WRENCHES)
         whole(self.trials, "trials", most=MOST_TRIALS)
         seed_of(self.seed)
-        for name in ("critical_friction", "independent", "controls", "keep_traces"):
+        for name in ("critical_friction", "controls", "keep_traces"):
             switch(getattr(self, name), name)
         instance(self.noise, Noise, "noise")
-        several(self.rules, partial(text, name="rules"), "rules", "names")
-        rules_named(self.rules)
         each = partial(instance, kind=NamedWrench, name="wrenches")
         several(self.wrenches, each, "wrenches", "NamedWrench values")
         drawn = (RANDOM.format(place) for place in range(self.random_wrenches))

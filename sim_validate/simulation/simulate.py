@@ -234,24 +234,3 @@ def first_touch(scene: Scene) -> tuple[Array, Array]:
     model = compiled(scene.xml)
     tips = [model.geom(f"finger{finger}").id for finger in range(len(scene.layout.contacts))]
     return touched(model, mujoco.MjData(model), tips)
-
-
-def acceleration(scene: Scene, wrenches: Array) -> Array:
-    """Compute the object's first acceleration under several wrenches, with unloaded fingers.
-
-    Takes `wrenches` (n, 6) [N, N m]. Gives force and torque that are not opposed, which is mass
-    times acceleration, (n, 6), torque about the centre of mass.
-    """
-    model = compiled(scene.xml)
-    data = mujoco.MjData(model)
-    body, mass = model.body("object").id, np.zeros((model.nv, model.nv))
-    left = np.empty((len(wrenches), 6))
-    with unlogged():
-        for place, wrench in enumerate(wrenches):
-            mujoco.mj_resetData(model, data)
-            torque = wrench[3:] - np.cross(scene.layout.center, wrench[:3])
-            data.xfrc_applied[body] = np.concatenate([wrench[:3], torque])
-            mujoco.mj_forward(model, data)
-            mujoco.mj_fullM(model, data, mass)
-            left[place] = (mass @ data.qacc)[:6]
-    return left

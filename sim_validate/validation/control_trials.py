@@ -6,7 +6,6 @@ even the bare squeeze, it is also tried without a load. The fingers do their bes
 forces that need the least friction or, if none balance, those closest to balance.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,16 +14,13 @@ from grasp_core.arrays import Array, to_digits
 from grasp_core.by_value import ByValue
 from grasp_core.forces.contact_forces import closest_forces, least_friction_forces
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.quality.wrench_limits import axis_wrenches
 from sim_validate.simulation.hold_verdict import LET_GO, HoldVerdict, Outcome, judge
-from sim_validate.simulation.other_rules import FORCE_AXES, accepted, rules_named
 from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.schedules import Load
-from sim_validate.simulation.setup import AXIS_NAMES, Agenda, Setup
+from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.simulation.simulate import Bench
 from sim_validate.simulation.traces import Trace
 from sim_validate.validation.controls import Control
-from sim_validate.validation.renamed import Renamed
 
 SEPARATING = "separating"
 """Name of the trial with the separating wrench, which the contacts provably cannot resist."""
@@ -64,10 +60,6 @@ class ControlVerdict(ByValue):
     control: Control
     tried: tuple[ControlTrial, ...]
     """Trials of the loads that no contact forces can balance."""
-    accepted_by: dict[str, bool]
-    """For each acceptance rule of another tool, whether it would accept the control."""
-
-    failed = Renamed("let_go")
 
     @property
     def held(self) -> bool:
@@ -83,9 +75,7 @@ class ControlVerdict(ByValue):
 def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup) -> ControlVerdict:
     """Simulate a negative control under the loads that it must not hold."""
     rig, loads = control_case(body, control, setup)
-    rules = rules_named(agenda.rules)
-    pulls = _pulls(body, control, setup) if rules else ()
-    traces = _held(rig, loads)
+    traces = rig.hold([each.load for each in loads], [each.settling for each in loads])
     layout = rig.bench.scene.layout
     tried = tuple(
         ControlTrial(
@@ -94,16 +84,7 @@ def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup
         )
         for each, trace in zip(loads, traces, strict=True)
     )  # fmt: skip
-    # other tools look at where the object ends, so their trials end no earlier
-    others = _held(rig, pulls, whole=True) if rules else ()
-    return ControlVerdict(
-        control, tried, {rule.name: accepted(rule, others, layout, setup.hold) for rule in rules}
-    )
-
-
-def _held(rig: Rig, loads: Sequence[ControlLoad], *, whole: bool = False) -> tuple[Trace, ...]:
-    settling = [each.settling for each in loads]
-    return rig.hold([each.load for each in loads], settling, whole=whole)
+    return ControlVerdict(control, tried)
 
 
 def control_case(
@@ -135,14 +116,6 @@ def _hopeless(body: Polyhedron, control: Control, setup: Setup) -> list[tuple[st
     if control.certificate.margin < -setup.hold.least_excess:
         loads.append((UNLOADED, np.zeros(6)))
     return loads
-
-
-def _pulls(body: Polyhedron, control: Control, setup: Setup) -> tuple[ControlLoad, ...]:
-    """Six axis-parallel forces, as other tools apply them, as large as the separating wrench."""
-    plan = _Planner(body, control, setup)
-    size = setup.hold.control_load * setup.fingers.max_normal_force_n
-    named = zip(AXIS_NAMES, axis_wrenches(body.radius), strict=True)
-    return tuple(plan.load(name, size * wrench) for name, wrench in named if name in FORCE_AXES)
 
 
 class _Planner:

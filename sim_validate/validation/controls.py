@@ -8,21 +8,18 @@ This wrench is the first load that the control is tested with.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, cross
+from grasp_core.arrays import Array, cross
 from grasp_core.by_value import ByValue
-from grasp_core.closure.contact_arrays import stacked, unit_size
+from grasp_core.closure.contact_arrays import stacked
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
-from grasp_core.closure.margin_program import deepest_forces
 from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from sim_validate.validation.paper_as_printed import uncorrected_contacts
 
 FRICTION_SHARE = 0.9
 """Friction of the low-friction control, relative to the lowest at which the grasp is in closure."""
@@ -30,10 +27,6 @@ LEAST_FRICTION = 1e-4
 """Lowest friction of a negative control; the simulator's own limit is 1e-5."""
 SEARCH = 64
 """Number of random displacements of the contacts that are tried to lose force closure."""
-KEPT = 64
-"""How many quadruples of faces keep their uncorrected contacts for the next grasp."""
-SURE = 1e-9
-"""Margin of closure above which compiled code is trusted where nothing depends on it."""
 TOWARD_CORNER = 0.95
 """How far a moved contact goes towards a corner of its face, as a share of the way."""
 
@@ -59,11 +52,9 @@ def negative_controls(
 ) -> tuple[Control, ...]:
     """Make the negative controls that exist for a grasp, at most one of each kind.
 
-    The kinds are friction below the critical one, fingers removed, a normal flipped, contacts moved
-    on their faces, which takes them out of the grasp's region, and the paper's uncorrected
-    constructions on the same faces. With torsion all of them are proved open as soft fingers.
-
-    Takes `torsion_m` [m].
+    The kinds are friction below the critical one, fingers removed, a normal flipped, and contacts
+    moved on their faces, out of the grasp's region. With torsion (`torsion_m` [m]) all of them are
+    proved open as soft fingers.
     """
     rng = np.random.default_rng(seed)
     candidates = (
@@ -71,7 +62,6 @@ def negative_controls(
         _fingers_removed(grasp, friction, torsion_m),
         _normal_flipped(grasp, friction, torsion_m),
         _contacts_moved(body, grasp, friction, torsion_m, rng),
-        _uncorrected(body, grasp, friction, torsion_m),
     )
     return tuple(found for tries in candidates if (found := next(tries, None)) is not None)
 
@@ -114,44 +104,6 @@ def _normal_flipped(grasp: Grasp, friction: float, torsion_m: float) -> Iterator
         contacts = list(grasp.contacts)
         contacts[finger] = replace(contact, normal=-contact.normal)
         yield from _refuted("normal_flipped", contacts, friction, torsion_m)
-
-
-def _uncorrected(
-    body: Polyhedron, grasp: Grasp, friction: float, torsion_m: float
-) -> Iterator[Control]:
-    """Yield contacts that the paper's printed programs accept, but that are not closed.
-
-    They depend on the faces alone, so grasps on the same faces have the same ones.
-    """
-    control = _uncorrected_on(body, tuple(sorted(grasp.faces)), friction, torsion_m)
-    if control is not None:
-        yield control
-
-
-@lru_cache(maxsize=KEPT)
-def _uncorrected_on(
-    body: Polyhedron, faces: tuple[int, ...], friction: float, torsion_m: float = 0.0
-) -> Control | None:
-    try:
-        for supposed, positions, normals in uncorrected_contacts(body, faces, friction):
-            for points in positions[_may_be_open(positions, normals, supposed)]:
-                contacts = [Contact(at, way) for at, way in zip(points, normals, strict=True)]
-                for control in _refuted("uncorrected", contacts, supposed, torsion_m):
-                    return control
-    except SolverError:
-        pass
-    return None
-
-
-def _may_be_open(positions: Array, normals: Array, friction: float) -> Indices:
-    """Find sets of contacts, of (g, k, 3), that compiled code does not find closed.
-
-    This only saves proofs: a set that is left out makes no control, and the others are proved.
-    """
-    arms, _, _ = unit_size(positions)
-    every = np.broadcast_to(normals, positions.shape)
-    _, _, margins = deepest_forces(arms, every, np.full(len(positions), friction))
-    return np.flatnonzero(~((margins[:, 0] > SURE) & (margins[:, 1] >= margins[:, 0])))
 
 
 def _contacts_moved(

@@ -10,9 +10,7 @@ from sim_validate.simulation.critical_friction import CriticalFriction
 from sim_validate.simulation.gate.gate import Gate
 from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.simulation.unplanned_bounds import Bounds
 from sim_validate.validation.control_trials import ControlVerdict
-from sim_validate.validation.renamed import Renamed
 from sim_validate.validation.repeats import Robustness
 from sim_validate.validation.wrench_verdict import AGREEMENT, WrenchVerdict
 
@@ -30,18 +28,12 @@ class Verdict(ByValue, InNotebooks):
     critical_friction: CriticalFriction
     wrenches: tuple[WrenchVerdict, ...]
     controls: tuple[ControlVerdict, ...]
-    bounds: Bounds | None
-    """Bounds on the wrenches held by fingers without planned forces; None if not asked for."""
     robustness: Robustness | None
     """How often the grasp holds with noise, if asked for."""
-    accepted_by: dict[str, bool]
-    """For each acceptance rule of another tool, whether it would accept the grasp."""
     gate: Gate
     scene: Scene
     setup: Setup
     agenda: Agenda
-
-    controls_failed = Renamed("controls_let_go")
 
     @property
     def predicted_critical_friction(self) -> float:
@@ -82,8 +74,6 @@ class Verdict(ByValue, InNotebooks):
         if self.agenda.limits != "none":
             found += [f"{trial.name}: the limit was not found near the predicted one"
                       for trial in self.wrenches if trial.simulated_limit is None]  # fmt: skip
-        if self.bounds is not None and not self.bounds.agree(self.critical_friction.predicted):
-            found.append("bounds found without planned forces are on the wrong side")
         if self.robustness is not None:
             found += self.robustness.contradictions
         return tuple(found)

@@ -26,12 +26,10 @@ from sim_validate.simulation.gate.gate import Gate, require_faithful
 from sim_validate.simulation.gate.mesh_contacts import require_touch
 from sim_validate.simulation.hold_verdict import invalid_start, judge
 from sim_validate.simulation.loads import PlannedLoad, planned_loads
-from sim_validate.simulation.other_rules import FORCE_AXES, accepted, rules_named
 from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.simulation.simulate import Bench
 from sim_validate.simulation.traces import Trace
-from sim_validate.simulation.unplanned_bounds import Bounds, independent_bounds
 from sim_validate.simulation.wrench_limits import SimulatedLimit, bisected_limits, ramped_limits
 from sim_validate.validation.control_trials import ControlVerdict, try_control
 from sim_validate.validation.controls import negative_controls
@@ -94,9 +92,7 @@ def validated(
         critical_friction=trial.critical(),
         wrenches=wrenches,
         controls=trial.controls(),
-        bounds=trial.bounds(),
         robustness=trial.robustness(),
-        accepted_by=trial.accepted_by(),
         gate=gate,
         scene=scene,
         setup=setup,
@@ -215,14 +211,6 @@ class _Bout:
         )
         return tuple(try_control(self.body, each, self.agenda, self.setup) for each in found)
 
-    def bounds(self) -> Bounds | None:
-        """Find bounds without planned forces, if asked for."""
-        if not self.agenda.independent:
-            return None
-        limits = [planned.limit for planned in self.loads]
-        critical = self.grasp.critical_friction
-        return independent_bounds(self.body, self.grasp, critical, self.rig, limits)
-
     def robustness(self) -> Robustness | None:
         """Repeat the holds with noise, if asked for: the same fingertips hold the same wrenches."""
         if not self.agenda.trials:
@@ -230,12 +218,3 @@ class _Bout:
         setup = for_repeats(self.setup, self.bench.scene)
         loads = [(planned.name, planned.load.wrench) for planned in self.loads]
         return robustness(self.body, self.grasp, self.friction, loads, self.agenda, setup)
-
-    def accepted_by(self) -> dict[str, bool]:
-        """Apply the rules of other tools, which look at where the object ends, to whole trials."""
-        rules = rules_named(self.agenda.rules)
-        if not rules:
-            return {}
-        pulls = [planned.load for planned in self.loads if planned.name in FORCE_AXES]
-        pulled = self.rig.hold(pulls, whole=True)
-        return {rule.name: accepted(rule, pulled, self.layout, self.setup.hold) for rule in rules}

@@ -91,7 +91,8 @@ def of_controls(body, grasp, friction):
 
 def judged(kind, rig, loads, settling=None):
     layout, protocol = rig.bench.scene.layout, rig.setup.hold
-    pairs = zip(rig.hold(loads, settling, whole=True), rig.hold(loads, settling), strict=True)
+    whole = replace(rig, whole=True).hold(loads, settling)
+    pairs = zip(whole, rig.hold(loads, settling), strict=True)
     limit = protocol.hold_threshold * layout.grasp_size_m
     for traces in pairs:
         whole, early = (judge(trace, layout, protocol) for trace in traces)

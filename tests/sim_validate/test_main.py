@@ -75,7 +75,7 @@ def test_a_verdict_has_the_fields_that_users_rely_on(here, capsys):
     (verdict,) = document["verdicts"]
     assert {
         "id", "contacts_sha256", "outcome", "held", "mismatches", "critical_friction", "wrenches",
-        "controls", "bounds", "robustness", "accepted_by", "settings", "versions",
+        "controls", "robustness", "settings", "versions",
     } == set(verdict)  # fmt: skip
     assert verdict["mismatches"] == []
     friction = verdict["critical_friction"]

@@ -73,8 +73,6 @@ def _agenda(testing: flag_groups.Testing, seed: int, folder: Path | None) -> Age
         random_wrenches=testing.random_wrenches,
         wrenches=(*own, *weight),
         limits=testing.limits,
-        independent=testing.independent,
-        rules=testing.also_judge_by,
         trials=testing.repeats.trials,
         noise=noise_of(testing.repeats),
         keep_traces=testing.traces,

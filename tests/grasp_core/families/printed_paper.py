@@ -1,28 +1,22 @@
-"""Solves the paper's programs exactly as printed, as a source of negative controls.
+"""Solves the paper's programs exactly as printed, to show that they fail.
 
 Sections 3.2 and 3.3 of Sudsang & Ponce leave conditions out that the constructions in `grasp_core`
 have. The printed pencil program (force lines in two flat pencils) leaves the order of the two foci
 open, so its discs hold contacts out of equilibrium. The printed regulus program (four lines of one
 ruled quadric) lacks the equation of equal pitch, so its lines are often independent and cannot
-balance. Their answers look like grasps, which makes them good negative controls. Nothing else may
-use them.
+balance.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import product
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.cones.pyramids import inscribed_facets
-from grasp_core.cones.spanning import balancing_weights, span_angle
-from grasp_core.families.constructions import PAIRINGS
-from grasp_core.families.regulus_program import LEAST_DEPTH
-from grasp_core.objects.face_pieces import FacePiece, unit_pieces
-from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.cones.spanning import balancing_weights
+from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.values import ForceCone
 
@@ -30,8 +24,6 @@ LEAST = 1e-3
 """Smallest disc radius accepted from the printed pencil program, in object radii."""
 PAIR = (0, 0, 1, 1)
 """The pair, 0 or 1, to which each of the four fingers belongs."""
-BELOW_SPAN = 0.99
-"""Largest half-angle of the cones, relative to the angle at which the normals stop spanning."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,53 +43,6 @@ class Lines:
     positions: Array
     forces: Array
     offset: float
-
-
-def uncorrected_contacts(
-    body: Polyhedron, faces: Sequence[int], friction: float
-) -> Iterator[tuple[float, Array, Array]]:
-    """Yield contacts that the printed programs take for grasps, with the friction they suppose.
-
-    Gives the friction that is supposed; positions of several sets of contacts, (g, 4, 3) [m]; and
-    the normals of all these sets, (4, 3).
-    """
-    pieces = _first_pieces(body)
-    normals = np.array([body.faces[face].normal for face in faces])
-    theta = min(math.atan(friction), BELOW_SPAN * span_angle(normals))
-    if theta <= 0.0:
-        return
-    for order in PAIRINGS:
-        quad = [pieces[faces[finger]] for finger in order]
-        units = np.array([piece.normal for piece in quad])
-        cones = [ForceCone(piece.normal, theta) for piece in quad]
-        if (lines := printed_regulus(quad, cones, LEAST_DEPTH)) is not None:
-            yield math.tan(theta), _true(body, lines.positions[None]), units
-        discs = printed_pencil(quad, theta)
-        if discs is not None and focus_gap(quad, discs.foci) < 0.0:
-            borders = np.array(list(_border_points(quad, discs)))
-            yield math.tan(theta), _true(body, borders), units
-
-
-@lru_cache(maxsize=8)
-def _first_pieces(body: Polyhedron) -> dict[int, FacePiece]:
-    """The first convex piece of each face, by the face's index, at object size one."""
-    pieces: dict[int, FacePiece] = {}
-    for piece in unit_pieces(body):
-        pieces.setdefault(piece.face, piece)
-    return pieces
-
-
-def _true(body: Polyhedron, positions: Array) -> Array:
-    return body.center_of_mass + body.radius * positions
-
-
-def _border_points(quad: Sequence[FacePiece], discs: Discs) -> Iterator[Array]:
-    """Contacts on the borders of the discs that push farthest out of the plane of each pair."""
-    N, _ = focus_line(quad)
-    flat = [piece.frame @ (piece.frame.T @ N[i]) for i, piece in zip(PAIR, quad, strict=True)]
-    ways = discs.radii[:, None] * np.array([unit(way) for way in flat])
-    for signs in product((1.0, -1.0), repeat=4):
-        yield discs.centers + np.array(signs)[:, None] * ways
 
 
 def focus_line(quad: Sequence[FacePiece]) -> tuple[list[Array], Array]:
