@@ -111,7 +111,6 @@ def test_settings_of_a_file_are_in_force_and_in_the_record(planned, verdict):
         (["--traces"], Exit.USAGE, "with --out DIR too"),
         (["--wrenches", "none.json"], Exit.INPUT, "none.json"),
         (["--setup", "none.toml"], Exit.INPUT, "none.toml"),
-        (["--also-judge-by", "1cm"], Exit.USAGE, "six-forces"),
         (["--limits", "guess"], Exit.USAGE, "bisection"),
         (["--weight-n", "1", "--down", "0", "0", "0"], Exit.USAGE, "zero"),
     ],

@@ -105,7 +105,7 @@ def test_a_flipped_normal_is_the_only_change():
 
 
 def test_the_simulator_lets_go_of_what_the_printed_regulus_program_takes_for_grasps():
-    body, theta, tested = scenes.example_object("random-16-1"), math.radians(10.0), 0
+    body, theta, tested = scenes.example_object("random-30-1"), math.radians(10.0), 0
     for quad, cones in paired_quadruples(body.name, theta, 160):
         lines = printed_regulus(quad, cones, LEAST_DEPTH)
         if lines is None:
