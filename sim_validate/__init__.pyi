@@ -14,12 +14,12 @@ from sim_validate.peer_files.dexgraspbench_records import write_dex_record as wr
 from sim_validate.peer_files.hand_records import dex_record as dex_record
 from sim_validate.peer_files.hand_records import reach_of_record as reach_of_record
 from sim_validate.peer_files.object_folders import write_dex_object as write_dex_object
-from sim_validate.protocols.judgement import Judgement as Judgement
+from sim_validate.protocols.judging import Judgement as Judgement
 from sim_validate.protocols.judging import judge_by as judge_by
 from sim_validate.protocols.judging import judge_hand_by as judge_hand_by
-from sim_validate.protocols.named_protocols import protocol as protocol
-from sim_validate.protocols.named_protocols import protocol_names as protocol_names
 from sim_validate.protocols.published import PublishedProtocol as PublishedProtocol
+from sim_validate.protocols.published import protocol as protocol
+from sim_validate.protocols.published import protocol_names as protocol_names
 from sim_validate.records.executions_json import Executions as Executions
 from sim_validate.records.executions_json import load_executions as load_executions
 from sim_validate.records.regions import load_regions as load_regions

@@ -14,7 +14,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "validate": (
         "validate plan/grasps.json --out plan",
-        "validate plan/grasps.json --protocol dexgraspbench --protocol graspqp --out plan",
+        "validate plan/grasps.json --protocol dexgraspbench --protocol dexonomy --out plan",
         "validate plan/grasps.json --weight-n 3 --down 0 0 -1 --limits ramp --trials 20",
     ),
     "execute": (

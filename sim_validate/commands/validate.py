@@ -13,7 +13,7 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
 from sim_validate.commands.asked.trials import prepared
-from sim_validate.commands.judging.by_protocols import judge_grasps
+from sim_validate.commands.judging import judge_grasps
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import remove_verdicts
 from sim_validate.files.writing import write_arrays

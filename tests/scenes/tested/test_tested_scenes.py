@@ -12,7 +12,7 @@ from scenes.physics import PhysicsSettings
 from scenes.tested.fingertip_scene import fingertip_scene
 from scenes.tested.hand_scene import HandServos, Postures, Weld, hand_scene, planned_postures
 from sim_validate.peer_files.hand_files import hand_file
-from sim_validate.protocols.named_protocols import protocol
+from sim_validate.protocols.published import protocol
 from tests.grasp_core.hands.gripping import FRICTION, plain_hand, reaches, scaled
 
 BODY = scaled("dodecahedron", 0.05)

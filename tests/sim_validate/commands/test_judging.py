@@ -29,20 +29,15 @@ def finite(document):
     return json.loads(document, parse_constant=lambda text: pytest.fail(f"{text} is no JSON"))
 
 
-def test_grasps_are_judged_by_each_test_and_an_imitation_is_called_one(grasps, tmp_path, capsys):
-    words = ["validate", str(grasps), "--protocol", "dexgraspbench", "--protocol", "graspqp"]
+def test_grasps_are_judged_by_each_test(grasps, tmp_path, capsys):
+    words = ["validate", str(grasps), "--protocol", "dexgraspbench", "--protocol", "dexonomy"]
     assert main([*words, "--out", str(tmp_path)]) == Exit.GOOD
-    said = capsys.readouterr().out
-    assert said.count("graspqp (imitation)") == 3
-    assert "graspqp is an imitation: PhysX" in said
-    assert "dexgraspbench (imitation)" not in said
+    assert capsys.readouterr().out.count("dexonomy") == 3
     document = finite((tmp_path / "judgements.json").read_text())
     assert document["complete"]
-    assert set(document["protocols"]) == {"dexgraspbench", "graspqp"}
-    assert [each["imitation"] for each in document["judgements"]] == [False, False, True, True]
+    assert set(document["protocols"]) == {"dexgraspbench", "dexonomy"}
     for each in document["judgements"]:
         test = document["protocols"][each["protocol"]]
-        assert each["imitation"] == test["imitation"] == bool(test["imitates"])
         assert each["theirs"]["passed"]
         assert each["ours"]["held"]
         assert each["ours"]["force_closure"]
@@ -50,7 +45,7 @@ def test_grasps_are_judged_by_each_test_and_an_imitation_is_called_one(grasps, t
         assert each["predicted"]["margin"] > 1.0
         assert len(each["theirs"]["runs"]) == len(test["runs"])
     every = {"grasps": 2, "theirs_passed": 2, "ours_held": 2, "predicted": 2, "agree": 2}
-    assert document["summary"] == {"dexgraspbench": every, "graspqp": every}
+    assert document["summary"] == {"dexgraspbench": every, "dexonomy": every}
     assert document["protocols"]["dexgraspbench"]["sources"][0]["commit"].startswith("1e7a5a6f")
 
 
@@ -85,13 +80,11 @@ def test_a_report_shows_what_each_test_says_and_new_judgements_remove_it(grasps,
     run.mkdir()
     shutil.copy(grasps, run)
     words = ["validate", str(run / "grasps.json"), "--limit", "1", "--out", str(run), "-q"]
-    main([*words, "--protocol", "dexgraspbench", "--protocol", "dexgraspnet"])
+    main([*words, "--protocol", "dexgraspbench"])
     main(["report", str(run), "--limit", "1", "-q"])
     page = (run / "report" / "index.html").read_text()
     assert "Judged by other tools" in page
     assert '<th scope="row">dexgraspbench</th>' in page
-    assert '<th scope="row">dexgraspnet (imitation)</th>' in page
-    assert "dexgraspnet (imitation): PhysX" in page
     main([*words, "--protocol", "dexonomy"])
     assert not (run / "report").exists()
 

@@ -11,9 +11,8 @@ from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.files.stale_results import JUDGEMENTS, remove_judgements
-from sim_validate.protocols.jobs import GraspCase, HandCase, judged
-from sim_validate.protocols.judgement import Judgement
 from sim_validate.protocols.judgements_json import judgements_summary, judgements_to_json
+from sim_validate.protocols.judging import GraspCase, HandCase, Judgement, judged
 from sim_validate.simulation.setup import Setup
 
 COLUMNS = ("grasp", "test", "theirs", "ours", "margin", "moved mm", "deg")
@@ -29,7 +28,7 @@ def judge_grasps(
     Gives the exit code, and the text of judgements.json.
     """
     cases = [
-        GraspCase(name, saved.body, grasp, saved.friction, setup, saved.seed)
+        GraspCase(name, saved.body, grasp, saved.friction, setup)
         for name in names
         for grasp in saved.grasps
     ]
@@ -38,14 +37,14 @@ def judge_grasps(
 
 def judge_hands(
     saved: SavedGrasps, hand: Hand, found: Sequence[HandReach], names: Sequence[str], *,
-    seed: int, jobs: int, folder: Path | None, reporter: Reporter,
+    jobs: int, folder: Path | None, reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
     """Judge the poses of a hand in the grasps of a file by tests.
 
     Gives the exit code, and the text of judgements.json.
     """
     cases = [
-        HandCase(name, hand, saved.body, each, saved.friction, seed)
+        HandCase(name, hand, saved.body, each, saved.friction)
         for name in names
         for each in found
         if each.reached
@@ -84,18 +83,14 @@ def show_judgements(judgements: Sequence[Judgement], reporter: Reporter) -> None
     rows = [_row(each) for each in judgements[:TABLE_ROWS]]
     reporter.table("judged by published tests", COLUMNS, rows)
     say_cut(len(judgements), reporter)
-    labels = {each.protocol.name: each.protocol.label for each in judgements}
     totals = [
-        (labels[name], *map(str, counts.values()))
+        (name, *map(str, counts.values()))
         for name, counts in judgements_summary(judgements).items()
     ]
     reporter.table("in all", TOTALS, totals)
-    for protocol in {each.protocol.name: each.protocol for each in judgements}.values():
-        if protocol.imitates:
-            reporter.say(f"{protocol.name} is an imitation: {protocol.imitates}")
     for each in judgements[:TABLE_ROWS]:
         for told in _surprises(each):
-            reporter.warn(f"{each.grasp}: {each.protocol.label}: {told}")
+            reporter.warn(f"{each.grasp}: {each.protocol.name}: {told}")
 
 
 def _row(each: Judgement) -> tuple[str, ...]:
@@ -103,10 +98,8 @@ def _row(each: Judgement) -> tuple[str, ...]:
     turned = max((run.turn_deg for run in each.runs), default=0.0)
     margin = "no load" if math.isinf(each.ours.margin) else f"{each.ours.margin:.3g}"
     theirs = "passed" if each.theirs else "failed"
-    if each.protocol.copies > 1:
-        theirs = f"{each.copies_passed} of {each.protocol.copies}"
     return (
-        each.grasp, each.protocol.label, theirs, "held" if each.ours.held else "not held", margin,
+        each.grasp, each.protocol.name, theirs, "held" if each.ours.held else "not held", margin,
         f"{1e3 * moved:.2g}", f"{turned:.2g}",
     )  # fmt: skip
 
