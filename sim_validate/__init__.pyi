@@ -1,4 +1,10 @@
 from sim_validate.datasets.open_dataset import load_dataset as load_dataset
+from sim_validate.dexgraspbench import DexRecord as DexRecord
+from sim_validate.dexgraspbench import dex_record as dex_record
+from sim_validate.dexgraspbench import load_dex_record as load_dex_record
+from sim_validate.dexgraspbench import reach_of_record as reach_of_record
+from sim_validate.dexgraspbench import write_dex_object as write_dex_object
+from sim_validate.dexgraspbench import write_dex_record as write_dex_record
 from sim_validate.execution.execute import execute as execute
 from sim_validate.execution.jobs import ExecutedGrasp as ExecutedGrasp
 from sim_validate.execution.settings import ExecutionSettings as ExecutionSettings
@@ -8,12 +14,6 @@ from sim_validate.hands.execute_hand import execute_hand as execute_hand
 from sim_validate.hands.hand_verdict import HandVerdict as HandVerdict
 from sim_validate.hands.validate_hand import hand_setup as hand_setup
 from sim_validate.hands.validate_hand import validate_hand as validate_hand
-from sim_validate.peer_files.dexgraspbench_records import DexRecord as DexRecord
-from sim_validate.peer_files.dexgraspbench_records import load_dex_record as load_dex_record
-from sim_validate.peer_files.dexgraspbench_records import write_dex_record as write_dex_record
-from sim_validate.peer_files.hand_records import dex_record as dex_record
-from sim_validate.peer_files.hand_records import reach_of_record as reach_of_record
-from sim_validate.peer_files.object_folders import write_dex_object as write_dex_object
 from sim_validate.protocols.judging import Judgement as Judgement
 from sim_validate.protocols.judging import judge_by as judge_by
 from sim_validate.protocols.judging import judge_hand_by as judge_hand_by

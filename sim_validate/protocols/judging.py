@@ -32,11 +32,10 @@ from scenes.hands.hand_mjcf import build_hand_scene
 from scenes.mjcf import Scene
 from scenes.tested.fingertip_scene import fingertip_scene
 from scenes.tested.hand_scene import HandServos, hand_scene, planned_postures
+from sim_validate.dexgraspbench import RecordedReach, hand_file, recorded_postures
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.hands.validate_hand import hand_setup
 from sim_validate.parallel.processes import each
-from sim_validate.peer_files.hand_files import hand_file
-from sim_validate.peer_files.hand_records import RecordedReach, recorded_postures
 from sim_validate.protocols.published import PROTOCOLS, PublishedProtocol
 from sim_validate.protocols.runs import RunVerdict, their_verdict
 from sim_validate.simulation.gate.gate import require_faithful

@@ -73,11 +73,11 @@ CALLS = [
     }),
     Call("sv.load_dex_record", lambda: {"path": "no/such/0.npy"}, {
         "path": PATH | {"nowhere": "no/such/0.npy"},
-    }, succeeds_in="tests/sim_validate/peer_files/test_dexgraspbench_records.py"),
+    }, succeeds_in="tests/sim_validate/test_dexgraspbench.py"),
     Call("sv.write_dex_record", lambda: {"record": record(), "path": "no/such/0.npy"}, {
         "record": VALUE, "path": PATH,
-    }, succeeds_in="tests/sim_validate/peer_files/test_dexgraspbench_records.py"),
+    }, succeeds_in="tests/sim_validate/test_dexgraspbench.py"),
     Call("sv.write_dex_object", lambda: {"body": body(), "folder": "no/such"}, {
         "body": VALUE, "folder": PATH,
-    }, succeeds_in="tests/sim_validate/peer_files/test_dexgraspbench_records.py"),
+    }, succeeds_in="tests/sim_validate/test_dexgraspbench.py"),
 ]  # fmt: skip

@@ -6,8 +6,8 @@ import shutil
 import pytest
 
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.dexgraspbench import load_dex_record
 from sim_validate.main import main
-from sim_validate.peer_files.dexgraspbench_records import load_dex_record
 
 
 @pytest.fixture(scope="module")

@@ -11,10 +11,10 @@ import grasp_core as gc
 from grasp_core.errors import InputError
 from scenes.mjcf_text import quaternion
 from scenes.tested.hand_scene import HandServos, hand_scene
-from sim_validate.peer_files.dexgraspbench_records import FREE
-from sim_validate.peer_files.hand_files import hand_file
-from sim_validate.peer_files.hand_records import (
+from sim_validate.dexgraspbench import (
+    FREE,
     dex_record,
+    hand_file,
     pose_of,
     reach_of_record,
     recorded_postures,

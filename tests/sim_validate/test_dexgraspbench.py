@@ -12,14 +12,17 @@ from grasp_core.errors import InputError
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.stance import stance_of
 from scenes.mjcf_text import quaternion
-from sim_validate.peer_files.dexgraspbench_records import (
+from sim_validate.dexgraspbench import (
+    FREE,
     DexRecord,
+    dex_record,
+    hand_file,
     load_dex_record,
+    pose_of,
+    reach_of_record,
+    write_dex_object,
     write_dex_record,
 )
-from sim_validate.peer_files.hand_files import hand_file
-from sim_validate.peer_files.hand_records import FREE, dex_record, pose_of, reach_of_record
-from sim_validate.peer_files.object_folders import write_dex_object
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
 SAME = 1e-9
@@ -243,28 +246,6 @@ def test_a_file_that_names_anything_but_plain_arrays_is_refused(protocol, harm, 
         load_dex_record(path)
 
 
-def test_a_short_file_takes_neither_time_nor_memory_nor_the_stack(tmp_path):
-    """Lists of a thousand copies of lists, a list of itself, deep tuples, and sizes that lie."""
-    many = []
-    for _ in range(6):
-        many = [many] * 1000
-    circle = []
-    circle.append(circle)
-    for value in (many, circle):
-        with pytest.raises(InputError, match=r"array of numbers|more than 10000 values"):
-            load_dex_record(saved(FIELDS | {"obj_scale": value}, tmp_path / "0.npy"))
-    huge = b"\xff" * 7 + b"\x0f."
-    for lie in (
-        b"\x80\x04Nr\xff\xff\xff\x7f.", b"\x80\x04\x8e" + huge, b"\x80\x05\x96" + huge,
-        b"\x80\x04)" + 10**6 * b"\x85" + b"}Q.", b"", b"\x80\x04N.", b"\x80\x04Pname\n.",
-    ):  # fmt: skip
-        np.save(tmp_path / "lie.npy", np.array({}, object), allow_pickle=True)
-        header = (tmp_path / "lie.npy").read_bytes()[:128]
-        (tmp_path / "lie.npy").write_bytes(header + lie)
-        with pytest.raises(InputError, match=r"lie.npy: the pickle"):
-            load_dex_record(tmp_path / "lie.npy")
-
-
 def test_any_damage_is_refused_with_our_error(tmp_path):
     path = saved(FIELDS, tmp_path / "0.npy", 4)
     data = path.read_bytes()
@@ -283,24 +264,17 @@ def test_any_damage_is_refused_with_our_error(tmp_path):
 
 @pytest.mark.parametrize(
     ("value", "said"),
-    [(np.array([{"qpos": {"WRJRx": 0.1}, "scale": 0.06}] * 3, object), "list of 3.*DexGraspNet"),
-     (np.array([FIELDS, FIELDS], object), "one grasp, got a list of 2. Save each"),
-     (np.zeros((4, 17)), r"numbers of shape \(4, 17\). Rows of 17 .* GraspNet"),
-     (np.zeros(3), r"numbers of shape \(3,\)$"), (np.array("text", object), "a dictionary")],
-    ids=["DexGraspNet", "several records", "GraspNet", "numbers", "text"],
+    [(np.array([FIELDS, FIELDS], object), "one grasp, got a list"), (np.zeros(3), "of numbers"),
+     (np.array("text", object), "got a str")],
+    ids=["several records", "numbers", "text"],
 )  # fmt: skip
-def test_files_of_another_kind_are_called_what_they_are(value, said, tmp_path):
+def test_files_of_another_kind_are_refused(value, said, tmp_path):
     np.save(tmp_path / "0.npy", value, allow_pickle=True)
     with pytest.raises(InputError, match=rf"0.npy: expected .*{said}"):
         load_dex_record(tmp_path / "0.npy")
-
-
-def test_other_formats_are_called_what_they_are(tmp_path):
-    np.savez(tmp_path / "0.npz", np.zeros(3))
     (tmp_path / "0.pkl").write_bytes(pickle.dumps(FIELDS))
-    for name, kind in (("0.npz", "zip archive"), ("0.pkl", "a bare pickle")):
-        with pytest.raises(InputError, match=rf"{name}: expected a .npy file .*{kind}"):
-            load_dex_record(tmp_path / name)
+    with pytest.raises(InputError, match=r"0.pkl: expected a .npy file"):
+        load_dex_record(tmp_path / "0.pkl")
 
 
 @pytest.mark.parametrize(
