@@ -51,7 +51,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.short_text import summary
 from grasp_core.values import Contact
 from scenes.mjcf_text import quaternion
-from scenes.tested.hand_scene import Postures
+from scenes.tested import Postures
 
 FREE = 7
 """Numbers of a pose: position and quaternion."""

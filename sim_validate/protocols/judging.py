@@ -30,8 +30,7 @@ from grasp_core.short_text import summary
 from grasp_core.values import Contact, Grasp
 from scenes.hands.hand_mjcf import build_hand_scene
 from scenes.mjcf import Scene
-from scenes.tested.fingertip_scene import fingertip_scene
-from scenes.tested.hand_scene import HandServos, hand_scene, planned_postures
+from scenes.tested import HandServos, fingertip_scene, hand_scene, planned_postures
 from sim_validate.dexgraspbench import RecordedReach, hand_file, recorded_postures
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.hands.validate_hand import hand_setup

@@ -17,7 +17,7 @@ from grasp_core.checked import one_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.short_text import summary
 from scenes.physics import PhysicsSettings
-from scenes.tested.hand_scene import Weld
+from scenes.tested import Weld
 
 Triple: TypeAlias = tuple[float, float, float]
 NOWHERE: Triple = (0.0, 0.0, 0.0)

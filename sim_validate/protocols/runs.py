@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.tested.tested_object import TestedScene
+from scenes.tested import TestedScene
 from sim_validate.protocols.published import Passing, PublishedProtocol, Run, Step
 from sim_validate.simulation.engine import batch, compiled, mujoco, step, unlogged
 from sim_validate.simulation.traces import rotation_angles

@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 from scenes.fingertips import FingerSettings
-from scenes.tested.fingertip_scene import fingertip_scene
+from scenes.tested import fingertip_scene
 from sim_validate.protocols.published import Step, protocol
 from sim_validate.protocols.runs import CHUNK, timeline
 from tests.grasp_core.hands.gripping import scaled

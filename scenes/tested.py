@@ -1,6 +1,16 @@
-"""Writes the scene in which a hand closes on an object of a stated mass and squeezes it.
+"""Writes the scenes in which tests of other tools run: fingertips or a hand hold an object.
 
-The shapes of links, and fingertips that none of them covers, touch the object's own surface. Joints
+The object has the mass that the test states. The world frame is the object's frame moved to the
+centre of mass. Fingers touch the object's own surface, wherever they slide (see
+`scenes.execution.surface`). Gravity is off: the weight, and what a moving palm does to the object,
+are forces on the object.
+
+Each of four fingertips moves on three slides along the axes of its contact, with a position servo
+on each, as in tests of closure (`scenes.mjcf`). The servos' stiffness is the usual one for the size
+of the grasp; fingertips and object have true masses, so servos are damped as a mass between them
+needs.
+
+The shapes of a hand's links, and fingertips that none of them covers, touch the surface. Joints
 have the hand's own angles. The palm is fixed in the world, links are light, and servos have as much
 inertia as their stiffness needs in steps of the test; or, where the test has it so, the hand is as
 heavy as it is, and its root is a free body on a weld to one that moves as told. A weld acts on a
@@ -13,16 +23,20 @@ soft one, and recoils as its fingers start.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
+from grasp_core.by_value import ByValue
 from grasp_core.hands.hand import PALM, Fingertip, Hand, HandFinger
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact, Grasp
+from scenes.execution.surface import touched_solids
+from scenes.fingertips import FingerSettings
 from scenes.hands.chains_mjcf import (
     SHAPES,
     Chains,
@@ -33,10 +47,33 @@ from scenes.hands.chains_mjcf import (
 )
 from scenes.hands.hand_layout import hand_layout
 from scenes.hands.link_masses import hand_inertials
-from scenes.mjcf_text import Element, add_element, as_texts, quaternion
+from scenes.layout import SQUEEZE, Layout, arrange
+from scenes.mjcf import AXES
+from scenes.mjcf_text import (
+    COMPILER,
+    Element,
+    add_comment,
+    add_element,
+    as_texts,
+    document,
+    element,
+    printable,
+    quaternion,
+)
 from scenes.physics import PhysicsSettings
-from scenes.tested.tested_object import TestedScene, begun, ended, mass_properties
 
+COMMENT = (
+    "The test of another tool: the object has the mass that the test states, and no gravity. "
+    "Servos stand open at the start, and are told to close and to squeeze."
+)
+"""Comment at the top of every scene."""
+FINGERS = (1 << 20) - 1
+"""Bits of what fingertips touch: each may have one of its own."""
+ORIGIN = np.zeros((1, 3))
+TIP_MASS_KG = 0.05
+"""Mass of a fingertip with the part of its finger that moves with it."""
+OPEN_M, OPEN_SIZES = 0.01, 0.25
+"""Distance from which fingertips come: the smaller of the two [m, grasp sizes]."""
 ARMATURE_KG_M2 = 1e-4
 """Least inertia of each joint's motor where links have no masses of their own."""
 RING_RAD = 0.5
@@ -45,6 +82,149 @@ ROOT, TOLD = "root", "told"
 """Names of the body that a weld holds, and of the one that moves as told."""
 COVERED_M = 1e-6
 """How far a fingertip's ball may stand out of a shape that covers it [m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TestedScene(ByValue):
+    """An object with what holds it as the text of a MuJoCo model, with commands of its servos."""
+
+    __test__ = False  # no class of tests, whatever its name begins with
+
+    xml: str
+    physics: PhysicsSettings
+    friction: float
+    mass_kg: float
+    inertia_kg_m2: Array
+    """Inertia of the object about its centre of mass, along the world axes, (3, 3) [kg m^2]."""
+    pushes_n: Array
+    """Normal forces with which the fingers are told to squeeze, (k,) [N]."""
+    opened: Array
+    """Commands with which the fingers are open, (u,) [m or rad]; the joints start there. Where a
+    hand hangs on a weld, the pose (7,) that its root is told to have comes first."""
+    shut: Array
+    """Commands with which they just touch, (u,) [m or rad]."""
+    squeezing: Array
+    """Commands with which they squeeze, (u,) [m or rad]."""
+    fingers: tuple[tuple[str, ...], ...]
+    """Names of the bodies of each finger."""
+    axes: Array = field(default_factory=lambda: np.eye(3))
+    """Columns are the axes of the test's world, along which it pulls, in the scene's, (3, 3)."""
+
+
+def mass_properties(body: Polyhedron, mass_kg: float) -> tuple[float, Array]:
+    """Return the mass [kg] and the inertia of a body of uniform density, (3, 3) [kg m^2]."""
+    return mass_kg, to_digits(mass_kg / body.volume * body.inertia)
+
+
+def begun(
+    body: Polyhedron, friction: float, mass: tuple[float, Array], physics: PhysicsSettings,
+) -> tuple[Element, Element]:  # fmt: skip
+    """Begin a scene: return its root, with the meshes of the surface, and its world."""
+    root = element("mujoco", {"model": printable(body.name)})
+    add_comment(root, COMMENT)
+    add_element(root, "compiler", COMPILER)
+    option = add_element(root, "option", physics.options())
+    add_element(option, "flag", physics.flags() | {"midphase": "disable"})
+    extent = {"extent": 3.0 * body.radius, "center": (0.0, 0.0, 0.0)}
+    add_element(root, "statistic", extent)
+    assets = add_element(root, "asset", {})
+    vertices = to_digits(body.vertices - body.center_of_mass)
+    seen = {"vertex": vertices.ravel(), "face": body.triangles.ravel()}
+    add_element(assets, "mesh", {"name": "object", "inertia": "shell"} | seen)
+    solids = touched_solids(body, ORIGIN, 2.0 * body.radius)
+    for place, corners in enumerate(solids):
+        solid = {"name": f"surface{place}", "inertia": "shell", "vertex": to_digits(corners)}
+        add_element(assets, "mesh", solid)
+    world = add_element(root, "worldbody", {})
+    rubbing = as_texts({"friction": (friction, physics.torsion_m, 0.0), **physics.contact()})
+    _object(world, mass, rubbing, len(solids))
+    return root, world
+
+
+def _object(
+    world: Element, mass: tuple[float, Array], rubbing: dict[str, str], solids: int
+) -> None:
+    """Add the object with its mass, and the solids that are its surface."""
+    body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
+    add_element(body, "freejoint", {"name": "object"})
+    inertia = mass[1][[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    add_element(body, "inertial", {"pos": (0.0, 0.0, 0.0), "mass": mass[0], "fullinertia": inertia})
+    seen = {"name": "object", "type": "mesh", "mesh": "object", "contype": 0, "conaffinity": 0,
+            "mass": 0.0, "group": 1, "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip
+    add_element(body, "geom", seen)
+    everything = {"contype": FINGERS | 1 << 20, "conaffinity": 0, "mass": 0.0, "group": 3,
+                  "rgba": (0.9, 0.6, 0.2, 0.3)}  # fmt: skip
+    for place in range(solids):
+        named = {"name": f"surface{place}", "type": "mesh", "mesh": f"surface{place}"}
+        add_element(body, "geom", named | everything | rubbing)
+
+
+def ended(root: Element, opened: Array, told: int = 0) -> str:
+    """Add the keyframe `open` and write the scene.
+
+    Takes `opened` (u,).
+    """
+    place = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], opened])
+    key = {"name": "open", "qpos": place, "ctrl": opened[told:]}
+    moved = {"mpos": opened[:3], "mquat": opened[3:told]} if told else {}
+    add_element(add_element(root, "keyframe", {}), "key", key | moved)
+    return document(root)
+
+
+def fingertip_scene(
+    body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float, mass_kg: float,
+    physics: PhysicsSettings, fingers: FingerSettings,
+) -> TestedScene:  # fmt: skip
+    """Make the scene of a grasp, or of contacts of any origin.
+
+    Takes `mass_kg` [kg].
+    """
+    base = arrange(body, grasp, friction, fingers, physics.torsion_m)
+    mass, inertia = mass_properties(body, mass_kg)
+    layout = replace(base, center=np.zeros(3), mass_kg=mass, inertia_kg_m2=inertia)
+    root, world = begun(body, friction, (mass, inertia), physics)
+    actuators = add_element(root, "actuator", {})
+    for finger in range(len(layout.contacts)):
+        _fingertip(world, layout, physics, finger)
+        _tip_servos(actuators, layout, finger)
+    away = min(OPEN_M, OPEN_SIZES * layout.grasp_size_m)
+    opened = np.tile([-away, 0.0, 0.0], len(layout.contacts))
+    squeeze = layout.squeeze / SQUEEZE
+    commands = to_digits(squeeze / layout.drive.stiffness_n_per_m).ravel()
+    names = tuple((f"finger{finger}",) for finger in range(len(layout.contacts)))
+    return TestedScene(
+        ended(root, opened), physics, friction, mass, inertia, squeeze[:, 0], opened,
+        np.zeros_like(opened), commands, names,
+    )  # fmt: skip
+
+
+def _fingertip(world: Element, layout: Layout, physics: PhysicsSettings, finger: int) -> None:
+    name, radius = f"finger{finger}", layout.drive.radius_m
+    pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.frames[finger])}
+    body = add_element(world, "body", {"name": name} | pose)
+    for axis, way in zip(AXES, np.eye(3), strict=True):
+        slide = {"name": f"{name}_{axis}", "type": "slide", "axis": way, "pos": (0.0, 0.0, 0.0),
+                 "limited": "false", "damping": 0.0, "stiffness": 0.0, "armature": 0.0,
+                 "frictionloss": 0.0}  # fmt: skip
+        add_element(body, "joint", slide)
+    inertia = (0.4 * TIP_MASS_KG * radius**2,) * 3
+    own = {"pos": (0.0, 0.0, 0.0), "mass": TIP_MASS_KG, "diaginertia": inertia}
+    add_element(body, "inertial", own)
+    tip = {"name": name, "type": "sphere", "size": radius, "contype": 0,
+           "conaffinity": 1 << finger, "friction": (layout.friction, layout.torsion_m, 0.0),
+           "mass": 0.0, "group": 0, "rgba": (0.8, 0.25, 0.2, 1.0)}  # fmt: skip
+    add_element(body, "geom", tip | physics.contact())
+
+
+def _tip_servos(actuators: Element, layout: Layout, finger: int) -> None:
+    stiffness = layout.drive.stiffness_n_per_m
+    share = TIP_MASS_KG + layout.mass_kg / len(layout.contacts)
+    damping = 2.0 * math.sqrt(stiffness * share)
+    for axis in AXES:
+        name = f"finger{finger}_{axis}"
+        servo = {"name": name, "joint": name, "kp": stiffness, "kv": damping,
+                 "ctrllimited": "false", "forcelimited": "false"}  # fmt: skip
+        add_element(actuators, "position", servo)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +326,7 @@ def hand_scene(
     )  # fmt: skip
     add_fingers(palm, chains)
     add_exclusions(add_element(root, "contact", {}), hand)
-    _add_servos(root, hand, postures, servos, physics.timestep)
+    _joint_servos(root, hand, postures, servos, physics.timestep)
     opened, shut, squeezing = np.hstack([roots, to_digits(postures.joints)])
     names = tuple(tuple(link.name for link in finger.links) for finger in hand.fingers)
     return TestedScene(
@@ -182,7 +362,7 @@ def _welded(root: Element, world: Element, weld: Weld) -> Element:
 
 def _tip(root: Element, finger: HandFinger, touching: dict[str, str]) -> dict[str, object]:
     """Return what a fingertip is: a solid with its corners, a ball, or nothing under a shape."""
-    corners = corners_of(finger.tip)
+    corners = finger.tip.corners
     if corners is None:
         return {} if _covered(finger) else {"conaffinity": 1, **touching}
     name = f"tip_{finger.name}"
@@ -192,14 +372,9 @@ def _tip(root: Element, finger: HandFinger, touching: dict[str, str]) -> dict[st
             "contype": SHAPES, **touching}  # fmt: skip
 
 
-def corners_of(tip: Fingertip) -> Array | None:
-    """Return the corners of a fingertip that is a block, (m, 3) [m]; None for a ball."""
-    return tip.corners
-
-
 def _without_cover(finger: HandFinger) -> HandFinger:
     """Return a finger without the shape that covers a block, its last; the block itself touches."""
-    if corners_of(finger.tip) is None:
+    if finger.tip.corners is None:
         return finger
     last = finger.links[-1]
     links = (*finger.links[:-1], replace(last, shapes=last.shapes[:-1]))
@@ -217,7 +392,7 @@ def _covered(finger: HandFinger) -> bool:
     return False
 
 
-def _add_servos(
+def _joint_servos(
     root: Element, hand: Hand, postures: Postures, servos: HandServos, step_s: float
 ) -> None:
     """Add a servo to each joint; on a weld, commands end where joints do, as in files of hands."""

@@ -9,8 +9,7 @@ import pytest
 import grasp_core as gc
 from scenes.fingertips import FingerSettings
 from scenes.physics import PhysicsSettings
-from scenes.tested.fingertip_scene import fingertip_scene
-from scenes.tested.hand_scene import HandServos, Postures, Weld, hand_scene, planned_postures
+from scenes.tested import HandServos, Postures, Weld, fingertip_scene, hand_scene, planned_postures
 from sim_validate.dexgraspbench import hand_file
 from sim_validate.protocols.published import protocol
 from tests.grasp_core.hands.gripping import FRICTION, plain_hand, reaches, scaled
