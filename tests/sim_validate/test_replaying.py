@@ -6,8 +6,7 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.replaying.recorded import Recorded
-from sim_validate.replaying.replay import replayed
+from sim_validate.replaying import Recorded, replayed
 from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.noise import Noise
 from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
