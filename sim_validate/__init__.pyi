@@ -32,15 +32,15 @@ from sim_validate.records.transfers.saved_transfer import load_transfer as load_
 from sim_validate.reports.charts.margin_charts import margin_figure as margin_figure
 from sim_validate.reports.charts.wrench_charts import wrench_figure as wrench_figure
 from sim_validate.reports.report import write_report as write_report
-from sim_validate.simulation.hold_verdict import Outcome as Outcome
-from sim_validate.simulation.noise import Noise as Noise
-from sim_validate.simulation.protocol import HoldProtocol as HoldProtocol
+from sim_validate.simulation.schedules import HoldProtocol as HoldProtocol
 from sim_validate.simulation.setup import Agenda as Agenda
 from sim_validate.simulation.setup import NamedWrench as NamedWrench
+from sim_validate.simulation.setup import Noise as Noise
 from sim_validate.simulation.setup import Setup as Setup
-from sim_validate.validation.grasp_verdict import Verdict as Verdict
-from sim_validate.validation.jobs import validate_all as validate_all
+from sim_validate.simulation.traces import Outcome as Outcome
 from sim_validate.validation.validation import (
     simulated_critical_friction as simulated_critical_friction,
 )
 from sim_validate.validation.validation import validate as validate
+from sim_validate.validation.validation import validate_all as validate_all
+from sim_validate.validation.verdict import Verdict as Verdict

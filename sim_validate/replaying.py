@@ -31,16 +31,22 @@ from sim_validate.datasets.rows import GIVEN, NOT_TRIED
 from sim_validate.records.grasps import NAMED, grasp_with_id, read_grasps, some
 from sim_validate.records.saved_verdicts import verdicts_of
 from sim_validate.records.setup_toml import OF_USERS, setup_from_tables
-from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome, invalid_start, judge
+from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.loads import PlannedLoad, planned_loads
-from sim_validate.simulation.noise import Noise
 from sim_validate.simulation.rig import Rig, Watched, squeezed
 from sim_validate.simulation.schedules import Load
-from sim_validate.simulation.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, NamedWrench, Setup
-from sim_validate.simulation.simulate import Bench
-from sim_validate.validation.control_trials import control_case
-from sim_validate.validation.controls import Control, negative_controls
-from sim_validate.validation.repeats import OPEN, disturbed_in, for_repeats, noisy_case
+from sim_validate.simulation.setup import (
+    AXIS_NAMES,
+    RANDOM,
+    WEAKEST,
+    Agenda,
+    NamedWrench,
+    Noise,
+    Setup,
+)
+from sim_validate.simulation.traces import HoldVerdict, Outcome, invalid_start, judge
+from sim_validate.validation.controls import Control, control_case, negative_controls
+from sim_validate.validation.noise import OPEN, disturbed_in, for_repeats, noisy_case
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"
 

@@ -10,8 +10,7 @@ from sim_validate.baselines.compare import WORDS, Status
 from sim_validate.baselines.entries import Baseline, Entry
 from sim_validate.baselines.executions import not_survived
 from sim_validate.baselines.parts.changed_part import Present
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 
 def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:

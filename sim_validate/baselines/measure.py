@@ -17,9 +17,9 @@ from sim_validate.baselines.settings import How, settings_of
 from sim_validate.execution.asked import AskedExecution
 from sim_validate.execution.jobs import ExecutedGrasp, ExecutionJob
 from sim_validate.parallel.processes import each, processes
-from sim_validate.simulation.gate.gate import require_faithful
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.jobs import Job, prepared, verdict_of
+from sim_validate.simulation.gate import require_faithful
+from sim_validate.validation.validation import Job, prepared, verdict_of
+from sim_validate.validation.verdict import Verdict
 
 Report = Callable[[int, int], None]
 """Function that is called with (done, total) after each grasp."""

@@ -22,11 +22,11 @@ from sim_validate.execution.asked import (
     execution_table,
 )
 from sim_validate.records.setup_toml import setup_from_file, setup_from_tables, tables_of
-from sim_validate.simulation.noise import Noise
 from sim_validate.simulation.setup import (
     Agenda,
     LimitSearch,
     NamedWrench,
+    Noise,
     Setup,
     with_planned_radius,
 )

@@ -30,8 +30,7 @@ from sim_validate.execution.asked import TABLE, AskedExecution, asked_execution
 from sim_validate.files.toml_tables import read_tables
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.wrenches import wrenches_from_file
-from sim_validate.simulation.noise import Noise
-from sim_validate.simulation.setup import Agenda
+from sim_validate.simulation.setup import Agenda, Noise
 
 ENDING = ".grasps.toml"
 KINDS: Mapping[str, type] = {

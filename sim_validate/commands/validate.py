@@ -18,12 +18,11 @@ from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import remove_verdicts
 from sim_validate.files.writing import write_arrays
 from sim_validate.records.verdicts_json import summary, trace_arrays, verdicts_to_json
-from sim_validate.simulation.gate.gate import require_faithful
-from sim_validate.simulation.hold_verdict import Outcome
+from sim_validate.simulation.gate import require_faithful
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.jobs import Job, validated
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.simulation.traces import Outcome
+from sim_validate.validation.validation import Job, validated
+from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 
 def validate_file(command: command_flags.Validate, reporter: Reporter) -> int:

@@ -21,7 +21,7 @@ from scenes.execution.turns import hinged, rotations
 from scenes.mjcf_text import quaternion
 from sim_validate.execution.drives import Drive, Table
 from sim_validate.execution.paths import WHOLE
-from sim_validate.simulation.engine import batch, compiled, mujoco, step, touched, unlogged
+from sim_validate.simulation.bench import batch, compiled, mujoco, step, touched, unlogged
 
 FREE, PALM = 6, 12
 """Joint velocities up to the end of the object's, and up to the end of the palm's."""

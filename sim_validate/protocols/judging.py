@@ -37,12 +37,12 @@ from sim_validate.hands.validate_hand import hand_setup
 from sim_validate.parallel.processes import each
 from sim_validate.protocols.published import PROTOCOLS, PublishedProtocol
 from sim_validate.protocols.runs import RunVerdict, their_verdict
-from sim_validate.simulation.gate.gate import require_faithful
-from sim_validate.simulation.hold_verdict import Outcome, judge
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.gate import require_faithful
 from sim_validate.simulation.loads import PlannedLoad, loads_as_they_are
 from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.simulate import Bench
+from sim_validate.simulation.traces import Outcome, judge
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from scenes.tested import TestedScene
 from sim_validate.protocols.published import Passing, PublishedProtocol, Run, Step
-from sim_validate.simulation.engine import batch, compiled, mujoco, step, unlogged
+from sim_validate.simulation.bench import batch, compiled, mujoco, step, unlogged
 from sim_validate.simulation.traces import rotation_angles
 
 CHUNK = 10

@@ -25,12 +25,11 @@ from sim_validate.records.verdicts_schema import (
     VerdictRecord,
     VerdictsFile,
 )
-from sim_validate.simulation.gate.gate import Gate
-from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
-from sim_validate.validation.control_trials import ControlVerdict
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.repeats import Robustness
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.simulation.gate import Gate
+from sim_validate.simulation.traces import HoldVerdict, Outcome
+from sim_validate.validation.controls import ControlVerdict
+from sim_validate.validation.noise import Robustness
+from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 
 def verdicts_to_json(

@@ -11,7 +11,7 @@ from typing_extensions import TypedDict
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from scenes.mjcf import Surface
-from sim_validate.simulation.hold_verdict import Outcome
+from sim_validate.simulation.traces import Outcome
 
 SCHEMA = 1
 Finite = Annotated[float, Field(allow_inf_nan=False)]

@@ -8,10 +8,10 @@ import numpy as np
 from grasp_core.arrays import Array
 from scenes.layout import Layout
 from sim_validate.simulation import schedules
+from sim_validate.simulation.bench import Bench, Motion
 from sim_validate.simulation.early_ends import EarlyEnds, Thresholds
 from sim_validate.simulation.schedules import Load, Schedule
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.simulate import Bench, Motion
 from sim_validate.simulation.traces import Trace, traces
 
 

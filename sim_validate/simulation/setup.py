@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import Literal, TypeAlias, get_args
 
@@ -12,6 +12,7 @@ import numpy as np
 from grasp_core.arrays import Array, frozen, to_digits
 from grasp_core.by_value import ByValue
 from grasp_core.checked import (
+    BOUNDS,
     LARGEST,
     MOST_RANDOM_WRENCHES,
     MOST_TRIALS,
@@ -34,8 +35,7 @@ from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, Surface, build_scene
 from scenes.physics import PhysicsSettings
-from sim_validate.simulation.noise import Noise
-from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.simulation.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
 
 AXIS_NAMES = tuple(
     f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
@@ -144,6 +144,30 @@ class NamedWrench(ByValue):
                 f"a wrench's name has up to 100 letters, digits, '_', '+', '-' and spaces; "
                 f"got {shown(self.name)}"
             )
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """How uncertain the pose, surface, friction and mass are, as standard deviations.
+
+    Raises:
+        InputError: A number is negative or out of its range.
+    """
+
+    shift: float = 0.01
+    """Deviation of the object's position along each axis, in object radii."""
+    turn_deg: float = 1.0
+    """Deviation of the object's orientation about each axis through its centre of mass [deg]."""
+    normal_deg: float = 1.0
+    """Deviation of the surface normal at each contact, about two axes in the surface [deg]."""
+    friction: float = 0.05
+    """Deviation of the friction coefficient, relative to the coefficient."""
+    mass: float = 0.05
+    """Deviation of the mass and of every load, relative to the planned values."""
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            number(value, name, **BOUNDS[f"noise_{name}"])
 
 
 @dataclass(frozen=True, slots=True)

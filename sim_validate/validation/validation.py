@@ -6,36 +6,46 @@ friction is found in simulation too, and on request the limits. The grasp is con
 wrenches hold. The run can be trusted when the simulator is faithful (`gate`) and no control holds.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from grasp_core.checked import coefficient, instance
+from grasp_core.checked import coefficient, function, instance, several, whole
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, UndecidedError
-from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene
-from sim_validate.simulation.critical_friction import CriticalFriction, released_friction
-from sim_validate.simulation.gate.gate import Gate, require_faithful
-from sim_validate.simulation.gate.mesh_contacts import require_touch
-from sim_validate.simulation.hold_verdict import invalid_start, judge
+from sim_validate.parallel.processes import each, processes
+from sim_validate.parallel.shared import Shared
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.gate import (
+    Gate,
+    measured_gate,
+    remember_gate,
+    require_faithful,
+    require_touch,
+)
+from sim_validate.simulation.limits import (
+    CriticalFriction,
+    SimulatedLimit,
+    bisected_limits,
+    ramped_limits,
+    released_friction,
+)
 from sim_validate.simulation.loads import PlannedLoad, planned_loads
 from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.simulation.simulate import Bench
-from sim_validate.simulation.traces import Trace
-from sim_validate.simulation.wrench_limits import SimulatedLimit, bisected_limits, ramped_limits
-from sim_validate.validation.control_trials import ControlVerdict, try_control
-from sim_validate.validation.controls import negative_controls
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.repeats import Robustness, for_repeats, robustness
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.simulation.traces import Trace, invalid_start, judge
+from sim_validate.validation.controls import ControlVerdict, negative_controls, try_control
+from sim_validate.validation.noise import Robustness, for_repeats, robustness
+from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 Chosen = TypeVar("Chosen")
 
@@ -72,12 +82,10 @@ def validate(
             f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"
         )
     gate = require_faithful(setup, friction, body.radius)
-    return validated(
-        body, replace(grasp, critical_friction=critical), friction, gate, agenda, setup
-    )
+    return tested(body, replace(grasp, critical_friction=critical), friction, gate, agenda, setup)
 
 
-def validated(
+def tested(
     body: Polyhedron, grasp: Grasp, friction: float, gate: Gate, agenda: Agenda, setup: Setup
 ) -> Verdict:
     """Test a grasp whose closure is proved, with a simulator that was checked before."""
@@ -218,3 +226,101 @@ class _Bout:
         setup = for_repeats(self.setup, self.bench.scene)
         loads = [(planned.name, planned.load.wrench) for planned in self.loads]
         return robustness(self.body, self.grasp, self.friction, loads, self.agenda, setup)
+
+
+Progress: TypeAlias = Callable[[int, int, Verdict], object]
+"""Function that is told the number of grasps done, the number of all, and the last verdict."""
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One grasp to validate, as it is sent to a worker process."""
+
+    body: Polyhedron
+    grasp: Grasp
+    friction: float
+    agenda: Agenda
+    setup: Setup
+    gate: Gate | None = None
+    """How the simulator did on the known cases, so that worker processes need not ask again."""
+
+    def __reduce__(self) -> tuple[Callable[..., "Job"], tuple[object, ...]]:
+        """Send the object so that all grasps of a worker process have the same one."""
+        rest = (self.grasp, self.friction, self.agenda, self.setup, self.gate)
+        return _arrived, (Shared(self.body), *rest)
+
+
+def _arrived(body: Shared[Polyhedron], *rest: Any) -> Job:
+    return Job(body.value, *rest)
+
+
+def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
+    """Yield one verdict per job, in order; the number of processors does not change the results."""
+    count = processes(len(jobs), processors)
+    return each(verdict_of, prepared(jobs, processors), jobs=count)
+
+
+def prepared(jobs: Sequence[Job], processors: int) -> list[Job]:
+    """Check the simulator for each job, and give each an equal share of processors that remain."""
+    threads = max(1, processors // processes(len(jobs), processors))
+    return [
+        replace(
+            job, setup=replace(job.setup, threads=threads),
+            gate=measured_gate(job.setup, job.friction, job.body.radius),
+        )
+        for job in jobs
+    ]  # fmt: skip
+
+
+def verdict_of(job: Job) -> Verdict:
+    """Validate one grasp."""
+    if job.gate is not None:
+        remember_gate(job.gate, job.setup, job.friction, job.body.radius)
+    return validate(job.body, job.grasp, job.friction, agenda=job.agenda, setup=job.setup)
+
+
+def validate_all(
+    body: Polyhedron,
+    grasps: Iterable[Grasp],
+    friction: float = 0.5,
+    *,
+    agenda: Agenda | None = None,
+    setup: Setup | None = None,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> tuple[Verdict, ...]:
+    """Test many grasps of one object in simulation, each as `validate` does.
+
+    Args:
+        body: The object.
+        grasps: Grasps in force closure at this friction, such as a plan.
+        friction: Coulomb coefficient at every contact.
+        agenda: Which trials to run; the default agenda if None.
+        setup: How trials are simulated; the default setup if None.
+        jobs: Largest number of processors to use; results do not depend on it. From 16 grasps on
+            they are used as processes.
+        progress: Called after each grasp, in order, with the number of grasps done, the number of
+            all, and the verdict. What it raises ends the loop.
+
+    Returns:
+        One verdict per grasp, in order.
+
+    Raises:
+        InputError: A grasp is not on the body's faces, or not closed at this friction.
+        UnfaithfulError: The simulator fails its checks with these settings.
+    """
+    check_body(body)
+    coefficient(friction)
+    kind = partial(instance, kind=Grasp, name="grasps")
+    listed = several(grasps, kind, "grasps", "Grasp values")
+    agenda, setup = asked_for(agenda, setup)
+    whole(jobs, "jobs", least=1)
+    if progress is not None:
+        function(progress, "progress")
+    tasks = [Job(body, grasp, friction, agenda, setup) for grasp in listed]
+    verdicts: list[Verdict] = []
+    for verdict in validated(tasks, jobs) if jobs > 1 else map(verdict_of, tasks):
+        verdicts.append(verdict)
+        if progress is not None:
+            progress(len(verdicts), len(tasks), verdict)
+    return tuple(verdicts)

@@ -26,16 +26,14 @@ from grasp_core.quality.wrench_limit import limit_of
 from scenes.physics import PhysicsSettings
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.records.verdicts_json import verdicts_to_json
-from sim_validate.simulation.critical_friction import released_friction
-from sim_validate.simulation.gate.gate import require_faithful
-from sim_validate.simulation.hold_verdict import Outcome, judge
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.gate import require_faithful
+from sim_validate.simulation.limits import bisected_limits, part, ramped_limits, released_friction
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.simulation.simulate import Bench
-from sim_validate.simulation.wrench_limits import bisected_limits, part, ramped_limits
-from sim_validate.validation.control_trials import try_control
-from sim_validate.validation.controls import negative_controls
+from sim_validate.simulation.traces import Outcome, judge
+from sim_validate.validation.controls import negative_controls, try_control
 from sim_validate.validation.validation import validate
 
 OBJECTS = (

@@ -7,9 +7,8 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from sim_validate.replaying import Recorded, replayed
-from sim_validate.simulation.hold_verdict import Outcome
-from sim_validate.simulation.noise import Noise
-from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
+from sim_validate.simulation.setup import Agenda, NamedWrench, Noise, Setup
+from sim_validate.simulation.traces import Outcome
 from tests.sim_validate.rigs import grasps
 
 AGENDA = Agenda(

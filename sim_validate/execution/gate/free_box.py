@@ -16,7 +16,7 @@ from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench
 from sim_validate.execution.drives import Drive, Table, idle
 from sim_validate.execution.gate.held_case import DOWN, FINGERS, WEIGHT, HeldCase, known, near
-from sim_validate.simulation.gate.case import Check
+from sim_validate.simulation.known_cases import Check
 
 FALL_S = 0.4
 """Time of the fall: steps of h make it h / FALL_S longer, a third of a percent at 1.25 ms [s]."""

@@ -12,7 +12,7 @@ from sim_validate.execution.gate.held_box import held_box
 from sim_validate.execution.gate.held_case import WEIGHT, HeldCase
 from sim_validate.execution.gate.struck_box import struck_box
 from sim_validate.execution.gate.surface import surfaces
-from sim_validate.simulation.gate.gate import Gate
+from sim_validate.simulation.gate import Gate
 
 
 def require_faithful_execution(

@@ -43,7 +43,7 @@ from sim_validate.execution.gate.held_case import (
     near,
 )
 from sim_validate.execution.slips import SLID, outcome, seen, slides
-from sim_validate.simulation.gate.case import Check
+from sim_validate.simulation.known_cases import Check
 
 WINDOW = 0.03
 """Loads from which and to which a ramp is slow, from the load of slip, relative to it. Loads change

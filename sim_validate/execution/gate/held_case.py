@@ -21,7 +21,7 @@ from scenes.execution.held_mjcf import HeldScene, build_held_scene
 from scenes.physics import PhysicsSettings
 from sim_validate.execution.bench import HeldMotion
 from sim_validate.execution.paths import samples, smoother
-from sim_validate.simulation.gate.case import Check
+from sim_validate.simulation.known_cases import Check
 
 DOWN = np.array(UPRIGHT)
 WEIGHT = GRAVITY_M_PER_S2 * DOWN

@@ -17,7 +17,7 @@ from sim_validate.execution.bench import HeldBench, HeldMotion
 from sim_validate.execution.drives import Drive, idle
 from sim_validate.execution.gate.held_case import FINGERS, SETTLE_S, HeldCase
 from sim_validate.execution.slips import seen
-from sim_validate.simulation.gate.case import Check
+from sim_validate.simulation.known_cases import Check
 
 BLOW = 1.2
 """Largest force of the blow, relative to the pushes of all fingers."""

@@ -18,8 +18,8 @@ from scenes.fingertips import fitting_radius
 from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench
 from sim_validate.execution.gate.held_case import SETTLE_S, TOLERANCE, HeldCase, known
-from sim_validate.simulation.gate.case import Check
-from sim_validate.simulation.gate.mesh_contacts import DEPTH, DEPTH_ERROR, NORMAL_ERROR
+from sim_validate.simulation.gate import DEPTH, DEPTH_ERROR, NORMAL_ERROR
+from sim_validate.simulation.known_cases import Check
 
 NAMES = ("box", "l-bracket")
 

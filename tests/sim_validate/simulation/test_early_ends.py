@@ -7,14 +7,18 @@ import pytest
 
 import grasp_core as gc
 from sim_validate.simulation.early_ends import USABLE, WATCHED, EarlyEnds, Thresholds, displaced
-from sim_validate.simulation.hold_verdict import Outcome, judge
-from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol
-from sim_validate.simulation.schedules import Clock, Load, hold, release
+from sim_validate.simulation.limits import part
+from sim_validate.simulation.schedules import (
+    Clock,
+    FrictionProtocol,
+    HoldProtocol,
+    Load,
+    hold,
+    release,
+)
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.traces import traces
-from sim_validate.simulation.wrench_limits import part
-from sim_validate.validation.control_trials import control_case
-from sim_validate.validation.controls import negative_controls
+from sim_validate.simulation.traces import Outcome, judge, traces
+from sim_validate.validation.controls import control_case, negative_controls
 from tests.benchmarks.early_ends import compared
 from tests.marks import more
 from tests.sim_validate.rigs import grasps, limiting_loads, rig_of

@@ -12,10 +12,9 @@ import grasp_core as gc
 import scenes
 from grasp_core.families.regulus_program import LEAST_DEPTH
 from sim_validate.simulation import schedules
-from sim_validate.simulation.protocol import HoldProtocol
+from sim_validate.simulation.schedules import HoldProtocol
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.validation.control_trials import try_control
-from sim_validate.validation.controls import Control, negative_controls
+from sim_validate.validation.controls import Control, negative_controls, try_control
 from tests.grasp_core.families.printed_paper import printed_regulus
 from tests.grasp_core.quadruples import paired_quadruples
 from tests.marks import more

@@ -10,9 +10,9 @@ import scenes
 import sim_validate as sv
 from scenes.fingertips import FingerSettings, clashes
 from sim_validate.records.verdicts_json import trace_arrays, verdicts_to_json
-from sim_validate.simulation.hold_verdict import Outcome
-from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.simulation.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
+from sim_validate.simulation.traces import Outcome
 from sim_validate.validation.controls import negative_controls
 from tests.marks import MORE, more
 from tests.sim_validate.rigs import grasps
