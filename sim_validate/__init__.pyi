@@ -6,8 +6,8 @@ from sim_validate.dexgraspbench import reach_of_record as reach_of_record
 from sim_validate.dexgraspbench import write_dex_object as write_dex_object
 from sim_validate.dexgraspbench import write_dex_record as write_dex_record
 from sim_validate.execution.execute import execute as execute
-from sim_validate.execution.jobs import ExecutedGrasp as ExecutedGrasp
 from sim_validate.execution.settings import ExecutionSettings as ExecutionSettings
+from sim_validate.execution.verdict import ExecutedGrasp as ExecutedGrasp
 from sim_validate.execution.verdict import Execution as Execution
 from sim_validate.execution.verdict import ExecutionTrial as ExecutionTrial
 from sim_validate.hands.execute_hand import execute_hand as execute_hand

@@ -20,7 +20,7 @@ from sim_validate.baselines.executions import (
     rounded,
 )
 from sim_validate.baselines.parts.recorded_part import RecordedPart, RecordedShape
-from sim_validate.execution.jobs import ExecutedGrasp
+from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.simulation.setup import WEAKEST
 from sim_validate.simulation.traces import Outcome
 from sim_validate.validation.verdict import Verdict, WrenchVerdict

@@ -15,7 +15,7 @@ from grasp_core.files.strict_json import shown
 from grasp_core.records.grasps_json import SavedGrasps
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface
-from sim_validate.execution.asked import (
+from sim_validate.execution.settings import (
     TABLE,
     AskedExecution,
     asked_execution,

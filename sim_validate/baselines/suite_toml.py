@@ -26,7 +26,7 @@ from sim_validate.baselines.parts.if_changed import CARRY, IfChanged, if_changed
 from sim_validate.baselines.parts.if_changed import TABLE as CHANGED
 from sim_validate.baselines.parts.source_file import Source, source_of
 from sim_validate.baselines.settings import How, noise_from_table, of_settings, setup_for
-from sim_validate.execution.asked import TABLE, AskedExecution, asked_execution
+from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution
 from sim_validate.files.toml_tables import read_tables
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.wrenches import wrenches_from_file

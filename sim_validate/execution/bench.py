@@ -16,11 +16,10 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
+from scenes.execution.held import hinged, rotations
 from scenes.execution.held_mjcf import SAMPLE_S, HeldScene, palm_armature
-from scenes.execution.turns import hinged, rotations
 from scenes.mjcf_text import quaternion
-from sim_validate.execution.drives import Drive, Table
-from sim_validate.execution.paths import WHOLE
+from sim_validate.execution.paths import WHOLE, Drive, Table
 from sim_validate.simulation.bench import batch, compiled, mujoco, step, touched, unlogged
 
 FREE, PALM = 6, 12

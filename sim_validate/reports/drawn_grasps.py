@@ -22,8 +22,7 @@ from scenes.drawing.hands.posed_hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
 from scenes.drawing.views import best_view
 from scenes.fingertips import FingerSettings
-from sim_validate.execution.filming import film, worth_seeing
-from sim_validate.execution.jobs import ExecutionJob
+from sim_validate.execution.jobs import ExecutionJob, film, worth_seeing
 from sim_validate.files.stale_results import CLIPS, PICTURES
 from sim_validate.records.executions_json import EXECUTIONS, Executions
 from sim_validate.replaying import Replayed, Wanted, of_verdict, replayed

@@ -13,10 +13,9 @@ from grasp_core.values import Grasp
 from sim_validate.datasets.execution_rows import Executed, executed_by
 from sim_validate.datasets.learning.settings import CONTROLS, Learning
 from sim_validate.datasets.learning.variants import Variant, draws, unmoved, variants, with_mass
-from sim_validate.execution.asked import AskedExecution
 from sim_validate.execution.execute import execute
-from sim_validate.execution.jobs import ExecutedGrasp
-from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.execution.settings import AskedExecution, ExecutionSettings
+from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.simulation.gate import Gate
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.validation.controls import Control, ControlVerdict, negative_controls, try_control
