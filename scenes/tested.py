@@ -50,17 +50,13 @@ from scenes.hands.link_masses import hand_inertials
 from scenes.layout import SQUEEZE, Layout, arrange
 from scenes.mjcf import AXES
 from scenes.mjcf_text import (
-    COMPILER,
     Element,
-    add_comment,
     add_element,
     as_texts,
     document,
-    element,
-    printable,
     quaternion,
 )
-from scenes.physics import PhysicsSettings
+from scenes.physics import PhysicsSettings, add_free_body, begin_scene
 
 COMMENT = (
     "The test of another tool: the object has the mass that the test states, and no gravity. "
@@ -120,22 +116,12 @@ def begun(
     body: Polyhedron, friction: float, mass: tuple[float, Array], physics: PhysicsSettings,
 ) -> tuple[Element, Element]:  # fmt: skip
     """Begin a scene: return its root, with the meshes of the surface, and its world."""
-    root = element("mujoco", {"model": printable(body.name)})
-    add_comment(root, COMMENT)
-    add_element(root, "compiler", COMPILER)
-    option = add_element(root, "option", physics.options())
-    add_element(option, "flag", physics.flags() | {"midphase": "disable"})
-    extent = {"extent": 3.0 * body.radius, "center": (0.0, 0.0, 0.0)}
-    add_element(root, "statistic", extent)
-    assets = add_element(root, "asset", {})
-    vertices = to_digits(body.vertices - body.center_of_mass)
-    seen = {"vertex": vertices.ravel(), "face": body.triangles.ravel()}
-    add_element(assets, "mesh", {"name": "object", "inertia": "shell"} | seen)
-    solids = touched_solids(body, ORIGIN, 2.0 * body.radius)
-    for place, corners in enumerate(solids):
-        solid = {"name": f"surface{place}", "inertia": "shell", "vertex": to_digits(corners)}
-        add_element(assets, "mesh", solid)
-    world = add_element(root, "worldbody", {})
+    mesh = (to_digits(body.vertices - body.center_of_mass), body.triangles)
+    solids = [to_digits(each) for each in touched_solids(body, ORIGIN, 2.0 * body.radius)]
+    flags = {"midphase": "disable"}
+    root, world = begin_scene(
+        body.name, COMMENT, physics, body.radius, mesh, flags=flags, solids=solids
+    )
     rubbing = as_texts({"friction": (friction, physics.torsion_m, 0.0), **physics.contact()})
     _object(world, mass, rubbing, len(solids))
     return root, world
@@ -145,10 +131,7 @@ def _object(
     world: Element, mass: tuple[float, Array], rubbing: dict[str, str], solids: int
 ) -> None:
     """Add the object with its mass, and the solids that are its surface."""
-    body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
-    add_element(body, "freejoint", {"name": "object"})
-    inertia = mass[1][[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    add_element(body, "inertial", {"pos": (0.0, 0.0, 0.0), "mass": mass[0], "fullinertia": inertia})
+    body = add_free_body(world, *mass)
     seen = {"name": "object", "type": "mesh", "mesh": "object", "contype": 0, "conaffinity": 0,
             "mass": 0.0, "group": 1, "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip
     add_element(body, "geom", seen)
@@ -175,10 +158,7 @@ def fingertip_scene(
     body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float, mass_kg: float,
     physics: PhysicsSettings, fingers: FingerSettings,
 ) -> TestedScene:  # fmt: skip
-    """Make the scene of a grasp, or of contacts of any origin.
-
-    Takes `mass_kg` [kg].
-    """
+    """Make the scene of a grasp, or of contacts of any origin."""
     base = arrange(body, grasp, friction, fingers, physics.torsion_m)
     mass, inertia = mass_properties(body, mass_kg)
     layout = replace(base, center=np.zeros(3), mass_kg=mass, inertia_kg_m2=inertia)
@@ -302,10 +282,7 @@ def hand_scene(
     hand: Hand, body: Polyhedron, postures: Postures, friction: float, mass_kg: float,
     physics: PhysicsSettings, servos: HandServos,
 ) -> TestedScene:  # fmt: skip
-    """Make the scene of a hand that closes on an object.
-
-    Takes `mass_kg` [kg].
-    """
+    """Make the scene of a hand that closes on an object."""
     mass, weights = mass_properties(body, mass_kg), {**hand_inertials(hand), **servos.inertials}
     root, world = begun(body, friction, mass, physics)
     palms = postures.palms.copy()

@@ -169,14 +169,17 @@ def _filled(data: Any, kind: Any, shape: tuple[int, ...], order: Any) -> Array:
     return np.frombuffer(data, kind.plain).reshape(shape, order=order)
 
 
+def _scalar(kind: Any, data: Any) -> Array:
+    return _filled(data, kind, (), "C")
+
+
+MAKERS: tuple[tuple[str, Any], ...] = (
+    ("multiarray._reconstruct", _Numbers), ("multiarray.scalar", _scalar),
+    ("numeric._frombuffer", _filled),
+)  # fmt: skip
 ALLOWED: dict[str, Any] = {
     "numpy.ndarray": _Numbers, "numpy.dtype": _Kind,
-    **{
-        f"numpy.{core}.{name}": make
-        for core in ("core", "_core")
-        for name, make in (("multiarray._reconstruct", _Numbers), ("numeric._frombuffer", _filled),
-                           ("multiarray.scalar", lambda kind, data: _filled(data, kind, (), "C")))
-    },
+    **{f"numpy.{core}.{name}": make for core in ("core", "_core") for name, make in MAKERS},
 }  # fmt: skip
 """What makes plain values in place of the functions that NumPy 1 and 2 name in pickles. NumPy's own
 would trust the state that a file gives them."""
@@ -190,7 +193,11 @@ class _Unpickler(pickle.Unpickler):
                 f"the file names {shown(f'{module}.{name}')}, which is not looked up; save plain "
                 "dictionaries of arrays, numbers and text"
             )
-        return lambda *given: make(*given)  # a new one: files can set attributes of what they get
+
+        def made(*given: Any) -> Any:  # a new one: files can set attributes of what they get
+            return make(*given)
+
+        return made
 
 
 def _unpickled(data: bytes) -> Any:

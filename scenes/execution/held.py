@@ -234,10 +234,7 @@ def held_layout(
     body: Polyhedron, grip: Grip, mass_kg: float, settings: HeldSettings | None = None,
     reach_m: float | None = None,
 ) -> HeldLayout:  # fmt: skip
-    """Place an object of a given mass between the springs of a grip.
-
-    Takes `mass_kg` [kg]; `reach_m` [m].
-    """
+    """Place an object of a given mass between the springs of a grip."""
     check_body(body)
     check_grip(grip)
     mass = positive(mass_kg, "mass_kg")

@@ -103,10 +103,7 @@ class HeldBench:
         self, scene: HeldScene, *, threads: int = 1, sample_s: float = SAMPLE_S,
         lost_m: float = math.inf, step_s: float | None = None,
     ) -> None:  # fmt: skip
-        """Compile a scene.
-
-        Takes `sample_s`, `step_s` [s]; `lost_m` [m].
-        """
+        """Compile a scene."""
         self.scene, self.threads, self.lost_m = scene, threads, lost_m
         self.model = compiled(scene.xml)
         if step_s is None:

@@ -76,10 +76,7 @@ from sim_validate.simulation.known_cases import Check
 def require_faithful_execution(
     layout: HeldLayout, physics: PhysicsSettings, hand: HeldSettings, push_n: float
 ) -> None:
-    """Check the simulator on known cases, and refuse settings under which a check fails.
-
-    Takes `push_n` [N].
-    """
+    """Check the simulator on known cases, and refuse settings under which a check fails."""
     for case in cases_of(layout, physics, hand, push_n):
         failed = [check for check in measured_case(case).checks if not check.passed]
         if failed:

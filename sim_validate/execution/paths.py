@@ -161,10 +161,7 @@ def loaded(share: Array, gravity: Array) -> Drive:
 
 
 def turned_weight(slowest_rad_per_s: float) -> Drive:
-    """Return the drive of `weight`: gravity turned through all directions.
-
-    Takes `slowest_rad_per_s` [rad/s].
-    """
+    """Return the drive of `weight`: gravity turned through all directions."""
     speed = float(np.clip(SLOW * slowest_rad_per_s, *TURNING))
     turns = math.pi / SPACING
     fine = np.arange(2001) / 2000.0

@@ -15,65 +15,9 @@ from grasp_core.files.json_text import text_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from sim_validate.protocols.judging import Judgement
-from sim_validate.protocols.published import PublishedProtocol
-from sim_validate.records.reaches_schema import NotNegative, Triple
+from sim_validate.records.reaches_schema import NotNegative
 from sim_validate.records.verdicts_json import finite, object_record
 from sim_validate.records.verdicts_schema import Count, ObjectRecord, Positive
-
-
-class SourceRecord(TypedDict):
-    """Fields about where a test is stated."""
-
-    repository: str
-    commit: str
-    paths: list[str]
-
-
-class StepRecord(TypedDict):
-    """Fields about a part of a run."""
-
-    seconds: Positive
-    pull_m_s2: Triple
-    line_m: Triple
-    wave_m: Triple
-    turn_deg: float
-    look_s: Positive | None
-
-
-class PassingRecord(TypedDict):
-    """Fields about when a run passes; null for no limit."""
-
-    most_m: Positive | None
-    most_deg: Positive | None
-    fingers: Count
-    most_overlap_m: Positive | None
-
-
-class WeldRecord(TypedDict):
-    """Fields about what a hand hangs on."""
-
-    solref: list[float]
-    solimp: list[float]
-
-
-class ProtocolRecord(TypedDict):
-    """Fields about a published test."""
-
-    name: str
-    version: str
-    sources: list[SourceRecord]
-    ours: list[str]
-    friction: Positive
-    timestep_s: Positive
-    runs: list[list[StepRecord]]
-    passing: PassingRecord
-    mass_kg: Positive | None
-    close_s: NotNegative
-    squeeze_s: NotNegative
-    servo_n_m_per_rad: Positive
-    own_servos: bool
-    weld: WeldRecord | None
-    physics: dict[str, Any]
 
 
 class RunRecord(TypedDict):
@@ -141,7 +85,7 @@ class JudgementsFile(TypedDict):
     object: ObjectRecord
     friction: Positive
     complete: bool
-    protocols: dict[str, ProtocolRecord]
+    protocols: dict[str, dict[str, Any]]
     summary: dict[str, TotalsRecord]
     judgements: list[JudgementRecord]
     versions: dict[str, str]
@@ -158,7 +102,9 @@ def judgements_to_json(
         "object": object_record(body),
         "friction": friction,
         "complete": complete,
-        "protocols": {name: protocol_record(test) for name, test in tests.items()},
+        "protocols": {
+            name: {**asdict(test), "physics": test.physics.record()} for name, test in tests.items()
+        },
         "summary": judgements_summary(listed),
         "judgements": [_record(each) for each in listed],
         "versions": {**versions()},
@@ -181,11 +127,6 @@ def judgements_summary(judgements: Sequence[Judgement]) -> dict[str, TotalsRecor
         }
         for name, found in named.items()
     }
-
-
-def protocol_record(protocol: PublishedProtocol) -> ProtocolRecord:
-    """Return all numbers of a published test, with units in their names, and its sources."""
-    return cast("ProtocolRecord", {**asdict(protocol), "physics": protocol.physics.record()})
 
 
 def _record(each: Judgement) -> JudgementRecord:

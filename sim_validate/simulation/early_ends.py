@@ -93,10 +93,7 @@ class EarlyEnds:
         self, layout: Layout, trials: Sequence[Schedule], sample_s: float, thresholds: Thresholds,
         start: Array | None = None,
     ) -> None:  # fmt: skip
-        """Begin to look at trials.
-
-        Takes `sample_s` [s].
-        """
+        """Begin to look at trials."""
         self.layout, self.thresholds, self.sample_s = layout, thresholds, sample_s
         self.resting = np.array([trial.resting for trial in trials])
         self.watched = np.array([trial.watched for trial in trials])

@@ -137,19 +137,13 @@ def require_faithful(
 def measured_gate(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
-    """Check the simulator on known cases, once per process for the same settings.
-
-    Takes `radius_m` [m].
-    """
+    """Check the simulator on known cases, once per process for the same settings."""
     case = _case(setup, friction, radius_m)
     return _KNOWN.get(case) or _kept(case, _measured(case))
 
 
 def remember_gate(gate: Gate, setup: Setup, friction: float, radius_m: float) -> None:
-    """Take over what `measured_gate` returned in the process that started this one.
-
-    Takes `radius_m` [m].
-    """
+    """Take over what `measured_gate` returned in the process that started this one."""
     _kept(_case(setup, friction, radius_m), gate)
 
 

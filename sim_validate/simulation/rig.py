@@ -109,10 +109,7 @@ class Rig:
     def release(
         self, settling_friction: float, frictions: Sequence[float], threshold_m: float | None = None
     ) -> tuple[Trace, ...]:
-        """Lower the friction of the unloaded object to several values, and trace its motion.
-
-        Takes `threshold_m` [m].
-        """
+        """Lower the friction of the unloaded object to several values, and trace its motion."""
         limits = None if threshold_m is None else Thresholds(threshold_m)
         return self._traces(self._releases(settling_friction, frictions), limits)
 
