@@ -89,24 +89,21 @@ VISIBLE_M = 1e-4
 
 
 def worth_seeing(found: Execution) -> tuple[ExecutionTrial, ...]:
-    """Choose the trials to film: the lift, the worst shake, and the worst slip that can be seen."""
-    shakes = sorted(found.of_kind("shake"), key=_hardness)
-    slips = sorted((trial for trial in found.trials if _seen_to_slip(trial)), key=_loss)
+    """Choose the trials to film: the lift, the worst shake, and the worst slip that can be seen.
+
+    Shakes that slip before they differ are ordered by their predictions.
+    """
+    shakes = sorted(
+        found.of_kind("shake"),
+        key=lambda each: (each.survived, each.simulated_first_slip, each.predicted_first_slip),
+    )
+    slips = [
+        each for each in found.trials
+        if each.dropped or (each.fate == "slipped" and each.slip_m >= VISIBLE_M)
+    ]  # fmt: skip
+    slips.sort(key=lambda each: (not each.dropped, -each.slip_m))
     chosen = [*found.of_kind("lift")[:1], *shakes[:1], *slips[:1]]
     return tuple({trial.name: trial for trial in chosen}.values())
-
-
-def _seen_to_slip(trial: ExecutionTrial) -> bool:
-    return trial.dropped or (trial.fate == "slipped" and trial.slip_m >= VISIBLE_M)
-
-
-def _hardness(trial: ExecutionTrial) -> tuple[bool, float, float]:
-    """Order trials, the worst first; those that slip before they differ, by their predictions."""
-    return trial.survived, trial.simulated_first_slip, trial.predicted_first_slip
-
-
-def _loss(trial: ExecutionTrial) -> tuple[bool, float]:
-    return not trial.dropped, -trial.slip_m
 
 
 def film(job: ExecutionJob, name: str, path: Path) -> Path:

@@ -21,7 +21,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from scenes.tested import TestedScene
 from sim_validate.protocols.published import Passing, PublishedProtocol, Run, Step
-from sim_validate.simulation.bench import batch, compiled, mujoco, step, unlogged
+from sim_validate.simulation.bench import batch, compiled, faults, mujoco, step, unlogged
 from sim_validate.simulation.traces import rotation_angles
 
 CHUNK = 10
@@ -181,7 +181,7 @@ class TestBench:
         return tuple(
             Motion(
                 poses[place, : len(each.commands)], tuple(touching[place]),
-                _fault(trials, place, errors),
+                next(iter(faults(trials, place, errors.get(place, ""))), ""),
             )
             for place, each in enumerate(runs)
         )  # fmt: skip
@@ -221,15 +221,6 @@ class TestBench:
         bodies = self.model.geom_bodyid[self.data.contact.geom]
         met = bodies[(bodies == self.body).any(axis=1)].ravel().tolist()
         return frozenset(self.fingers[body] for body in met if body in self.fingers)
-
-
-def _fault(trials: "batch.Batch", place: int, errors: dict[int, str]) -> str:
-    if place in errors:
-        return errors[place]
-    if not np.isfinite(trials.state[place]).all():
-        return "a number of the simulator's state is not finite"
-    warnings = int(trials.warning[place, :, 1].sum())
-    return f"the simulator raised {warnings} warnings" if warnings else ""
 
 
 def judged_run(number: int, motion: Motion, run: Timeline, passing: Passing) -> RunVerdict:

@@ -72,6 +72,16 @@ def step(
         errors.update({int(trial): trials.error(int(trial)) for trial in failure.ids})
 
 
+def faults(trials: batch.Batch, trial: int, error: str) -> tuple[str, ...]:
+    """Say what went wrong in a trial, in words."""
+    found = [error] if error else []
+    if not np.isfinite(trials.state[trial]).all():
+        found.append("a number of the simulator's state is not finite")
+    if warnings := int(trials.warning[trial, :, 1].sum()):
+        found.append(f"the simulator raised {warnings} warnings")
+    return tuple(found)
+
+
 def touched(model: mujoco.MjModel, data: mujoco.MjData, tips: Sequence[int]) -> tuple[Array, Array]:
     """Find what each fingertip touches in a state of a scene.
 

@@ -148,7 +148,7 @@ def _check(numbers: Mapping[str, Any]) -> None:
             shares = several(
                 value, partial(number, name=name, above=0.0, below=1.0), name, "shares"
             )
-            if not (shares and _rising(shares)):
+            if not shares or any(one >= two for one, two in pairwise(shares)):
                 raise InputError(
                     f"{name} must be one or more numbers from 0 to 1 in rising order, got {value}"
                 )
@@ -157,10 +157,6 @@ def _check(numbers: Mapping[str, Any]) -> None:
         else:
             least, largest = RANGES.get(name, SECONDS if name.endswith("_s") else POSITIVE)
             number(value, name, least=least, most=largest)
-
-
-def _rising(values: tuple[float, ...]) -> bool:
-    return all(one < two for one, two in pairwise(values))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

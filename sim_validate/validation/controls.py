@@ -219,54 +219,34 @@ def control_case(
     fingers = replace(setup.fingers, radius_m=None)
     on_pads = replace(setup, fingers=fingers, surface="pads")
     scene = on_pads.scene(body, control.contacts, control.friction)
-    plan = _Planner(body, control, setup)
-    idle = plan.load(UNLOADED, np.zeros(6))
+    idle = _planned(body, control, setup, UNLOADED, np.zeros(6))
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     rig = squeezed(bench, setup, idle.load.forces, control.friction, idle.settling)
-    hopeless = _hopeless(body, control, setup)
-    return rig, tuple(
-        idle if name == UNLOADED else plan.load(name, wrench) for name, wrench in hopeless
-    )
-
-
-def _hopeless(body: Polyhedron, control: Control, setup: Setup) -> list[tuple[str, Array]]:
-    """The separating wrench, and a zero wrench if no forces balance the bare squeeze."""
     # The separating wrench is a linear function of wrenches. With torques measured in object
     # radii its coefficients are times the scale; the wrench along them is times it once more.
     scale = np.array([1.0] * 3 + [body.radius] * 3)
     facing = -control.separating_wrench(body.center_of_mass) * scale**2
     size = setup.hold.control_load * setup.fingers.max_normal_force_n
-    loads = [(SEPARATING, to_digits(size * facing / float(np.linalg.norm(facing / scale))))]
-    if control.certificate.margin < -setup.hold.least_excess:
-        loads.append((UNLOADED, np.zeros(6)))
-    return loads
+    wrench = to_digits(size * facing / float(np.linalg.norm(facing / scale)))
+    loads = [_planned(body, control, setup, SEPARATING, wrench)]
+    if control.certificate.margin < -setup.hold.least_excess:  # no forces balance the bare squeeze
+        loads.append(idle)
+    return rig, tuple(loads)
 
 
-class _Planner:
-    """Plans finger forces on a negative control: of least friction, or nearest to balance."""
-
-    def __init__(self, body: Polyhedron, control: Control, setup: Setup) -> None:
-        self.contacts = (
-            np.array([contact.position for contact in control.contacts]),
-            np.array([contact.normal for contact in control.contacts]),
-            control.friction,
-        )
-        largest = setup.fingers.max_normal_force_n
-        self.limits = (setup.hold.least_normal_share * largest, largest)
-        self.center, self.protocol = body.center_of_mass, setup.hold
-
-    def load(self, name: str, wrench: Array) -> ControlLoad:
-        """Plan forces for a wrench."""
-        forces, needed = self._forces(wrench)
-        settling = self.protocol.settling_friction * max(self.contacts[2], needed or 0.0)
-        return ControlLoad(name, Load(wrench, forces), settling, needed)
-
-    def _forces(self, wrench: Array) -> tuple[Array, float | None]:
-        """Planned forces, (k, 3) [N], and their friction; None if none balance."""
-        limits, center = self.limits, self.center
-        balanced = least_friction_forces(*self.contacts, wrench, normal_force=limits, center=center)
-        if balanced is not None:
-            return to_digits(balanced[0]), float(to_digits(np.array(balanced[1])))
-        return to_digits(
-            closest_forces(*self.contacts, wrench, normal_force=limits, center=center)
-        ), None
+def _planned(
+    body: Polyhedron, control: Control, setup: Setup, name: str, wrench: Array
+) -> ControlLoad:
+    """Plan forces for a wrench: of least friction, or nearest to balance where none balance it."""
+    positions = np.array([contact.position for contact in control.contacts])
+    normals = np.array([contact.normal for contact in control.contacts])
+    largest = setup.fingers.max_normal_force_n
+    limits = (setup.hold.least_normal_share * largest, largest)
+    given, center = (positions, normals, control.friction, wrench), body.center_of_mass
+    balanced = least_friction_forces(*given, normal_force=limits, center=center)
+    if balanced is None:
+        needed, forces = None, closest_forces(*given, normal_force=limits, center=center)
+    else:
+        needed, forces = float(to_digits(np.array(balanced[1]))), balanced[0]
+    settling = setup.hold.settling_friction * max(control.friction, needed or 0.0)
+    return ControlLoad(name, Load(wrench, to_digits(forces)), settling, needed)

@@ -7,6 +7,7 @@ wrenches hold. The run can be trusted when the simulator is faithful (`gate`) an
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
@@ -21,7 +22,6 @@ from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from scenes.fingertips import clashes
-from scenes.mjcf import Scene
 from sim_validate.parallel.processes import each, processes
 from sim_validate.parallel.shared import Shared
 from sim_validate.simulation.bench import Bench
@@ -42,9 +42,9 @@ from sim_validate.simulation.limits import (
 from sim_validate.simulation.loads import PlannedLoad, planned_loads
 from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.simulation.traces import Trace, invalid_start, judge
+from sim_validate.simulation.traces import invalid_start, judge
 from sim_validate.validation.controls import ControlVerdict, negative_controls, try_control
-from sim_validate.validation.noise import Robustness, for_repeats, robustness
+from sim_validate.validation.noise import for_repeats, robustness
 from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 Chosen = TypeVar("Chosen")
@@ -91,20 +91,61 @@ def tested(
     """Test a grasp whose closure is proved, with a simulator that was checked before."""
     require_touch(body, grasp.contacts, setup)
     scene = setup.scene(body, grasp, friction)
-    trial = _Bout(body, grasp, friction, scene, agenda, setup)
-    wrenches = trial.wrenches()
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    rig = squeezed(bench, setup, scene.layout.squeeze_forces, friction)
+    loads = planned_loads(body, grasp.contacts, friction, rig.idle, agenda, setup)
+    wrenches = _held_wrenches(body, grasp, rig, loads, agenda)
+    critical = CriticalFriction(grasp.critical_friction)
+    if agenda.critical_friction:
+        with suppress(UndecidedError):
+            critical = released_friction(
+                bench, grasp.positions, grasp.normals, critical.predicted, setup
+            )
+    controls, repeats = tuple[ControlVerdict, ...](), None
+    if agenda.controls:
+        made = negative_controls(body, grasp, friction, agenda.seed, setup.torsion_m)
+        controls = tuple(try_control(body, each, agenda, setup) for each in made)
+    if agenda.trials:  # the same fingertips hold the same wrenches
+        named = [(planned.name, planned.load.wrench) for planned in loads]
+        repeats = robustness(body, grasp, friction, named, agenda, for_repeats(setup, scene))
     return Verdict(
         id=grasp.id,
         contacts=grasp.contacts,
         friction=friction,
-        critical_friction=trial.critical(),
+        critical_friction=critical,
         wrenches=wrenches,
-        controls=trial.controls(),
-        robustness=trial.robustness(),
+        controls=controls,
+        robustness=repeats,
         gate=gate,
         scene=scene,
         setup=setup,
         agenda=agenda,
+    )
+
+
+def _held_wrenches(
+    body: Polyhedron, grasp: Grasp, rig: Rig, loads: Sequence[PlannedLoad], agenda: Agenda
+) -> tuple[WrenchVerdict, ...]:
+    """Judge the hold of every load and, if asked for, find its limit."""
+    layout, limits = rig.bench.scene.layout, [planned.limit for planned in loads]
+    traces = rig.hold([planned.load for planned in loads])
+    overlap = clashes(body, grasp.positions, grasp.normals, layout.drive.radius_m)
+    found: Sequence[SimulatedLimit | None] = [None] * len(limits)
+    if agenda.limits != "none":
+        search = ramped_limits if agenda.limits == "ramp" else bisected_limits
+        found = search(rig, limits)
+    verdicts = [judge(trace, layout, rig.setup.hold) for trace in traces]
+    return tuple(
+        WrenchVerdict(
+            name=planned.name,
+            wrench=planned.load.wrench,
+            predicted_limit=planned.predicted_limit,
+            required_friction=planned.required_friction,
+            hold=invalid_start(verdict, overlap) if overlap else verdict,
+            simulated_limit=limit,
+            trace=trace if agenda.keep_traces else None,
+        )
+        for planned, trace, verdict, limit in zip(loads, traces, verdicts, found, strict=True)
     )
 
 
@@ -151,81 +192,6 @@ def _given(value: Chosen | None, default: Chosen, name: str) -> Chosen:
         return default
     instance(value, type(default), name)
     return value
-
-
-class _Bout:
-    """A grasp on the bench, with the trials of an agenda."""
-
-    def __init__(
-        self, body: Polyhedron, grasp: Grasp, friction: float, scene: Scene,
-        agenda: Agenda, setup: Setup,
-    ) -> None:  # fmt: skip
-        self.body, self.grasp, self.friction = body, grasp, friction
-        self.agenda, self.setup, self.layout = agenda, setup, scene.layout
-        self.bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
-        self.rig: Rig = squeezed(self.bench, setup, self.layout.squeeze_forces, friction)
-        self.loads = planned_loads(body, grasp.contacts, friction, self.rig.idle, agenda, setup)
-        self.traces = self.rig.hold([planned.load for planned in self.loads])
-
-    def wrenches(self) -> tuple[WrenchVerdict, ...]:
-        """Judge the hold of every load and, if asked for, find its limit."""
-        radius = self.layout.drive.radius_m
-        overlap = clashes(self.body, self.grasp.positions, self.grasp.normals, radius)
-        return tuple(
-            self._wrench(planned, trace, limit, overlap)
-            for planned, trace, limit in zip(self.loads, self.traces, self._limits(), strict=True)
-        )
-
-    def _wrench(
-        self, planned: PlannedLoad, trace: Trace, limit: SimulatedLimit | None,
-        overlap: Sequence[str],
-    ) -> WrenchVerdict:  # fmt: skip
-        verdict = judge(trace, self.layout, self.setup.hold)
-        return WrenchVerdict(
-            name=planned.name,
-            wrench=planned.load.wrench,
-            predicted_limit=planned.predicted_limit,
-            required_friction=planned.required_friction,
-            hold=invalid_start(verdict, overlap) if overlap else verdict,
-            simulated_limit=limit,
-            trace=trace if self.agenda.keep_traces else None,
-        )
-
-    def _limits(self) -> tuple[SimulatedLimit | None, ...]:
-        limits = [planned.limit for planned in self.loads]
-        if self.agenda.limits == "ramp":
-            return ramped_limits(self.rig, limits)
-        if self.agenda.limits == "bisection":
-            return bisected_limits(self.rig, limits)
-        return (None,) * len(limits)
-
-    def critical(self) -> CriticalFriction:
-        """Predict the critical friction and, if asked for, find it in simulation."""
-        predicted = self.grasp.critical_friction
-        if not self.agenda.critical_friction:
-            return CriticalFriction(predicted)
-        grasp, setup = self.grasp, self.setup
-        try:
-            return released_friction(self.bench, grasp.positions, grasp.normals, predicted, setup)
-        except UndecidedError:
-            return CriticalFriction(predicted)
-
-    def controls(self) -> tuple[ControlVerdict, ...]:
-        """Try the negative controls, if asked for."""
-        if not self.agenda.controls:
-            return ()
-        found = negative_controls(
-            self.body, self.grasp, self.friction, self.agenda.seed, self.setup.torsion_m
-        )
-        return tuple(try_control(self.body, each, self.agenda, self.setup) for each in found)
-
-    def robustness(self) -> Robustness | None:
-        """Repeat the holds with noise, if asked for: the same fingertips hold the same wrenches."""
-        if not self.agenda.trials:
-            return None
-        setup = for_repeats(self.setup, self.bench.scene)
-        loads = [(planned.name, planned.load.wrench) for planned in self.loads]
-        return robustness(self.body, self.grasp, self.friction, loads, self.agenda, setup)
 
 
 Progress: TypeAlias = Callable[[int, int, Verdict], object]
