@@ -210,7 +210,7 @@ def begin_scene(
     add_comment(root, comment)
     add_element(root, "compiler", COMPILER)
     option = add_element(root, "option", physics.options())
-    add_element(option, "flag", physics.flags() | flags)
+    add_element(option, "flag", {**physics.flags(), **flags})
     add_element(root, "statistic", {"extent": 3.0 * radius_m, "center": (0.0, 0.0, 0.0)})
     assets = add_element(root, "asset", {})
     seen = {"vertex": mesh[0].ravel(), "face": mesh[1].ravel()}

@@ -10,7 +10,8 @@ import sim_validate as sv
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.setup import Agenda, NamedWrench, Noise, Setup
 from sim_validate.simulation.traces import Outcome
-from sim_validate.validation.noise import disturbed_in, heavier, interval, noisy_trial
+from sim_validate.validation.noise import disturbed_in, heavier, noisy_trial
+from sim_validate.validation.verdict import interval
 from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
