@@ -1,25 +1,25 @@
 from sim_validate.datasets.open_dataset import load_dataset as load_dataset
+from sim_validate.dexgraspbench import DexRecord as DexRecord
+from sim_validate.dexgraspbench import dex_record as dex_record
+from sim_validate.dexgraspbench import load_dex_record as load_dex_record
+from sim_validate.dexgraspbench import reach_of_record as reach_of_record
+from sim_validate.dexgraspbench import write_dex_object as write_dex_object
+from sim_validate.dexgraspbench import write_dex_record as write_dex_record
 from sim_validate.execution.execute import execute as execute
-from sim_validate.execution.jobs import ExecutedGrasp as ExecutedGrasp
 from sim_validate.execution.settings import ExecutionSettings as ExecutionSettings
+from sim_validate.execution.verdict import ExecutedGrasp as ExecutedGrasp
 from sim_validate.execution.verdict import Execution as Execution
 from sim_validate.execution.verdict import ExecutionTrial as ExecutionTrial
 from sim_validate.hands.execute_hand import execute_hand as execute_hand
 from sim_validate.hands.hand_verdict import HandVerdict as HandVerdict
 from sim_validate.hands.validate_hand import hand_setup as hand_setup
 from sim_validate.hands.validate_hand import validate_hand as validate_hand
-from sim_validate.peer_files.dexgraspbench_records import DexRecord as DexRecord
-from sim_validate.peer_files.dexgraspbench_records import load_dex_record as load_dex_record
-from sim_validate.peer_files.dexgraspbench_records import write_dex_record as write_dex_record
-from sim_validate.peer_files.hand_records import dex_record as dex_record
-from sim_validate.peer_files.hand_records import reach_of_record as reach_of_record
-from sim_validate.peer_files.object_folders import write_dex_object as write_dex_object
-from sim_validate.protocols.judgement import Judgement as Judgement
+from sim_validate.protocols.judging import Judgement as Judgement
 from sim_validate.protocols.judging import judge_by as judge_by
 from sim_validate.protocols.judging import judge_hand_by as judge_hand_by
-from sim_validate.protocols.named_protocols import protocol as protocol
-from sim_validate.protocols.named_protocols import protocol_names as protocol_names
 from sim_validate.protocols.published import PublishedProtocol as PublishedProtocol
+from sim_validate.protocols.published import protocol as protocol
+from sim_validate.protocols.published import protocol_names as protocol_names
 from sim_validate.records.executions_json import Executions as Executions
 from sim_validate.records.executions_json import load_executions as load_executions
 from sim_validate.records.regions import load_regions as load_regions
@@ -32,15 +32,15 @@ from sim_validate.records.transfers.saved_transfer import load_transfer as load_
 from sim_validate.reports.charts.margin_charts import margin_figure as margin_figure
 from sim_validate.reports.charts.wrench_charts import wrench_figure as wrench_figure
 from sim_validate.reports.report import write_report as write_report
-from sim_validate.simulation.hold_verdict import Outcome as Outcome
-from sim_validate.simulation.noise import Noise as Noise
-from sim_validate.simulation.protocol import HoldProtocol as HoldProtocol
+from sim_validate.simulation.schedules import HoldProtocol as HoldProtocol
 from sim_validate.simulation.setup import Agenda as Agenda
 from sim_validate.simulation.setup import NamedWrench as NamedWrench
+from sim_validate.simulation.setup import Noise as Noise
 from sim_validate.simulation.setup import Setup as Setup
-from sim_validate.validation.grasp_verdict import Verdict as Verdict
-from sim_validate.validation.jobs import validate_all as validate_all
+from sim_validate.simulation.traces import Outcome as Outcome
 from sim_validate.validation.validation import (
     simulated_critical_friction as simulated_critical_friction,
 )
 from sim_validate.validation.validation import validate as validate
+from sim_validate.validation.validation import validate_all as validate_all
+from sim_validate.validation.verdict import Verdict as Verdict

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from sim_validate.baselines.parts.source_file import Source
     from sim_validate.baselines.suite_toml import Suite
     from sim_validate.execution.verdict import Execution
-    from sim_validate.validation.grasp_verdict import Verdict
+    from sim_validate.validation.verdict import Verdict
 
     Entries = tuple[dict[str, Any] | None, dict[str, Any] | None]
 

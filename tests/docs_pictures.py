@@ -21,8 +21,7 @@ from scenes.drawing.pictures import grasp_figure, grasp_sheet
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.records.executions_json import Executions
-from sim_validate.replaying.recorded import Recorded
-from sim_validate.replaying.replay import replayed
+from sim_validate.replaying import Recorded, replayed
 from sim_validate.reports.charts.fidelity_charts import Agreement, fidelity_figure
 from sim_validate.reports.charts.margin_charts import margin_figure
 from sim_validate.reports.charts.motion_charts import motion_figure

@@ -25,8 +25,8 @@ from sim_validate.execution.verdict import Fate
 from sim_validate.main import main
 from sim_validate.records.setup_toml import setup_from_file
 from sim_validate.records.wrenches import wrenches_from_file
-from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.setup import Setup
+from sim_validate.simulation.traces import Outcome
 from tests import api_reference, docs_pictures
 from tests.sim_validate.datasets.small import build_small
 

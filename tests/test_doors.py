@@ -34,7 +34,7 @@ DOORS = {
     "PIL": "scenes/drawing/frames.py",
     "matplotlib": "scenes/drawing/canvas.py",
     "jinja2": "scenes/drawing/pages.py",
-    "scipy.stats": "sim_validate/validation/repeats.py",
+    "scipy.stats": "sim_validate/validation/verdict.py",
     "ray": "sim_validate/parallel/clusters.py",
     "distributed": "sim_validate/parallel/clusters.py",
     "pyarrow": ("sim_validate/datasets/parquet.py", "sim_validate/datasets/exports/tables.py"),

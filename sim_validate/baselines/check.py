@@ -8,7 +8,7 @@ from sim_validate.baselines.entries import Baseline
 from sim_validate.baselines.measure import Measured, Report, measured, with_planned_fingers
 from sim_validate.baselines.parts.changed_part import Present
 from sim_validate.baselines.settings import How
-from sim_validate.validation.grasp_verdict import Verdict
+from sim_validate.validation.verdict import Verdict
 
 
 @dataclass(frozen=True, slots=True, eq=False)

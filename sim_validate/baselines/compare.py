@@ -17,7 +17,7 @@ from typing import Any, cast
 from grasp_core.transferring.judging import FRICTION_BAND
 from sim_validate.baselines.differences import Bands, Difference, differences
 from sim_validate.baselines.entries import Baseline, Entry
-from sim_validate.simulation.hold_verdict import LET_GO, Outcome
+from sim_validate.simulation.traces import LET_GO, Outcome
 
 DECISIVE = ("graspproof", "mujoco", "machine")
 """Packages and other components whose version may change any result."""

@@ -9,12 +9,12 @@ from grasp_core.errors import InputError
 from sim_validate.baselines.executions import not_survived
 from sim_validate.baselines.explain import unstable
 from sim_validate.baselines.grasp_cases import GraspCase, case_of
-from sim_validate.execution.jobs import ExecutedGrasp, ExecutionJob, executed_grasp
+from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.simulation.noise import Noise
-from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
-from sim_validate.validation.grasp_verdict import Verdict
+from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.simulation.setup import Agenda, NamedWrench, Noise, Setup
 from sim_validate.validation.validation import validate
+from sim_validate.validation.verdict import Verdict
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,11 +20,10 @@ from sim_validate.baselines.executions import (
     rounded,
 )
 from sim_validate.baselines.parts.recorded_part import RecordedPart, RecordedShape
-from sim_validate.execution.jobs import ExecutedGrasp
-from sim_validate.simulation.hold_verdict import Outcome
+from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.simulation.setup import WEAKEST
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.simulation.traces import Outcome
+from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 NUMBERS = (
     "critical_friction", "simulated_critical_friction", "limit_n", "simulated_limit_n",

@@ -8,8 +8,8 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from grasp_core.errors import InputError
-from sim_validate.execution.jobs import ExecutedGrasp, ExecutionJob, executed_grasp
-from sim_validate.execution.verdict import held_controls_in_words, losses_in_words
+from sim_validate.execution.jobs import ExecutionJob, executed_grasp
+from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, losses_in_words
 
 DIGITS = 12
 """Number of decimal digits to which a baseline keeps numbers."""

@@ -10,8 +10,7 @@ from sim_validate.baselines.compare import WORDS, Status
 from sim_validate.baselines.entries import Baseline, Entry
 from sim_validate.baselines.executions import not_survived
 from sim_validate.baselines.parts.changed_part import Present
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 
 def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
@@ -62,18 +61,25 @@ def _next_steps(name: str, at: str | None, files: tuple[Path, Path], now: Presen
     chosen = f" --wrench={shlex.quote(at)}" if at else ""
     check = f"  all of them: graspproof baseline check {baseline} --grasps {grasps}"
     if now.carried is None:
-        which = f"--grasp {shlex.quote(name)}{chosen} --grasps {grasps}"
         if at is not None:
-            yield f"  to see it: graspproof replay {baseline} {which} --out replay"
+            yield _to_see(name, chosen, grasps)
         yield check
         return
     part = shlex.quote(str(now.source.file))
     lengths = f"--unit {now.unit}" + (f" --scale {now.scale!r}" if now.scale != 1.0 else "")
     yield f"  its contacts: graspproof transfer {grasps} {part} {lengths} --out carried"
     if at is not None:
-        which = f"--grasp {shlex.quote(now.id_on_part(name) or name)}{chosen}"
-        yield f"  to see it: graspproof replay carried/grasps.json {which} --out replay"
+        yield _to_see(now.id_on_part(name) or name, chosen, "carried/grasps.json")
     yield f"{check} --object {part}"
+
+
+def _to_see(name: str, chosen: str, grasps: str) -> str:
+    """Return the commands that simulate a grasp, and then one of its trials with a clip."""
+    which = f"--grasp {shlex.quote(name)}{chosen} --grasps {grasps}"
+    return (
+        f"  to see it: graspproof validate {grasps} --out seen; "
+        f"graspproof replay seen {which} --out replay"
+    )
 
 
 def unstable(verdict: Verdict) -> str:

@@ -14,12 +14,13 @@ from sim_validate.baselines.entries import Baseline, Entry, entry_of
 from sim_validate.baselines.executions import tried_execution
 from sim_validate.baselines.parts.changed_part import Present
 from sim_validate.baselines.settings import How, settings_of
-from sim_validate.execution.asked import AskedExecution
-from sim_validate.execution.jobs import ExecutedGrasp, ExecutionJob
+from sim_validate.execution.jobs import ExecutionJob
+from sim_validate.execution.settings import AskedExecution
+from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.parallel.processes import each, processes
-from sim_validate.simulation.gate.gate import require_faithful
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.jobs import Job, prepared, verdict_of
+from sim_validate.simulation.gate import require_faithful
+from sim_validate.validation.validation import Job, prepared, verdict_of
+from sim_validate.validation.verdict import Verdict
 
 Report = Callable[[int, int], None]
 """Function that is called with (done, total) after each grasp."""

@@ -15,18 +15,18 @@ from grasp_core.files.strict_json import shown
 from grasp_core.records.grasps_json import SavedGrasps
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface
-from sim_validate.execution.asked import (
+from sim_validate.execution.settings import (
     TABLE,
     AskedExecution,
     asked_execution,
     execution_table,
 )
 from sim_validate.records.setup_toml import setup_from_file, setup_from_tables, tables_of
-from sim_validate.simulation.noise import Noise
 from sim_validate.simulation.setup import (
     Agenda,
     LimitSearch,
     NamedWrench,
+    Noise,
     Setup,
     with_planned_radius,
 )

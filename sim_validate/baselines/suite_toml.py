@@ -26,12 +26,11 @@ from sim_validate.baselines.parts.if_changed import CARRY, IfChanged, if_changed
 from sim_validate.baselines.parts.if_changed import TABLE as CHANGED
 from sim_validate.baselines.parts.source_file import Source, source_of
 from sim_validate.baselines.settings import How, noise_from_table, of_settings, setup_for
-from sim_validate.execution.asked import TABLE, AskedExecution, asked_execution
+from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution
 from sim_validate.files.toml_tables import read_tables
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.wrenches import wrenches_from_file
-from sim_validate.simulation.noise import Noise
-from sim_validate.simulation.setup import Agenda
+from sim_validate.simulation.setup import Agenda, Noise
 
 ENDING = ".grasps.toml"
 KINDS: Mapping[str, type] = {

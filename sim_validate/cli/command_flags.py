@@ -199,8 +199,7 @@ class Replay:
     """Simulate one recorded trial again, and write its motion, sample by sample, and a clip."""
 
     source: Positional[Path]
-    """Where the trial is recorded: a baseline, verdicts.json or grasps.json, the folder of a run,
-    or a dataset."""
+    """Where the trial is recorded: a verdicts.json, the folder of a run, or a dataset."""
     grasp: str | None = None
     """Id of the grasp; may be left out if there is only one."""
     wrench: str | None = None
@@ -212,7 +211,7 @@ class Replay:
     trial: Annotated[int, at_least(0, up_to=MOST_COUNT)] | None = None
     """Number of a repeat with noise to replay instead of the trial without noise."""
     grasps: Path | None = None
-    """The grasps.json that the verdicts or the baseline are about, if it is not where they say."""
+    """The grasps.json that the verdicts are about, if it is not beside them."""
     out: Path | None = None
     """Folder for scene.xml, trace.csv and, where graphics are available, clip.gif."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)

@@ -14,7 +14,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "validate": (
         "validate plan/grasps.json --out plan",
-        "validate plan/grasps.json --protocol dexgraspbench --protocol graspqp --out plan",
+        "validate plan/grasps.json --protocol dexgraspbench --protocol dexonomy --out plan",
         "validate plan/grasps.json --weight-n 3 --down 0 0 -1 --limits ramp --trials 20",
     ),
     "execute": (
@@ -36,7 +36,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "replay": (
         "replay graspproof-out/wedge --grasp c-0-1-2-7 --out replay",
-        "replay wedge.baseline.json --grasp c-0-1-2-7 --wrench weakest --out replay",
+        "replay graspproof-out/wedge --grasp c-0-1-2-7 --wrench weakest --out replay",
     ),
     "analyze": (
         "analyze contacts.json --friction 0.5 --wrench 0 0 -3 0 0 0",

@@ -21,7 +21,7 @@ from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.parallel.processes import available_cores
 from sim_validate.records.verdicts_json import finite, gate_record
-from sim_validate.simulation.gate.gate import Gate, measured_gate
+from sim_validate.simulation.gate import Gate, measured_gate
 from sim_validate.simulation.setup import Setup
 from sim_validate.validation.validation import validate
 

@@ -13,15 +13,12 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.executions import check_mass, execution_settings
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
-from sim_validate.execution.jobs import (
-    ExecutedGrasp,
-    ExecutionJob,
-    best_executed,
-    executed,
-)
+from sim_validate.execution.jobs import ExecutionJob, executed
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (
+    ExecutedGrasp,
     Execution,
+    best_executed,
     held_controls_in_words,
     losses_in_words,
 )

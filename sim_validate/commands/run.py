@@ -22,7 +22,7 @@ from sim_validate.commands.report import shown_report
 from sim_validate.commands.validate import simulate_grasps
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import REPORT, remove_results, require_report_folder
-from sim_validate.simulation.gate.gate import require_faithful
+from sim_validate.simulation.gate import require_faithful
 from sim_validate.simulation.setup import Agenda, Setup
 
 RESULTS = Path("graspproof-out")

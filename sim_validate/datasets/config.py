@@ -24,7 +24,7 @@ from sim_validate.datasets.columns import Tables
 from sim_validate.datasets.learning.columns import dataset_tables
 from sim_validate.datasets.learning.settings import TABLE as LEARNING
 from sim_validate.datasets.learning.settings import Learning, asked_learning, learning_table
-from sim_validate.execution.asked import (
+from sim_validate.execution.settings import (
     TABLE,
     AskedExecution,
     asked_execution,

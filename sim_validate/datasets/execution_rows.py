@@ -6,9 +6,8 @@ from dataclasses import asdict, replace
 from typing import Any, TypeAlias
 
 from grasp_core.values import FINGERS
-from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.execution.settings import ExecutionSettings, TrialKind
-from sim_validate.execution.verdict import Execution
+from sim_validate.execution.verdict import ExecutedGrasp, Execution
 
 Executed: TypeAlias = ExecutedGrasp | str | None
 """An execution, the reason why it was refused, or None where none is asked for."""

@@ -22,10 +22,9 @@ from sim_validate.datasets.learning.variants import ratio_of
 from sim_validate.datasets.learning.varied import VARIED, Tried
 from sim_validate.datasets.object_rows import split_of
 from sim_validate.datasets.units import WorkUnit
-from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
-from sim_validate.validation.control_trials import ControlVerdict
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.simulation.traces import HoldVerdict, Outcome
+from sim_validate.validation.controls import ControlVerdict
+from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 Row: TypeAlias = Mapping[str, Any]
 Rows: TypeAlias = Mapping[Name, tuple[Row, ...]]

@@ -26,7 +26,7 @@ from sim_validate.datasets.config import CREDITS, DatasetConfig
 from sim_validate.datasets.given_contacts import GivenGrasp, given_sha256, read_given
 from sim_validate.datasets.learning.settings import TABLE as LEARNING
 from sim_validate.datasets.learning.settings import learning_table
-from sim_validate.execution.asked import TABLE, execution_table
+from sim_validate.execution.settings import TABLE, execution_table
 
 CHUNK = 2**20
 PART = 25

@@ -30,7 +30,7 @@ from grasp_core.solvers.ties import first_best
 from scenes.execution.held import HeldLayout
 from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench, HeldMotion
-from sim_validate.execution.drives import Drive, joined
+from sim_validate.execution.paths import Drive, joined
 from sim_validate.execution.slips import SLID, outcome, seen, slides
 from sim_validate.execution.verdict import ExecutionControl
 

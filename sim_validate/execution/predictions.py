@@ -46,7 +46,7 @@ from grasp_core.execution.grips import Grip
 from grasp_core.solvers.ties import first_best
 from scenes.execution.held import HeldLayout
 from scenes.execution.held_mjcf import SAMPLE_S
-from sim_validate.execution.drives import Drive
+from sim_validate.execution.paths import Drive
 
 POSE = 6
 

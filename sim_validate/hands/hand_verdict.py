@@ -8,10 +8,10 @@ from grasp_core.by_value import ByValue
 from grasp_core.short_text import summary
 from scenes.hands.hand_mjcf import HandScene
 from sim_validate.hands.hand_controls import HandControl
-from sim_validate.simulation.gate.case import Check
-from sim_validate.simulation.hold_verdict import LET_GO, HoldVerdict, Outcome
+from sim_validate.simulation.known_cases import Check
 from sim_validate.simulation.setup import WEAKEST, Agenda, Setup
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.simulation.traces import LET_GO, HoldVerdict, Outcome
+from sim_validate.validation.verdict import WrenchVerdict
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

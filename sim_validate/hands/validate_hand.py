@@ -20,20 +20,20 @@ from scenes.hands.hand_mjcf import HandScene, build_hand_scene, hand_physics, li
 from sim_validate.hands.hand_controls import HandCase, HandControl, hand_controls
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.hands.hand_verdict import HandControlVerdict, HandVerdict
-from sim_validate.simulation.gate.gate import require_faithful
-from sim_validate.simulation.hold_verdict import judge
-from sim_validate.simulation.loads import planned_loads
-from sim_validate.simulation.rig import Rig, squeezed
-from sim_validate.simulation.schedules import Load
-from sim_validate.simulation.setup import WEAKEST, Agenda, Setup
-from sim_validate.simulation.simulate import Bench
-from sim_validate.simulation.wrench_limits import (
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.gate import require_faithful
+from sim_validate.simulation.limits import (
     SimulatedLimit,
     bisected_limits,
     part,
     ramped_limits,
 )
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.simulation.loads import planned_loads
+from sim_validate.simulation.rig import Rig, squeezed
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.setup import WEAKEST, Agenda, Setup
+from sim_validate.simulation.traces import judge
+from sim_validate.validation.verdict import WrenchVerdict
 
 MOST_PUSH_N = 100.0
 """Largest normal force of a fingertip in predictions, unless stated [N]: more than hands' motors

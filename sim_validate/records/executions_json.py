@@ -22,10 +22,14 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from scenes.physics import PhysicsSettings
 from sim_validate.execution.enough import Enough
-from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import Skipped
-from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
+from sim_validate.execution.verdict import (
+    ExecutedGrasp,
+    Execution,
+    ExecutionControl,
+    ExecutionTrial,
+)
 from sim_validate.records.executions_schema import (
     SCHEMA,
     EnoughRecord,

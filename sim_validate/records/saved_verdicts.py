@@ -13,7 +13,7 @@ from grasp_core.files.complaints import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById, frame_of
 from sim_validate.records.verdicts_schema import SCHEMA, VerdictRecord, VerdictsFile
-from sim_validate.simulation.hold_verdict import LET_GO, Outcome
+from sim_validate.simulation.traces import LET_GO, Outcome
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -17,7 +17,7 @@ from grasp_core.files.strict_json import shown
 from scenes.fingertips import FingerSettings
 from scenes.physics import PhysicsSettings
 from sim_validate.files.toml_tables import read_tables
-from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.simulation.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.simulation.setup import Setup
 
 OURS = ("drive", "indentation")

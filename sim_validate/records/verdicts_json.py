@@ -25,12 +25,11 @@ from sim_validate.records.verdicts_schema import (
     VerdictRecord,
     VerdictsFile,
 )
-from sim_validate.simulation.gate.gate import Gate
-from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
-from sim_validate.validation.control_trials import ControlVerdict
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.repeats import Robustness
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.simulation.gate import Gate
+from sim_validate.simulation.traces import HoldVerdict, Outcome
+from sim_validate.validation.controls import ControlVerdict
+from sim_validate.validation.noise import Robustness
+from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 
 def verdicts_to_json(
@@ -95,7 +94,7 @@ def summary(verdicts: Iterable[Verdict]) -> Summary:
 
 
 def _verdict_record(body: Polyhedron, verdict: Verdict) -> VerdictRecord:
-    bounds, friction = verdict.bounds, verdict.critical_friction
+    friction = verdict.critical_friction
     return {
         "id": verdict.id,
         "contacts_sha256": contacts_sha256(verdict.contacts),
@@ -111,9 +110,7 @@ def _verdict_record(body: Polyhedron, verdict: Verdict) -> VerdictRecord:
         "controls": {
             control.control.name: _control_record(body, control) for control in verdict.controls
         },
-        "bounds": None if bounds is None else asdict(bounds),
         "robustness": _robustness_record(verdict.robustness),
-        "accepted_by": verdict.accepted_by,
         "settings": _settings(verdict),
         "versions": {**versions()},
     }
@@ -166,7 +163,6 @@ def _control_record(body: Polyhedron, verdict: ControlVerdict) -> ControlRecord:
             }
             for trial in verdict.tried
         ],
-        "accepted_by": verdict.accepted_by,
     }
 
 

@@ -11,7 +11,7 @@ from typing_extensions import TypedDict
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from scenes.mjcf import Surface
-from sim_validate.simulation.hold_verdict import Outcome
+from sim_validate.simulation.traces import Outcome
 
 SCHEMA = 1
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -111,7 +111,6 @@ class ControlRecord(TypedDict):
     closure_margin: NotRequired[Finite | None]
     separating_wrench: NotRequired[Wrench]
     wrenches: Annotated[list[ControlTrialRecord], Field(min_length=1)]
-    accepted_by: NotRequired[dict[str, bool]]
 
 
 class LostRecord(TypedDict):
@@ -172,9 +171,7 @@ class VerdictRecord(TypedDict):
     critical_friction: CriticalFrictionRecord
     wrenches: list[TrialRecord]
     controls: dict[str, ControlRecord]
-    bounds: NotRequired[dict[str, Any] | None]
     robustness: NotRequired[RobustnessRecord | None]
-    accepted_by: NotRequired[dict[str, bool]]
     settings: SettingsRecord
     versions: dict[str, str | None]
 

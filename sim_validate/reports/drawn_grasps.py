@@ -22,13 +22,10 @@ from scenes.drawing.hands.posed_hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
 from scenes.drawing.views import best_view
 from scenes.fingertips import FingerSettings
-from sim_validate.execution.filming import film, worth_seeing
-from sim_validate.execution.jobs import ExecutionJob
+from sim_validate.execution.jobs import ExecutionJob, film, worth_seeing
 from sim_validate.files.stale_results import CLIPS, PICTURES
 from sim_validate.records.executions_json import EXECUTIONS, Executions
-from sim_validate.replaying.from_verdicts import of_verdict
-from sim_validate.replaying.recorded import Wanted
-from sim_validate.replaying.replay import Replayed, replayed
+from sim_validate.replaying import Replayed, Wanted, of_verdict, replayed
 from sim_validate.reports.agreement import Record
 from sim_validate.reports.charts.margin_charts import margin_panels
 from sim_validate.reports.charts.motion_charts import motion_panels

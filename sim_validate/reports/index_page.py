@@ -117,9 +117,7 @@ def _judged(run: RunFolder) -> Iterable[Record]:
         return
     summary: Record = run.judgements["summary"]
     for name, counts in summary.items():
-        test: Record = run.judgements["protocols"][name]
-        label = f"{name} (imitation)" if test["imitation"] else name
-        yield {"name": label, "object": run.saved.body.name, "imitates": test["imitates"], **counts}
+        yield {"name": name, "object": run.saved.body.name, **counts}
 
 
 def all_verdicts(runs: Iterable[RunFolder]) -> list[Record]:

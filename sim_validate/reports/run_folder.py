@@ -10,9 +10,9 @@ from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.records.grasps_json import SavedGrasps
-from sim_validate.execution.jobs import ExecutedGrasp
+from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.files.stale_results import BEST, JUDGEMENTS, REACHES
-from sim_validate.protocols.judgements_schema import JudgementsFile
+from sim_validate.protocols.judgements_json import JudgementsFile
 from sim_validate.records.executions_json import EXECUTIONS, Executions, load_executions
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.regions import REGIONS

@@ -16,9 +16,9 @@ from grasp_core.quality.wrench_body import WrenchBody
 from grasp_core.quality.wrench_limit import WrenchLimit, limit_of
 from grasp_core.quality.wrench_limits import axis_wrenches
 from grasp_core.values import Contact
+from sim_validate.simulation.limits import part
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup
-from sim_validate.simulation.wrench_limits import part
 
 NO_PUSH = 1e-9
 """Normal forces below this share of the largest one count as zero."""

@@ -19,9 +19,9 @@ import numpy as np
 import grasp_core as gc
 import scenes
 from sim_validate.parallel.processes import available_cores, each
-from sim_validate.simulation.critical_friction import released_friction
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.limits import released_friction
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.simulate import Bench
 
 WORST = 0.005
 """Largest error of a critical friction, relative to the predicted one."""

@@ -20,15 +20,13 @@ import numpy as np
 import grasp_core as gc
 import scenes
 from sim_validate.parallel.processes import each
-from sim_validate.simulation.critical_friction import forces_just_above
-from sim_validate.simulation.hold_verdict import judge
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.limits import forces_just_above, part
 from sim_validate.simulation.loads import planned_loads
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.simulation.simulate import Bench
-from sim_validate.simulation.wrench_limits import part
-from sim_validate.validation.control_trials import control_case
-from sim_validate.validation.controls import negative_controls
+from sim_validate.simulation.traces import judge
+from sim_validate.validation.controls import control_case, negative_controls
 
 OBJECTS = (
     "tetrahedron", "octahedron", "dodecahedron", "box", "wedge", "chamfered-box", "l-bracket",
@@ -91,7 +89,8 @@ def of_controls(body, grasp, friction):
 
 def judged(kind, rig, loads, settling=None):
     layout, protocol = rig.bench.scene.layout, rig.setup.hold
-    pairs = zip(rig.hold(loads, settling, whole=True), rig.hold(loads, settling), strict=True)
+    whole = replace(rig, whole=True).hold(loads, settling)
+    pairs = zip(whole, rig.hold(loads, settling), strict=True)
     limit = protocol.hold_threshold * layout.grasp_size_m
     for traces in pairs:
         whole, early = (judge(trace, layout, protocol) for trace in traces)

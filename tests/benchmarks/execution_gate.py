@@ -9,7 +9,7 @@ import time
 from dataclasses import replace
 from itertools import product
 
-from sim_validate.execution.gate.gate import measured_case
+from sim_validate.execution.gate import measured_case
 from tests.sim_validate.execution.gate.settings_of_gates import BROKEN, RIGHT, held_case
 
 MASSES, STIFFNESSES, RADII = (0.05, 0.3, 2.0), (500.0, 2000.0, 10_000.0), (0.02, 0.07, 0.2)

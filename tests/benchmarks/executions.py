@@ -43,7 +43,7 @@ from grasp_core.closure.wrenches import contact_frames, grasp_map
 from grasp_core.geometry.nearest_points import nearest_on_surface
 from scenes.execution.held_mjcf import build_held_scene
 from sim_validate.execution.execute import chosen_squeeze
-from sim_validate.execution.misplaced import met, misplacements
+from sim_validate.execution.trials import met, misplacements
 from sim_validate.parallel.processes import each
 from tests.benchmarks import held_grasps as held
 

@@ -20,11 +20,11 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from sim_validate.simulation.hold_verdict import holds
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.limits import part, ramped_limits
 from sim_validate.simulation.loads import loads_as_they_are, planned_loads
 from sim_validate.simulation.rig import squeezed
-from sim_validate.simulation.simulate import Bench
-from sim_validate.simulation.wrench_limits import part, ramped_limits
+from sim_validate.simulation.traces import holds
 from tests.benchmarks.payloads import directions
 
 FRICTION, RADIUS_M, APPROACH_M = 0.5, 0.035, 0.03

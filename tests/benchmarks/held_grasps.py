@@ -17,7 +17,7 @@ from scenes.execution.held_mjcf import SAMPLE_S, build_held_scene
 from scenes.fingertips import fitting_radius
 from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench
-from sim_validate.execution.drives import Drive, idle
+from sim_validate.execution.paths import Drive, idle
 from sim_validate.execution.predictions import held_dynamics
 from sim_validate.execution.slips import outcome
 

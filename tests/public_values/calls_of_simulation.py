@@ -142,9 +142,8 @@ CALLS = [
     Call("sv.Agenda", dict, {
         "random_wrenches": COUNT,
         "wrenches": SEVERAL,
-        **dict.fromkeys(("critical_friction", "independent", "controls", "keep_traces"), SWITCH),
+        **dict.fromkeys(("critical_friction", "controls", "keep_traces"), SWITCH),
         "limits": WORD,
-        "rules": SEVERAL | {"unknown": ("nonsense",), "numbers": (1, 2)},
         "trials": COUNT,
         "noise": VALUE,
         "seed": SEED,

@@ -88,7 +88,6 @@ NAMED_OTHERWISE = {
     ("sv.load_dataset", "folder"): "folder|no/such",
     ("sv.load_dex_record", "path"): "path|no/such",
     ("sv.write_report", "folder"): "folder|no/such",
-    ("sv.Agenda", "rules"): "rule",
 }
 """What messages say of arguments in place of their names."""
 FEWEST_CASES = 3000

@@ -27,7 +27,7 @@ from sim_validate.cli import (
 from sim_validate.cli.flag_bounds import Bound
 from sim_validate.datasets.learning.settings import Learning
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.simulation.noise import Noise
+from sim_validate.simulation.setup import Noise
 from tests.sim_validate.rigs import grasps
 
 ENDS = {end for ends in BOUNDS.values() for end in ends.values()}

@@ -10,10 +10,10 @@ from grasp_core.closure.contact_arrays import contact_frictions
 from grasp_core.quality.wrench_body import WrenchBody
 from grasp_core.quality.wrench_limit import limit_of
 from scenes.mjcf import build_scene
+from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.simulate import Bench
 
 MAX_FORCE = 10.0
 

@@ -23,7 +23,7 @@ from sim_validate.commands.hands.simulated import (
     tries_ours,
     with_motors,
 )
-from sim_validate.commands.judging.by_protocols import judge_hands
+from sim_validate.commands.judging import judge_hands
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import REACHES, remove_reaches
 from sim_validate.hands.execute_hand import hand_execution_settings
@@ -54,7 +54,7 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
         judged = Exit.GOOD
         if command.protocol:
             judged, text = judge_hands(
-                chosen, hand, found, command.protocol, seed=command.seed, jobs=command.jobs,
+                chosen, hand, found, command.protocol, jobs=command.jobs,
                 folder=command.out, reporter=reporter,
             )  # fmt: skip
     reporter.text(text)

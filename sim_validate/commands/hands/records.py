@@ -9,9 +9,7 @@ from grasp_core.objects.convexity import is_convex
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.short_text import counted
 from sim_validate.cli.console import Reporter
-from sim_validate.peer_files.dexgraspbench_records import write_dex_record
-from sim_validate.peer_files.hand_records import dex_record
-from sim_validate.peer_files.object_folders import write_dex_object
+from sim_validate.dexgraspbench import dex_record, write_dex_object, write_dex_record
 
 
 def write_records(

@@ -28,7 +28,7 @@ from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.units import WorkUnit, units_of, units_sha256
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.paths import path_inside
-from sim_validate.simulation.gate.gate import require_faithful
+from sim_validate.simulation.gate import require_faithful
 from sim_validate.simulation.setup import Setup
 
 OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)

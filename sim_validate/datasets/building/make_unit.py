@@ -20,9 +20,8 @@ from sim_validate.datasets.rows import GIVEN, GraspRows, Row, Rows
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.validation.control_trials import try_control
-from sim_validate.validation.controls import Control
-from sim_validate.validation.grasp_verdict import Verdict
+from sim_validate.validation.controls import Control, try_control
+from sim_validate.validation.verdict import Verdict
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,6 @@ LABELS: Mapping[str, str] = {
     "fingers_removed": "only three or two of a grasp's contacts",
     "normal_flipped": "a grasp with one finger that pulls where it should push",
     "contacts_moved": "contacts moved on their faces out of force closure",
-    "uncorrected": "contacts that the paper's construction as printed wrongly gives on these faces",
 }
 """Meanings of the values of the column `label`."""
 PLANNED = (

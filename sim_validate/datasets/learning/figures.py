@@ -26,8 +26,8 @@ from scenes.fingertips import fitting_radius
 from sim_validate.datasets.execution_rows import for_fingers
 from sim_validate.datasets.learning.hand_poses import hand_cells, hand_named
 from sim_validate.datasets.learning.settings import Learning
-from sim_validate.execution.asked import AskedExecution
 from sim_validate.execution.execute import tip_radius
+from sim_validate.execution.settings import AskedExecution
 
 USUAL_PUSH_N = 10.0
 """Largest push of a finger where the dataset has no executions, which state their own [N]."""

@@ -12,7 +12,7 @@ from grasp_core.arrays import Array
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.polyhedron import Polyhedron
 from sim_validate.datasets.learning.settings import Learning
-from sim_validate.execution.resting import rests
+from sim_validate.execution.trials import rests
 
 CONVEX = 0.999
 """Least share of its hull's volume that a convex object has."""

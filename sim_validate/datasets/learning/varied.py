@@ -13,16 +13,14 @@ from grasp_core.values import Grasp
 from sim_validate.datasets.execution_rows import Executed, executed_by
 from sim_validate.datasets.learning.settings import CONTROLS, Learning
 from sim_validate.datasets.learning.variants import Variant, draws, unmoved, variants, with_mass
-from sim_validate.execution.asked import AskedExecution
 from sim_validate.execution.execute import execute
-from sim_validate.execution.jobs import ExecutedGrasp
-from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.simulation.gate.gate import Gate
+from sim_validate.execution.settings import AskedExecution, ExecutionSettings
+from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.simulation.gate import Gate
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.validation.control_trials import ControlVerdict, try_control
-from sim_validate.validation.controls import Control, negative_controls
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.validation import validate, validated
+from sim_validate.validation.controls import Control, ControlVerdict, negative_controls, try_control
+from sim_validate.validation.validation import tested, validate
+from sim_validate.validation.verdict import Verdict
 
 VARIED = "varied"
 """Label of rows that are made from a grasp and may hold or not."""
@@ -92,7 +90,7 @@ class Varying:
         seated, friction = variant.seated, variant.friction
         if isinstance(variant.proved, Grasp):
             agenda = replace(self.agenda, controls=False, critical_friction=False)
-            return validated(seated.body, variant.proved, friction, gate, agenda, Setup())
+            return tested(seated.body, variant.proved, friction, gate, agenda, Setup())
         control = Control(VARIED, seated.contacts, friction, variant.proved)
         return try_control(seated.body, control, self.agenda, Setup())
 

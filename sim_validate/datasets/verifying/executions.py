@@ -24,8 +24,8 @@ from sim_validate.datasets.learning.varied import VARIED
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.rows import GIVEN
 from sim_validate.datasets.verifying.rows_by_object import ObjectRows, Row
-from sim_validate.execution.asked import AskedExecution
 from sim_validate.execution.execute import tip_radius
+from sim_validate.execution.settings import AskedExecution
 from sim_validate.execution.verdict import may_slip
 
 ROUNDING = 1e-6

@@ -12,7 +12,7 @@ from scenes.drawing.flat.panels import ROW, Entry, Panel, keyed, marker
 from scenes.drawing.flat.scales import Scale, ticks_between
 from scenes.drawing.flat.sheets import Area, Dots, Line, Mark, Sheet, Words, beside
 from sim_validate.reports.agreement import Agreement
-from sim_validate.validation.wrench_verdict import AGREEMENT
+from sim_validate.validation.verdict import AGREEMENT
 
 WIDTH, HEIGHT = 360.0, 388.0
 """Size of a panel [pixels]."""

@@ -12,7 +12,7 @@ from scenes.drawing.flat.colours import BAD, FINGERS, INK, NEUTRAL
 from scenes.drawing.flat.panels import ROW, Entry, Panel, keyed
 from scenes.drawing.flat.scales import Scale, ticks_in
 from scenes.drawing.flat.sheets import Mark, Sheet, beside
-from sim_validate.replaying.replay import Replayed
+from sim_validate.replaying import Replayed
 
 WIDTH, HEIGHT = 300.0, 316.0
 """Size of a panel [pixels]."""

@@ -23,8 +23,7 @@ from scenes.drawing.flat.panels import ROW, SMALL, Entry, Panel, Shape, keyed, m
 from scenes.drawing.flat.scales import Scale
 from scenes.drawing.flat.sheets import Area, Line, Mark, Sheet, Words
 from sim_validate.execution.enough import accelerations_g
-from sim_validate.execution.jobs import ExecutedGrasp
-from sim_validate.execution.verdict import ExecutionTrial
+from sim_validate.execution.verdict import ExecutedGrasp, ExecutionTrial
 from sim_validate.records.executions_json import Executions
 
 WIDTH = 400.0

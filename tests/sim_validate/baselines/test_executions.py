@@ -18,10 +18,14 @@ from sim_validate.baselines.executions import ExecutionEntry, execution_entry, n
 from sim_validate.baselines.measure import Measured
 from sim_validate.baselines.settings import How, of_settings, settings_of
 from sim_validate.baselines.suite_toml import suite_from_tables
-from sim_validate.execution.asked import asked_execution
-from sim_validate.execution.jobs import ExecutedGrasp
+from sim_validate.execution.settings import asked_execution
 from sim_validate.execution.trials import Skipped
-from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
+from sim_validate.execution.verdict import (
+    ExecutedGrasp,
+    Execution,
+    ExecutionControl,
+    ExecutionTrial,
+)
 from sim_validate.simulation.setup import Agenda, Setup
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, OTHER_ARITHMETIC, OTHERS
 

@@ -6,7 +6,7 @@ from scenes.example_objects import example_object
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.learning.settings import Learning
 from sim_validate.datasets.open_dataset import select
-from sim_validate.execution.asked import AskedExecution
+from sim_validate.execution.settings import AskedExecution
 
 LEARNED = DatasetConfig(
     objects=("tetrahedron", "wedge"), families=("concurrent",), limit=1,

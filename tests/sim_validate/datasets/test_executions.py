@@ -24,8 +24,8 @@ from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.verifying.executions import loose_difference
 from sim_validate.datasets.verifying.redo import Sample
 from sim_validate.datasets.verifying.verify import verify
-from sim_validate.execution.asked import AskedExecution
-from sim_validate.execution.jobs import ExecutedGrasp
+from sim_validate.execution.settings import AskedExecution
+from sim_validate.execution.verdict import ExecutedGrasp
 from tests.sim_validate.datasets.engines import Here, silent
 from tests.sim_validate.datasets.forging import forged
 from tests.sim_validate.datasets.pair import all_rows

@@ -12,7 +12,7 @@ import scenes
 from grasp_core.closure.wrenches import cross_matrix
 from scenes.execution.held_mjcf import SAMPLE_S
 from sim_validate.execution import paths
-from sim_validate.execution.drives import Table, idle
+from sim_validate.execution.paths import Table, idle
 from sim_validate.execution.predictions import (
     expected,
     held_dynamics,

@@ -15,8 +15,7 @@ from scenes.drawing.flat.panels import thinned
 from scenes.drawing.flat.scales import ticks_between
 from scenes.drawing.flat.sheets import Area, Dots, Image
 from scenes.drawing.flat.svg import svg_of
-from sim_validate.replaying.recorded import Recorded
-from sim_validate.replaying.replay import replayed
+from sim_validate.replaying import Recorded, replayed
 from sim_validate.reports.agreement import (
     Agreement,
     as_predicted,

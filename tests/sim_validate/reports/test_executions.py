@@ -16,10 +16,14 @@ from scenes.execution.held import HeldSettings
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.executions import execution_settings
-from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import Skipped
-from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
+from sim_validate.execution.verdict import (
+    ExecutedGrasp,
+    Execution,
+    ExecutionControl,
+    ExecutionTrial,
+)
 from sim_validate.files.stale_results import remove_executions
 from sim_validate.main import main
 from sim_validate.records.executions_json import Executions, executions_to_json, load_executions
