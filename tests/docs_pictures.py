@@ -13,7 +13,7 @@ import numpy as np
 import grasp_core as gc
 import scenes
 from scenes.drawing.canvas import figure_of, write_figure
-from scenes.drawing.flat.colours import FINGERS
+from scenes.drawing.colours import FINGERS
 from scenes.drawing.flat.panels import Entry, Panel, keyed
 from scenes.drawing.flat.scales import Scale
 from scenes.drawing.flat.sheets import Dots, Sheet, Words, beside, moved

@@ -19,7 +19,7 @@ import numpy as np
 
 from grasp_core.errors import InputError
 from grasp_core.files.whole_files import replacing, write_parts
-from scenes.drawing.flat.colours import INK, LEVELS, ramp_bytes
+from scenes.drawing.colours import INK, LEVELS, ramp_bytes
 from scenes.drawing.flat.sheets import Area, Dots, Image, Line, Mark, Sheet, Words, closed
 from scenes.drawing.flat.svg import svg_of
 

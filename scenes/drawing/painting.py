@@ -12,7 +12,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.polygons import convex_hull
-from scenes.drawing.flat.colours import hexed, rgb
+from scenes.drawing.colours import hexed, rgb
 from scenes.drawing.outlines import Surface, joined, outline
 from scenes.drawing.palette import LOOKS, Look, colour_of
 from scenes.drawing.shapes import Role, Shape

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from scenes.drawing.flat.colours import FINGERS, FOCUS, GLASS, HAND, INK, SURFACE
+from scenes.drawing.colours import FINGERS, FOCUS, GLASS, HAND, INK, SURFACE
 from scenes.drawing.shapes import Role, Shape
 
 

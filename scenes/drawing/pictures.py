@@ -23,7 +23,7 @@ from scenes.drawing.drawings import (
     finger_size,
     glass,
 )
-from scenes.drawing.flat.colours import FINGERS, NEUTRAL
+from scenes.drawing.colours import FINGERS, NEUTRAL
 from scenes.drawing.flat.panels import ROW, Entry, keyed, thinned
 from scenes.drawing.flat.sheets import Area, Dots, Line, Mark, Sheet, closed, numbered
 from scenes.drawing.hands.hand_views import view_of_hand

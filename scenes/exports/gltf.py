@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.drawing.flat.colours import FINGERS, GLASS, rgb
+from scenes.drawing.colours import FINGERS, GLASS, rgb
 from scenes.exports.placed_grasps import PlacedGrasp
 
 SECTIONS = 24

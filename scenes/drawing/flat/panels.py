@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.flat.colours import NEUTRAL
+from scenes.drawing.colours import NEUTRAL
 from scenes.drawing.flat.letters import width_of
 from scenes.drawing.flat.scales import Scale
 from scenes.drawing.flat.sheets import LETTER, Area, Dots, Line, Mark, Words, ink_line, outlined

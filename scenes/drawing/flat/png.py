@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 
 from grasp_core.arrays import Indices
-from scenes.drawing.flat.colours import LEVELS, ramp_bytes
+from scenes.drawing.colours import LEVELS, ramp_bytes
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 PALETTE, BITS = 3, 8

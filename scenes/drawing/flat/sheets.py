@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from scenes.drawing.flat.colours import INK, PAPER
+from scenes.drawing.colours import INK, PAPER
 
 LETTER = 12.0
 """Size of letters [pixels]."""

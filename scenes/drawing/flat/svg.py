@@ -16,7 +16,7 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.flat.colours import INK, NIGHT
+from scenes.drawing.colours import INK, NIGHT
 from scenes.drawing.flat.png import png_of
 from scenes.drawing.flat.sheets import Area, Dots, Image, Line, Mark, Sheet, Words
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.flat.colours import BAD, GOOD, NEUTRAL
+from scenes.drawing.colours import BAD, GOOD, NEUTRAL
 from scenes.drawing.flat.panels import SMALL, Panel
 from scenes.drawing.flat.scales import Scale, ticks_in
 from scenes.drawing.flat.sheets import Area, Mark, Sheet, Words

@@ -7,7 +7,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from scenes.drawing.canvas import figure_of
-from scenes.drawing.flat.colours import BAD, GOOD, NEUTRAL
+from scenes.drawing.colours import BAD, GOOD, NEUTRAL
 from scenes.drawing.flat.panels import ROW, Entry, Panel, keyed, marker
 from scenes.drawing.flat.scales import Scale, ticks_between
 from scenes.drawing.flat.sheets import Area, Dots, Line, Mark, Sheet, Words, beside

@@ -18,7 +18,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_limits import many_limits
 from grasp_core.values import Grasp
 from scenes.drawing.canvas import figure_of
-from scenes.drawing.flat.colours import BAD, LEVELS, NEUTRAL, PAPER, levels_of
+from scenes.drawing.colours import BAD, LEVELS, NEUTRAL, PAPER, levels_of
 from scenes.drawing.flat.panels import SMALL
 from scenes.drawing.flat.scales import ticks_in
 from scenes.drawing.flat.sheets import (

@@ -8,7 +8,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from scenes.drawing.canvas import figure_of
-from scenes.drawing.flat.colours import BAD, FINGERS, INK, NEUTRAL
+from scenes.drawing.colours import BAD, FINGERS, INK, NEUTRAL
 from scenes.drawing.flat.panels import ROW, Entry, Panel, keyed
 from scenes.drawing.flat.scales import Scale, ticks_in
 from scenes.drawing.flat.sheets import Mark, Sheet, beside

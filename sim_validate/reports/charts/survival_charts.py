@@ -18,7 +18,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from scenes.drawing.canvas import figure_of
-from scenes.drawing.flat.colours import BAD, FINGERS, GOOD, INK, NEUTRAL
+from scenes.drawing.colours import BAD, FINGERS, GOOD, INK, NEUTRAL
 from scenes.drawing.flat.panels import ROW, SMALL, Entry, Panel, Shape, keyed, marker
 from scenes.drawing.flat.scales import Scale
 from scenes.drawing.flat.sheets import Area, Line, Mark, Sheet, Words

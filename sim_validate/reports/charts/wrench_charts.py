@@ -19,7 +19,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.values import Grasp
 from scenes.drawing.canvas import figure_of
-from scenes.drawing.flat.colours import BAD, GOOD, INK
+from scenes.drawing.colours import BAD, GOOD, INK
 from scenes.drawing.flat.panels import ROW, Entry, Panel, keyed, thinned
 from scenes.drawing.flat.scales import Scale, ticks_in
 from scenes.drawing.flat.sheets import Area, Line, Mark, Sheet, beside, circle, outlined

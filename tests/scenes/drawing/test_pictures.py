@@ -15,7 +15,7 @@ from grasp_core.geometry.polygons import convex_hull
 from scenes.drawing import pictures
 from scenes.drawing.canvas import FORMATS, encoded
 from scenes.drawing.drawings import BAR_RADIUS, drawing_of, finger_size, glass
-from scenes.drawing.flat.colours import BAD, FINGERS, FOCUS, GOOD, INK, SURFACE, rgb
+from scenes.drawing.colours import BAD, FINGERS, FOCUS, GOOD, INK, SURFACE, rgb
 from scenes.drawing.outlines import Surface, outline
 from scenes.drawing.painting import painted
 from scenes.drawing.palette import LOOKS

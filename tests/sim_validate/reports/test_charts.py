@@ -10,7 +10,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.wrench_sets import WrenchSet
 from scenes.drawing.canvas import encoded
-from scenes.drawing.flat.colours import BAD, GOOD, LEVELS
+from scenes.drawing.colours import BAD, GOOD, LEVELS
 from scenes.drawing.flat.panels import thinned
 from scenes.drawing.flat.scales import ticks_between
 from scenes.drawing.flat.sheets import Area, Dots, Image

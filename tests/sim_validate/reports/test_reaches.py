@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
-from scenes.drawing.flat.colours import FINGERS, HAND
+from scenes.drawing.colours import FINGERS, HAND
 from scenes.drawing.turntable import UNITS
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
-from scenes.drawing.flat.colours import FINGERS
+from scenes.drawing.colours import FINGERS
 from scenes.drawing.painting import DARKEST, LIGHT
 from scenes.drawing.turntable import UNITS
 from scenes.drawing.views import DISTANCE

@@ -11,8 +11,8 @@ import scenes
 from grasp_core.errors import InputError
 from grasp_core.values import Contact
 from scenes.drawing.drawings import drawing_with_hand
-from scenes.drawing.flat.colours import FINGERS as COLOURS
-from scenes.drawing.flat.colours import HAND
+from scenes.drawing.colours import FINGERS as COLOURS
+from scenes.drawing.colours import HAND
 from scenes.drawing.flat.sheets import Dots, Words
 from scenes.drawing.hands.hand_views import extent_with, view_of_hand
 from scenes.drawing.hands.posed_hands import (
