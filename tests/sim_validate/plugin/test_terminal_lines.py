@@ -1,6 +1,6 @@
 """What the terminal says at the end of a run, for lines that are written down here."""
 
-from sim_validate.reports.terminal_lines import MOST_TOLD, sections
+from sim_validate.pytest_plugin import MOST_TOLD, sections
 
 NOTE = "part.obj has changed: face 3 moved"
 
@@ -33,4 +33,4 @@ def test_a_long_list_is_cut():
     lines = [line(f"{number:03d} same", note=NOTE) for number in range(MOST_TOLD + 3)]
     ((_, texts),) = sections(lines)
     assert len(texts) == 1 + MOST_TOLD + 1
-    assert texts[-1] == "  and 3 more; --grasp-report DIR lists all"
+    assert texts[-1] == "  and 3 more; --junitxml FILE lists all"
