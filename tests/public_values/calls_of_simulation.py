@@ -44,7 +44,7 @@ CALLS = [
         "path": PATH | {"unknown ending": "a.obj", "no ending": "a"},
         "to": WORD,
         "fingertip_radius_m": optional(POSITIVE),
-    }, succeeds_in="tests/scenes/exports/test_formats.py"),
+    }, succeeds_in="tests/scenes/test_exports.py"),
     Call("scenes.example_names", dict, {}),
     Call("scenes.example_object", lambda: {"name": "box"}, {
         "name": TEXT | {

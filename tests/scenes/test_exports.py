@@ -11,14 +11,13 @@ import yaml
 
 import grasp_core as gc
 import scenes
-from scenes.exports.formats import ENDINGS
-from scenes.exports.placed_grasps import ROD_LENGTH
+from scenes.exports import ENDINGS, ROD_LENGTH
 
 SAME = {"rtol": 0.0, "atol": 1e-12}
 """For numbers of 64 bits about objects of a tenth of a metre, whose rounding is 1e-17."""
 SINGLE = 1e-7
 """Relative rounding of the numbers of 32 bits in which vertices are kept: 2^-24, rounded up."""
-FILES = {"moveit": "grasps.yaml", "gltf": "grasps.glb", "usd": "grasps.usda"}
+FILES = {"moveit": "grasps.yaml", "gltf": "grasps.glb"}
 
 
 @pytest.fixture(scope="module")
@@ -42,8 +41,6 @@ def written(plan, tmp_path):
     """Path of the plan, exported in a format."""
 
     def write(to, **more):
-        if to == "usd":
-            pytest.importorskip("pxr")
         return scenes.export_grasps(plan, tmp_path / FILES[to], to, **more)
 
     return write
@@ -119,60 +116,6 @@ def test_grasps_of_a_file_stand_apart(plan, written):
         boxes.append((np.vstack(corners).min(axis=0), np.vstack(corners).max(axis=0)))
     for (low, high), (other_low, other_high) in zip(boxes, [*boxes[1:], boxes[0]], strict=True):
         assert (low > other_high).any() or (high < other_low).any()
-
-
-def test_the_stage_is_in_metres_with_every_finger_at_its_contact(plan, written):
-    usd = pytest.importorskip("pxr.Usd")
-    from pxr import UsdGeom
-
-    stage = usd.Stage.Open(str(written("usd")))
-    assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
-    assert stage.GetDefaultPrim().GetPath() == "/grasps"
-    assert [prim.GetName() for prim in stage.GetDefaultPrim().GetChildren()] == [
-        "grasp_0", "grasp_1", "grasp_2"
-    ]  # fmt: skip
-    cache = UsdGeom.XformCache()
-    for number, grasp in enumerate(plan):
-        prim = stage.GetPrimAtPath(f"/grasps/grasp_{number}")
-        assert prim.GetDisplayName() == grasp.id
-        assert prim.GetAttribute("graspproof:ferrari_canny_lower_n").Get() == grasp.ferrari_canny[0]
-        assert prim.GetAttribute("graspproof:family").Get() == grasp.family
-        for finger in range(4):
-            pose = placed(cache, stage, f"{prim.GetPath()}/finger_{finger}", prim)
-            np.testing.assert_allclose(pose[:3, 3], grasp.positions[finger], **SAME)
-            np.testing.assert_allclose(pose[:3, 2], grasp.normals[finger], **SAME)
-            tip = stage.GetPrimAtPath(f"{prim.GetPath()}/finger_{finger}/tip")
-            assert UsdGeom.Sphere(tip).GetRadiusAttr().Get() == 0.003
-            center = placed(cache, stage, str(tip.GetPath()), prim)[:3, 3]
-            np.testing.assert_allclose(
-                center, grasp.positions[finger] - 0.003 * grasp.normals[finger], **SAME
-            )
-            bar = stage.GetPrimAtPath(f"{prim.GetPath()}/finger_{finger}_rod/bar")
-            assert UsdGeom.Cylinder(bar).GetHeightAttr().Get() == 0.03
-            middle = placed(cache, stage, str(bar.GetPath()), prim)[:3, 3]
-            np.testing.assert_allclose(middle, center - 0.015 * ways_in(grasp)[finger], **SAME)
-
-
-def placed(cache, stage, path, grasp):
-    """Pose of a prim in the frame of its grasp; USD's vectors are rows."""
-    pose, _ = cache.ComputeRelativeTransform(stage.GetPrimAtPath(path), grasp)
-    return np.array(pose).T
-
-
-def test_every_grasp_of_a_stage_has_the_object(plan, written):
-    usd = pytest.importorskip("pxr.Usd")
-    from pxr import UsdGeom
-
-    stage = usd.Stage.Open(str(written("usd")))
-    for number in range(len(plan)):
-        shown = stage.GetPrimAtPath(f"/grasps/grasp_{number}/object")
-        assert shown.IsInstance()
-        mesh = UsdGeom.Mesh(shown.GetPrototype().GetChild("mesh"))
-        points = np.array(mesh.GetPointsAttr().Get())
-        np.testing.assert_allclose(points, plan.body.vertices, rtol=SINGLE, atol=1e-12)
-        corners = np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
-        np.testing.assert_array_equal(corners, plan.body.triangles)
-        assert set(mesh.GetFaceVertexCountsAttr().Get()) == {3}
 
 
 MESSAGES = {
@@ -299,9 +242,8 @@ def test_a_plan_without_grasps_is_refused(plan, tmp_path):
         scenes.export_grasps(plan[:0], tmp_path / "a.glb", "gltf")
 
 
-@pytest.mark.parametrize(("to", "library"), [("moveit", "yaml"), ("usd", "pxr.Usd")])
-def test_a_missing_library_is_named_with_its_extra(plan, tmp_path, monkeypatch, to, library):
-    monkeypatch.setitem(__import__("sys").modules, library, None)
-    with pytest.raises(gc.InputError, match=rf"pip install 'graspproof\[{to}\]'"):
-        scenes.export_grasps(plan, tmp_path / FILES[to], to)
+def test_a_missing_library_is_named_with_its_extra(plan, tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "yaml", None)
+    with pytest.raises(gc.InputError, match=r"pip install 'graspproof\[moveit\]'"):
+        scenes.export_grasps(plan, tmp_path / FILES["moveit"], "moveit")
     assert not list(tmp_path.iterdir())
