@@ -20,9 +20,9 @@ from scenes.drawing.drawings import (
     drawing_of,
     glass,
 )
-from scenes.drawing.flat.svg import svg_of
 from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG, number_places, sheet_of
 from scenes.drawing.shapes import Shape
+from scenes.drawing.sheets import svg_of
 from scenes.drawing.views import Alone, Extent, View, best_view, view_alone
 from scenes.layout import Layout
 from scenes.mjcf import Scene

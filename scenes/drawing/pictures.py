@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from grasp_core.objects.face import Face
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
-from scenes.drawing.canvas import figure_of, format_of, write_sheet
+from scenes.drawing.colours import FINGERS, NEUTRAL
 from scenes.drawing.drawings import (
     BAR_LENGTH,
     drawing_of,
@@ -23,14 +23,11 @@ from scenes.drawing.drawings import (
     finger_size,
     glass,
 )
-from scenes.drawing.colours import FINGERS, NEUTRAL
-from scenes.drawing.flat.panels import ROW, Entry, keyed, thinned
-from scenes.drawing.flat.sheets import Area, Dots, Line, Mark, Sheet, closed, numbered
-from scenes.drawing.hands.hand_views import view_of_hand
-from scenes.drawing.hands.posed_hands import PosedHand, numbers_behind, posed_hand
+from scenes.drawing.hands import PosedHand, numbers_behind, posed_hand, view_of_hand
 from scenes.drawing.painting import Patch, painted
-from scenes.drawing.palette import LOOKS, colour_of
-from scenes.drawing.shapes import Role, Shape, extent_of
+from scenes.drawing.panels import ROW, Entry, keyed, thinned
+from scenes.drawing.shapes import LOOKS, Role, Shape, colour_of, extent_of
+from scenes.drawing.sheets import Area, Dots, Line, Mark, Sheet, closed, format_of, numbered
 from scenes.drawing.views import Extent, View, best_view
 
 if TYPE_CHECKING:
@@ -81,7 +78,7 @@ def write_picture(
     Args:
         body: The object.
         grasp: A grasp on the faces of `body`.
-        path: Path of the picture; its ending (png, svg, pdf, webp, jpg) says the format.
+        path: Path of the picture; its ending (svg or png) says the format.
         friction: Coulomb coefficient of the friction cones.
         view: The view to draw from; None chooses the best one.
         hand: A hand to draw in place of straight fingers, with `reach`.
@@ -95,7 +92,7 @@ def write_picture(
     format_of(path)
     held = held_by(hand, reach, grasp)
     sheet = grasp_sheet(body, grasp, friction, view=view, legend=True, held=held)
-    return write_sheet(sheet, path)
+    return sheet.write(path)
 
 
 def write_object_picture(body: Polyhedron, path: Path) -> Path:
@@ -111,7 +108,7 @@ def write_object_picture(body: Polyhedron, path: Path) -> Path:
     sheet = sheet_of(
         glass(body), body, view, body.name, numbers=places, side=SIDE, labels=labels
     )  # fmt: skip
-    return write_sheet(sheet, path)
+    return sheet.write(path)
 
 
 def _faces_towards(view: View, body: Polyhedron) -> list[int]:
@@ -137,14 +134,14 @@ def _middle(face: Face) -> Array:
 def grasp_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
     legend: bool = True, hand: Hand | None = None, reach: "HandReach | None" = None,
-) -> Any:  # fmt: skip
-    """Draw a grasp as `write_picture` does, as a matplotlib figure.
+) -> Sheet:  # fmt: skip
+    """Draw a grasp as `write_picture` does, as a sheet that a notebook shows.
 
     Raises:
         InputError: As for `write_picture`.
     """
     held = held_by(hand, reach, grasp)
-    return figure_of(grasp_sheet(body, grasp, friction, view=view, legend=legend, held=held))
+    return grasp_sheet(body, grasp, friction, view=view, legend=legend, held=held)
 
 
 def grasp_sheet(

@@ -14,11 +14,9 @@ from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
-from scenes.drawing.canvas import write_sheet
 from scenes.drawing.clips import GraphicsError, has_display, write_clip
-from scenes.drawing.hands.posed_hands import PosedHand
+from scenes.drawing.hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
-from scenes.drawing.turning_clips import write_turning_clip
 from scenes.drawing.turntable import turntable_page
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, build_scene
@@ -107,17 +105,13 @@ def _written(
     body = saved.body
     if command.picture is not None:
         sheet = grasp_sheet(body, grasp, friction, legend=True, held=shown.held)
-        yield write_sheet(sheet, command.picture)
+        yield sheet.write(command.picture)
         reporter.say(f"wrote {command.picture}")
     if command.page is not None:
         yield write_text(command.page, turntable_page(body, grasp, friction, shown.held))
         reporter.say(f"wrote {command.page}")
     if command.clip is not None:
-        try:
-            yield write_closing_clip(_scene(saved, grasp, friction), grasp, command.clip)
-        except GraphicsError as error:
-            reporter.warn(f"the clip shows the picture turning, not the fingers closing: {error}")
-            yield write_turning_clip(body, grasp, command.clip, friction)
+        yield write_closing_clip(_scene(saved, grasp, friction), grasp, command.clip)
         reporter.say(f"wrote {command.clip}")
 
 

@@ -17,9 +17,9 @@ from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import ContactRegion, Grasp, four
 from scenes.drawing.clips import GraphicsError, magnified, write_clip
-from scenes.drawing.flat.svg import svg_of
-from scenes.drawing.hands.posed_hands import PosedHand
+from scenes.drawing.hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
+from scenes.drawing.sheets import svg_of
 from scenes.drawing.views import best_view
 from scenes.fingertips import FingerSettings
 from sim_validate.execution.filming import film, worth_seeing

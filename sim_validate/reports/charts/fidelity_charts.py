@@ -1,16 +1,13 @@
 """Charts of simulated over predicted values; points should lie on the line of equal values."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.canvas import figure_of
 from scenes.drawing.colours import BAD, GOOD, NEUTRAL
-from scenes.drawing.flat.panels import ROW, Entry, Panel, keyed, marker
-from scenes.drawing.flat.scales import Scale, ticks_between
-from scenes.drawing.flat.sheets import Area, Dots, Line, Mark, Sheet, Words, beside
+from scenes.drawing.panels import ROW, Entry, Panel, Scale, keyed, marker, ticks_between
+from scenes.drawing.sheets import Area, Dots, Line, Mark, Sheet, Words
 from sim_validate.reports.agreement import Agreement
 from sim_validate.validation.wrench_verdict import AGREEMENT
 
@@ -22,16 +19,8 @@ LEAST_SHOWN = 0.5
 """Place of zero on a logarithmic axis, relative to the least value above zero."""
 
 
-def fidelity_figure(agreements: Sequence[Agreement]) -> Any:
-    """Draw simulated over predicted values on logarithmic axes.
-
-    Gives a matplotlib figure.
-    """
-    return figure_of(beside(fidelity_panels(agreements)))
-
-
 def fidelity_panels(agreements: Sequence[Agreement]) -> tuple[Sheet, ...]:
-    """Draw the panels of `fidelity_figure` as sheets of their own."""
+    """Draw simulated over predicted values on logarithmic axes, a panel for each quantity."""
     return tuple(_panel(agreement) for agreement in agreements)
 
 

@@ -12,16 +12,13 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.canvas import figure_of
 from scenes.drawing.colours import BAD, FINGERS, GOOD, INK, NEUTRAL
-from scenes.drawing.flat.panels import ROW, SMALL, Entry, Panel, Shape, keyed, marker
-from scenes.drawing.flat.scales import Scale
-from scenes.drawing.flat.sheets import Area, Line, Mark, Sheet, Words
+from scenes.drawing.panels import ROW, SMALL, Entry, Panel, Scale, Shape, keyed, marker
+from scenes.drawing.sheets import Area, Line, Mark, Sheet, Words
 from sim_validate.execution.enough import accelerations_g
 from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.execution.verdict import ExecutionTrial
@@ -143,16 +140,8 @@ def survival_sentence(executed: Sequence[Executions]) -> str:
     )
 
 
-def survival_figure(executed: Sequence[Executions]) -> Any:
-    """Draw the share of grasps that survives, by the acceleration of the palm.
-
-    Gives a matplotlib figure.
-    """
-    return figure_of(survival_sheet(executed))
-
-
 def survival_sheet(executed: Sequence[Executions]) -> Sheet:
-    """Draw `survival_figure` as a sheet."""
+    """Draw the share of grasps that survives, by the acceleration of the palm."""
     multiples, found = certified_multiples(executed), survivals(executed)
     ends = [NARROWEST, *multiples, *(1.0 + mark.acceleration_g for mark in found)]
     end = min(BEYOND * max(ends), WIDEST)

@@ -11,7 +11,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.hands.reach import HandReach
 from grasp_core.values import Contact
-from scenes.drawing.hands.posed_hands import posed_hand
+from scenes.drawing.hands import posed_hand
 from sim_validate.records.reaches_json import reaches_to_json
 
 FRICTION, CLEARANCE = 0.5, 5e-4

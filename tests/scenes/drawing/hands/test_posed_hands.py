@@ -10,21 +10,22 @@ import pytest
 import scenes
 from grasp_core.errors import InputError
 from grasp_core.values import Contact
-from scenes.drawing.drawings import drawing_with_hand
 from scenes.drawing.colours import FINGERS as COLOURS
 from scenes.drawing.colours import HAND
-from scenes.drawing.flat.sheets import Dots, Words
-from scenes.drawing.hands.hand_views import extent_with, view_of_hand
-from scenes.drawing.hands.posed_hands import (
+from scenes.drawing.drawings import drawing_with_hand
+from scenes.drawing.hands import (
+    STEPS,
     PosedHand,
+    extent_with,
     hand_shapes,
     numbers_behind,
     parts_of,
     posed_hand,
+    view_of_hand,
 )
-from scenes.drawing.hands.rounded_boxes import STEPS
-from scenes.drawing.palette import colour_of
 from scenes.drawing.pictures import grasp_sheet, write_picture
+from scenes.drawing.shapes import colour_of
+from scenes.drawing.sheets import Dots, Words
 from tests.grasp_core.hands.gripping import plain_hand
 from tests.scenes.drawing.hands.standing import FRICTION, ROUNDING, held, standing
 from tests.scenes.drawing.whole import assert_whole

@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from scenes.drawing.hands.rounded_boxes import STEPS, rounded_box
+from scenes.drawing.hands import STEPS, rounded_box
 
 WHOLE = np.ones((2, 3), dtype=bool)
 HALF = np.array([0.03, 0.02, 0.01])

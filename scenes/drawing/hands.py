@@ -1,19 +1,31 @@
-"""Places a hand in the pose in which it stands in a grasp, and makes the shapes that show it.
+"""Shows a hand in the pose in which it stands in a grasp: its shapes, and the view to see it from.
 
 Every part is a convex solid, so that pictures draw it as its outline and the sides that face the
 viewer. Long parts are cut into pieces about as long as they are thick: parts are drawn in the order
 of the depths of their middles, which is the right order for parts of like size.
+
+The sides of a rounded box, all points within a radius of a box, are those of a coarse ball whose
+eight octants are moved apart to the corners of the box. The points of the ball are at equal steps
+of latitude and longitude, and those on the border of two octants occur twice, once for the corner
+on either side: what lies between the two is a side of the box or a part of a round edge. Where the
+box or the radius has no size, sides without area are left out. So the same rule makes boxes,
+capsules and balls.
+
+A hand is several times as large as what it holds, and most views show its back only. So the view
+also may be from below, and the contacts and the object should be seen past palm and fingers.
 """
 
 import importlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, frozen, frozen_indices
+from grasp_core.arrays import Array, Indices, frozen, frozen_indices
 from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE
@@ -21,12 +33,115 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.stance import with_balls
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
-from scenes.drawing.hands.rounded_boxes import rounded_box
 from scenes.drawing.shapes import Role, Shape
+from scenes.drawing.views import (
+    DISTANCE,
+    SAME_MERIT,
+    Alone,
+    View,
+    edge_on,
+    least_gaps,
+    views_at,
+)
 
 if TYPE_CHECKING:
     from grasp_core.hands.reach import HandReach
+
+STEPS = 3
+"""Number of sides along a quarter of a circle."""
+FEWEST_CORNERS = 3
+SAME = 1e-9
+"""Distance below which corners of a box of size 1 are one: far above rounding."""
+Truths: TypeAlias = NDArray[np.bool_]
+"""Array of truths, of any shape."""
+Ends: TypeAlias = tuple[bool, bool, bool]
+"""A truth about each axis of a box."""
+
+
+def rounded_box(low: Array, high: Array, radius: float, outer: Truths) -> tuple[Array, ...]:
+    """Make the sides of a rounded box, or of a piece of one that is cut across its axes.
+
+    Takes `low`, `high` (3,) [m]; `radius` [m]; `outer` (2, 3). Gives flat sides in the axes of the
+    box, (k, 3) each [m], corners counter-clockwise as seen from outside.
+    """
+    first, last = _ends(outer[0]), _ends(outer[1])
+    sides = _sides(_ends(high > low), radius > 0.0, first, last)
+    corners = _corners(low, high, radius, first, last)
+    return tuple(corners[side] for side in sides)
+
+
+def _ends(row: Truths) -> Ends:
+    x, y, z = row.tolist()
+    return x, y, z
+
+
+def _corners(low: Array, high: Array, radius: float, first: Ends, last: Ends) -> Array:
+    """Place every point of the ball, (rows * columns, 3) [m]."""
+    ways, upper = _grid()
+    reach = radius * np.where(upper, last, first)
+    return (np.where(upper, high, low) + reach * ways).reshape(-1, 3)
+
+
+@cache
+def _sides(long: Ends, rounded: bool, first: Ends, last: Ends) -> tuple[Indices, ...]:
+    """Return the corners of each side that has an area and is not a cut."""
+    # which corners coincide does not depend on sizes, so that a box of size 1 tells
+    high = np.array(long, dtype=float)
+    corners = _corners(-high, high, float(rounded), first, last)
+    cut = np.zeros(len(corners), dtype=np.int64)  # one bit for each cut that a corner lies in
+    for bit, (end, sign) in enumerate([(first, -1.0), (last, 1.0)]):
+        for axis in range(3):
+            if not end[axis]:
+                on = np.abs(corners[:, axis] - sign * high[axis]) < SAME
+                cut |= on.astype(np.int64) << (3 * bit + axis)
+    kept = (_without_repeats(side, corners) for side in _around())
+    return tuple(
+        side for side in kept
+        if len(side) >= FEWEST_CORNERS and not np.bitwise_and.reduce(cut[side])
+    )  # fmt: skip
+
+
+def _around() -> Iterator[Indices]:
+    """Yield the corners of the sides around the poles, and of those between them."""
+    rows, columns = _grid()[0].shape[:2]
+    places: Indices = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
+    yield places[0]
+    yield places[-1, ::-1]
+    for i, j in product(range(rows - 1), range(columns)):
+        k = (j + 1) % columns
+        yield places[[i, i + 1, i + 1, i], [j, j, k, k]]
+
+
+def _without_repeats(side: Indices, corners: Array) -> Indices:
+    """Leave out corners that are where the next one is."""
+    here = corners[side]
+    return side[np.abs(np.roll(here, -1, axis=0) - here).max(axis=1) > SAME]
+
+
+@cache
+def _grid() -> tuple[Array, Truths]:
+    """Return the points of a ball, from its upper pole to its lower one, and their octants.
+
+    Gives unit vectors, (rows, columns, 3), and whether each belongs to the upper half along each
+    axis, of the same shape.
+    """
+    quarter = np.linspace(0.0, 0.5 * np.pi, STEPS + 1)
+    heights = np.concatenate([quarter[::-1], -quarter])
+    above = np.repeat([1.0, -1.0], STEPS + 1)
+    turns = (0.5 * np.pi * np.arange(4)[:, None] + quarter).ravel()
+    middles = np.repeat(0.5 * np.pi * np.arange(4) + 0.25 * np.pi, STEPS + 1)
+    flat, up = np.cos(heights)[:, None], np.sin(heights)[:, None]
+    ones = np.ones((len(heights), len(turns)))
+    ways = np.stack([flat * np.cos(turns), flat * np.sin(turns), up * ones], axis=-1)
+    signs = np.stack(
+        [np.sign(np.cos(middles)) * ones, np.sign(np.sin(middles)) * ones, above[:, None] * ones],
+        axis=-1,
+    )
+    return ways, signs > 0.0
+
 
 LONG, LEAST = 1.2, 2.5
 """Length of a piece of a part in thicknesses of the part, but at least so many radii of the hand's
@@ -204,3 +319,69 @@ def numbers_behind(held: PosedHand) -> Array:
     places = held.positions
     ways = (held.tips - places) / held.tip_radii[:, None]
     return places + NUMBER_BEYOND * held.tip_radii[:, None] * ways
+
+
+ELEVATIONS = (18, 28, 40, 0, -18, -28, -40)
+"""Elevations of the views to choose from [deg]; of equally good ones the first is taken."""
+HIDDEN = 4.0
+"""Fault of a view in which the hand hides all contacts."""
+BEHIND = 1.0
+"""Fault of a view in which the hand hides all of the object's faces that it could show."""
+ALONG = 0.8
+"""Fault of a view along the way from the middle of the hand to the object: fingers look short."""
+EDGE_ON = 0.5
+"""Fault of a view in which all of the object's faces are seen nearly as lines."""
+TINY = 1e-12
+"""Least length of a ray along an axis, so that it may be divided by [m]."""
+INSIDE = 0.9
+"""Share of a part's size within which it hides what is behind it: a fingertip's rim hides no
+contact."""
+
+
+def extent_with(body: Polyhedron, parts: HandParts) -> Alone:
+    """Measure a ball around an object and a hand."""
+    reaches = np.linalg.norm(parts.half_sizes, axis=1) + parts.radii
+    middles = np.vstack([parts.middles, body.vertices])
+    sizes = np.concatenate([reaches, np.zeros(len(body.vertices))])
+    low, high = (middles.T - sizes).min(axis=1), (middles.T + sizes).max(axis=1)
+    center = 0.5 * (low + high)
+    return Alone(center, float((np.linalg.norm(middles - center, axis=1) + sizes).max()))
+
+
+def view_of_hand(body: Polyhedron, held: PosedHand) -> View:
+    """Choose a view in which contacts, object and hand are seen."""
+    parts = parts_of(held)
+    extent = extent_with(body, parts)
+    angles, axes = views_at(ELEVATIONS)
+    cameras = extent.center_of_mass + DISTANCE * extent.radius * axes[:, 2]
+    centroids = np.array([face.centroid for face in body.faces])
+    arms = cameras[:, None] - centroids
+    facing = np.einsum("vfi,fi->vf", arms, body.normals) < 0.0  # normals point into the object
+    behind = _hidden(centroids, cameras, parts) & facing
+    covered = behind.sum(axis=1) / np.maximum(facing.sum(axis=1), 1)
+    hidden = _hidden(held.positions, cameras, parts).mean(axis=1)
+    apart = least_gaps(axes, np.vstack([held.positions, numbers_behind(held)]), extent)
+    merits = apart / body.radius - HIDDEN * hidden - BEHIND * covered
+    way = body.center_of_mass - parts.middles.mean(axis=0)
+    along = np.abs(axes[:, 2] @ way) / max(float(np.linalg.norm(way)), TINY)
+    merits -= EDGE_ON * edge_on(body, axes) + ALONG * along
+    return View.of_angles(*angles[first_best(merits, SAME_MERIT)], extent)
+
+
+def _hidden(points: Array, cameras: Array, parts: HandParts) -> Array:
+    """Tell which points (p, 3) the parts of a hand hide from cameras (v, 3), (v, p).
+
+    A ray is inside a box where it is between the two planes of each pair: from the last entry to
+    the first exit. For a rounded box the box in it is taken, which a contact on it is outside of.
+    """
+    sizes = INSIDE * (parts.half_sizes + parts.radii[:, None] / np.sqrt(3.0))
+    hides = np.zeros((len(cameras), len(points)), dtype=bool)
+    for middle, turned, half in zip(parts.middles, parts.axes, sizes, strict=True):
+        starts = (points - middle) @ turned
+        ways = (cameras - middle) @ turned
+        ways = ways[:, None] - starts
+        ways = np.where(np.abs(ways) < TINY, TINY, ways)
+        one, two = (-half - starts) / ways, (half - starts) / ways
+        enters, leaves = np.minimum(one, two).max(axis=2), np.maximum(one, two).min(axis=2)
+        hides |= leaves > np.maximum(enters, 0.0)
+    return hides
