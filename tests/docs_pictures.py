@@ -20,7 +20,7 @@ from scenes.drawing.pictures import grasp_figure, grasp_sheet
 from scenes.drawing.sheets import Dots, Sheet, Words, beside, moved, png_of
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.records.executions_json import Executions
+from sim_validate.records.executions import Executions
 from sim_validate.replaying.recorded import Recorded
 from sim_validate.replaying.replay import replayed
 from sim_validate.reports.charts.fidelity_charts import Agreement, fidelity_panels

@@ -27,7 +27,7 @@ from sim_validate.execution.verdict import (
 )
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import remove_executions
-from sim_validate.records.executions_json import (
+from sim_validate.records.executions import (
     EXECUTIONS,
     executions_summary,
     executions_to_json,

@@ -33,8 +33,8 @@ from sim_validate.parallel.compiling import compiled_beside
 
 if TYPE_CHECKING:
     from grasp_core.optimizing.best.result import BestGrasp
-    from sim_validate.commands.best.best_json import Rated
     from sim_validate.parallel.certifying import Found
+    from sim_validate.records.best import Rated
 
 CARRIED = {"payload": "payload kg", "first-slip": "first slip"}
 """Column of what grasps carry, by the rank that orders them."""

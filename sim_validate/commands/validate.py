@@ -17,7 +17,7 @@ from sim_validate.commands.judging.by_protocols import judge_grasps
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import remove_verdicts
 from sim_validate.files.writing import write_arrays
-from sim_validate.records.verdicts_json import summary, trace_arrays, verdicts_to_json
+from sim_validate.records.verdicts import summary, trace_arrays, verdicts_to_json
 from sim_validate.simulation.gate.gate import require_faithful
 from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.other_rules import RULES

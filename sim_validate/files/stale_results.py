@@ -19,8 +19,6 @@ from grasp_core.files.whole_files import UNFINISHED
 REPORT, INDEX, GRASPS = "report", "index.html", "grasps"
 STYLE = "style.css"
 STATIC = (STYLE, "gallery.js", "tables.js", "turntable.js")
-CHARTS_OF_INDEX = ("fidelity.svg", "survival.svg")
-"""Files that reports of earlier versions have; the charts now stand in the pages."""
 OF_GRASPS = ("transfer.json", "grasps.json")
 BEST = ("best.json", "best-proof.npz")
 REACHES = "reaches.json"
@@ -143,7 +141,7 @@ def remove_pages(folder: Path) -> None:
     """Remove the pages of a report, the first page first; its mark stays."""
     _remove(
         chain(
-            (folder / name for name in (INDEX, *CHARTS_OF_INDEX, *STATIC)),
+            (folder / name for name in (INDEX, *STATIC)),
             folder.glob("object-*.js"),
             folder.glob(f"{GRASPS}/*.html"),
             folder.glob(f"{PICTURES}/*.svg"),

@@ -21,7 +21,7 @@ from sim_validate.protocols.judgements_schema import (
     TotalsRecord,
 )
 from sim_validate.protocols.published import PublishedProtocol
-from sim_validate.records.verdicts_json import finite, object_record
+from sim_validate.records.fields import finite, object_record
 
 
 def judgements_to_json(

@@ -1,12 +1,17 @@
-"""Writes and reads certified regions: one proof file per grasp, and one `regions.json`."""
+"""Writes and reads certified regions: one proof file per grasp, and one `regions.json`.
+
+Type checking holds the writer to the fields of `regions.json`, which reports read.
+"""
 
 import hashlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, Any, Literal, NotRequired
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict, Field, with_config
+from typing_extensions import TypedDict
 
 from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
 from grasp_core.checked import path_of
@@ -24,16 +29,66 @@ from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.files.npz import read_arrays
 from sim_validate.files.writing import write_arrays
 from sim_validate.parallel.certifying import Asked, Found
+from sim_validate.records.fields import Finite, ObjectRecord, Positive
 
-if TYPE_CHECKING:  # planning needs no schema
-    from sim_validate.records.regions_schema import (
-        GraspRecord,
-        NamedGrasp,
-        ProofRecord,
-        RegionsFile,
-    )
 
-SCHEMA = 3
+class RegionRecord(TypedDict):
+    """Fields about the region of one finger."""
+
+    kind: NotRequired[str]
+    polygon_m: Annotated[list[tuple[Finite, Finite, Finite]], Field(min_length=FEWEST_CORNERS)]
+    inscribed_radius_m: Finite
+    area_m2: NotRequired[Finite]
+
+
+class ProofRecord(TypedDict):
+    """Fields about the file that proves a grasp's regions."""
+
+    file: Annotated[str, Field(pattern=r"^proofs/[A-Za-z0-9][A-Za-z0-9_-]{0,99}\.npz$")]
+    """Path of the proof, relative to the folder of `regions.json`."""
+    sha256: NotRequired[str]
+
+
+class NamedGrasp(TypedDict):
+    """Fields about the grasp that regions belong to."""
+
+    id: str
+    contacts_sha256: str
+    family: NotRequired[str]
+    planned_radius_m: NotRequired[Finite]
+
+
+class GraspRecord(NamedGrasp):
+    """Fields about the regions of one grasp, or the reason why it has none."""
+
+    disc_radius_m: Finite | None
+    centers_m: NotRequired[list[list[Finite]]]
+    friction: NotRequired[list[Finite]]
+    open_radius_m: NotRequired[Finite | None]
+    open_choice_m: NotRequired[list[list[Finite]] | None]
+    cones: NotRequired[int]
+    proof: NotRequired[ProofRecord | None]
+    regions: Annotated[list[RegionRecord], Field(min_length=FINGERS, max_length=FINGERS)] | None
+    reason: NotRequired[str]
+
+
+@with_config(ConfigDict(strict=True, extra="allow"))
+class RegionsFile(TypedDict):
+    """The content of `regions.json`; type checking holds its writer to it."""
+
+    schema: Literal[1]
+    object: ObjectRecord
+    friction: Positive
+    reserve: NotRequired[Finite]
+    balance: NotRequired[str]
+    recenter: NotRequired[bool]
+    edge_clearance_m: NotRequired[Finite]
+    cones: NotRequired[int]
+    versions: NotRequired[dict[str, str]]
+    grasps: list[GraspRecord]
+
+
+SCHEMA = 1
 REGIONS, PROOFS = "regions.json", "proofs"
 POLYGONS = tuple(f"region{i}_m" for i in range(FINGERS))
 BORDERS = tuple(f"border{i}_m" for i in range(FINGERS))

@@ -9,8 +9,8 @@ from grasp_core.errors import InputError
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.settings import noise_from_table
 from sim_validate.records.grasps import grasp_with_id, some
-from sim_validate.records.saved_verdicts import verdicts_of
 from sim_validate.records.setup_toml import OF_USERS, setup_from_tables
+from sim_validate.records.verdicts import verdicts_of
 from sim_validate.replaying.from_grasps import (
     grasps_behind,
     of_grasp,

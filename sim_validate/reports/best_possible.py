@@ -1,16 +1,9 @@
 """Says how much of the possible each grasp reaches, where a search has bounded what is possible."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import cast
+from collections.abc import Iterable
 
-from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
-from grasp_core.files.strict_json import object_of
-from grasp_core.files.text_files import read_text
 from scenes.drawing.pages import number
-from sim_validate.records.best.best_schema import OTHER, USUAL, BestFile, BestForLoadsFile
+from sim_validate.records.best import Possible
 from sim_validate.reports.agreement import Record
 
 MILLI, PERCENT = 1e3, 100.0
@@ -22,59 +15,6 @@ MEASURES = {
     "task": ("multiple of the task's loads, for normal forces of sum 1 N", ""),
 }
 """What each measure says of a grasp, and its unit."""
-
-
-@dataclass(frozen=True, slots=True)
-class Possible:
-    """The best grasp that a search has found, and the bound that no grasp exceeds."""
-
-    object_sha256: str
-    friction: float
-    measure: str
-    clearance_m: float
-    best: str
-    """Id of the best grasp."""
-    bound: float
-    gap: float
-    proof: str
-    """Name of the file with the proof of the bound; empty if it was not kept."""
-    reached: Mapping[str, float]
-    """Lower ends of the measure of the best grasp and the planned ones, by id."""
-
-    def share(self, grasp: str) -> float | None:
-        """Return how much of the bound a grasp reaches; None if it was not compared."""
-        return self.reached[grasp] / self.bound if grasp in self.reached else None
-
-
-def read_possible(path: Path) -> Possible:
-    """Read `best.json`."""
-    text = read_text(path)
-    schema = object_of(text, path.name).get("schema")
-    if schema == OTHER:
-        loads = record_of(BestForLoadsFile, text, path.name, schema=OTHER)
-        rated = {each["id"]: each["quality"][0] for each in loads["planned"]}
-        return _possible(
-            cast("Record", loads), loads["measure"], loads["quality"][0], loads["bound"], rated
-        )
-    found = record_of(BestFile, text, path.name, schema=USUAL)
-    rated = {each["id"]: each["quality_n"][0] for each in found["planned"]}
-    return _possible(
-        cast("Record", found), "ferrari-canny", found["quality_n"][0], found["bound_n"], rated
-    )
-
-
-def _possible(
-    found: Record, measure: str, quality: float, bound: float, rated: Mapping[str, float]
-) -> Possible:
-    name = found["grasp"]["id"]
-    if quality > bound:
-        raise InputError(
-            f"bound: expected at least the quality {quality:g} of {name}, got {bound:g}"
-        )
-    return Possible(
-        found["object"]["content_sha256"], found["friction"], measure, found["clearance_m"], name,
-        bound, found["gap"], found["proof"] or "", {**rated, name: quality},
-    )  # fmt: skip
 
 
 def described_possible(possible: Possible | None) -> Record | None:

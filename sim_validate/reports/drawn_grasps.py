@@ -25,7 +25,7 @@ from scenes.fingertips import FingerSettings
 from sim_validate.execution.filming import film, worth_seeing
 from sim_validate.execution.jobs import ExecutionJob
 from sim_validate.files.stale_results import CLIPS, PICTURES
-from sim_validate.records.executions_json import EXECUTIONS, Executions
+from sim_validate.records.executions import EXECUTIONS, Executions
 from sim_validate.replaying.from_verdicts import of_verdict
 from sim_validate.replaying.recorded import Wanted
 from sim_validate.replaying.replay import Replayed, replayed

@@ -13,7 +13,7 @@ from scenes.drawing.pages import NOTHING, number
 from sim_validate.execution.jobs import ExecutedGrasp, best_executed
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import Execution, ExecutionTrial, ended
-from sim_validate.records.executions_json import Executions, executions_summary
+from sim_validate.records.executions import Executions, executions_summary
 from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record, said_of
 
 MILLI = 1e3

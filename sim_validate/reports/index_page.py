@@ -8,7 +8,7 @@ from grasp_core.objects.symmetries import Copies, copies_of
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from scenes.drawing.sheets import svg_of
-from sim_validate.records.executions_json import Executions
+from sim_validate.records.executions import Executions
 from sim_validate.reports.agreement import (
     Agreement,
     Record,

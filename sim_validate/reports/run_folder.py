@@ -13,15 +13,13 @@ from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.files.stale_results import BEST, JUDGEMENTS, REACHES
 from sim_validate.protocols.judgements_schema import JudgementsFile
-from sim_validate.records.executions_json import EXECUTIONS, Executions, load_executions
+from sim_validate.records.best import Possible, read_possible
+from sim_validate.records.executions import EXECUTIONS, Executions, load_executions
 from sim_validate.records.grasps import read_grasps
-from sim_validate.records.regions import REGIONS
+from sim_validate.records.regions import REGIONS, RegionsFile
 from sim_validate.records.regions import SCHEMA as REGIONS_SCHEMA
-from sim_validate.records.regions_schema import RegionsFile
-from sim_validate.records.saved_verdicts import verdicts_of
-from sim_validate.records.verdicts_schema import VerdictsFile
+from sim_validate.records.verdicts import VerdictsFile, verdicts_of
 from sim_validate.reports.agreement import BAD, Record, said_of
-from sim_validate.reports.best_possible import Possible, read_possible
 
 if TYPE_CHECKING:
     from sim_validate.records.saved_reaches import SavedReaches

@@ -22,7 +22,7 @@ from scenes.drawing.sheets import Area, Line, Mark, Sheet, Words
 from sim_validate.execution.enough import accelerations_g
 from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.execution.verdict import ExecutionTrial
-from sim_validate.records.executions_json import Executions
+from sim_validate.records.executions import Executions
 
 WIDTH = 400.0
 """Width of the chart [pixels]; its height depends on its key."""

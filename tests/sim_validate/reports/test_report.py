@@ -17,7 +17,7 @@ from scenes.drawing.views import DISTANCE
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.records import saved_verdicts
+from sim_validate.records import verdicts
 from sim_validate.records.grasps import read_grasps
 from sim_validate.reports.agreement import said_of
 from sim_validate.reports.pages import asset
@@ -178,7 +178,7 @@ def changed(path, change):
 
 def counted(document, _=None):
     """Make the summary that of the verdicts."""
-    document["summary"].update(saved_verdicts._counts(document["verdicts"]))
+    document["summary"].update(verdicts._counts(document["verdicts"]))
 
 
 def without_proofs(document):

@@ -8,7 +8,7 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.records.executions_json import executions_from_json, executions_to_json
+from sim_validate.records.executions import executions_from_json, executions_to_json
 from tests.sim_validate.records.executed import BODY, GRASPS, SETTINGS, executions_text
 
 

@@ -1,13 +1,17 @@
 """Writes and reads `executions.json`: each executed grasp, with all settings that were used.
 
-Numbers that JSON lacks are null: a first slip that never comes is infinite.
+Type checking holds the writer to the fields. Numbers that JSON lacks are null: a first slip that
+never comes is infinite.
 """
 
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Annotated, Any, Literal, NotRequired, TypeVar, cast
+
+from pydantic import ConfigDict, Field, with_config
+from typing_extensions import TypedDict
 
 from grasp_core.arrays import frozen
 from grasp_core.by_value import ByValue
@@ -23,18 +27,103 @@ from grasp_core.provenance import versions
 from scenes.physics import PhysicsSettings
 from sim_validate.execution.enough import Enough
 from sim_validate.execution.jobs import ExecutedGrasp
-from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.execution.settings import ExecutionSettings, TrialKind
 from sim_validate.execution.trials import Skipped
-from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
-from sim_validate.records.executions_schema import (
-    SCHEMA,
-    EnoughRecord,
-    ExecutionRecord,
-    ExecutionsFile,
-    ExecutionsSummary,
-    ExecutionTrialRecord,
-)
-from sim_validate.records.verdicts_json import finite, object_record
+from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial, Fate
+from sim_validate.records.fields import Count, Finite, ObjectRecord, Positive, finite, object_record
+
+SCHEMA = 1
+FEWEST_CONTACTS = 2
+Force = tuple[Finite, Finite, Finite]
+
+
+class ExecutionTrialRecord(TypedDict):
+    """Fields about one trial; slips and losses are multiples of its load, null where none comes.
+
+    Motions are null where the simulator diverged.
+    """
+
+    kind: TrialKind
+    name: str
+    survived: bool
+    fate: Fate
+    slip_m: Finite | None
+    displacement_m: Finite | None
+    turn_rad: Finite | None
+    predicted_first_slip: Finite | None
+    predicted_loss: Finite | None
+    simulated_first_slip: Finite | None
+    step_s: Positive
+
+
+class ExecutionControlRecord(TypedDict):
+    """Fields about one negative control, which must slip."""
+
+    name: str
+    let_go: bool
+    first_slip: Finite | None
+
+
+class SkippedRecord(TypedDict):
+    """Fields about a trial that the grasp cannot go through."""
+
+    kind: TrialKind
+    reason: str
+
+
+class EnoughRecord(TypedDict):
+    """Fields about the push that would be enough for the trials; null where none was found."""
+
+    load_multiple: Finite
+    push_n: Positive | None
+    stiffness_n_per_m: Positive | None
+    predicted_loss: Finite | None
+    reason: str | None
+
+
+class ExecutionRecord(TypedDict):
+    """Fields about the execution of one grasp, or the reason why no squeeze holds the object."""
+
+    id: str
+    family: str
+    contacts_sha256: str
+    survived: bool
+    reason: str | None
+    load_multiple: Finite | None
+    squeeze_n: Annotated[list[Force], Field(min_length=FEWEST_CONTACTS)] | None
+    tip_radius_m: Annotated[list[Positive], Field(min_length=FEWEST_CONTACTS)] | None
+    enough: EnoughRecord | None
+    trials: list[ExecutionTrialRecord]
+    controls: list[ExecutionControlRecord]
+    skipped: list[SkippedRecord]
+    physics: dict[str, Any] | None
+
+
+class ExecutionsSummary(TypedDict):
+    """Numbers of grasps, trials and negative controls, and how they ended."""
+
+    grasps: Count
+    grasps_survived: Count
+    grasps_without_squeeze: Count
+    trials: Count
+    trials_survived: Count
+    controls: Count
+    controls_let_go: Count
+
+
+@with_config(ConfigDict(strict=True, extra="allow"))
+class ExecutionsFile(TypedDict):
+    """The content of `executions.json`; type checking holds its writer to it."""
+
+    schema: Literal[1]
+    object: ObjectRecord
+    friction: Positive
+    complete: bool
+    settings: dict[str, Any]
+    summary: NotRequired[ExecutionsSummary]
+    executions: list[ExecutionRecord]
+    versions: dict[str, str | None]
+
 
 EXECUTIONS = "executions.json"
 """Name of the file in a folder of results."""
