@@ -49,6 +49,22 @@ ROD_LENGTH = 0.5
 SPACING = 2.5
 """Distance between neighbouring grasps of a grid, in object radii and rod lengths: two of each keep
 them apart, and the rest is for the fingertips."""
+Message = dict[str, Any]
+JOINTS = tuple(f"finger{finger}_{axis}" for finger in range(FINGERS) for axis in "xyz")
+MOTIONS = ("pre_grasp_approach", "post_grasp_retreat", "post_place_retreat")
+HEAD = """\
+# Grasps by four spherical fingertips: metres, newtons, vectors in the frame of the object.
+# graspable_object: a grasping_msgs/GraspableObject for a hand with joints fingerI_x, _y and _z.
+# fingertips: what such messages have no fields for.
+"""
+WIDTH = 120
+"""Number of columns after which lists are broken."""
+SECTIONS = 24
+"""Number of corners of the circles that replace round tips and rods."""
+ROUGHNESS = 0.6
+GraspFormat: TypeAlias = Literal["moveit", "gltf"]
+ENDINGS: Mapping[GraspFormat, tuple[str, ...]] = {"moveit": (".yaml", ".yml"), "gltf": (".glb",)}
+"""Endings of the files that each format is written to."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,11 +133,6 @@ def _figures(plan: Plan, grasp: Grasp) -> Mapping[str, str | float]:
     return {"id": grasp.id, "family": grasp.family, **finite}
 
 
-Message = dict[str, Any]
-JOINTS = tuple(f"finger{finger}_{axis}" for finger in range(FINGERS) for axis in "xyz")
-MOTIONS = ("pre_grasp_approach", "post_grasp_retreat", "post_place_retreat")
-
-
 def graspable_object(body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> Message:
     """Return a grasping_msgs/GraspableObject: an object with a moveit_msgs/Grasp for each grasp."""
     return {"object": _object(body), "grasps": [_grasp(body.name, placed) for placed in grasps]}
@@ -179,15 +190,6 @@ def _xyz(vector: Array) -> Message:
     return {"x": x, "y": y, "z": z}
 
 
-HEAD = """\
-# Grasps by four spherical fingertips: metres, newtons, vectors in the frame of the object.
-# graspable_object: a grasping_msgs/GraspableObject for a hand with joints fingerI_x, _y and _z.
-# fingertips: what such messages have no fields for.
-"""
-WIDTH = 120
-"""Number of columns after which lists are broken."""
-
-
 def yaml_text(body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> str:
     """Return the text of a YAML file; equal grasps give equal text."""
     try:
@@ -223,11 +225,6 @@ def _fingertips(placed: PlacedGrasp) -> Mapping[str, object]:
             for contact, way in zip(placed.grasp.contacts, ways, strict=True)
         ],
     }
-
-
-SECTIONS = 24
-"""Number of corners of the circles that replace round tips and rods."""
-ROUGHNESS = 0.6
 
 
 def glb(body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> bytes:
@@ -277,11 +274,6 @@ def _painted(trimesh: Any, mesh: Any, colour: str) -> Any:
     )
     mesh.visual = trimesh.visual.TextureVisuals(material=material)
     return mesh
-
-
-GraspFormat: TypeAlias = Literal["moveit", "gltf"]
-ENDINGS: Mapping[GraspFormat, tuple[str, ...]] = {"moveit": (".yaml", ".yml"), "gltf": (".glb",)}
-"""Endings of the files that each format is written to."""
 
 
 def export_grasps(

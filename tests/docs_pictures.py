@@ -23,10 +23,9 @@ from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.records.executions import Executions
 from sim_validate.replaying.recorded import Recorded
 from sim_validate.replaying.replay import replayed
-from sim_validate.reports.charts.fidelity_charts import Agreement, fidelity_panels
 from sim_validate.reports.charts.margin_charts import margin_figure
 from sim_validate.reports.charts.motion_charts import motion_panels
-from sim_validate.reports.charts.survival_charts import survival_sheet
+from sim_validate.reports.charts.run_charts import Agreement, fidelity_panels, survival_sheet
 from sim_validate.reports.charts.wrench_charts import wrench_figure
 from sim_validate.reports.drawn_grasps import certified
 from sim_validate.simulation.setup import Agenda, Setup

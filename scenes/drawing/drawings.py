@@ -34,6 +34,27 @@ RULINGS = 40
 PARALLEL = 1e-9
 """Least length of the cross product that gives the direction of a transversal, relative to the
 squared reach."""
+BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
+"""Length and radius of a finger's bar, in finger sizes."""
+CONE_LENGTH = 0.42
+"""Length of a cone's sides, in finger sizes."""
+STOUT = 1.3
+"""Finger size over the radius of a ball of the object's volume: compact objects have fingers in
+proportion to their radius, and long or thin ones fingers in proportion to how thick they are."""
+BEYOND = 0.2
+"""Length by which a line is drawn past the points it connects, in object radii."""
+REACH = 0.95
+"""Radius around the object's centre within which the ruled surface of a regulus is drawn, in object
+radii."""
+FARTHEST = 4.0
+"""Greatest length of a line of force, and greatest distance from the centre at which a focus still
+has its plane drawn, in object radii; the foci of built-in objects are within three."""
+SLACK_RAD = 1e-6
+"""Angle by which rounding may make a force cone exceed its friction cone [rad]."""
+POLYGON = 3
+"""Least number of corners of a region that can be filled with colour."""
+MOST_TRIANGLES = 2500
+"""Largest number of triangles drawn for the object; finer surfaces are simplified first."""
 
 
 def rulings(points: Array, directions: Array, center: Array, reach: float) -> tuple[Array, ...]:
@@ -70,29 +91,6 @@ def between(segments: Sequence[Array]) -> tuple[Array, ...]:
         turned = two if (one[1] - one[0]) @ (two[1] - two[0]) > 0.0 else two[::-1]
         quads.append(np.array([one[0], one[1], turned[1], turned[0]]))
     return tuple(quads)
-
-
-BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
-"""Length and radius of a finger's bar, in finger sizes."""
-CONE_LENGTH = 0.42
-"""Length of a cone's sides, in finger sizes."""
-STOUT = 1.3
-"""Finger size over the radius of a ball of the object's volume: compact objects have fingers in
-proportion to their radius, and long or thin ones fingers in proportion to how thick they are."""
-BEYOND = 0.2
-"""Length by which a line is drawn past the points it connects, in object radii."""
-REACH = 0.95
-"""Radius around the object's centre within which the ruled surface of a regulus is drawn, in object
-radii."""
-FARTHEST = 4.0
-"""Greatest length of a line of force, and greatest distance from the centre at which a focus still
-has its plane drawn, in object radii; the foci of built-in objects are within three."""
-SLACK_RAD = 1e-6
-"""Angle by which rounding may make a force cone exceed its friction cone [rad]."""
-POLYGON = 3
-"""Least number of corners of a region that can be filled with colour."""
-MOST_TRIANGLES = 2500
-"""Largest number of triangles drawn for the object; finer surfaces are simplified first."""
 
 
 def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, ...]:

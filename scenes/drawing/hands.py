@@ -59,6 +59,31 @@ Truths: TypeAlias = NDArray[np.bool_]
 """Array of truths, of any shape."""
 Ends: TypeAlias = tuple[bool, bool, bool]
 """A truth about each axis of a box."""
+LONG, LEAST = 1.2, 2.5
+"""Length of a piece of a part in thicknesses of the part, but at least so many radii of the hand's
+largest fingertip."""
+MOST_PIECES = 6
+"""Largest number of pieces along one axis of a part."""
+OVERLAP = 0.02
+"""How far a piece reaches into the next one, as a share of its length, so that no gap is seen."""
+NUMBER_BEYOND = 2.9
+"""Distance of a finger's number from its contact, through the middle of the fingertip, in the
+fingertip's radii."""
+ELEVATIONS = (18, 28, 40, 0, -18, -28, -40)
+"""Elevations of the views to choose from [deg]; of equally good ones the first is taken."""
+HIDDEN = 4.0
+"""Fault of a view in which the hand hides all contacts."""
+BEHIND = 1.0
+"""Fault of a view in which the hand hides all of the object's faces that it could show."""
+ALONG = 0.8
+"""Fault of a view along the way from the middle of the hand to the object: fingers look short."""
+EDGE_ON = 0.5
+"""Fault of a view in which all of the object's faces are seen nearly as lines."""
+TINY = 1e-12
+"""Least length of a ray along an axis, so that it may be divided by [m]."""
+INSIDE = 0.9
+"""Share of a part's size within which it hides what is behind it: a fingertip's rim hides no
+contact."""
 
 
 def rounded_box(low: Array, high: Array, radius: float, outer: Truths) -> tuple[Array, ...]:
@@ -141,18 +166,6 @@ def _grid() -> tuple[Array, Truths]:
         axis=-1,
     )
     return ways, signs > 0.0
-
-
-LONG, LEAST = 1.2, 2.5
-"""Length of a piece of a part in thicknesses of the part, but at least so many radii of the hand's
-largest fingertip."""
-MOST_PIECES = 6
-"""Largest number of pieces along one axis of a part."""
-OVERLAP = 0.02
-"""How far a piece reaches into the next one, as a share of its length, so that no gap is seen."""
-NUMBER_BEYOND = 2.9
-"""Distance of a finger's number from its contact, through the middle of the fingertip, in the
-fingertip's radii."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -319,23 +332,6 @@ def numbers_behind(held: PosedHand) -> Array:
     places = held.positions
     ways = (held.tips - places) / held.tip_radii[:, None]
     return places + NUMBER_BEYOND * held.tip_radii[:, None] * ways
-
-
-ELEVATIONS = (18, 28, 40, 0, -18, -28, -40)
-"""Elevations of the views to choose from [deg]; of equally good ones the first is taken."""
-HIDDEN = 4.0
-"""Fault of a view in which the hand hides all contacts."""
-BEHIND = 1.0
-"""Fault of a view in which the hand hides all of the object's faces that it could show."""
-ALONG = 0.8
-"""Fault of a view along the way from the middle of the hand to the object: fingers look short."""
-EDGE_ON = 0.5
-"""Fault of a view in which all of the object's faces are seen nearly as lines."""
-TINY = 1e-12
-"""Least length of a ray along an axis, so that it may be divided by [m]."""
-INSIDE = 0.9
-"""Share of a part's size within which it hides what is behind it: a fingertip's rim hides no
-contact."""
 
 
 def extent_with(body: Polyhedron, parts: HandParts) -> Alone:

@@ -28,6 +28,25 @@ MOST_EDGES = 1500
 """Largest number of edges drawn; of more, as scans have them, only the sharpest are drawn."""
 SAME_POINT = 1e-6
 """Distance up to which two corners count as one, relative to the size of the surface."""
+LIGHT = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
+"""Direction towards the light, as (right, up, towards the viewer): from the left, above and in
+front."""
+DARKEST = 0.55
+"""Brightness of a side that faces away from the light, as a share of its colour."""
+DASHES = 24
+"""Number of parts, every other one drawn, in a dashed line as long as the picture is wide."""
+PIECES = 8
+"""Number of parts in a solid line as long as the picture is wide; each part has its own depth."""
+FEW = 100
+"""Number of polygons of a surface up to which each has its own depth; of more, those that are
+equally bright and on the same side are joined."""
+SHADES = 7
+"""Number of shades of joined surfaces and of round bars: hardly fewer than eight bits tell apart in
+clear glass."""
+WHOLE: tuple[Role, ...] = ("friction cone",)
+"""Roles whose lines are short, so that each is drawn whole."""
+SOLIDS: tuple[Role, ...] = ("finger", "hand", "fingertip")
+"""Roles whose shapes are convex bodies that nothing shines through."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,25 +170,6 @@ def _loops(ways: dict[int, list[tuple[int, int]]]) -> list[list[int]]:
     return loops
 
 
-LIGHT = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
-"""Direction towards the light, as (right, up, towards the viewer): from the left, above and in
-front."""
-DARKEST = 0.55
-"""Brightness of a side that faces away from the light, as a share of its colour."""
-DASHES = 24
-"""Number of parts, every other one drawn, in a dashed line as long as the picture is wide."""
-PIECES = 8
-"""Number of parts in a solid line as long as the picture is wide; each part has its own depth."""
-FEW = 100
-"""Number of polygons of a surface up to which each has its own depth; of more, those that are
-equally bright and on the same side are joined."""
-SHADES = 7
-"""Number of shades of joined surfaces and of round bars: hardly fewer than eight bits tell apart in
-clear glass."""
-WHOLE: tuple[Role, ...] = ("friction cone",)
-"""Roles whose lines are short, so that each is drawn whole."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Patch:
     """One flat part of a picture, with its depth and colour: an area, a line or a dot."""
@@ -276,8 +276,6 @@ def _cone(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
         yield Patch((part,), float(near.mean()), colour_of(shape), look.fill)
 
 
-SOLIDS: tuple[Role, ...] = ("finger", "hand", "fingertip")
-"""Roles whose shapes are convex bodies that nothing shines through."""
 FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Patch]]] = {
     "object": _glass,
     "force cone": _cone,

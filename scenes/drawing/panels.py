@@ -14,6 +14,33 @@ from scenes.drawing.sheets import LETTER, Area, Dots, Line, Mark, Words, ink_lin
 NARROW, WIDE = set("ijl.,:;|'!fItr()[] -"), set("mwMW@%+=<>≤")
 NARROW_WIDTH, USUAL_WIDTH, WIDE_WIDTH = 0.42, 0.66, 1.0
 """Widths of letters in DejaVu Sans, the widest of common fonts, in letter sizes."""
+LONG_RANGE = 300.0
+"""Ratio of an axis's ends above which the axis shows only powers of ten."""
+NICE = (1.0, 2.0, 5.0, 10.0)
+"""Steps between ticks, times powers of ten."""
+EDGE = 8.0
+"""Place of a title, from the left edge of the sheet [pixels]."""
+TICK = 4.0
+"""Length of a tick [pixels]."""
+SMALL = 11.0
+"""Size of the letters of ticks and keys [pixels]."""
+ROW, SAMPLE = 16.0, 18.0
+"""Height of a row of a key, and length of the sample before its text [pixels]."""
+EVEN = 0.2
+"""Distance by which a drawn curve may miss its points [pixels]."""
+Shape: TypeAlias = Literal["disc", "square", "diamond", "up", "down", "cross", "plus"]
+CORNERS: dict[Shape, tuple[tuple[float, float], ...]] = {
+    "square": ((-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)),
+    "diamond": ((0.0, -1.2), (1.0, 0.0), (0.0, 1.2), (-1.0, 0.0)),
+    "up": ((0.0, -1.1), (1.1, 0.9), (-1.1, 0.9)),
+    "down": ((0.0, 1.1), (-1.1, -0.9), (1.1, -0.9)),
+    "cross": ((-0.5, 0.0), (-1.0, -0.5), (-0.5, -1.0), (0.0, -0.5), (0.5, -1.0), (1.0, -0.5),
+              (0.5, 0.0), (1.0, 0.5), (0.5, 1.0), (0.0, 0.5), (-0.5, 1.0), (-1.0, 0.5)),
+    "plus": ((-0.35, -0.35), (-0.35, -1.1), (0.35, -1.1), (0.35, -0.35), (1.1, -0.35), (1.1, 0.35),
+             (0.35, 0.35), (0.35, 1.1), (-0.35, 1.1), (-0.35, 0.35), (-1.1, 0.35), (-1.1, -0.35)),
+    "disc": tuple((float(np.cos(a)), float(np.sin(a))) for a in np.arange(0.0, 6.28, 0.5236)),
+}  # fmt: skip
+"""Corners of markers of size 1, (x, y) with y downwards."""
 
 
 def width_of(text: str, size: float) -> float:
@@ -22,12 +49,6 @@ def width_of(text: str, size: float) -> float:
         NARROW_WIDTH if letter in NARROW else WIDE_WIDTH if letter in WIDE else USUAL_WIDTH
         for letter in text
     )
-
-
-LONG_RANGE = 300.0
-"""Ratio of an axis's ends above which the axis shows only powers of ten."""
-NICE = (1.0, 2.0, 5.0, 10.0)
-"""Steps between ticks, times powers of ten."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,31 +83,6 @@ def ticks_between(low: float, high: float) -> list[float]:
     steps = (1.0, 2.0, 5.0) if high < LONG_RANGE * low else (1.0,)
     found = [step * 10.0**power for power in powers for step in steps]
     return [value for value in found if low <= value <= high]
-
-
-EDGE = 8.0
-"""Place of a title, from the left edge of the sheet [pixels]."""
-TICK = 4.0
-"""Length of a tick [pixels]."""
-SMALL = 11.0
-"""Size of the letters of ticks and keys [pixels]."""
-ROW, SAMPLE = 16.0, 18.0
-"""Height of a row of a key, and length of the sample before its text [pixels]."""
-EVEN = 0.2
-"""Distance by which a drawn curve may miss its points [pixels]."""
-Shape: TypeAlias = Literal["disc", "square", "diamond", "up", "down", "cross", "plus"]
-CORNERS: dict[Shape, tuple[tuple[float, float], ...]] = {
-    "square": ((-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)),
-    "diamond": ((0.0, -1.2), (1.0, 0.0), (0.0, 1.2), (-1.0, 0.0)),
-    "up": ((0.0, -1.1), (1.1, 0.9), (-1.1, 0.9)),
-    "down": ((0.0, 1.1), (-1.1, -0.9), (1.1, -0.9)),
-    "cross": ((-0.5, 0.0), (-1.0, -0.5), (-0.5, -1.0), (0.0, -0.5), (0.5, -1.0), (1.0, -0.5),
-              (0.5, 0.0), (1.0, 0.5), (0.5, 1.0), (0.0, 0.5), (-0.5, 1.0), (-1.0, 0.5)),
-    "plus": ((-0.35, -0.35), (-0.35, -1.1), (0.35, -1.1), (0.35, -0.35), (1.1, -0.35), (1.1, 0.35),
-             (0.35, 0.35), (0.35, 1.1), (-0.35, 1.1), (-0.35, 0.35), (-1.1, 0.35), (-1.1, -0.35)),
-    "disc": tuple((float(np.cos(a)), float(np.sin(a))) for a in np.arange(0.0, 6.28, 0.5236)),
-}  # fmt: skip
-"""Corners of markers of size 1, (x, y) with y downwards."""
 
 
 @dataclass(frozen=True, slots=True)

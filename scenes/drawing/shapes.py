@@ -17,6 +17,10 @@ Role: TypeAlias = Literal[
 ]  # fmt: skip
 SIDES = 20
 """Number of corners of the polygons that replace circles."""
+OF_ROLES: dict[Role, str] = {
+    "object": GLASS, "edge": INK, "focus": FOCUS, "plane": SURFACE, "ruled surface": SURFACE,
+    "contact": INK, "hand": HAND, "fingertip": HAND,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,10 +117,6 @@ LOOKS: dict[Role, Look] = {
     "hand": Look(fill=1.0, shaded=True),
     "fingertip": Look(fill=1.0, shaded=True),
 }
-OF_ROLES: dict[Role, str] = {
-    "object": GLASS, "edge": INK, "focus": FOCUS, "plane": SURFACE, "ruled surface": SURFACE,
-    "contact": INK, "hand": HAND, "fingertip": HAND,
-}  # fmt: skip
 
 
 def colour_of(shape: Shape) -> str:

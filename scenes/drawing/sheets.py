@@ -39,6 +39,20 @@ LETTER = 12.0
 ROUND = 48
 """Number of corners of a polygon that replaces a circle."""
 Anchor: TypeAlias = Literal["start", "middle", "end"]
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
+PALETTE, BITS = 3, 8
+"""PNG's number for pixels that name a colour of a palette, and the bits of such a name."""
+HARDEST = 9
+"""Level of compression; higher ones do not exist."""
+PARTS = 4
+"""Number of parts of a pixel in which places are written."""
+BASELINE = 0.35
+"""Distance of the baseline of letters below their middle, in letter sizes."""
+FONT = "system-ui,sans-serif"
+DASHES = "20 16"
+"""Lengths of dashes and of the gaps between them [parts of pixels]."""
+Look: TypeAlias = tuple[tuple[str, str], ...]
+"""Names and values of presentation attributes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -212,13 +226,6 @@ def ink_line(points: Sequence[tuple[float, float]], width: float = 1.0) -> Line:
     return Line((np.array(points),), INK, width)
 
 
-SIGNATURE = b"\x89PNG\r\n\x1a\n"
-PALETTE, BITS = 3, 8
-"""PNG's number for pixels that name a colour of a palette, and the bits of such a name."""
-HARDEST = 9
-"""Level of compression; higher ones do not exist."""
-
-
 def _image_png(levels: Indices) -> bytes:
     """Write an image (rows, columns) with the colours of the ramp as PNG bytes (ISO/IEC 15948)."""
     rows, columns = levels.shape
@@ -236,17 +243,6 @@ def _image_png(levels: Indices) -> bytes:
 
 def _chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-
-PARTS = 4
-"""Number of parts of a pixel in which places are written."""
-BASELINE = 0.35
-"""Distance of the baseline of letters below their middle, in letter sizes."""
-FONT = "system-ui,sans-serif"
-DASHES = "20 16"
-"""Lengths of dashes and of the gaps between them [parts of pixels]."""
-Look: TypeAlias = tuple[tuple[str, str], ...]
-"""Names and values of presentation attributes."""
 
 
 def svg_of(sheet: Sheet, *, alone: bool = False, paper: bool = False) -> str:

@@ -1,4 +1,4 @@
-"""Runs the command `view`, which shows one grasp in MuJoCo's viewer or writes it to files."""
+"""Runs the commands that show results: one grasp (`view`), or a run as pages (`report`)."""
 
 import subprocess
 import sys
@@ -23,9 +23,11 @@ from scenes.mjcf import Scene, build_scene
 from sim_validate.cli import showing_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.files.result_folders import alone_in
 from sim_validate.records.grasps import grasp_with_id, read_grasps
 from sim_validate.reports.reached_grasps import held_in, why_not_held
-from sim_validate.reports.run_folder import GRASPS, reaches_beside
+from sim_validate.reports.report import Report, write_report
+from sim_validate.reports.run_folder import GRASPS, folder_of, reaches_beside
 from sim_validate.simulation.setup import with_planned_radius
 
 COMING, RESTING = 60, 20
@@ -131,3 +133,38 @@ def closing(scene: Scene) -> Array:
     slides = np.vstack([left[:, None] * away, np.zeros((RESTING, len(away)))])
     home = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     return np.column_stack([np.tile(home, (len(slides), 1)), slides])
+
+
+def report_folder(command: showing_flags.Report, reporter: Reporter) -> int:
+    """Write the results of a run as pages, and print where they are."""
+    at = command.out or folder_of(command.folder)
+    with alone_in(at if command.out or at.is_dir() else None):
+        report = shown_report(command, reporter)
+    reporter.document({"report": str(report.index), "grasps": report.grasps})
+    return Exit.GOOD
+
+
+def shown_report(asked: showing_flags.Report, reporter: Reporter) -> Report:
+    """Write the pages of a run, and say where they are."""
+
+    def say_ready(index: Path, drawn: int, total: int) -> None:
+        reporter.say(
+            f"report: {index} can be opened now; {drawn} of {total} cards are drawn, "
+            "the others follow"
+        )
+
+    with reporter.progress("drawing") as steps:
+        report = write_report(
+            asked.folder,
+            asked.out,
+            jobs=asked.jobs,
+            limit=asked.limit,
+            clips=asked.clips,
+            every_copy=asked.every_copy,
+            progress=steps.update,
+            ready=say_ready,
+        )
+    if report.no_clip:
+        reporter.warn(f"no clips: {report.no_clip}")
+    reporter.say(f"report: open {report.index} in a browser")
+    return report

@@ -35,6 +35,11 @@ from sim_validate.records.fields import Count, Finite, ObjectRecord, Positive, f
 SCHEMA = 1
 FEWEST_CONTACTS = 2
 Force = tuple[Finite, Finite, Finite]
+EXECUTIONS = "executions.json"
+"""Name of the file in a folder of results."""
+Where = tuple[str | int, ...]
+"""Keys that lead to a record in its file."""
+Settings = TypeVar("Settings", ExecutionSettings, PhysicsSettings)
 
 
 class ExecutionTrialRecord(TypedDict):
@@ -123,13 +128,6 @@ class ExecutionsFile(TypedDict):
     summary: NotRequired[ExecutionsSummary]
     executions: list[ExecutionRecord]
     versions: dict[str, str | None]
-
-
-EXECUTIONS = "executions.json"
-"""Name of the file in a folder of results."""
-Where = tuple[str | int, ...]
-"""Keys that lead to a record in its file."""
-Settings = TypeVar("Settings", ExecutionSettings, PhysicsSettings)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

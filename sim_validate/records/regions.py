@@ -31,6 +31,23 @@ from sim_validate.files.writing import write_arrays
 from sim_validate.parallel.certifying import Asked, Found
 from sim_validate.records.fields import Finite, ObjectRecord, Positive
 
+SCHEMA = 1
+REGIONS, PROOFS = "regions.json", "proofs"
+POLYGONS = tuple(f"region{i}_m" for i in range(FINGERS))
+BORDERS = tuple(f"border{i}_m" for i in range(FINGERS))
+SHAPES: Mapping[str, tuple[int | None, ...]] = {
+    "axes": (6, 6), "codes": (None,), "forces": (None, FINGERS, 3), "normals": (FINGERS, 3),
+    "friction": (FINGERS,), "origin_m": (3,), "depths_m": (FINGERS,), "centers_m": (FINGERS, 3),
+    "open_choice_m": (None, 3), "open_wrench": (None,), "scale_m": (), "disc_radius_m": (),
+    "open_radius_m": (),
+    **dict.fromkeys((*POLYGONS, *BORDERS), (None, 3)),
+}  # fmt: skip
+"""Shape of each array in a proof file; None stands for any length."""
+MOST_CORNERS = 1000
+"""Largest number of corners of a region's polygon in a file."""
+SMALLEST_SCALE, LARGEST = 1e-6, 1e6
+"""Smallest and largest unit of length of a proof, and largest coordinate in it [m]."""
+
 
 class RegionRecord(TypedDict):
     """Fields about the region of one finger."""
@@ -86,24 +103,6 @@ class RegionsFile(TypedDict):
     cones: NotRequired[int]
     versions: NotRequired[dict[str, str]]
     grasps: list[GraspRecord]
-
-
-SCHEMA = 1
-REGIONS, PROOFS = "regions.json", "proofs"
-POLYGONS = tuple(f"region{i}_m" for i in range(FINGERS))
-BORDERS = tuple(f"border{i}_m" for i in range(FINGERS))
-SHAPES: Mapping[str, tuple[int | None, ...]] = {
-    "axes": (6, 6), "codes": (None,), "forces": (None, FINGERS, 3), "normals": (FINGERS, 3),
-    "friction": (FINGERS,), "origin_m": (3,), "depths_m": (FINGERS,), "centers_m": (FINGERS, 3),
-    "open_choice_m": (None, 3), "open_wrench": (None,), "scale_m": (), "disc_radius_m": (),
-    "open_radius_m": (),
-    **dict.fromkeys((*POLYGONS, *BORDERS), (None, 3)),
-}  # fmt: skip
-"""Shape of each array in a proof file; None stands for any length."""
-MOST_CORNERS = 1000
-"""Largest number of corners of a region's polygon in a file."""
-SMALLEST_SCALE, LARGEST = 1e-6, 1e6
-"""Smallest and largest unit of length of a proof, and largest coordinate in it [m]."""
 
 
 def write_regions(

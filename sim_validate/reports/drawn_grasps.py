@@ -24,7 +24,7 @@ from scenes.drawing.views import best_view
 from scenes.fingertips import FingerSettings
 from sim_validate.execution.filming import film, worth_seeing
 from sim_validate.execution.jobs import ExecutionJob
-from sim_validate.files.stale_results import CLIPS, PICTURES
+from sim_validate.files.result_folders import CLIPS, PICTURES
 from sim_validate.records.executions import EXECUTIONS, Executions
 from sim_validate.replaying.from_verdicts import of_verdict
 from sim_validate.replaying.recorded import Wanted

@@ -7,7 +7,9 @@ from typing import Any, cast
 from grasp_core.objects.symmetries import Copies, copies_of
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
+from scenes.drawing.pages import number
 from scenes.drawing.sheets import svg_of
+from sim_validate.records.best import Possible
 from sim_validate.records.executions import Executions
 from sim_validate.reports.agreement import (
     Agreement,
@@ -18,16 +20,18 @@ from sim_validate.reports.agreement import (
     quadrants_in,
     wrench_size,
 )
-from sim_validate.reports.best_possible import described_possible
-from sim_validate.reports.charts.fidelity_charts import fidelity_panels
-from sim_validate.reports.charts.survival_charts import survival_sentence, survival_sheet
+from sim_validate.reports.charts.run_charts import (
+    fidelity_panels,
+    survival_sentence,
+    survival_sheet,
+)
 from sim_validate.reports.executed_grasps import (
     described_executions,
     execution_row,
     execution_settings,
     said_of_both,
 )
-from sim_validate.reports.grasp_page import MILLI, MIRRORED, Copy
+from sim_validate.reports.grasp_page import MEASURES, MILLI, MIRRORED, PERCENT, Copy
 from sim_validate.reports.pages import page
 from sim_validate.reports.reached_grasps import (
     described_reaches,
@@ -36,6 +40,9 @@ from sim_validate.reports.reached_grasps import (
     said_of_reach,
 )
 from sim_validate.reports.run_folder import RunFolder
+
+ROWS = 20
+"""Largest number of grasps in the table of the possible."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,9 +113,32 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         possible=[
             {"object": run.saved.body.name, **found}
             for run in runs
-            if (found := described_possible(run.possible)) is not None
+            if (found := _described_possible(run.possible)) is not None
         ],
     )
+
+
+def _described_possible(possible: Possible | None) -> Record | None:
+    """Build the section about the best grasp and the bound; None where nothing was bounded."""
+    if possible is None:
+        return None
+    what, unit = MEASURES[possible.measure]
+    proved = f"by the proof in {possible.proof}" if possible.proof else "whose proof was not kept"
+    ranked = sorted(possible.reached.items(), key=lambda each: (-each[1], each[0]))
+    return {
+        "said": (
+            f"Best is {possible.best}: {number(possible.reached[possible.best])}{unit} of "
+            f"{what}. No four contacts at least {number(MILLI * possible.clearance_m)} mm from "
+            f"edges exceed {number(possible.bound)}{unit} at friction {number(possible.friction)}, "
+            f"{proved}; {PERCENT * possible.gap:.1f} % are between the two."
+        ),
+        "what": f"{what}{f' [{unit.strip()}]' if unit else ''}",
+        "rows": [
+            (name, number(value), f"{PERCENT * value / possible.bound:.1f}")
+            for name, value in ranked[:ROWS]
+        ],
+        "more": max(0, len(ranked) - ROWS),
+    }
 
 
 def _judged(run: RunFolder) -> Iterable[Record]:

@@ -9,7 +9,7 @@ from typing import TypeAlias
 from grasp_core.checked import function, path_of, switch, whole
 from grasp_core.files.text_files import write_text
 from scenes.drawing.turntable import as_text, object_data
-from sim_validate.files.stale_results import (
+from sim_validate.files.result_folders import (
     GRASPS,
     INDEX,
     REPORT,

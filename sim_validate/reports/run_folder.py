@@ -11,7 +11,7 @@ from grasp_core.files.complaints import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.execution.jobs import ExecutedGrasp
-from sim_validate.files.stale_results import BEST, JUDGEMENTS, REACHES
+from sim_validate.files.result_folders import BEST, JUDGEMENTS, REACHES
 from sim_validate.protocols.judgements_schema import JudgementsFile
 from sim_validate.records.best import Possible, read_possible
 from sim_validate.records.executions import EXECUTIONS, Executions, load_executions

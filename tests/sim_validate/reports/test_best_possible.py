@@ -8,7 +8,7 @@ import pytest
 
 from sim_validate.main import main
 from sim_validate.records.best import read_possible
-from sim_validate.reports.best_possible import possible_facts
+from sim_validate.reports.grasp_page import possible_facts
 from sim_validate.reports.report import write_report
 
 

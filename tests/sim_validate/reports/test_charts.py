@@ -20,7 +20,6 @@ from sim_validate.reports.agreement import (
     limits_in,
     quadrants_in,
 )
-from sim_validate.reports.charts.fidelity_charts import fidelity_panels
 from sim_validate.reports.charts.margin_charts import (
     directions_of_map,
     margin_figure,
@@ -30,6 +29,7 @@ from sim_validate.reports.charts.margin_charts import (
     pixels,
 )
 from sim_validate.reports.charts.motion_charts import friction_used, motion_panels
+from sim_validate.reports.charts.run_charts import fidelity_panels
 from sim_validate.reports.charts.wrench_charts import shadow_of, wrench_figure, wrench_panels
 from sim_validate.simulation.setup import Agenda, Setup
 from tests.scenes.drawing.whole import assert_whole

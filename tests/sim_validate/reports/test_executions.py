@@ -20,13 +20,13 @@ from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import Skipped
 from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
-from sim_validate.files.stale_results import remove_executions
+from sim_validate.files.result_folders import remove_executions
 from sim_validate.main import main
 from sim_validate.records.executions import Executions, executions_to_json, load_executions
 from sim_validate.records.grasps import read_grasps
 from sim_validate.reports import drawn_grasps
 from sim_validate.reports import report as reports
-from sim_validate.reports.charts.survival_charts import (
+from sim_validate.reports.charts.run_charts import (
     accelerations_g,
     certified_multiples,
     certified_steps,

@@ -1,11 +1,14 @@
-"""Draws which share of executed grasps survives, by the acceleration of the palm.
+"""Draws what a whole run shows: simulated over predicted values, and survival by acceleration.
+
+Points of simulated over predicted values should lie on the line of equal values.
 
 A squeeze that is certified for s times the weight in any direction carries the weight while the
-palm accelerates by up to (s - 1) g in any direction, as |g + a| <= g + |a|. The curve is the share
-of grasps so certified. Marks are the shares that survived the trials of one kind in simulation, at
-the largest acceleration of these trials; hollow marks are the shares in which no slip is predicted.
-The certificate is for forces through the centre of mass that come slowly. Springs that overshoot,
-and the torques of knocks and of shakes about an axis, can put marks below the curve.
+palm accelerates by up to (s - 1) g in any direction, as |g + a| <= g + |a|. The curve of survival
+is the share of grasps so certified. Marks are the shares that survived the trials of one kind in
+simulation, at the largest acceleration of these trials; hollow marks are the shares in which no
+slip is predicted. The certificate is for forces through the centre of mass that come slowly.
+Springs that overshoot, and the torques of knocks and of shakes about an axis, can put marks below
+the curve.
 """
 
 import math
@@ -17,16 +20,34 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from scenes.drawing.colours import BAD, FINGERS, GOOD, INK, NEUTRAL
-from scenes.drawing.panels import ROW, SMALL, Entry, Panel, Scale, Shape, keyed, marker
-from scenes.drawing.sheets import Area, Line, Mark, Sheet, Words
+from scenes.drawing.panels import (
+    ROW,
+    SMALL,
+    Entry,
+    Panel,
+    Scale,
+    Shape,
+    keyed,
+    marker,
+    ticks_between,
+)
+from scenes.drawing.sheets import Area, Dots, Line, Mark, Sheet, Words
 from sim_validate.execution.enough import accelerations_g
 from sim_validate.execution.jobs import ExecutedGrasp
 from sim_validate.execution.verdict import ExecutionTrial
 from sim_validate.records.executions import Executions
+from sim_validate.reports.agreement import Agreement
+from sim_validate.validation.wrench_verdict import AGREEMENT
 
-WIDTH = 400.0
+FIDELITY_WIDTH, FIDELITY_HEIGHT = 360.0, 388.0
+"""Size of a panel [pixels]."""
+FIDELITY_PLACE = (70.0, 28.0, 280.0, 280.0)
+"""Left and upper border of what a panel draws in, its width and its height [pixels]."""
+LEAST_SHOWN = 0.5
+"""Place of zero on a logarithmic axis, relative to the least value above zero."""
+SURVIVAL_WIDTH = 400.0
 """Width of the chart [pixels]; its height depends on its key."""
-PLACE = (70.0, 28.0, 306.0, 230.0)
+SURVIVAL_PLACE = (70.0, 28.0, 306.0, 230.0)
 """Left and upper border of what the chart draws in, its width and its height [pixels]."""
 BELOW = 44.0
 """Height of the numbers and the name below the axis [pixels]."""
@@ -52,6 +73,49 @@ APART = 0.08
 """Least distance between ticks, relative to the length of the axis."""
 SAME = 9
 """Number of decimals to which two accelerations must agree to count as equal [g]."""
+
+
+def fidelity_panels(agreements: Sequence[Agreement]) -> tuple[Sheet, ...]:
+    """Draw simulated over predicted values on logarithmic axes, a panel for each quantity."""
+    return tuple(_fidelity_panel(agreement) for agreement in agreements)
+
+
+def _fidelity_panel(agreement: Agreement) -> Sheet:
+    name = f"{agreement.quantity}: simulated over predicted"
+    pairs = np.array(agreement.pairs).reshape(-1, 2)
+    if not (pairs > 0.0).any():
+        panel = Panel(*FIDELITY_PLACE, Scale(0.0, 1.0), Scale(0.0, 1.0))
+        left, top, wide, high = FIDELITY_PLACE
+        nothing = Words(left + 0.5 * wide, top + 0.5 * high, "none measured", "middle")
+        labels = panel.named(agreement.quantity, "predicted", "simulated")
+        return Sheet(
+            FIDELITY_WIDTH, FIDELITY_HEIGHT, name, (*panel.frame([], []), *labels, nothing)
+        )
+    pairs = np.maximum(pairs, LEAST_SHOWN * pairs[pairs > 0.0].min())
+    ends = np.array([0.7 * pairs.min(), 1.4 * pairs.max()])
+    scale = Scale(float(ends[0]), float(ends[1]), log=True)
+    panel = Panel(*FIDELITY_PLACE, scale, scale)
+    labels = [(tick, f"{tick:g}") for tick in ticks_between(scale.low, scale.high)]
+    low, high = (1.0 - AGREEMENT) * ends, (1.0 + AGREEMENT) * ends
+    band = np.vstack([panel.at(ends, low), panel.at(ends, high)[::-1]])
+    marks: list[Mark] = [*panel.frame(labels, labels), Area((band,), NEUTRAL, 0.3)]
+    marks.append(Line((panel.at(ends, ends),), NEUTRAL, 1.0))
+    key = [Entry("identity", NEUTRAL), Entry(f"within {AGREEMENT:.0%}", NEUTRAL, "area")]
+    off = np.array(agreement.differ())
+    if (~off).any():
+        marks.append(Dots(_pairs_on_sheet(panel, pairs[~off]), GOOD, 3.0))
+        key.append(Entry(f"{int((~off).sum())} agree", GOOD, "disc"))
+    if off.any():
+        marks += [marker("cross", place, 5.0, BAD) for place in _pairs_on_sheet(panel, pairs[off])]
+        key.append(Entry(f"{int(off.sum())} differ", BAD, "cross"))
+    below, _ = keyed(key, 8.0, FIDELITY_HEIGHT - 2.0 * ROW, FIDELITY_WIDTH - 8.0)
+    names = panel.named(agreement.quantity, "predicted", "simulated")
+    return Sheet(FIDELITY_WIDTH, FIDELITY_HEIGHT, name, (*marks, *names, *below))
+
+
+def _pairs_on_sheet(panel: Panel, pairs: Array) -> Array:
+    """Find where pairs are on the sheet, those within half a pixel of one another once, (k, 2)."""
+    return np.unique(np.rint(2.0 * panel.at(*pairs.T)), axis=0) / 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +149,7 @@ def survivals(executed: Iterable[Executions]) -> list[Survival]:
     for one in executed:
         accelerations = accelerations_g(one.settings)
         lost = sum(each.execution is None for each in one.grasps)
-        for kind, ends in _ends(one.grasps).items():
+        for kind, ends in _ends_by_kind(one.grasps).items():
             found[kind, round(accelerations[kind], SAME)] += ends + [(False, False)] * lost
     order = list(LOOKS)
     return [
@@ -99,7 +163,7 @@ def survivals(executed: Iterable[Executions]) -> list[Survival]:
     ]  # fmt: skip
 
 
-def _ends(grasps: Iterable[ExecutedGrasp]) -> dict[str, list[tuple[bool, bool]]]:
+def _ends_by_kind(grasps: Iterable[ExecutedGrasp]) -> dict[str, list[tuple[bool, bool]]]:
     """List, for each kind of trial, whether grasps survived it and were predicted not to slip."""
     ends = defaultdict[str, list[tuple[bool, bool]]](list)
     for each in grasps:
@@ -145,12 +209,12 @@ def survival_sheet(executed: Sequence[Executions]) -> Sheet:
     multiples, found = certified_multiples(executed), survivals(executed)
     ends = [NARROWEST, *multiples, *(1.0 + mark.acceleration_g for mark in found)]
     end = min(BEYOND * max(ends), WIDEST)
-    panel = Panel(*PLACE, Scale(1.0, end, log=True), Scale(0.0, 1.03))
+    panel = Panel(*SURVIVAL_PLACE, Scale(1.0, end, log=True), Scale(0.0, 1.03))
     marks = [
         *panel.frame([(1.0 + tick, f"{tick:g}") for tick in ticks_up_to(end)],
                      [(share, f"{share:.0%}") for share in SHARES]),
-        *_curve(panel, multiples, end),
-        *(mark for each in found for mark in _marked(panel, each)),
+        *_certified_curve(panel, multiples, end),
+        *(mark for each in found for mark in _survival_marks(panel, each)),
         *panel.named("survival", "acceleration beside the weight [g]",
                      "share of grasps that survives"),
     ]  # fmt: skip
@@ -159,15 +223,15 @@ def survival_sheet(executed: Sequence[Executions]) -> Sheet:
               LOOKS[each.kind][1], LOOKS[each.kind][0])
         for each in found
     ]  # fmt: skip
-    top = PLACE[1] + PLACE[3] + BELOW
+    top = SURVIVAL_PLACE[1] + SURVIVAL_PLACE[3] + BELOW
     marks += [Words(8.0, top + (place + 0.5) * ROW, line, size=SMALL)
               for place, line in enumerate(FILLED)]  # fmt: skip
-    below, rows = keyed(key, 8.0, top + (len(FILLED) + 0.3) * ROW, WIDTH - 8.0)
+    below, rows = keyed(key, 8.0, top + (len(FILLED) + 0.3) * ROW, SURVIVAL_WIDTH - 8.0)
     height = top + (len(FILLED) + rows + 0.5) * ROW
-    return Sheet(WIDTH, height, "Share of grasps that survives", (*marks, *below))
+    return Sheet(SURVIVAL_WIDTH, height, "Share of grasps that survives", (*marks, *below))
 
 
-def _curve(panel: Panel, multiples: Array, end: float) -> Iterator[Mark]:
+def _certified_curve(panel: Panel, multiples: Array, end: float) -> Iterator[Mark]:
     """Draw the share of grasps that are certified for each multiple of the weight."""
     steps, shares = certified_steps(multiples, end)
     x = np.append(np.repeat(steps, 2)[1:], end)
@@ -185,7 +249,7 @@ def certified_steps(multiples: Array, end: float) -> tuple[Array, Array]:
     return steps, shares
 
 
-def _marked(panel: Panel, mark: Survival) -> Iterator[Mark]:
+def _survival_marks(panel: Panel, mark: Survival) -> Iterator[Mark]:
     """Draw the marks of a kind of trial: hollow as predicted, filled as simulated."""
     shape, colour = LOOKS[mark.kind]
     shares = np.array([mark.predicted, mark.survived]) / mark.grasps
