@@ -103,18 +103,14 @@ def placed_grasps(plan: Plan, fingertip_radius_m: float | None) -> tuple[PlacedG
             offset=step * np.array([place % columns, place // columns, 0.0]),
             contacts=grasp.contact_frames(),
             tip_radius=(tip := radius or fitting_radius(plan.body, grasp.positions, grasp.normals)),
-            rods=_rods(grasp, tip),
+            rods=poses_along(
+                grasp.positions - tip * grasp.normals,
+                grasp.normals if grasp.approach_directions is None else grasp.approach_directions,
+            ),
             rod_length=length,
             figures=_figures(plan, grasp),
         )
         for place, grasp in enumerate(plan.grasps)
-    )
-
-
-def _rods(grasp: Grasp, radius: float) -> Array:
-    ways = grasp.approach_directions
-    return poses_along(
-        grasp.positions - radius * grasp.normals, grasp.normals if ways is None else ways
     )
 
 
@@ -164,7 +160,14 @@ def _grasp(frame: str, placed: PlacedGrasp) -> Message:
         "grasp_posture": _posture(touching, efforts),
         "grasp_pose": {"header": {"frame_id": frame}, "pose": _pose(hand)},
         "grasp_quality": grasp.ferrari_canny[0],
-        **{name: _no_motion(frame) for name in MOTIONS},
+        **{
+            name: {
+                "direction": {"header": {"frame_id": frame}, "vector": _xyz(np.zeros(3))},
+                "desired_distance": 0.0,
+                "min_distance": 0.0,
+            }
+            for name in MOTIONS
+        },
     }
 
 
@@ -172,12 +175,6 @@ def _posture(centers: Array, more: Message) -> Message:
     """Return a trajectory_msgs/JointTrajectory of one point, for centres of fingertips (4, 3)."""
     point = {"positions": centers.ravel().tolist(), **more}
     return {"joint_names": list(JOINTS), "points": [point]}
-
-
-def _no_motion(frame: str) -> Message:
-    """Return a moveit_msgs/GripperTranslation of length zero."""
-    still = {"header": {"frame_id": frame}, "vector": _xyz(np.zeros(3))}
-    return {"direction": still, "desired_distance": 0.0, "min_distance": 0.0}
 
 
 def _pose(place: Array) -> Message:
@@ -277,11 +274,7 @@ def _painted(trimesh: Any, mesh: Any, colour: str) -> Any:
 
 
 def export_grasps(
-    plan: Plan,
-    path: str | Path,
-    to: GraspFormat,
-    *,
-    fingertip_radius_m: float | None = None,
+    plan: Plan, path: str | Path, to: GraspFormat, *, fingertip_radius_m: float | None = None
 ) -> Path:
     """Write the grasps of a plan for another program, as one file; equal plans give equal bytes.
 

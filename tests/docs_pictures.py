@@ -29,7 +29,7 @@ from sim_validate.reports.charts.run_charts import Agreement, fidelity_panels, s
 from sim_validate.reports.charts.wrench_charts import wrench_figure
 from sim_validate.reports.drawn_grasps import certified
 from sim_validate.simulation.setup import Agenda, Setup
-from tests.scenes.drawing.hands.standing import standing
+from tests.scenes.drawing.standing import standing
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
 BENCHMARKS = FOLDER.parent / "benchmarks.md"

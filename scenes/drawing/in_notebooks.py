@@ -13,13 +13,7 @@ from grasp_core.arrays import Array
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
-from scenes.drawing.drawings import (
-    bar,
-    coarse,
-    drawing_alone,
-    drawing_of,
-    glass,
-)
+from scenes.drawing.drawings import bar, coarse, drawing_alone, drawing_of, glass
 from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG, number_places, sheet_of
 from scenes.drawing.shapes import Shape
 from scenes.drawing.sheets import svg_of

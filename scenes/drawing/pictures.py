@@ -16,13 +16,7 @@ from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from scenes.drawing.colours import FINGERS, NEUTRAL
-from scenes.drawing.drawings import (
-    BAR_LENGTH,
-    drawing_of,
-    drawing_with_hand,
-    finger_size,
-    glass,
-)
+from scenes.drawing.drawings import BAR_LENGTH, drawing_of, drawing_with_hand, finger_size, glass
 from scenes.drawing.hands import PosedHand, numbers_behind, posed_hand, view_of_hand
 from scenes.drawing.painting import Patch, painted
 from scenes.drawing.panels import ROW, Entry, keyed, thinned

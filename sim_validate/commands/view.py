@@ -3,8 +3,6 @@
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +13,6 @@ from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, has_display, write_clip
-from scenes.drawing.hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
 from scenes.drawing.turntable import turntable_page
 from scenes.fingertips import FingerSettings
@@ -57,8 +54,19 @@ def view_grasp(command: showing_flags.View, reporter: Reporter) -> int:
     held = held_in(reaches, grasp)
     if reaches is not None and held is None:
         reporter.warn(f"the hand is not shown: {why_not_held(reaches, grasp)}")
-    shown = _Shown(saved, grasp, friction, held)
-    files = [str(path) for path in _written(command, shown, reporter)]
+    files = list[str]()
+
+    def keep(path: Path) -> None:
+        reporter.say(f"wrote {path}")
+        files.append(str(path))
+
+    if command.picture is not None:
+        sheet = grasp_sheet(saved.body, grasp, friction, legend=True, held=held)
+        keep(sheet.write(command.picture))
+    if command.page is not None:
+        keep(write_text(command.page, turntable_page(saved.body, grasp, friction, held)))
+    if command.clip is not None:
+        keep(write_closing_clip(_scene(saved, grasp, friction), grasp, command.clip))
     reporter.document({"id": grasp.id, "files": files})
     return Exit.GOOD
 
@@ -87,34 +95,6 @@ def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
             f"MuJoCo's viewer failed with exit code {ended}; show the grasp with --picture, "
             "--page or --clip"
         )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Shown:
-    """What is written to files."""
-
-    saved: SavedGrasps
-    grasp: Grasp
-    friction: float
-    held: PosedHand | None
-    """The hand in the grasp, for pictures and pages."""
-
-
-def _written(
-    command: showing_flags.View, shown: _Shown, reporter: Reporter
-) -> Iterator[Path]:  # fmt: skip
-    saved, grasp, friction = shown.saved, shown.grasp, shown.friction
-    body = saved.body
-    if command.picture is not None:
-        sheet = grasp_sheet(body, grasp, friction, legend=True, held=shown.held)
-        yield sheet.write(command.picture)
-        reporter.say(f"wrote {command.picture}")
-    if command.page is not None:
-        yield write_text(command.page, turntable_page(body, grasp, friction, shown.held))
-        reporter.say(f"wrote {command.page}")
-    if command.clip is not None:
-        yield write_closing_clip(_scene(saved, grasp, friction), grasp, command.clip)
-        reporter.say(f"wrote {command.clip}")
 
 
 def write_closing_clip(scene: Scene, grasp: Grasp, path: Path) -> Path:

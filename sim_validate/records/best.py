@@ -1,9 +1,8 @@
 """Writes and reads `best.json`: the best grasp of an object, and the bound on all others."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -11,13 +10,14 @@ from typing_extensions import TypedDict
 
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
-from grasp_core.files.text_files import read_text
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.result import BestGrasp
 from grasp_core.provenance import versions
 from grasp_core.quality.measures import MeasureName
 from grasp_core.values import FINGERS, Grasp
 from sim_validate.records.fields import Count, Finite, ObjectRecord, Positive, Triple
+
+if TYPE_CHECKING:  # reports need no search
+    from grasp_core.optimizing.best.result import BestGrasp
 
 SCHEMA = 1
 Bounds = tuple[Finite, Finite]
@@ -89,7 +89,7 @@ class Rated:
 
 
 def best_to_document(
-    body: Polyhedron, best: BestGrasp, planned: Sequence[Rated], proof: str | None
+    body: Polyhedron, best: "BestGrasp", planned: Sequence[Rated], proof: str | None
 ) -> dict[str, object]:
     """Build the JSON document of a search for the best grasp."""
     grasp, quality, measure = best.grasp, best.quality, best.proof.measure
@@ -131,39 +131,18 @@ def best_to_document(
     }
 
 
-@dataclass(frozen=True, slots=True)
-class Possible:
-    """The best grasp that a search has found, and the bound that no grasp exceeds."""
-
-    object_sha256: str
-    friction: float
-    measure: str
-    clearance_m: float
-    best: str
-    """Id of the best grasp."""
-    bound: float
-    gap: float
-    proof: str
-    """Name of the file with the proof of the bound; empty if it was not kept."""
-    reached: Mapping[str, float]
-    """Lower ends of the measure of the best grasp and the planned ones, by id."""
-
-    def share(self, grasp: str) -> float | None:
-        """Return how much of the bound a grasp reaches; None if it was not compared."""
-        return self.reached[grasp] / self.bound if grasp in self.reached else None
-
-
-def read_possible(path: Path) -> Possible:
-    """Read `best.json`."""
-    found = record_of(BestFile, read_text(path), path.name, schema=SCHEMA)
+def best_of(text: str) -> BestFile:
+    """Read the text of a `best.json`."""
+    found = record_of(BestFile, text, "best.json", schema=SCHEMA)
     name, quality, bound = found["grasp"]["id"], found["quality"][0], found["bound"]
     if quality > bound:
         raise InputError(
             f"bound: expected at least the quality {quality:g} of {name}, got {bound:g}"
         )
-    rated = {each["id"]: each["quality"][0] for each in found["planned"]}
-    return Possible(
-        found["object"]["content_sha256"], found["friction"], found["measure"],
-        found["clearance_m"], name, bound, found["gap"], found["proof"] or "",
-        {**rated, name: quality},
-    )  # fmt: skip
+    return found
+
+
+def shares_of_bound(best: BestFile) -> dict[str, float]:
+    """Return how much of the bound each compared grasp reaches, by id."""
+    shares = {each["id"]: each["quality"][0] / best["bound"] for each in best["planned"]}
+    return {**shares, best["grasp"]["id"]: best["quality"][0] / best["bound"]}

@@ -17,6 +17,7 @@ from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
 from grasp_core.checked import path_of
 from grasp_core.closure.contact_arrays import contacts_sha256
 from grasp_core.errors import InputError, SolverError
+from grasp_core.files.complaints import record_of
 from grasp_core.files.json_text import text_of
 from grasp_core.files.text_files import write_text
 from grasp_core.geometry.flat_polygons import FEWEST_CORNERS
@@ -106,11 +107,8 @@ class RegionsFile(TypedDict):
 
 
 def write_regions(
-    folder: Path | None,
-    body: Polyhedron,
-    asked: Asked,
-    found: Iterable[Found],
-) -> "RegionsFile":
+    folder: Path | None, body: Polyhedron, asked: Asked, found: Iterable[Found]
+) -> RegionsFile:
     """Write each proof when it is ready, then `regions.json`; write nothing if `folder` is None.
 
     Gives the content of regions.json.
@@ -135,7 +133,7 @@ def write_regions(
 
 def _record(
     grasp: Grasp, proved: CertifiedRegions | str, body: Polyhedron, folder: Path | None
-) -> "GraspRecord":
+) -> GraspRecord:
     """Build the record of one grasp, and write its proof or remove an earlier one."""
     named: NamedGrasp = {
         "id": grasp.id,
@@ -207,6 +205,11 @@ def proof_arrays(
     }
 
 
+def regions_file_of(text: str) -> RegionsFile:
+    """Read the text of a `regions.json`."""
+    return record_of(RegionsFile, text, REGIONS, schema=SCHEMA)
+
+
 def load_regions(path: str | Path) -> CertifiedRegions:
     """Read regions and their proof, as `graspproof regions` writes them; nothing is verified yet.
 
@@ -272,12 +275,9 @@ def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRe
         )
     try:
         with np.errstate(invalid="ignore", divide="ignore"):  # edges without length divide by zero
-            return ContactRegion("certified", polygon, _inscribed(polygon, normal, scale))
+            radius = scale * inscribed_disc_radius_of(polygon / scale, normal)
+            return ContactRegion("certified", polygon, radius)
     except SolverError as error:
         raise InputError(
             f"{name}: expected the corners of a convex polygon in order; certify the regions again"
         ) from error
-
-
-def _inscribed(polygon: Array, normal: Array, scale: float) -> float:
-    return scale * inscribed_disc_radius_of(polygon / scale, normal)

@@ -110,7 +110,9 @@ def tasks_of(
             friction=run.friction,
             verdict=run.verdicts.get(grasp.id),
             regions=run.shaded.get(grasp.id),
-            executions=_own(run, grasp),
+            executions=None
+            if run.executions is None or (found := run.executed(grasp.id)) is None
+            else replace(run.executions, grasps=(found,)),
             held=held_in(run.reaches, grasp),
             source=run.verdicts_path,
             folder=folder,
@@ -119,13 +121,6 @@ def tasks_of(
         )
         for grasp in grasps
     ]
-
-
-def _own(run: RunFolder, grasp: Grasp) -> Executions | None:
-    found = run.executed(grasp.id)
-    if run.executions is None or found is None:
-        return None
-    return replace(run.executions, grasps=(found,))
 
 
 def certified(grasp: Grasp, record: Record | None) -> Grasp:
@@ -174,10 +169,7 @@ def _with_motion(task: Task, verdict: Record, drawn: Drawn) -> Drawn:
     size = found.scene.layout.grasp_size_m
     panels = motion_panels(found, recorded.setup.hold.hold_threshold * size)
     drawn = replace(
-        drawn,
-        motion=tuple(map(svg_of, panels)),
-        trial=found.name,
-        outcome=found.hold.outcome.value,
+        drawn, motion=tuple(map(svg_of, panels)), trial=found.name, outcome=found.hold.outcome.value
     )
     return _with_clip(task, found, drawn) if task.clip else drawn
 

@@ -13,21 +13,10 @@ from grasp_core.cones.spanning import angles_between
 from grasp_core.values import Grasp
 from scenes.drawing.pages import NOTHING, number
 from scenes.drawing.turntable import as_text, grasp_data
-from sim_validate.records.best import Possible
-from sim_validate.reports.agreement import (
-    BAD,
-    GOOD,
-    Record,
-    as_predicted,
-    let_go,
-    wrench_size,
-)
+from sim_validate.records.best import BestFile, shares_of_bound
+from sim_validate.reports.agreement import BAD, GOOD, Record, as_predicted, let_go, wrench_size
 from sim_validate.reports.drawn_grasps import Drawn, certified, largest_push
-from sim_validate.reports.executed_grasps import (
-    execute_command,
-    execution_section,
-    said_of_both,
-)
+from sim_validate.reports.executed_grasps import execute_command, execution_section, said_of_both
 from sim_validate.reports.pages import page
 from sim_validate.reports.reached_grasps import held_in, reach_commands, reach_section
 from sim_validate.reports.run_folder import GRASPS, RunFolder
@@ -173,16 +162,16 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[Fac
         yield from _measured(verdict)
 
 
-def possible_facts(possible: Possible | None, grasp: str) -> Iterable[Fact]:
+def possible_facts(best: BestFile | None, grasp: str) -> Iterable[Fact]:
     """Yield the share that a grasp reaches of what a search has bounded."""
-    share = None if possible is None else possible.share(grasp)
-    if possible is None or share is None:
+    share = None if best is None else shares_of_bound(best).get(grasp)
+    if best is None or share is None:
         return
-    what, unit = MEASURES[possible.measure]
+    what, unit = MEASURES[best["measure"]]
     yield (
         "Share of the possible", f"{PERCENT * share:.1f} %",
-        f"{what}, over the bound {number(possible.bound)}{unit} for all contacts "
-        f"at least {number(MILLI * possible.clearance_m)} mm from edges; grasps nearer to edges "
+        f"{what}, over the bound {number(best['bound'])}{unit} for all contacts "
+        f"at least {number(MILLI * best['clearance_m'])} mm from edges; grasps nearer to edges "
         "may exceed it",
     )  # fmt: skip
 

@@ -9,7 +9,7 @@ from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from scenes.drawing.pages import number
 from scenes.drawing.sheets import svg_of
-from sim_validate.records.best import Possible
+from sim_validate.records.best import BestFile, shares_of_bound
 from sim_validate.records.executions import Executions
 from sim_validate.reports.agreement import (
     Agreement,
@@ -118,24 +118,24 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
     )
 
 
-def _described_possible(possible: Possible | None) -> Record | None:
+def _described_possible(best: BestFile | None) -> Record | None:
     """Build the section about the best grasp and the bound; None where nothing was bounded."""
-    if possible is None:
+    if best is None:
         return None
-    what, unit = MEASURES[possible.measure]
-    proved = f"by the proof in {possible.proof}" if possible.proof else "whose proof was not kept"
-    ranked = sorted(possible.reached.items(), key=lambda each: (-each[1], each[0]))
+    (what, unit), bound, name = MEASURES[best["measure"]], best["bound"], best["grasp"]["id"]
+    proved = f"by the proof in {best['proof']}" if best["proof"] else "whose proof was not kept"
+    reached = {each["id"]: each["quality"][0] for each in best["planned"]}
+    ranked = sorted({**reached, name: best["quality"][0]}.items(), key=lambda e: (-e[1], e[0]))
     return {
         "said": (
-            f"Best is {possible.best}: {number(possible.reached[possible.best])}{unit} of "
-            f"{what}. No four contacts at least {number(MILLI * possible.clearance_m)} mm from "
-            f"edges exceed {number(possible.bound)}{unit} at friction {number(possible.friction)}, "
-            f"{proved}; {PERCENT * possible.gap:.1f} % are between the two."
+            f"Best is {name}: {number(best['quality'][0])}{unit} of {what}. No four contacts at "
+            f"least {number(MILLI * best['clearance_m'])} mm from edges exceed "
+            f"{number(bound)}{unit} at friction {number(best['friction'])}, {proved}; "
+            f"{PERCENT * best['gap']:.1f} % are between the two."
         ),
         "what": f"{what}{f' [{unit.strip()}]' if unit else ''}",
         "rows": [
-            (name, number(value), f"{PERCENT * value / possible.bound:.1f}")
-            for name, value in ranked[:ROWS]
+            (each, number(value), f"{PERCENT * value / bound:.1f}") for each, value in ranked[:ROWS]
         ],
         "more": max(0, len(ranked) - ROWS),
     }
@@ -195,7 +195,7 @@ def _card(shown: Shown) -> dict[str, Any]:
         "tone": tone,
         "radius_mm": round(MILLI * grasp.radius, 6),
         "quality": grasp.ferrari_canny[0],
-        "share": None if shown.run.possible is None else shown.run.possible.share(grasp.id),
+        "share": shares_of_bound(shown.run.possible).get(grasp.id) if shown.run.possible else None,
         "critical_friction": grasp.critical_friction,
         "executed": execution_row(executed) if shown.run.executions else None,
         "reached": said_of_reach(shown.run.reaches, grasp) if shown.run.reaches else None,

@@ -20,19 +20,8 @@ from sim_validate.files.result_folders import (
 )  # fmt: skip
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.reports.drawn_grasps import Drawn, Task, draw, tasks_of
-from sim_validate.reports.grasp_page import (
-    MIRRORED,
-    ROTATED,
-    Copy,
-    Kin,
-    Neighbours,
-    grasp_page,
-)
-from sim_validate.reports.index_page import (
-    Shown,
-    cards_of,
-    index_page,
-)
+from sim_validate.reports.grasp_page import MIRRORED, ROTATED, Copy, Kin, Neighbours, grasp_page
+from sim_validate.reports.index_page import Shown, cards_of, index_page
 from sim_validate.reports.pages import asset, style
 from sim_validate.reports.run_folder import RunFolder, folder_of, runs_in
 

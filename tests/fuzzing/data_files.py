@@ -34,7 +34,7 @@ from sim_validate.records.verdicts import verdicts_of
 from sim_validate.records.wrenches import wrenches_from_json
 from sim_validate.simulation.setup import Setup
 from tests.fuzzing.targets import Target
-from tests.scenes.drawing.hands.standing import reaches_text
+from tests.scenes.drawing.standing import reaches_text
 from tests.sim_validate.records.executed import executions_text
 
 STABILITY = Path(__file__).parents[1] / "stability" / "box"
@@ -342,7 +342,7 @@ TARGETS = (
            lambda: [executions_text().encode()], _same_executions, "json"),
     Target("transfer", lambda data: transfer_from_json(text_of(data)), lambda: [_transfer_seed()],
            _same_transfer, "json"),
-    Target("regions", lambda data: record_of(RegionsFile, text_of(data), "regions.json", schema=3),
+    Target("regions", lambda data: record_of(RegionsFile, text_of(data), "regions.json", schema=1),
            lambda: [_json(REGIONS)], _same_record, "json"),
     Target("reaches", lambda data: reaches_from_json(text_of(data)),
            lambda: [reaches_text().encode()],

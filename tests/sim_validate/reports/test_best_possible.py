@@ -7,7 +7,7 @@ import re
 import pytest
 
 from sim_validate.main import main
-from sim_validate.records.best import read_possible
+from sim_validate.records.best import best_of
 from sim_validate.reports.grasp_page import possible_facts
 from sim_validate.reports.report import write_report
 
@@ -50,9 +50,9 @@ def test_without_a_search_pages_say_nothing_of_the_possible(tmp_path):
 def test_other_measures_are_named(tmp_path):
     words = ["plan", "tetrahedron", "--limit", "1", "--best", "--gap", "0.4", "--jobs", "1"]
     assert main([*words, "--measure", "weight", "--out", str(tmp_path), "-q"]) == 0
-    found = read_possible(tmp_path / "best.json")
-    assert found.measure == "weight"
-    ((name, value, meaning),) = possible_facts(found, found.best)
+    found = best_of((tmp_path / "best.json").read_text())
+    assert found["measure"] == "weight"
+    ((name, value, meaning),) = possible_facts(found, found["grasp"]["id"])
     assert name == "Share of the possible"
     assert float(value.split()[0]) >= 60.0
     assert meaning.startswith("weight held in every orientation")

@@ -18,7 +18,7 @@ from tests.browser import (
     opened,
     requests_of,
 )
-from tests.scenes.drawing.hands.standing import GRASP, run_with_hand
+from tests.scenes.drawing.standing import GRASP, run_with_hand
 from tests.sim_validate.reports.test_report import EVIL, changed
 
 pytestmark = [pytest.mark.slow, needs_browser]

@@ -27,7 +27,7 @@ from scenes.drawing.pictures import grasp_sheet, write_picture
 from scenes.drawing.shapes import colour_of
 from scenes.drawing.sheets import Dots, Words
 from tests.grasp_core.hands.gripping import plain_hand
-from tests.scenes.drawing.hands.standing import FRICTION, ROUNDING, held, standing
+from tests.scenes.drawing.standing import FRICTION, ROUNDING, held, standing
 from tests.scenes.drawing.whole import assert_whole
 
 
