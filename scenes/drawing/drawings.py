@@ -138,28 +138,12 @@ def finger_size(body: Extent) -> float:
 
 def glass(body: Polyhedron) -> tuple[Shape, ...]:
     """Return the shapes of the object: its surface, and the edges at which it is bent."""
-    panes = _panes(body)
-    return (
-        Shape("object", polygons=panes),
-        Shape("edge", lines=tuple(feature_edges(_edged(body, panes)))),
-    )
-
-
-def _edged(body: Polyhedron, panes: tuple[Array, ...]) -> Sequence[Array]:
-    """Return the polygons whose edges are the object's; fine surfaces keep their own triangles."""
     if body.patches is None:
-        return panes
-    return tuple(body.vertices[body.triangles])
-
-
-def _panes(body: Polyhedron) -> tuple[Array, ...]:
-    """Return the polygons of the surface, counter-clockwise as seen from outside.
-
-    They are face pieces, or the triangles of a curved surface.
-    """
-    if body.patches is None:
-        return tuple(piece[::-1] for face in body.faces for piece in face.pieces)
-    return tuple(coarse(body.vertices, body.triangles))
+        panes = edged = tuple(piece[::-1] for face in body.faces for piece in face.pieces)
+    else:  # a fine surface keeps the edges of its own triangles
+        panes = tuple(coarse(body.vertices, body.triangles))
+        edged = tuple(body.vertices[body.triangles])
+    return Shape("object", polygons=panes), Shape("edge", lines=tuple(feature_edges(edged)))
 
 
 def coarse(vertices: Array, triangles: Indices) -> Array:

@@ -72,8 +72,10 @@ class Surface:
         names = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
         owners = np.repeat(np.arange(len(polygons)), counts)
         turned = np.cross(corners, corners[_followers(owners, counts)])
-        starts = np.cumsum(counts) - counts
-        return cls(corners, names, owners, _units(np.add.reduceat(turned, starts)))
+        normals = np.add.reduceat(turned, np.cumsum(counts) - counts)
+        lengths = np.linalg.norm(normals, axis=1)
+        normals = normals / np.where(lengths > 0.0, lengths, np.inf)[:, None]
+        return cls(corners, names, owners, normals)
 
     def following(self) -> Indices:
         """Return the place of the next corner of the same polygon for each corner, (n,)."""
@@ -111,11 +113,6 @@ def _followers(owners: Indices, counts: Indices) -> Indices:
     ends = np.cumsum(counts)
     places[ends - 1] = ends - counts
     return places
-
-
-def _units(vectors: Array) -> Array:
-    lengths = np.linalg.norm(vectors, axis=1)
-    return vectors / np.where(lengths > 0.0, lengths, np.inf)[:, None]
 
 
 def _angles(surface: Surface, one: Indices, two: Indices) -> Array:
@@ -196,29 +193,23 @@ def _patches(shape: Shape, view: View, width: float) -> Iterator[Patch]:
     look = LOOKS[shape.role]
     if look.fill and shape.polygons:
         yield from FILLED.get(shape.role, _each)(shape, look, view)
-    lines = [*shape.lines, *_outline(shape, view)] if look.line or shape.role == "object" else []
-    for line in lines if shape.role not in WHOLE else ():
-        drawn = LOOKS["edge"] if shape.role == "object" else look
-        yield from _line(line, drawn, _line_colour(shape), view, width)
-    for line in lines if shape.role in WHOLE else ():
-        flat, near = view.seen(line)
-        yield Patch((flat,), float(near.mean()), colour_of(shape), look.opacity,
-                    width=0.01 * look.line * width)  # fmt: skip
+    if shape.role == "object" and shape.polygons:
+        edge = Shape("edge")
+        for line in (*shape.lines, *outline(Surface.of(shape.polygons), view.camera)):
+            yield from _line(line, LOOKS["edge"], colour_of(edge), view, width)
+    elif shape.role in WHOLE:
+        for line in shape.lines:
+            flat, near = view.seen(line)
+            yield Patch((flat,), float(near.mean()), colour_of(shape), look.opacity,
+                        width=0.01 * look.line * width)  # fmt: skip
+    elif look.line:
+        for line in shape.lines:
+            yield from _line(line, look, colour_of(shape), view, width)
     for point in () if shape.points is None else shape.points:
         place, (near,) = view.seen(point[None])
         # A dot is drawn in front of what it marks.
         yield Patch((place,), float(near) + 0.02 * width, colour_of(shape), look.opacity,
                     radius=0.005 * look.dot * width)  # fmt: skip
-
-
-def _line_colour(shape: Shape) -> str:
-    return colour_of(Shape("edge") if shape.role == "object" else shape)
-
-
-def _outline(shape: Shape, view: View) -> Sequence[Array]:
-    if shape.role != "object" or not shape.polygons:
-        return ()
-    return tuple(outline(Surface.of(shape.polygons), view.camera))
 
 
 def _each(shape: Shape, look: Look, view: View) -> Iterator[Patch]:

@@ -296,17 +296,15 @@ def _names(runs: Iterable[tuple[bool, list[Mark]]]) -> dict[Look, str]:
 
 def _drawn(marks: Iterable[Mark], names: Mapping[Look, str]) -> str:
     """Write areas, lines and dots; neighbours that look alike share a group."""
-    return "".join(
-        _alike(_attributes(look, names), [_path(mark) for mark in alike])
-        for look, alike in groupby(marks, key=_look)
-    )
-
-
-def _alike(attributes: str, paths: list[str]) -> str:
-    if len(paths) == 1:
-        return f'<path{attributes} d="{paths[0]}"/>'
-    inside = "".join(f'<path d="{path}"/>' for path in paths)
-    return f"<g{attributes}>{inside}</g>"
+    groups = list[str]()
+    for look, alike in groupby(marks, key=_look):
+        attributes, paths = _attributes(look, names), [_path(mark) for mark in alike]
+        if len(paths) == 1:
+            groups.append(f'<path{attributes} d="{paths[0]}"/>')
+        else:
+            inside = "".join(f'<path d="{path}"/>' for path in paths)
+            groups.append(f"<g{attributes}>{inside}</g>")
+    return "".join(groups)
 
 
 def _attributes(look: Look, names: Mapping[Look, str]) -> str:

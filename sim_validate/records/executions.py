@@ -5,7 +5,7 @@ never comes is infinite.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NotRequired, TypeVar, cast
@@ -155,21 +155,21 @@ class Executions(ByValue, ById[ExecutedGrasp]):
         Raises:
             InputError: The library pandas is not installed.
         """
-        return frame_of(list(map(_row, self.grasps)), [each.id for each in self.grasps])
-
-
-def _row(grasp: ExecutedGrasp) -> Mapping[str, object]:
-    found = grasp.execution
-    return {
-        "family": grasp.family,
-        "survived": grasp.survived,
-        "controls_let_go": grasp.controls_let_go,
-        "trials": len(grasp.trials),
-        "trials_survived": sum(trial.survived for trial in grasp.trials),
-        "least_predicted_loss": grasp.least_predicted_loss,
-        "load_multiple": math.nan if found is None else found.load_multiple,
-        "payload_kg": math.nan if found is None else found.payload_kg,
-    }
+        rows = [
+            {
+                "family": each.family,
+                "survived": each.survived,
+                "controls_let_go": each.controls_let_go,
+                "trials": len(each.trials),
+                "trials_survived": sum(trial.survived for trial in each.trials),
+                "least_predicted_loss": each.least_predicted_loss,
+                "load_multiple": math.nan if found is None else found.load_multiple,
+                "payload_kg": math.nan if found is None else found.payload_kg,
+            }
+            for each in self.grasps
+            for found in [each.execution]
+        ]
+        return frame_of(rows, [each.id for each in self.grasps])
 
 
 def executions_to_json(

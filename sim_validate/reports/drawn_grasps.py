@@ -140,7 +140,12 @@ def draw(task: Task) -> Drawn:
     view = best_view(body, grasp)
     path = task.folder / PICTURES / f"{task.name}.svg"
     write_text(path, svg_of(grasp_sheet(body, grasp, task.friction, view=view), alone=True))
-    drawn = _with_hand(task, Drawn(f"{PICTURES}/{path.name}"))
+    drawn = Drawn(f"{PICTURES}/{path.name}")
+    if task.held is not None:
+        path = task.folder / PICTURES / f"{task.name}-hand.svg"
+        sheet = grasp_sheet(body, grasp, task.friction, held=task.held)
+        write_text(path, svg_of(sheet, alone=True))
+        drawn = replace(drawn, hand=f"{PICTURES}/{path.name}")
     if force_closure(grasp, friction=task.friction).closed:
         largest = largest_push(task.verdict)
         wrenches = wrench_panels(body, grasp, task.friction, view=view)
@@ -151,16 +156,6 @@ def draw(task: Task) -> Drawn:
     if task.verdict is not None:
         drawn = _with_motion(task, task.verdict, drawn)
     return _with_executed(task, task.executions, drawn) if task.clip and task.executions else drawn
-
-
-def _with_hand(task: Task, drawn: Drawn) -> Drawn:
-    """Draw the hand in the grasp, if there is one."""
-    if task.held is None:
-        return drawn
-    path = task.folder / PICTURES / f"{task.name}-hand.svg"
-    sheet = grasp_sheet(task.saved.body, task.grasp, task.friction, held=task.held)
-    write_text(path, svg_of(sheet, alone=True))
-    return replace(drawn, hand=f"{PICTURES}/{path.name}")
 
 
 def _with_motion(task: Task, verdict: Record, drawn: Drawn) -> Drawn:
