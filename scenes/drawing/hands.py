@@ -114,11 +114,13 @@ def _sides(long: Ends, rounded: bool, first: Ends, last: Ends) -> tuple[Indices,
             if not end[axis]:
                 on = np.abs(corners[:, axis] - sign * high[axis]) < SAME
                 cut |= on.astype(np.int64) << (3 * bit + axis)
-    kept = (_without_repeats(side, corners) for side in _around())
-    return tuple(
-        side for side in kept
-        if len(side) >= FEWEST_CORNERS and not np.bitwise_and.reduce(cut[side])
-    )  # fmt: skip
+    sides = list[Indices]()
+    for side in _around():
+        here = corners[side]
+        side = side[np.abs(np.roll(here, -1, axis=0) - here).max(axis=1) > SAME]  # each corner once
+        if len(side) >= FEWEST_CORNERS and not np.bitwise_and.reduce(cut[side]):
+            sides.append(side)
+    return tuple(sides)
 
 
 def _around() -> Iterator[Indices]:
@@ -130,12 +132,6 @@ def _around() -> Iterator[Indices]:
     for i, j in product(range(rows - 1), range(columns)):
         k = (j + 1) % columns
         yield places[[i, i + 1, i + 1, i], [j, j, k, k]]
-
-
-def _without_repeats(side: Indices, corners: Array) -> Indices:
-    """Leave out corners that are where the next one is."""
-    here = corners[side]
-    return side[np.abs(np.roll(here, -1, axis=0) - here).max(axis=1) > SAME]
 
 
 @cache
@@ -250,28 +246,23 @@ def parts_of(held: PosedHand) -> HandParts:
     at = places(held.hand, held.joints, held.palm_pose)
     R = np.concatenate([at.link_rotations[0], held.palm_pose[None, :3, :3]])  # the palm's is -1
     p = np.concatenate([at.link_positions[0], held.palm_pose[None, :3, 3]])
-    tips = arrays.shape_tips.tolist()
+    tips: list[int] = arrays.shape_tips.tolist()
     own = arrays.tip_shapes.tolist()
-    kept = np.array([n for n, tip in enumerate(tips) if n not in own or tips.count(tip) == 1])
-    links = arrays.shape_links[kept]
+    kept = [n for n, tip in enumerate(tips) if n not in own or tips.count(tip) == 1]
+    links: list[int] = arrays.shape_links[kept].tolist()
     contact_of = {finger: contact for contact, finger in enumerate(held.fingers)}
+    blocks = list[Array | None]()
+    for n, link in zip(kept, links, strict=True):
+        corners = held.hand.fingers[tips[n]].tip.corners if n in own else None
+        blocks.append(None if corners is None else p[link] + corners @ R[link].T)
     return HandParts(
         p[links] + np.einsum("nij,nj->ni", R[links], arrays.shape_positions[kept]),
         R[links] @ arrays.shape_rotations[kept],
         arrays.shape_sizes[kept],
         arrays.shape_radii[kept],
-        tuple(contact_of.get(tips[n]) for n in kept.tolist()),
-        tuple(
-            _block(held.hand, tips[n], R[links[i]], p[links[i]]) if n in own else None
-            for i, n in enumerate(kept.tolist())
-        ),
+        tuple(contact_of.get(tips[n]) for n in kept),
+        tuple(blocks),
     )
-
-
-def _block(hand: Hand, finger: int, R: Array, p: Array) -> Array | None:
-    """Place the corners of a fingertip that is a block on a link with axes R and origin p."""
-    corners = hand.fingers[finger].tip.corners
-    return None if corners is None else p + corners @ R.T
 
 
 def hand_shapes(held: PosedHand) -> tuple[Shape, ...]:

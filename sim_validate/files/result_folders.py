@@ -27,12 +27,12 @@ OF_GRASPS = ("transfer.json", "grasps.json")
 BEST = ("best.json", "best-proof.npz")
 REACHES = "reaches.json"
 JUDGEMENTS = "judgements.json"
-PICTURES, CHARTS, CLIPS = "pictures", "charts", "clips"
+PICTURES, CLIPS = "pictures", "clips"
 MARK = ".graspproof-report"
 MARKED = "The pages here were written by graspproof, which may replace them.\n"
 ID = re.compile(r"[bcprf](-\d+){4}[\w-]*", re.ASCII)
 """Pattern of a grasp's id, as plans name grasps; people give other ids to contacts of their own."""
-PAGES = ("", GRASPS, PICTURES, CHARTS, CLIPS)
+PAGES = ("", GRASPS, PICTURES, CLIPS)
 PARTS = ("scenes", "traces", "proofs", *PAGES, *(f"{REPORT}/{part}" for part in PAGES))
 """Subfolders into which commands write."""
 
@@ -152,16 +152,13 @@ def remove_pages(folder: Path) -> None:
             folder.glob("object-*.js"),
             folder.glob(f"{GRASPS}/*.html"),
             folder.glob(f"{PICTURES}/*.svg"),
-            *(folder.glob(f"{kind}/*.webp") for kind in (PICTURES, CHARTS, CLIPS)),
+            folder.glob(f"{CLIPS}/*.webp"),
         )
     )
-    for kind in (GRASPS, PICTURES, CHARTS, CLIPS):
-        _remove_if_empty(folder / kind)
-
-
-def _remove_if_empty(folder: Path) -> None:
-    if folder.is_dir() and not any(folder.iterdir()):
-        folder.rmdir()
+    for kind in (GRASPS, PICTURES, CLIPS):
+        part = folder / kind
+        if part.is_dir() and not any(part.iterdir()):
+            part.rmdir()
 
 
 @contextmanager

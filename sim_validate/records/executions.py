@@ -5,7 +5,7 @@ never comes is infinite.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NotRequired, TypeVar, cast
@@ -285,7 +285,13 @@ def executions_from_json(text: str) -> Executions:
     grasps = tuple(
         _grasp(each, settings, ("executions", row)) for row, each in enumerate(record["executions"])
     )
-    _check_summary(record.get("summary"), grasps)
+    summary: Mapping[str, object] = record.get("summary") or {}
+    for name, count in executions_summary(grasps).items():
+        if summary.get(name, count) != count:
+            raise InputError(
+                f"summary.{name}: expected {count}, as the executions say, got {summary[name]}; "
+                "write the file again, or remove it"
+            )
     return Executions(
         object_sha256=record["object"]["content_sha256"],
         friction=record["friction"],
@@ -293,18 +299,6 @@ def executions_from_json(text: str) -> Executions:
         complete=record["complete"],
         grasps=grasps,
     )
-
-
-def _check_summary(summary: ExecutionsSummary | None, grasps: Iterable[ExecutedGrasp]) -> None:
-    """Refuse a summary that contradicts the executions."""
-    if summary is None:
-        return
-    for name, count in executions_summary(grasps).items():
-        if summary[name] != count:
-            raise InputError(
-                f"summary.{name}: expected {count}, as the executions say, got {summary[name]}; "
-                "write the file again, or remove it"
-            )
 
 
 def _filled(kind: type[Settings], given: dict[str, Any], where: Where) -> Settings:

@@ -300,7 +300,7 @@ def test_pages_of_an_earlier_report_are_removed_and_nothing_else(copy):
 
 def test_pages_are_not_put_among_other_things(copy, tmp_path, capsys):
     """Such as the pages and pictures of somebody else's site."""
-    names = ("index.html", "style.css", "pictures/a.webp")
+    names = ("index.html", "style.css", "clips/a.webp")
     for name in names:
         (tmp_path / "site" / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "site" / name).write_text("mine")
