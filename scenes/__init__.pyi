@@ -1,5 +1,6 @@
 from scenes.drawing.pictures import grasp_figure as grasp_figure
 from scenes.drawing.pictures import write_picture as write_picture
+from scenes.drawing.sheets import Sheet as Sheet
 from scenes.drawing.turntable import Turntable as Turntable
 from scenes.drawing.turntable import show as show
 from scenes.example_objects import example_names as example_names
@@ -8,7 +9,7 @@ from scenes.execution.held import HeldSettings as HeldSettings
 from scenes.execution.held_mjcf import HeldScene as HeldScene
 from scenes.execution.held_mjcf import build_held_scene as build_held_scene
 from scenes.execution.held_mjcf import write_held_scene as write_held_scene
-from scenes.exports.formats import export_grasps as export_grasps
+from scenes.exports import export_grasps as export_grasps
 from scenes.fingertips import FingerSettings as FingerSettings
 from scenes.hand_files.loading import load_hand as load_hand
 from scenes.hands.hand_mjcf import HandScene as HandScene

@@ -39,7 +39,7 @@ ACTIONS: dict[type[Any], str] = {
     command_flags.Scene: "scene:write_scenes",
     command_flags.Export: "scene:export_grasps",
     showing_flags.View: "view:view_grasp",
-    showing_flags.Report: "report:report_folder",
+    showing_flags.Report: "view:report_folder",
     command_flags.Regions: "regions:certify_file",
     command_flags.Replay: "replay:replay_trial",
     command_flags.Analyze: "analyze:analyze_file",

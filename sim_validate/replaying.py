@@ -29,8 +29,8 @@ from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
 from sim_validate.records.grasps import NAMED, grasp_with_id, read_grasps, some
-from sim_validate.records.saved_verdicts import verdicts_of
 from sim_validate.records.setup_toml import OF_USERS, setup_from_tables
+from sim_validate.records.verdicts import verdicts_of
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.loads import PlannedLoad, planned_loads
 from sim_validate.simulation.rig import Rig, Watched, squeezed

@@ -37,6 +37,8 @@ DOCS = sorted(set(SITE.parent.glob("*.md")) - {SITE})
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 PAGES = {page.stem: page.read_text() for page in DOCS}
 DATASETS = PAGES["datasets"]
+WITH_FILES = {"datasets", "regions", "baselines", "recipes"}
+"""Pages whose code needs files, which tests of their own make."""
 
 
 def blocks(text, language):
@@ -79,7 +81,7 @@ def test_commands_end_as_the_page_says(page, tmp_path, monkeypatch):
 
 EXAMPLES = [
     pytest.param(page, code, said, id=f"{page}-{place}")
-    for page, text in PAGES.items() if page not in {"datasets", "regions", "baselines"}
+    for page, text in PAGES.items() if page not in WITH_FILES
     for place, (code, said) in enumerate(
         re.findall(r"```python\n(.*?)```\n\nprints\n\n```text\n(.*?)```", text, re.DOTALL)
     )
@@ -104,7 +106,7 @@ def test_every_block_of_code_is_one_that_a_test_runs():
     for text in PAGES.values():
         for language in re.findall(r"^```(\w+)$", text, re.MULTILINE):
             kinds[language] += 1
-    own = [text for page, text in PAGES.items() if page not in {"datasets", "regions", "baselines"}]
+    own = [text for page, text in PAGES.items() if page not in WITH_FILES]
     assert sum(len(blocks(text, "python")) for text in own) == len(EXAMPLES) >= 9
     assert not any(blocks(text, "py") for text in own)
     for name in ("json", "toml", "xml"):

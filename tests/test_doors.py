@@ -17,9 +17,8 @@ from sim_validate.main import ACTIONS
 ROOT = Path(__file__).parent.parent
 DOORS = {
     "manifold3d": "grasp_core/objects/booleans.py",
-    "trimesh": ("grasp_core/objects/conversion.py", "scenes/exports/gltf.py"),
-    "yaml": "scenes/exports/moveit.py",
-    "pxr": "scenes/exports/usd.py",
+    "trimesh": ("grasp_core/objects/conversion.py", "scenes/exports.py"),
+    "yaml": "scenes/exports.py",
     "pandas": "grasp_core/grasp_tables.py",
     "numba": ("grasp_core/compiled.py", "grasp_core/kept_loops.py"),
     "highspy": "grasp_core/solvers/lp.py",
@@ -32,7 +31,7 @@ DOORS = {
     ),
     "mujoco_menagerie": "scenes/hand_files/menagerie.py",
     "PIL": "scenes/drawing/frames.py",
-    "matplotlib": "scenes/drawing/canvas.py",
+    "resvg_py": "scenes/drawing/sheets.py",
     "jinja2": "scenes/drawing/pages.py",
     "scipy.stats": "sim_validate/validation/verdict.py",
     "ray": "sim_validate/parallel/clusters.py",
@@ -75,12 +74,12 @@ def test_only_kernels_are_compiled():
 
 HEAVY = (
     "numpy", "scipy", "numba", "highspy", "clarabel", "qpsolvers", "manifold3d", "trimesh",
-    "mujoco", "pydantic", "matplotlib",
+    "mujoco", "pydantic", "resvg_py",
 )  # fmt: skip
 NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "pydantic", "scipy.spatial", "scipy.optimize")
 
 NOT_TO_PLAN_AGAIN = (
-    *NOT_TO_PLAN, "highspy", "clarabel", "matplotlib", "PIL", "pyarrow", "jinja2",
+    *NOT_TO_PLAN, "highspy", "clarabel", "resvg_py", "PIL", "pyarrow", "jinja2",
     "scipy.sparse", "scipy.stats", "grasp_core.regions",
     "grasp_core.optimizing", "sim_validate.simulation", "sim_validate.reports",
 )  # fmt: skip

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from grasp_core.regions.certify_regions import CONES, CertifiedRegions
+from grasp_core.regions.certificates import CertifiedRegions
+from grasp_core.regions.certify_regions import CONES
 from sim_validate.cli import command_flags
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main

@@ -27,7 +27,8 @@ from grasp_core.arrays import Array
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.closure.wrenches import contact_frames
 from grasp_core.objects.face_pieces import FacePiece
-from grasp_core.quality.ferrari_canny import FerrariCanny, InnerPolytope, wrench_set_quality
+from grasp_core.quality.ferrari_canny import FerrariCanny, wrench_set_quality
+from grasp_core.quality.inner_polytope import InnerPolytope
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import graded, nearest_optimum, on_grid, surpassing
 

@@ -147,11 +147,11 @@ class Export:
 
     grasps: Positional[Path]
     """The grasps.json with the grasps to write."""
-    to: Literal["moveit", "gltf", "usd"]
-    """Format to write: YAML with the fields of ROS messages (moveit), a binary glTF scene (gltf) or
-    a USD stage (usd), see docs/exports.md."""
+    to: Literal["moveit", "gltf"]
+    """Format to write: YAML with the fields of ROS messages (moveit) or a binary glTF scene (gltf),
+    see docs/exports.md."""
     out: Annotated[Path, arg(aliases=("-o",))]
-    """File to write, which ends in .yaml for moveit, .glb for gltf, and .usda or .usdc for usd."""
+    """File to write, which ends in .yaml for moveit and .glb for gltf."""
     grasp: str | None = None
     """Id of the grasp to write; if not given, all grasps are written."""
     limit: Count | None = None
@@ -251,7 +251,7 @@ class Inspect:
     object: Positional[str]
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
     picture: Annotated[Path, ends_in(*PICTURES)] | None = None
-    """Write the object as a picture (png, svg, pdf, webp, jpg)."""
+    """Write the object as a picture (svg, png)."""
     mesh: OmitArgPrefixes[Mesh] = field(default_factory=Mesh)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 

@@ -84,7 +84,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "dataset export": ("dataset export ds --to csv --out tables",),
     "baseline record": ("baseline record grasps.json -o wedge.baseline.json",),
-    "baseline check": ("baseline check wedge.baseline.json --junit results.xml",),
+    "baseline check": ("baseline check wedge.baseline.json",),
 }
 """Examples of each command, without the program's name."""
 HELP = {"-h", "--help"}

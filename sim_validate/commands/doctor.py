@@ -20,7 +20,8 @@ from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.parallel.processes import available_cores
-from sim_validate.records.verdicts_json import finite, gate_record
+from sim_validate.records.fields import finite
+from sim_validate.records.verdicts import gate_record
 from sim_validate.simulation.gate import Gate, measured_gate
 from sim_validate.simulation.setup import Setup
 from sim_validate.validation.validation import validate

@@ -22,9 +22,8 @@ from sim_validate.execution.verdict import (
     held_controls_in_words,
     losses_in_words,
 )
-from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.stale_results import remove_executions
-from sim_validate.records.executions_json import (
+from sim_validate.files.result_folders import alone_in, remove_executions
+from sim_validate.records.executions import (
     EXECUTIONS,
     executions_summary,
     executions_to_json,

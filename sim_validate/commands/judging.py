@@ -10,7 +10,7 @@ from grasp_core.hands.reach import HandReach
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.files.stale_results import JUDGEMENTS, remove_judgements
+from sim_validate.files.result_folders import JUDGEMENTS, remove_judgements
 from sim_validate.protocols.judgements_json import judgements_summary, judgements_to_json
 from sim_validate.protocols.judging import GraspCase, HandCase, Judgement, judged
 from sim_validate.simulation.setup import Setup

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from grasp_core.cones.spanning import count_spanning
-from grasp_core.objects.face import Face
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
@@ -48,7 +47,16 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
         "radius_m": body.radius,
         "center_of_mass_m": body.center_of_mass.tolist(),
         "spanning_quadruples": spanning,
-        "face_list": _face_list(body),
+        "face_list": [
+            {
+                "number": number,
+                "normal": face.normal.tolist(),  # into the object
+                "area_m2": face.area,
+                "center_m": face.centroid.tolist(),
+                "place": face_in_words(face),
+            }
+            for number, face in enumerate(body.faces)
+        ],
         "content_sha256": body.content_sha256,
         "notes": list(body.notes),
     }
@@ -59,31 +67,16 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
     for sentence in _sentences(body, spanning):
         reporter.say(f"  {sentence}")
     if body.patches is None and len(body.faces) <= MOST_NUMBERED:
-        rows = [_row(number, face) for number, face in enumerate(body.faces)]
+        rows = [
+            (str(number), face_in_words(face), f"{MM2 * face.area:.5g}")
+            for number, face in enumerate(body.faces)
+        ]
         reporter.table("faces, by the numbers in ids of grasps", COLUMNS, rows)
     if command.picture is not None:
         reporter.say(f"wrote {command.picture}")
     else:
         reporter.say("  `--picture FILE.png` draws it.")
     return Exit.GOOD
-
-
-def _face_list(body: Polyhedron) -> list[dict[str, Any]]:
-    """List the faces of a mesh, in order of their numbers; normals point into the object."""
-    return [
-        {
-            "number": number,
-            "normal": face.normal.tolist(),
-            "area_m2": face.area,
-            "center_m": face.centroid.tolist(),
-            "place": face_in_words(face),
-        }
-        for number, face in enumerate(body.faces)
-    ]
-
-
-def _row(number: int, face: Face) -> tuple[str, ...]:
-    return str(number), face_in_words(face), f"{MM2 * face.area:.5g}"
 
 
 def _sentences(body: Polyhedron, spanning: int | None) -> Iterator[str]:

@@ -8,8 +8,7 @@ from grasp_core.errors import InputError
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.stale_results import remove_regions
+from sim_validate.files.result_folders import alone_in, remove_regions
 from sim_validate.parallel.certifying import Asked, certified
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.regions import REGIONS, write_regions

@@ -11,7 +11,7 @@ from scenes.mjcf import write_scene
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.records.verdicts_json import finite
+from sim_validate.records.fields import finite
 from sim_validate.replaying import Recorded, Replayed, Wanted, recorded_in, replayed
 
 SHOWN = 12

@@ -17,8 +17,7 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import saved_grasps
 from sim_validate.commands.asked.objects import load_object
-from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.stale_results import remove_results
+from sim_validate.files.result_folders import alone_in, remove_results
 from sim_validate.records.transfers.transfer_json import TRANSFER, carried_to_json, transfer_to_json
 
 MM = 1e3

@@ -14,10 +14,9 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
 from sim_validate.commands.asked.trials import prepared
 from sim_validate.commands.judging import judge_grasps
-from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.stale_results import remove_verdicts
+from sim_validate.files.result_folders import alone_in, remove_verdicts
 from sim_validate.files.writing import write_arrays
-from sim_validate.records.verdicts_json import summary, trace_arrays, verdicts_to_json
+from sim_validate.records.verdicts import summary, trace_arrays, verdicts_to_json
 from sim_validate.simulation.gate import require_faithful
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.simulation.traces import Outcome

@@ -24,9 +24,10 @@ from grasp_core.arrays import Array
 from grasp_core.checked import instance, several, switch, whole
 from grasp_core.closure.contact_arrays import FEWEST, contact_arrays, stacked
 from grasp_core.errors import InputError, NoForcesError
-from grasp_core.execution.best_squeeze import BestSqueeze, best_squeeze
+from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet, any_direction
+from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp

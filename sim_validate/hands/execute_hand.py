@@ -10,9 +10,10 @@ from dataclasses import replace
 from grasp_core.checked import instance, switch, whole
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, NoForcesError
-from grasp_core.execution.best_squeeze import BestSqueeze, searched
+from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.grips import unsqueezed
 from grasp_core.execution.loads import LoadSet, any_direction
+from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_grips import hand_grip
 from grasp_core.hands.reach import HandReach

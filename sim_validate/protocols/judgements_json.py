@@ -15,9 +15,8 @@ from grasp_core.files.json_text import text_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from sim_validate.protocols.judging import Judgement
+from sim_validate.records.fields import Count, ObjectRecord, Positive, finite, object_record
 from sim_validate.records.reaches_schema import NotNegative
-from sim_validate.records.verdicts_json import finite, object_record
-from sim_validate.records.verdicts_schema import Count, ObjectRecord, Positive
 
 
 class RunRecord(TypedDict):

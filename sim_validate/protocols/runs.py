@@ -19,9 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
+from scenes.silent_mujoco import unlogged
 from scenes.tested import TestedScene
 from sim_validate.protocols.published import Passing, PublishedProtocol, Run, Step
-from sim_validate.simulation.bench import batch, compiled, faults, mujoco, step, unlogged
+from sim_validate.simulation.bench import batch, compiled, faults, mujoco, step
 from sim_validate.simulation.traces import rotation_angles
 
 CHUNK = 10

@@ -23,7 +23,7 @@ from grasp_core.hands.hand import (
     Link,
     LinkShape,
 )
-from sim_validate.records.verdicts_schema import Finite
+from sim_validate.records.fields import Finite
 
 Triple = tuple[Finite, Finite, Finite]
 Rotation = tuple[Triple, Triple, Triple]

@@ -16,7 +16,8 @@ from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from sim_validate.hands.hand_verdict import HandVerdict
 from sim_validate.hands.jobs import ExecutedHand
-from sim_validate.records.executions_json import enough_record, tip_radii
+from sim_validate.records.executions import enough_record, tip_radii
+from sim_validate.records.fields import object_record
 from sim_validate.records.hand_model import model_record
 from sim_validate.records.reaches_schema import (
     AskedRecord,
@@ -30,7 +31,6 @@ from sim_validate.records.reaches_schema import (
     SimulatedHandRecord,
     Triple,
 )
-from sim_validate.records.verdicts_json import object_record
 
 SCHEMA = 1
 

@@ -8,9 +8,9 @@ from typing_extensions import TypedDict
 from grasp_core.hands.hand import FEWEST_FINGERS
 from grasp_core.hands.reach import ReachReason
 from grasp_core.values import FINGERS
-from sim_validate.records.executions_schema import EnoughRecord
+from sim_validate.records.executions import EnoughRecord
+from sim_validate.records.fields import Count, Finite, ObjectRecord, Positive
 from sim_validate.records.hand_model import ModelRecord
-from sim_validate.records.verdicts_schema import Count, Finite, ObjectRecord, Positive
 
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Contact = Annotated[int, Field(ge=0, lt=FINGERS)]

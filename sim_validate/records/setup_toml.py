@@ -89,14 +89,11 @@ def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:
             )
     kind = cast("type[Any]", type(values))
     try:
-        text = json.dumps({**_as_dict(values), **given})
+        known = {field.name: getattr(values, field.name) for field in fields(values)}
+        text = json.dumps({**known, **given})
         checked: Any = TypeAdapter(kind).validate_json(text, strict=True)
     except ValidationError as error:
         raise InputError(f"{path}: [{table}] {complaint(error, kind)}") from error
     except InputError as error:  # raised by the value's own checks
         raise InputError(f"{path}: [{table}] {error}") from error
     return checked
-
-
-def _as_dict(values: Any) -> dict[str, Any]:
-    return {field.name: getattr(values, field.name) for field in fields(values)}

@@ -77,8 +77,7 @@ def weights(
     ways = [np.array(down) for down in downs] or [*np.eye(3), *-np.eye(3)]
     return tuple(
         NamedWrench(
-            f"weight_{place}",
-            np.concatenate([weight_n * way / np.linalg.norm(way), np.zeros(3)]),
+            f"weight_{place}", np.concatenate([weight_n * way / np.linalg.norm(way), np.zeros(3)])
         )
         for place, way in enumerate(ways)
     )

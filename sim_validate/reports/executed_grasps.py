@@ -18,7 +18,7 @@ from sim_validate.execution.verdict import (
     best_executed,
     ended,
 )
-from sim_validate.records.executions_json import Executions, executions_summary
+from sim_validate.records.executions import Executions, executions_summary
 from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record, said_of
 
 MILLI = 1e3

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from grasp_core.hands.named_hands import HANDS
 from grasp_core.short_text import counted
 from grasp_core.values import Grasp
-from scenes.drawing.hands.posed_hands import PosedHand, posed_hand
+from scenes.drawing.hands import PosedHand, posed_hand
 from scenes.drawing.pages import number
-from sim_validate.records.executions_json import enough_of
+from sim_validate.records.executions import enough_of
 from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from grasp_core.quality.wrench_body import WrenchBody
 from grasp_core.quality.wrench_limit import limit_of
 from scenes.physics import PhysicsSettings
 from sim_validate.parallel.processes import available_cores, each
-from sim_validate.records.verdicts_json import verdicts_to_json
+from sim_validate.records.verdicts import verdicts_to_json
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.gate import require_faithful
 from sim_validate.simulation.limits import bisected_limits, part, ramped_limits, released_friction

@@ -24,7 +24,6 @@ COLD = "no folder for kernels"
 """Compiles all loops again, beside their modules, which `test_kept_loops` sees of one of them."""
 SURROUNDINGS = {
     "no home": {**NO_HOME, "NUMBA_CACHE_DIR": str(KEPT)},
-    "no folder for matplotlib": {"MPLCONFIGDIR": NOWHERE, "MPLBACKEND": "nonsense"},
     COLD: {"NUMBA_CACHE_DIR": NOWHERE, "XDG_CACHE_HOME": NOWHERE},
     "no threads": {"OMP_NUM_THREADS": "many"},
     "no temporary folder": {"TMPDIR": NOWHERE},

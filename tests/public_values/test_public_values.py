@@ -35,6 +35,7 @@ MADE_BY_FUNCTIONS = {
     "sv.SavedVerdict": "load_verdicts",
     "sv.SavedVerdicts": "load_verdicts",
     "gc.BestGrasp": "best_grasp",
+    "scenes.Sheet": "grasp_figure",
     "gc.BestSqueeze": "best_squeeze",
     "gc.FirstSlip": "first_slip",
     "gc.FreeMass": "payload",

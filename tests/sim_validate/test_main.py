@@ -64,7 +64,7 @@ def test_a_report_that_fails_leaves_the_run_as_it_is(monkeypatch, capsys):
     def broken(*_, **__):
         raise OSError(28, "No space left on device", "a.webp")
 
-    monkeypatch.setattr("sim_validate.commands.report.write_report", broken)
+    monkeypatch.setattr("sim_validate.commands.view.write_report", broken)
     assert main(["run", "tetrahedron", "--limit", "1", "-q"]) == Exit.GOOD
     assert "no report: a.webp: No space left on device" in capsys.readouterr().err
 

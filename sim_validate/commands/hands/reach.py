@@ -24,8 +24,7 @@ from sim_validate.commands.hands.simulated import (
     with_motors,
 )
 from sim_validate.commands.judging import judge_hands
-from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.stale_results import REACHES, remove_reaches
+from sim_validate.files.result_folders import REACHES, alone_in, remove_reaches
 from sim_validate.hands.execute_hand import hand_execution_settings
 from sim_validate.parallel.compiling_hands import compile_for_hands, must_compile
 from sim_validate.parallel.reaching import ReachJob, reached

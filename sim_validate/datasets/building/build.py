@@ -26,8 +26,8 @@ from sim_validate.datasets.describing.card import CARD
 from sim_validate.datasets.manifest import MANIFEST, read_manifest
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.units import WorkUnit, units_of, units_sha256
-from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.paths import path_inside
+from sim_validate.files.result_folders import alone_in
 from sim_validate.simulation.gate import require_faithful
 from sim_validate.simulation.setup import Setup
 

@@ -14,8 +14,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import Protocol
 
 from sim_validate.datasets.building.staging import Staging
-from sim_validate.datasets.building.worker import Limits, Task, Work, WorkerError, do_task, do_unit
-from sim_validate.datasets.units import WorkUnit, provenance
+from sim_validate.datasets.building.worker import Limits, Task, Work, do_task, do_unit
+from sim_validate.datasets.units import WorkerError, WorkUnit, provenance
 from sim_validate.parallel import interrupts
 
 AHEAD = 3

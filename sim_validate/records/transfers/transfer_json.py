@@ -10,6 +10,7 @@ from grasp_core.transferring.contacts import CarriedContact
 from grasp_core.transferring.face_changes import FaceChange
 from grasp_core.transferring.judging import FRICTION_BAND, QUALITY_BAND, GraspFigures
 from grasp_core.transferring.transfer import CarriedGrasp, Transfer
+from sim_validate.records.fields import object_record
 from sim_validate.records.transfers.transfer_schema import (
     CarriedContactRecord,
     CarriedGraspRecord,
@@ -19,7 +20,6 @@ from sim_validate.records.transfers.transfer_schema import (
     TransferSummary,
     Triple,
 )
-from sim_validate.records.verdicts_json import object_record
 
 TRANSFER = "transfer.json"
 """Name of the file in a folder of results."""

@@ -7,7 +7,7 @@ from typing_extensions import TypedDict
 
 from grasp_core.transferring.judging import Change
 from grasp_core.values import FINGERS
-from sim_validate.records.verdicts_schema import Count, Finite, ObjectRecord, Positive
+from sim_validate.records.fields import Count, Finite, ObjectRecord, Positive
 
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Triple = tuple[Finite, Finite, Finite]

@@ -6,10 +6,9 @@ from itertools import pairwise
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.flat.colours import BAD, GOOD, NEUTRAL
-from scenes.drawing.flat.panels import SMALL, Panel
-from scenes.drawing.flat.scales import Scale, ticks_in
-from scenes.drawing.flat.sheets import Area, Mark, Sheet, Words
+from scenes.drawing.colours import BAD, GOOD, NEUTRAL
+from scenes.drawing.panels import SMALL, Panel, Scale, ticks_in
+from scenes.drawing.sheets import Area, Mark, Sheet, Words
 
 WIDTH, HEIGHT = 360.0, 240.0
 """Size of a panel [pixels]."""

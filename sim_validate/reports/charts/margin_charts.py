@@ -6,7 +6,6 @@ The maps use Hammer's projection, which keeps areas; +x is in the middle and -x 
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -17,11 +16,10 @@ from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_limits import many_limits
 from grasp_core.values import Grasp
-from scenes.drawing.canvas import figure_of
-from scenes.drawing.flat.colours import BAD, LEVELS, NEUTRAL, PAPER, levels_of
-from scenes.drawing.flat.panels import SMALL
-from scenes.drawing.flat.scales import ticks_in
-from scenes.drawing.flat.sheets import (
+from scenes.drawing.colours import BAD, LEVELS, NEUTRAL, PAPER, levels_of
+from scenes.drawing.panels import SMALL, ticks_in
+from scenes.drawing.pictures import check_drawn
+from scenes.drawing.sheets import (
     Area,
     Image,
     Mark,
@@ -32,7 +30,6 @@ from scenes.drawing.flat.sheets import (
     ink_line,
     outlined,
 )
-from scenes.drawing.pictures import check_drawn
 from scenes.fingertips import FingerSettings
 
 LONGITUDES, LATITUDES = 21, 11
@@ -63,7 +60,7 @@ little off the poles."""
 
 def margin_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = USUAL_PUSH_N
-) -> Any:
+) -> Sheet:
     """Draw the largest force and torque that a grasp resists in every direction.
 
     Args:
@@ -73,13 +70,13 @@ def margin_figure(
         max_normal_force_n: Largest normal force of each finger [N].
 
     Returns:
-        A matplotlib figure.
+        A sheet with all panels, which a notebook shows and `write` puts into a file.
 
     Raises:
         InputError: The grasp does not lie on the body, or is not in force closure at this friction.
     """
     panels = margin_panels(body, grasp, friction, max_normal_force_n=max_normal_force_n)
-    return figure_of(beside(panels))
+    return beside(panels)
 
 
 def margin_panels(

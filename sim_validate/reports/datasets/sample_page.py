@@ -15,9 +15,9 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated, seat
 from grasp_core.values import FINGERS, Contact, ContactRegion, ForceCone, Grasp, Witness, four
 from scenes.drawing.drawings import drawing_of
-from scenes.drawing.flat.svg import svg_of
 from scenes.drawing.pages import number
 from scenes.drawing.pictures import SIDE, number_places, sheet_of
+from scenes.drawing.sheets import svg_of
 from scenes.drawing.views import best_view
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.open_dataset import Selection

@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 
 from grasp_core.files.text_files import write_text
-from scenes.drawing.flat.svg import svg_of
 from scenes.drawing.pages import number
+from scenes.drawing.sheets import svg_of
 from sim_validate.datasets.describing.stats import Spread, Stats
 from sim_validate.reports.charts.distribution_charts import histogram, shares
 from sim_validate.reports.pages import page, style

@@ -9,14 +9,11 @@ from scipy.optimize import nnls
 
 from grasp_core.closure.wrenches import contact_frames, grasp_map, normal_and_tangential
 from grasp_core.cones.pyramids import PYRAMID_SIDES
+from grasp_core.errors import NoForcesError
 from grasp_core.forces import force_programs
 from grasp_core.forces.balance import Balance
 from grasp_core.forces.cone_forces import least_norm_in_cones
-from grasp_core.forces.contact_forces import (
-    NoForcesError,
-    contact_forces,
-    least_friction_forces,
-)
+from grasp_core.forces.contact_forces import contact_forces, least_friction_forces
 from grasp_core.solvers import nearest_point as least_distance_module
 from tests.grasp_core.forces.loads import (
     ALL_LIMITS,

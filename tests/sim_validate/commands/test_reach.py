@@ -15,7 +15,7 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.hand_flags import Reach
 from sim_validate.commands.hands import simulated
 from sim_validate.commands.hands.reach import say_where_to_look
-from sim_validate.files.stale_results import REACHES
+from sim_validate.files.result_folders import REACHES
 from sim_validate.hands.jobs import held_by_hands
 from sim_validate.hands.validate_hand import MOST_PUSH_N
 from sim_validate.main import main

@@ -19,10 +19,9 @@ import trimesh
 import grasp_core as gc
 import sim_validate
 from grasp_core.geometry.nearest_points import nearest_on_surface
-from sim_validate.cli.dataset_flags import ExportFormat, SplitName
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.building.build import build
-from sim_validate.datasets.columns import TABLES
+from sim_validate.datasets.columns import TABLES, ExportFormat, SplitName
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.exports.formats import EXPORTERS, export
 from sim_validate.datasets.exports.isaac import yaml_number
@@ -30,7 +29,7 @@ from sim_validate.datasets.object_rows import SPLITS
 from sim_validate.files.writing import whole_folder
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, silent
-from tests.sim_validate.datasets.verifying.test_verify import forged
+from tests.sim_validate.datasets.forging import forged
 
 ROOT = Path(__file__).parents[3]
 

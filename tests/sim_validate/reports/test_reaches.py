@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
-from scenes.drawing.flat.colours import FINGERS, HAND
+from scenes.drawing.colours import FINGERS, HAND
 from scenes.drawing.turntable import UNITS
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
@@ -15,7 +15,7 @@ from sim_validate.main import main
 from sim_validate.records.saved_reaches import read_reaches
 from sim_validate.reports.report import write_report
 from sim_validate.reports.run_folder import runs_in
-from tests.scenes.drawing.hands.standing import (
+from tests.scenes.drawing.standing import (
     FRICTION,
     GRASP,
     POSITIONS,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from sim_validate.simulation.early_ends import USABLE, WATCHED, EarlyEnds, Thresholds, displaced
+from sim_validate.simulation.early_ends import USABLE, WATCHED, EarlyEnds, Thresholds
 from sim_validate.simulation.limits import part
 from sim_validate.simulation.schedules import (
     Clock,
@@ -17,7 +17,7 @@ from sim_validate.simulation.schedules import (
     release,
 )
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.traces import Outcome, judge, traces
+from sim_validate.simulation.traces import Outcome, displaced, judge, traces
 from sim_validate.validation.controls import control_case, negative_controls
 from tests.benchmarks.early_ends import compared
 from tests.marks import more
