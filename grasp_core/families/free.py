@@ -104,7 +104,6 @@ class Absence(ByValue):
 class Undecided:
     """The answer when the free method found neither a grasp nor a proof within its budget."""
 
-    open_parts: int
     open_share: float
     """Share of all choices of contacts that is undecided, where each cut counts for half."""
 
@@ -140,13 +139,13 @@ def place_free(
             found = _restarted(pieces, friction, rng, restarts)
         if found is not None:
             general = of_general_type(pieces, found, friction, rng)
-            return general or Undecided(len(waiting) + 1, _share([*waiting, (0.0, path)]))
+            return general or Undecided(_share([*waiting, (0.0, path)]))
         margin = patch.margin if patch is not None else 0.0
         # (3): parts with the largest margin are examined first
         for half in (0, 1):
             heappush(waiting, (-graded(margin), (*path, half)))
     if waiting:
-        return Undecided(len(waiting), _share(waiting))
+        return Undecided(_share(waiting))
     return Absence(tuple(pieces), friction, tuple(leaves))
 
 

@@ -129,7 +129,7 @@ def _whole(on: Standard, faces: FaceQuadruple, request: PlanRequest, gathered: G
     hulls = tuple(shape.hull for shape in chosen_shapes(on.shapes, whole))
     gathered.tally.count("solved")
     answer = _place(hulls, request, np.random.default_rng([request.seed, *faces]), restarts=0)
-    return hulls, answer if isinstance(answer, Absence) else Undecided(1, 1.0)
+    return hulls, answer if isinstance(answer, Absence) else Undecided(1.0)
 
 
 def _answers(
@@ -166,7 +166,7 @@ def _answers(
             return answers
     # more choices than were tried: the rest stays undecided
     if math.prod(len(shape.pieces) for shape in shapes) > most:
-        answers.append((hulls, Undecided(1, 1.0)))
+        answers.append((hulls, Undecided(1.0)))
     return answers
 
 
@@ -214,7 +214,7 @@ def _place(
             restarts=restarts, whole=known,
         )  # fmt: skip
     except SolverError:
-        return Undecided(1, 1.0)
+        return Undecided(1.0)
 
 
 def _cone_choices(placed: Sequence[Placed], request: PlanRequest) -> list[tuple[Cones, ...]]:

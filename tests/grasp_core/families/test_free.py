@@ -187,7 +187,7 @@ def test_splitting_proves_absence_where_the_patch_of_the_whole_faces_is_closed()
     pieces = quadruple(name, indices)
     whole = close_patch(pieces, tuple(piece.corners for piece in pieces), friction)
     assert whole.closed
-    assert place(pieces, friction) == Undecided(2, 1.0)
+    assert place(pieces, friction) == Undecided(1.0)
     absence = split_absence()
     assert isinstance(absence, Absence)
     assert len(absence.leaves) > 1
@@ -200,7 +200,7 @@ def test_splitting_finds_a_grasp_that_restarts_miss(monkeypatch, restarts):
     monkeypatch.setattr(patch, "RESTARTS", restarts)
     name, indices, friction = NEEDS_A_SPLIT
     pieces = quadruple(name, indices)
-    assert place(pieces, friction) == Undecided(2, 1.0)
+    assert place(pieces, friction) == Undecided(1.0)
     found = place(pieces, friction, cells=100)
     assert isinstance(found, Placement)
     assert gc.force_closure(found.positions, normals_of(pieces), friction).closed
