@@ -67,7 +67,6 @@ def write_regions(
         "object": {"name": body.name, "content_sha256": body.content_sha256},
         "friction": asked.friction,
         "reserve": asked.reserve,
-        "balance": asked.balance,
         "recenter": asked.recenter,
         "edge_clearance_m": asked.clearance,
         "cones": asked.max_cones,

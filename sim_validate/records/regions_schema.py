@@ -58,7 +58,6 @@ class RegionsFile(TypedDict):
     object: ObjectRecord
     friction: Positive
     reserve: NotRequired[Finite]
-    balance: NotRequired[str]
     recenter: NotRequired[bool]
     edge_clearance_m: NotRequired[Finite]
     cones: NotRequired[int]
