@@ -54,7 +54,7 @@ LARGEST_RATIO = 1e6
 """
 LONGEST_LEVER = 2e9
 """Largest entry of a matrix of wrenches: coordinates up to `LARGEST_RATIO`, and a thousand times as
-much where torques are over a thousandth of the scale (see `resisted_loads`)."""
+much where torques are over a thousandth of the scale (see `measures`)."""
 
 
 def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
