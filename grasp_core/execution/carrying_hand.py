@@ -59,8 +59,8 @@ import numpy as np
 from grasp_core.arrays import SHIFT, Array, Indices, cross, of_order_one
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST
+from grasp_core.closure.contacts import WRENCH, contact_frames, in_frames
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.closure.wrenches import WRENCH, contact_frames, in_frames
 from grasp_core.execution.ball_in_hull import ball_in
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.fields import are_frictions, are_units, is_a, is_array, is_indices, is_number

@@ -32,8 +32,7 @@ from heapq import heappop, heappush
 import numpy as np
 
 from grasp_core.by_value import ByValue
-from grasp_core.closure.batches.certificates import certificates
-from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.closure.force_closure import ClosureCertificate, certificates, force_closure
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.face_parts import (
     Corners,

@@ -35,9 +35,9 @@ from dataclasses import replace
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.closure.contacts import cross_matrix, grasp_map, normal_and_tangential
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.closure.lines import classify_lines
-from grasp_core.closure.wrenches import cross_matrix, grasp_map, normal_and_tangential
 from grasp_core.cones.pyramids import pyramid_facets
 from grasp_core.errors import UndecidedError
 from grasp_core.families.face_parts import Corners

@@ -2,7 +2,7 @@
 
 Each metric replaces the friction cones by inscribed pyramids, whose edges are forces of unit normal
 part n + mu t; the first t is the first tangent of the contact's frame (see
-`wrenches.contact_frames`). How the pyramids are turned changes the second digit. For a quality
+`contacts.contact_frames`). How the pyramids are turned changes the second digit. For a quality
 without pyramids see `ferrari_canny`.
 """
 
@@ -16,14 +16,15 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.checked import MOST_EDGES, whole
-from grasp_core.closure.contact_arrays import (
+from grasp_core.closure.contacts import (
+    WRENCH,
     contact_arrays,
     contacts_in,
+    grasp_map,
     stacked,
     unit_size,
 )
 from grasp_core.closure.wrench_sets import WrenchSet, scaled_arms
-from grasp_core.closure.wrenches import WRENCH, grasp_map
 from grasp_core.errors import InputError
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.values import Contact, Grasp

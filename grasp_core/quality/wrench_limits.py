@@ -45,10 +45,16 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, frozen, frozen_copy
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, positive
-from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions
-from grasp_core.closure.soft.contacts import LOCAL, contact_torsions, torsion_lengths
+from grasp_core.closure.contacts import (
+    WRENCH,
+    contact_arrays,
+    contact_frames,
+    contact_frictions,
+    grasp_map,
+    in_frames,
+)
+from grasp_core.closure.soft_contacts import LOCAL, contact_torsions, torsion_lengths
 from grasp_core.closure.wrench_sets import WrenchSet, with_torques
-from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 from grasp_core.errors import InputError, SolverError
 from grasp_core.fields import is_array, is_number
 from grasp_core.quality.motors import Motors, motors_for

@@ -23,7 +23,7 @@ from grasp_core.checked import (
     switch,
     whole,
 )
-from grasp_core.closure.contact_arrays import stacked
+from grasp_core.closure.contacts import stacked
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.errors import InputError, SolverError, UndecidedError
 from grasp_core.geometry.flat_polygons import convex_polygon, holds_disc

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.wrenches import WRENCH
+from grasp_core.closure.contacts import WRENCH
 
 
 @dataclass(frozen=True, slots=True, eq=False)

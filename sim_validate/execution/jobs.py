@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from grasp_core.by_value import ByValue
-from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import NoForcesError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best

@@ -11,7 +11,7 @@ from functools import partial
 
 from grasp_core.arrays import Array
 from grasp_core.checked import coefficient, instance, one_of, seed_of, several
-from grasp_core.closure.contact_arrays import FEWEST
+from grasp_core.closure.contacts import FEWEST
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
 from grasp_core.checked import path_of
-from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError, SolverError
 from grasp_core.files.json_text import text_of
 from grasp_core.files.text_files import write_text

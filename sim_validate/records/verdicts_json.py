@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any, cast
 
 from grasp_core.arrays import Array
-from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.files.json_text import text_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions

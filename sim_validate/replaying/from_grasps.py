@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.errors import InputError
 from grasp_core.records.grasps_json import SavedGrasps

@@ -8,7 +8,7 @@ protocol's full length, to be looked at.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from grasp_core.closure.contact_arrays import stacked
+from grasp_core.closure.contacts import stacked
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron

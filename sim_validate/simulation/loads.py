@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, cross, to_digits
-from grasp_core.closure.contact_arrays import contact_frictions, stacked
-from grasp_core.closure.soft.contacts import contact_torsions
-from grasp_core.closure.wrenches import normal_and_tangential
+from grasp_core.closure.contacts import contact_frictions, normal_and_tangential, stacked
+from grasp_core.closure.soft_contacts import contact_torsions
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import (

@@ -17,7 +17,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.checked import BOUNDS, number
-from grasp_core.closure.wrenches import contact_frames
+from grasp_core.closure.contacts import contact_frames
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp

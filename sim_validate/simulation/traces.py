@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.closure.wrenches import normal_and_tangential
+from grasp_core.closure.contacts import normal_and_tangential
 from scenes.layout import Layout
 from sim_validate.simulation.simulate import Motion
 

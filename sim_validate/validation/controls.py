@@ -15,10 +15,10 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, cross
 from grasp_core.by_value import ByValue
-from grasp_core.closure.contact_arrays import stacked, unit_size
+from grasp_core.closure.contacts import stacked, unit_size
 from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.closure.decision import deepest_forces
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
-from grasp_core.closure.margin_program import deepest_forces
 from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp

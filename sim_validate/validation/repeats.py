@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 from grasp_core.arrays import Array
-from grasp_core.closure.contact_arrays import stacked
+from grasp_core.closure.contacts import stacked
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import UndecidedError
 from grasp_core.objects.polyhedron import Polyhedron

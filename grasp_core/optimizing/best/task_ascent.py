@@ -20,8 +20,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.closure.contacts import contact_frames
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.closure.wrenches import contact_frames
 from grasp_core.optimizing.ascent import (
     FIRST_REACH,
     GOOD,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.contact_arrays import contact_frictions
+from grasp_core.closure.contacts import contact_frictions
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.values import Contact

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from grasp_core.closure.wrenches import normal_and_tangential
+from grasp_core.closure.contacts import normal_and_tangential
 from grasp_core.forces.contact_forces import (
     contact_forces,
     least_friction_forces,

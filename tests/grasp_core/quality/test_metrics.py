@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import contact_frames
+from grasp_core.closure.contacts import contact_frames
 from scenes.example_objects import example_object
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
 

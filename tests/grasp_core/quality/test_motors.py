@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import linprog
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import grasp_map
+from grasp_core.closure.contacts import grasp_map
 from grasp_core.quality.wrench_limits import (
     SETTLED,
     WrenchBody,

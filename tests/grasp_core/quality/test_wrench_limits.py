@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import grasp_map, normal_and_tangential
+from grasp_core.closure.contacts import grasp_map, normal_and_tangential
 from grasp_core.quality import wrench_limits
 from grasp_core.quality.wrench_limits import (
     WrenchBody,

@@ -1,4 +1,4 @@
-"""Describes soft contacts: point contacts that also transmit a torque about their normal.
+"""Describes contacts that also transmit a torque about their normal, and proves their closure.
 
 With the coefficients mu of sliding and mu_t of torsion, a length, the normal part n, the tangential
 part t and the torque m about the normal stay in the cone
@@ -17,10 +17,26 @@ normal force, along a twist y with the contact velocity v and the turning w abou
 
 Contacts without torsion, or without friction, have columns of zeros.
 
+The proofs are those of `proofs` in these coordinates x = (n, a), where every cone is n >= |a|. Let
+e_i = n_i - |a_i| be depths, r_i = 1 / mu_i, w the wrench of all x_i, and sigma the sixth singular
+value of the matrix of the A_i. A correction of length c = (|w| + rounding) / sigma balances the
+forces and takes at most sqrt(2) c from each depth, so
+
+    min_i (e_i - sqrt(2) c) / r_i / (sum n_i + sqrt(k) c)  >  0                         (4)
+
+proves closure and bounds the margin from below. A twist y refutes closure if no support is
+positive but for rounding; the largest support M, where it is negative, bounds the margin t:
+
+    t  <=  M / sum_i r_i (M - n_i.v_i).                                                 (5)
+
+For with t r_i <= e_i the shares b_i = n_i - r_i t are at least |a_i|, so that the power of contact
+i is at most b_i s_i + r_i t n_i.v_i, and the sum of the powers is zero.
+
 Source: the elliptical limit surface in Howe & Cutkosky, "Practical force-motion models for sliding
 manipulation", IJRR 15(6), 1996; MuJoCo's documentation, "Computation", on elliptic friction cones.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,8 +45,8 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, cross, frozen, frozen_each
 from grasp_core.checked import LARGEST
-from grasp_core.closure.contact_arrays import unit_size
-from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
+from grasp_core.closure.contacts import WRENCH, contact_frames, grasp_map, in_frames, unit_size
+from grasp_core.closure.proofs import CHECK_SLACK, RANK
 from grasp_core.errors import InputError
 from grasp_core.fields import is_array
 
@@ -172,3 +188,54 @@ class SoftContacts:
         """Move a twist at unit size from the mean contact to the frame's origin, (6,)."""
         turning = twist[3:] / self.size
         return np.concatenate([twist[:3] - cross(turning, self.center), turning])
+
+
+def supports(slopes: Array) -> Array:
+    """Compute the supports s_i of the cones, from powers of local coordinates (k, 4), (k,)."""
+    return slopes[:, 0] + np.linalg.norm(slopes[:, 1:], axis=1)
+
+
+def depths(local: Array) -> Array:
+    """Compute the depths e_i of local coordinates (k, 4) in their cones, (k,)."""
+    return local[:, 0] - np.linalg.norm(local[:, 1:], axis=1)
+
+
+def proved_margin(contacts: SoftContacts, local: Array, caution: float = 1.0) -> float:
+    """Compute the margin (4) that forces and torques prove.
+
+    Takes `local` (k, 4). Gives a lower bound of the optimum of the margin program; minus infinity
+    if there is none.
+    """
+    matrix = contacts.matrix
+    if not (np.isfinite(matrix).all() and np.isfinite(local).all()) or matrix.shape[1] < WRENCH:
+        return -math.inf
+    least = float(np.linalg.svd(matrix, compute_uv=False)[WRENCH - 1])
+    if least <= RANK:
+        return -math.inf
+    rounding = CHECK_SLACK * max(1.0, float(contacts.reach.max()))
+    imbalance = float(np.linalg.norm(matrix @ local.ravel()))
+    # c of (4); its normal parts sum to at most sqrt(k) c
+    corrected = caution * (imbalance + rounding) / least
+    pushes = float(local[:, 0].sum()) + math.sqrt(len(local)) * corrected
+    left = float(((depths(local) - math.sqrt(2.0) * corrected) / contacts.shares).min())
+    return left / pushes if pushes > 0.0 else -math.inf
+
+
+def margin_ceiling(contacts: SoftContacts, twist: Array, caution: float = 1.0) -> float:
+    """Bound the margin of closure from above by (5), with a twist that separates the contacts.
+
+    Takes `twist` (6,). Gives the bound, below zero; zero where the largest support M is zero to
+    within rounding; infinity where M is more, and the twist proves nothing.
+    """
+    length = float(np.linalg.norm(twist))
+    if not 0.0 < length < math.inf:
+        return math.inf
+    slopes = contacts.slopes(twist)
+    each = supports(slopes)
+    if not (each / contacts.longest).max() <= CHECK_SLACK * length:
+        return math.inf
+    rounding = caution * CHECK_SLACK * length * contacts.longest
+    largest = float((each + rounding).max())
+    if largest >= 0.0:
+        return 0.0
+    return largest / float((contacts.shares * (largest - slopes[:, 0] + rounding)).sum())

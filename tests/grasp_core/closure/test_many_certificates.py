@@ -5,11 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from grasp_core.closure.batches.certificates import certificates, closing_margins
-from grasp_core.closure.batches.margins import margin_ceilings, proved_margins
-from grasp_core.closure.contact_arrays import unit_size
-from grasp_core.closure.force_closure import force_closure
-from grasp_core.closure.proofs import margin_ceiling, proved_margin
+from grasp_core.closure.contacts import unit_size
+from grasp_core.closure.force_closure import certificates, closing_margins, force_closure
+from grasp_core.closure.proofs import margin_ceiling, margin_ceilings, proved_margin, proved_margins
 from grasp_core.errors import UndecidedError
 
 SETS = 300

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.soft.contacts import SoftContacts
-from grasp_core.closure.soft.critical_friction import friction_interval
+from grasp_core.closure.soft_closure import friction_interval
+from grasp_core.closure.soft_contacts import SoftContacts
 from tests.judges import random_contacts
 
 CASES = 60
