@@ -19,10 +19,10 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.disc_bounds.program_bounds import AttemptBounds
-from grasp_core.families.batches.settling import Attempt
 from grasp_core.families.constructions import Construction
+from grasp_core.families.disc_bounds import AttemptBounds
 from grasp_core.families.kernel_tables import Attempts
+from grasp_core.families.placing import Attempt
 from grasp_core.planning.blocks import Blocks
 from grasp_core.planning.quadruples import ConedQuadruples, WideQuadruples
 from grasp_core.planning.result import Tally

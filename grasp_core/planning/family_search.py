@@ -10,11 +10,11 @@ from typing import TypeAlias
 
 import numpy as np
 
-from grasp_core.cones.many_quadruples import each_cones_positively_span
-from grasp_core.disc_bounds.program_bounds import AttemptBounds
-from grasp_core.families.batches.settling import Attempt, Settling
+from grasp_core.cones.spanning import each_cones_positively_span
 from grasp_core.families.constructions import Construction
+from grasp_core.families.disc_bounds import AttemptBounds
 from grasp_core.families.free import Absence
+from grasp_core.families.placing import Attempt, Settling
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.planning.best_first import BestFirst
 from grasp_core.planning.blocks import Blocks

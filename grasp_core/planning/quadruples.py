@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, frozen_copy
 from grasp_core.by_value import trusted
-from grasp_core.families.batches.settling import Attempt, Cones
 from grasp_core.families.constructions import LEAST_RADIUS, Construction
+from grasp_core.families.placing import Attempt, Cones
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
 from grasp_core.solvers.ties import graded
 from grasp_core.values import ForceCone, four

@@ -20,7 +20,7 @@ from grasp_core.arrays import Array
 from grasp_core.cones.pyramids import inscribed_facets
 from grasp_core.cones.spanning import balancing_weights, span_angle
 from grasp_core.families.constructions import PAIRINGS
-from grasp_core.families.regulus_program import LEAST_DEPTH
+from grasp_core.families.regulus import LEAST_DEPTH
 from grasp_core.objects.face_pieces import FacePiece, unit_pieces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize

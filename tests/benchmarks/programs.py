@@ -20,8 +20,8 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 import grasp_core as gc
-from grasp_core.disc_bounds.program_bounds import AttemptBounds
 from grasp_core.families import discs, regulus
+from grasp_core.families.disc_bounds import AttemptBounds
 from grasp_core.solvers import lp
 from scenes.example_objects import example_object
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.families import free
 from grasp_core.families import free as patch
-from grasp_core.families import free_contacts
 from grasp_core.families.free import Absence, Undecided, close_patch
 from grasp_core.families.placements import Placement
 from grasp_core.objects.booleans import extrusion
@@ -103,7 +103,7 @@ def test_placements_balance_strictly_inside_their_faces_and_cones():
         assert np.abs(wrench(placed.positions, placed.forces)).max() < TOLERANCE
         assert pushes.sum() == pytest.approx(1.0, abs=TOLERANCE)
         assert (slides < friction * pushes).all()
-        assert insets(pieces, placed.positions).min() > free_contacts.LEAST_INSET - TOLERANCE
+        assert insets(pieces, placed.positions).min() > free.LEAST_INSET - TOLERANCE
         assert insets(pieces, placed.positions).min() == pytest.approx(placed.merit, abs=TOLERANCE)
         assert gc.classify_lines(placed.positions, placed.forces) == "regulus"
     assert len(found) >= 250
@@ -116,7 +116,7 @@ def test_a_linear_program_with_inner_pyramids_accepts_the_placements(every):
         normals = normals_of(pieces)
         assert pyramid_margin(placed.positions, normals, friction, 128, outer=False) > 0.0
         spread = np.linalg.svd(placed.positions - placed.positions.mean(axis=0), compute_uv=False)
-        assert spread[1] > free_contacts.LEAST_INSET
+        assert spread[1] > free.LEAST_INSET
     assert len(found) >= 250 // every
 
 
@@ -266,7 +266,7 @@ def test_a_grasp_of_two_parallel_slabs_is_not_along_one_line():
     placed = place(walls, 0.5)
     assert isinstance(placed, Placement)
     spread = np.linalg.svd(placed.positions - placed.positions.mean(axis=0), compute_uv=False)
-    assert spread[1] > free_contacts.LEAST_INSET
+    assert spread[1] > free.LEAST_INSET
 
 
 def test_friction_must_be_positive():

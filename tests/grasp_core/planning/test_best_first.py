@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.disc_bounds.program_bounds import AttemptBounds
 from grasp_core.errors import SolverError
-from grasp_core.families import discs as largest_discs
-from grasp_core.families.batches.placing import ManyPlacements
+from grasp_core.families import placements as largest_discs
 from grasp_core.families.constructions import CONSTRUCTIONS
+from grasp_core.families.disc_bounds import AttemptBounds
+from grasp_core.families.placing import ManyPlacements
 from grasp_core.planning import best_first as promising_module
 from grasp_core.planning.best_first import BestFirst
 from grasp_core.planning.blocks import all_blocks

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.disc_bounds.program_bounds import KERNELS, AttemptBounds
 from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS
+from grasp_core.families.disc_bounds import KERNELS, AttemptBounds
 from grasp_core.families.kernel_tables import Attempts
 from grasp_core.families.placements import Placement
 from grasp_core.objects.face_pieces import face_shapes

@@ -1,13 +1,13 @@
-"""Reference for the kernel of `corner_bounds`: its bounds (1) and (2) in NumPy."""
+"""Reference for the kernel of `corner_bounds_kernel`: its bounds (1) and (2) in NumPy."""
 
 from itertools import combinations
 
 import numpy as np
 
 from grasp_core.cones.spanning import balancing_weights
-from grasp_core.disc_bounds.corner_bounds_kernel import SAME_AXIS
 from grasp_core.families.concurrent import concurrent_radius_bounds
 from grasp_core.families.constructions import PAIRINGS
+from grasp_core.families.corner_bounds_kernel import SAME_AXIS
 from grasp_core.families.pencil import pencil_radius_bounds
 from grasp_core.values import FINGERS
 

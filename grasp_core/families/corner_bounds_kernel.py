@@ -1,6 +1,6 @@
 """Bounds discs from above by the corners of the faces, in compiled code.
 
-Numbers in comments are those of the derivation in `disc_bounds.corner_bounds`.
+Numbers in comments are those of the derivation in `disc_bounds`.
 """
 
 import numpy as np

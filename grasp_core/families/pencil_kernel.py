@@ -1,16 +1,16 @@
-"""Places pencil grasps for many attempts, with the program of `families.pencil`.
+"""Places and bounds pencil grasps for many attempts, with the program of `pencil`.
 
-Numbers in comments are those of its derivation.
+Numbers in comments are those of its derivation. Bounds are those of programs with one common
+radius, in both cells; `discs_kernel` says why one radius is enough. Their ball about each focus is
+no larger than needed, R = r + the largest depth, which leaves the variables (x0, k, r).
 """
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
-from grasp_core.families.attempts_kernel import FINGERS, edges_of
-from grasp_core.families.batches.discs_kernel import Program, largest_discs
-from grasp_core.families.batches.placed import LEFT, NONE, PLACED, Placed
-from grasp_core.families.kernel_tables import Attempts, FaceTable
+from grasp_core.families.discs_kernel import Program, bounded, edges_of, largest_discs, room_for
+from grasp_core.families.kernel_tables import LEFT, NONE, PLACED, Attempts, FaceTable, Placed
 from grasp_core.families.pencil import BALL, CELL_A, CELL_B, RADII, SMALLEST, VARIABLES, K
 from grasp_core.geometry.vectors_kernel import (
     angle_between,
@@ -18,11 +18,15 @@ from grasp_core.geometry.vectors_kernel import (
     dotted,
     focus_direction,
 )
+from grasp_core.solvers.lp_kernel import Rows
 from grasp_core.solvers.ties import SAME_SHARE
+from grasp_core.values import FINGERS
 
 FIRST_RADIUS = RADII.start
 SIGN_A, SIGN_B = CELL_A[0], CELL_B[0]
 """Sign of k u in the focus of the first two fingers, for the two orders of the foci."""
+BOUND_VARIABLES = 5
+"""Number of variables (x0, k, r) of a bound's program."""
 
 
 @loop("numpy")
@@ -180,3 +184,126 @@ def _take(
             placed.forces[a, finger, j] = weights[finger] * axes[finger, j] / pushes
         placed.foci[a, 0, j] = x[j] + sign * x[K] * u[j]
         placed.foci[a, 1, j] = x[j] - sign * x[K] * u[j]
+
+
+@loop()
+def pencil_bounds(
+    faces: FaceTable, attempts: Attempts, least_gap: float, least: float, bounds: Array
+) -> None:
+    """Bound the discs of pencil grasps from above, for both orders of the foci.
+
+    Takes `attempts` (0, 1) or (2, 3); `bounds` (a,).
+    """
+    room = np.empty((BOUND_VARIABLES + 2) * (1 + FINGERS * (2 + faces.E.shape[1])))
+    for a in range(len(bounds)):
+        u, edges = focus_direction(attempts.axes[a]), edges_of(faces, attempts, a)
+        bounds[a] = -np.inf
+        for cell in (SIGN_A, SIGN_B):
+            near = FINGERS if cell == SIGN_B else 0
+            rows, row = room_for(room, BOUND_VARIABLES, 1 + FINGERS + edges + near), 1
+            # the foci are 2 k apart
+            rows.At[K, 0], rows.b[0] = -2.0, -least_gap
+            for finger in range(FINGERS):
+                depth = _depth_along(faces, attempts, (a, finger), cell, u)
+                row = _bound_ball_row(faces, attempts, (a, finger), depth, rows, row)
+                row = _bound_edge_rows(faces, attempts, (a, finger, u), depth, rows, row)
+                if near:
+                    row = _bound_near_row(faces, attempts, (a, finger, u), depth, rows, row)
+            bounds[a] = max(bounds[a], bounded(rows, max(least, bounds[a])))
+
+
+@loop()
+def _depth_along(
+    faces: FaceTable, attempts: Attempts, place: tuple[int, int], cell: float, u: Array
+) -> tuple[Array, float, float]:
+    """Express a finger's distance s from its focus by (1), as a linear function.
+
+    Gives its slopes in (x0, k), its constant, and the sign of k u.
+    """
+    a, finger = place
+    face, s = attempts.faces[a, finger], np.empty(K + 1)
+    n, o = faces.normals[face], faces.origins[face]
+    along = dotted(n, attempts.axes[a, finger])
+    sign = cell if finger < FINGERS // 2 else -cell
+    for j in range(3):
+        s[j] = n[j] / along
+    s[K] = sign * dotted(n, u) / along
+    return s, -dotted(n, o) / along, sign
+
+
+@loop()
+def _bound_ball_row(
+    faces: FaceTable,
+    attempts: Attempts,
+    place: tuple[int, int],
+    depth: tuple[Array, float, float],
+    rows: Rows,
+    row: int,
+) -> int:
+    """Fill in row (2), which keeps the ball about a focus in the cones of a disc's points."""
+    (a, finger), (s, s0, _) = place, depth
+    face, psi, largest = attempts.faces[a, finger], attempts.half_angles[a], 0.0
+    for other in range(FINGERS):
+        largest = max(largest, faces.depths[attempts.faces[a, other]])
+    lean = angle_between(faces.normals[face], attempts.axes[a, finger])
+    for j in range(K + 1):
+        rows.At[j, row] = -np.sin(psi) * s[j]
+    rows.At[-1, row] = 2.0 if lean >= psi else 1.0 + np.cos(psi - lean)  # 1 + kappa
+    # (6), for this disc in (2) and for the largest R of (3)
+    rows.b[row] = np.sin(psi) * s0 - faces.depths[face] - largest
+    return row + 1
+
+
+@loop()
+def _bound_edge_rows(
+    faces: FaceTable,
+    attempts: Attempts,
+    setting: tuple[int, int, Array],
+    depth: tuple[Array, float, float],
+    rows: Rows,
+    row: int,
+) -> int:
+    """Fill in rows that keep the disc around a contact inside its face."""
+    (a, finger, u), (s, s0, sign) = setting, depth
+    face, axis = attempts.faces[a, finger], attempts.axes[a, finger]
+    T, o = faces.frames[face], faces.origins[face]
+    for e in range(faces.edges[face]):
+        back, far, high = 0.0, 0.0, 0.0
+        for j in range(3):
+            edge = T[j, 0] * faces.E[face, e, 0] + T[j, 1] * faces.E[face, e, 1]
+            rows.At[j, row] = edge
+            back += edge * axis[j]
+            far += edge * u[j]
+            high += edge * o[j]
+        # along u, k moves the focus c
+        rows.At[K, row], rows.At[-1, row] = sign * far, 1.0
+        # the disc lies s back from c along the axis
+        for j in range(K + 1):
+            rows.At[j, row] -= back * s[j]
+        rows.b[row] = faces.b[face, e] + back * s0 + high
+        row += 1
+    return row
+
+
+@loop()
+def _bound_near_row(
+    faces: FaceTable,
+    attempts: Attempts,
+    setting: tuple[int, int, Array],
+    depth: tuple[Array, float, float],
+    rows: Rows,
+    row: int,
+) -> int:
+    """Fill in row (5), by which a focus of cell B does not pass the other pair's crossing point."""
+    (a, finger, u), (s, s0, sign) = setting, depth
+    face = attempts.faces[a, finger]
+    toward = sign * dotted(attempts.axes[a, finger], u)
+    across, T = abs(dotted(faces.normals[face], u)), faces.frames[face]
+    for j in range(K + 1):
+        rows.At[j, row] = -toward * s[j]
+    rows.At[K, row] += 2.0
+    # r |T'u| of (5)
+    rows.At[-1, row] = np.hypot(dotted(T[:, 0], u), dotted(T[:, 1], u))
+    # (6) takes eps |n.u| from the limit
+    rows.b[row] = toward * s0 - faces.depths[face] * across
+    return row + 1

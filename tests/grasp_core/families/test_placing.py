@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from grasp_core.families.batches import placing
-from grasp_core.families.batches.discs_kernel import optimum
-from grasp_core.families.batches.placed import LEFT, NONE, PLACED
-from grasp_core.families.batches.placing import ManyPlacements
+from grasp_core.families import placing
 from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS, MIXED, regions_of
+from grasp_core.families.discs_kernel import optimum
+from grasp_core.families.kernel_tables import LEFT, NONE, PLACED
 from grasp_core.families.placements import Placement
+from grasp_core.families.placing import ManyPlacements
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.blocks import all_blocks
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, PlannedCones
@@ -129,7 +129,7 @@ def test_what_compiled_code_leaves_is_left(monkeypatch):
             kernel.place(*given)
             given[-1].ends[::2] = LEFT
 
-        return SimpleNamespace(place=place) if "concurrent" in name else kernel
+        return SimpleNamespace(place=place, footprints=kernel.footprints)
 
     monkeypatch.setattr(placing, "compiled", leaving)
     asked = [(*each, LEAST_RADIUS) for each in listed]

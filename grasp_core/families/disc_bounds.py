@@ -1,4 +1,6 @@
-"""Bounds discs from above by the corners of the faces alone, which costs almost no time.
+"""Bounds discs from above: by the corners of the faces alone, or by small linear programs.
+
+Reach, width and heights across bound discs by the corners alone, which costs almost no time.
 
 Reach. With positive weights w of sum w_i a_i = 0 for the axes, and contacts c_i on the faces,
 sum w_i a_i.(x0 - c_i) = -sum w_i a_i.c_i wherever the focus x0 is. So the weighted mean of the
@@ -28,24 +30,39 @@ it makes the left side of (3) larger by
 
 (3) and (4) spare programs that would find discs below the least radius, or below those already
 found.
+
+Programs. An attempt is four faces in the order of the fingers, with a force cone each. Where a
+construction has discs, the bound is the value of the first program of `largest_discs`, which
+maximises the smallest radius, on the convex hulls of the faces: no choice of their pieces offers
+more. For reguli the bound only says whether any slopes are feasible on the hulls.
 """
 
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
+from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
 from grasp_core.families.concurrent import concurrent_radius_bounds
-from grasp_core.families.constructions import PAIRINGS
-from grasp_core.families.kernel_tables import Corners
+from grasp_core.families.constructions import LEAST_RADIUS, PAIRINGS, Construction
+from grasp_core.families.kernel_tables import Attempts, Corners, FaceTable, face_table
 from grasp_core.families.pencil import pencil_radius_bounds
+from grasp_core.families.regulus import regulus_bounds
+from grasp_core.objects.face_pieces import Shapes
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.values import FINGERS
+from grasp_core.solvers.lp import RESIDUAL
+from grasp_core.values import FINGERS, Family
 
-KERNEL = "grasp_core.disc_bounds.corner_bounds_kernel"
+KERNEL = "grasp_core.families.corner_bounds_kernel"
 LEAST_SINE = 1e-6
 """Half angles between axes with a sine up to this are so small that they bound no width."""
+KERNELS: dict[Family, str] = {
+    "concurrent": "grasp_core.families.concurrent_kernel",
+    "pencil": "grasp_core.families.pencil_kernel",
+}
 
 
 def corners_of(body: Polyhedron) -> Corners:
@@ -116,3 +133,45 @@ def widths_apart(faces: Indices, apart: Array, halves: Array, leaning: Array) ->
         bound = np.where(sines > LEAST_SINE, apart[pair] / np.maximum(sines, LEAST_SINE), np.inf)
         widths[:, i, j] = widths[:, j, i] = bound
     return widths
+
+
+@dataclass(frozen=True, eq=False)
+class AttemptBounds:
+    """Upper bounds on disc radii for attempts on one object's faces."""
+
+    shapes: Shapes
+
+    def of(self, construction: Construction, attempts: Attempts, least: float) -> Array:
+        """Bound the smallest radius from above, (a,) [object radii]; infinite if not proved.
+
+        For reguli the bounds are infinite or, where no slopes are feasible, minus infinity.
+        """
+        attempts = Attempts(
+            np.ascontiguousarray(attempts.faces),
+            np.ascontiguousarray(attempts.axes),
+            np.ascontiguousarray(attempts.half_angles),
+        )
+        if construction.limits is None:
+            return self._of_reguli(attempts)
+        # hulls stand for faces of several pieces: they offer no less than any piece
+        kernel = compiled(KERNELS[construction.family])
+        bounds = np.empty(len(attempts.faces))
+        if construction.family == "pencil":
+            kernel.pencil_bounds(self._table, attempts, LEAST_RADIUS, least, bounds)
+        else:
+            turns = np.array(facet_turns(PYRAMID_SIDES))
+            kernel.concurrent_bounds(self._table, attempts, turns, least, bounds)
+        # a proved bound may be off by what the check of multipliers allows
+        return bounds + RESIDUAL
+
+    def _of_reguli(self, attempts: Attempts) -> Array:
+        bounds = np.full(len(attempts.faces), np.inf)
+        merits, _ = regulus_bounds(self._table, attempts, -np.inf)
+        # merits are no radii: only a proof that excludes all slopes tells anything
+        bounds[merits == -np.inf] = -np.inf
+        return bounds
+
+    @cached_property
+    def _table(self) -> FaceTable:
+        """Put the hulls of all faces into one table."""
+        return face_table([shape.hull if shape else None for shape in self.shapes])
