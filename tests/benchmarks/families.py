@@ -33,8 +33,8 @@ from grasp_core.families.regulus import (
     slope_at,
 )
 from grasp_core.objects.face_pieces import face_shapes
-from grasp_core.planning.blocks import spanning_blocks
 from grasp_core.planning.planned_cones import NORMAL, PlannedCones
+from grasp_core.planning.quadruples import spanning_blocks
 from grasp_core.solvers.lp import LinearProgram, Optimum, _by_highs
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object

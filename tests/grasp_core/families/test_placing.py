@@ -12,8 +12,8 @@ from grasp_core.families.kernel_tables import LEFT, NONE, PLACED
 from grasp_core.families.placements import Placement
 from grasp_core.families.placing import ManyPlacements
 from grasp_core.objects.face_pieces import face_shapes
-from grasp_core.planning.blocks import all_blocks
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, PlannedCones
+from grasp_core.planning.quadruples import all_blocks
 from grasp_core.values import ForceCone, four
 from scenes.example_objects import example_object
 from tests.grasp_core.curved import curved_body

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-import grasp_core.regions.cover_search as search
+import grasp_core.regions.largest_discs as search
 from grasp_core.closure.contacts import contact_frames
 from grasp_core.regions.proof import SLACK
 from grasp_core.regions.sites import Sites

@@ -21,9 +21,8 @@ from grasp_core.planning.given_contacts import seat
 from grasp_core.quality import wrench_limits
 from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.records.contacts_json import ContactSet
-from grasp_core.regions.centers import larger_inside
-from grasp_core.regions.cover_search import search_cover
-from grasp_core.regions.largest_discs import Grounds, Proved
+from grasp_core.regions.growth import larger_inside
+from grasp_core.regions.largest_discs import Grounds, Proved, search_cover
 from grasp_core.regions.sites import Sites
 from scenes.example_objects import example_object
 from sim_validate import contact_analysis as analysis

@@ -5,16 +5,15 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.errors import SolverError
-from grasp_core.families import placements as largest_discs
+from grasp_core.families import placements
 from grasp_core.families.constructions import CONSTRUCTIONS
 from grasp_core.families.disc_bounds import AttemptBounds
 from grasp_core.families.placing import ManyPlacements
-from grasp_core.planning import best_first as promising_module
-from grasp_core.planning.best_first import BestFirst
-from grasp_core.planning.blocks import all_blocks
-from grasp_core.planning.family_search import SAME_MERIT
+from grasp_core.planning import family_search as promising_module
+from grasp_core.planning.family_search import SAME_MERIT, BestFirst
 from grasp_core.planning.methods import prepared
 from grasp_core.planning.planned_cones import PlannedCones
+from grasp_core.planning.quadruples import all_blocks
 from grasp_core.planning.request import PlanRequest
 from grasp_core.planning.result import Tally
 from scenes.example_objects import example_object
@@ -118,7 +117,7 @@ def test_quadruples_come_in_the_order_of_their_bounds_and_only_as_asked_for(name
 
 def test_a_program_that_fails_leaves_its_attempt_to_the_search(monkeypatch):
     """Every attempt comes to its whole programs, some of which have no answer here."""
-    body, calls, solve = example_object("random-10-1"), [], largest_discs.maximize_above
+    body, calls, solve = example_object("random-10-1"), [], placements.maximize_above
 
     def sometimes(program, cutoff):
         calls.append(program)
@@ -129,7 +128,7 @@ def test_a_program_that_fails_leaves_its_attempt_to_the_search(monkeypatch):
     expected = gc.plan(body, 0.4, families="concurrent", limit=5).grasps
     monkeypatch.setattr(ManyPlacements, "of", lambda _, __, asked: [None] * len(asked))
     monkeypatch.setattr(AttemptBounds, "of", lambda *args: np.full(len(args[2].faces), np.inf))
-    monkeypatch.setattr(largest_discs, "maximize_above", sometimes)
+    monkeypatch.setattr(placements, "maximize_above", sometimes)
     plan = gc.plan(body, 0.4, families="concurrent", limit=5)
     assert len(calls) >= 20
     assert len(plan.grasps) == 5
