@@ -132,7 +132,8 @@ class Answer:
     margin: float
     """Optimum of the program as the solver found it, dimensionless; only `closed` is proved."""
     forces: Array
-    """Balancing forces, (k, 3); they prove closure if `closed` is True."""
+    """Balancing forces, (k, 3), or local coordinates of soft ones, (k, 4); they prove closure if `closed`
+    is True."""
     twist: Array
     """Twist of the dual program, (6,); it refutes closure if `closed` is False."""
     closed: bool | None
@@ -237,7 +238,7 @@ def _twist_sparing_interior_forces(
             arms[rest[balanced]], normals[rest[balanced]], friction[rest[balanced]]
         )
         # a force inside its cone can work along every velocity of its contact, so that must be zero
-        twists = _null_space(generators.T @ twists, twists)
+        twists = null_space(generators.T @ twists, twists)
         rest = rest[~balanced]
         if not twists.shape[1]:
             return None
@@ -251,7 +252,7 @@ def _twist_sparing_interior_forces(
             return None
 
 
-def _null_space(rows: Array, basis: Array) -> Array:
+def null_space(rows: Array, basis: Array) -> Array:
     """Return a basis of the vectors in the span of `basis` (columns) that `rows` maps to 0."""
     if not rows.size:
         return basis

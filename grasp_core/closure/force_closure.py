@@ -236,60 +236,42 @@ def force_closure(
     points, units = contact_arrays(positions, normals)
     mu = contact_frictions(friction, len(points))
     torsions = contact_torsions(torsion_m, mu)
-    if torsions is not None:
-        return _with_torsion(points, units, mu, torsions)
-    arms, center, size = unit_size(points)
-    answer = decide(arms, units, mu)
-    if answer.closed is not None:
-        forces, wrench = None, None
+    forces, wrench, torques = None, None, None
+    if torsions is None:
+        arms, center, size = unit_size(points)
+        answer = decide(arms, units, mu)
         if answer.closed:
             # (2) exactly: scaling forces leaves (1) and the sign of (3) alone
             forces = answer.forces / float(np.einsum("ki,ki->", answer.forces, units))
-        else:
-            wrench = _about_origin(answer.twist, center, size)
-        found = ClosureCertificate(answer.closed, answer.margin, points, units, mu, forces, wrench)
+        elif answer.closed is False:
+            turning = answer.twist[3:] / size
+            wrench = np.concatenate([answer.twist[:3] - cross(turning, center), turning])
+    else:
+        contacts = SoftContacts.of(points, units, mu, torsions)
+        answer = soft_closure.decide(contacts)
+        if answer.closed:
+            local = answer.forces / float(answer.forces[:, 0].sum())
+            forces, torques = contacts.in_space(local)
+        elif answer.closed is False:
+            wrench = contacts.about_origin(answer.twist)
+    if answer.closed is not None:
+        found = ClosureCertificate(
+            answer.closed, answer.margin, points, units, mu, forces, wrench, torsions, torques
+        )
         # a caution above one leaves room for `verify` to round otherwise on another processor
         found = replace(found, margin=found.proved(CAUTION))
         if found.verify():
             return found
-    raise UndecidedError(_why_undecided(answer.margin))
-
-
-def _with_torsion(
-    points: Array, units: Array, friction: Array, torsions: Array
-) -> ClosureCertificate:
-    contacts = SoftContacts.of(points, units, friction, torsions)
-    answer = soft_closure.decide(contacts)
-    if answer.closed is not None:
-        forces, wrench, torques = None, None, None
-        if answer.closed:
-            forces, torques = contacts.in_space(answer.local / float(answer.local[:, 0].sum()))
-        else:
-            wrench = contacts.about_origin(answer.twist)
-        found = ClosureCertificate(
-            answer.closed, answer.margin, points, units, friction, forces, wrench, torsions, torques
-        )
-        found = replace(found, margin=found.proved(CAUTION))
-        if found.verify():
-            return found
-    raise UndecidedError(_why_undecided(answer.margin))
-
-
-def _why_undecided(margin: float) -> str:
-    if abs(margin) < UNSAFE:
-        return (
-            f"the closure margin is {margin:.2g}, too close to zero to decide; change the "
+    if abs(answer.margin) < UNSAFE:
+        raise UndecidedError(
+            f"the closure margin is {answer.margin:.2g}, too close to zero to decide; change the "
             "friction or the contacts slightly"
         )
-    return (
-        f"neither force closure nor its opposite can be proved (margin {margin:.2g}): contacts or "
-        "normals nearly coincide, or lie nearly on a line; move them apart or leave some out"
+    raise UndecidedError(
+        f"neither force closure nor its opposite can be proved (margin {answer.margin:.2g}): "
+        "contacts or normals nearly coincide, or lie nearly on a line; move them apart or leave "
+        "some out"
     )
-
-
-def _about_origin(twist: Array, center: Array, size: Array) -> Array:
-    turning = twist[3:] / size
-    return np.concatenate([twist[:3] - cross(turning, center), turning])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -428,10 +428,7 @@ class Ends:
         self.trials += 1
         root = friction - margin / slope if slope > 0.0 and math.isfinite(margin) else math.nan
         if self.lower < root < self.upper and self.trials % HALVING:
-            past = NUDGE * FRICTION_ACCURACY * root + OVERSHOOT * (root - friction) ** 2 / root
-            if self.upper - root > root - self.lower:
-                return root + min(past, 0.5 * (self.upper - root))
-            return root - min(past, 0.5 * (root - self.lower))
+            return slightly_past(root, friction, self.lower, self.upper)
         if self.lower > 0.0:
             return _between(self.lower, self.upper)
         self.share *= self.share
@@ -455,6 +452,14 @@ def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tupl
     with np.errstate(over="ignore"):  # contacts that hardly slide are separated at any friction
         ratios = -along / np.maximum(across, np.finfo(np.float64).tiny)
     return twist, float(ratios.min(initial=2.0 * LARGEST_FRICTION))
+
+
+def slightly_past(root: float, trial: float, lower: float, upper: float) -> float:
+    """Move a root by Newton's method past itself, towards the wider side of an interval."""
+    past = NUDGE * FRICTION_ACCURACY * root + OVERSHOOT * (root - trial) ** 2 / root
+    if upper - root > root - lower:
+        return root + min(past, 0.5 * (upper - root))
+    return root - min(past, 0.5 * (root - lower))
 
 
 def _between(lower: float, upper: float) -> float:

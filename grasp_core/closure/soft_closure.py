@@ -33,7 +33,24 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contacts import WRENCH
-from grasp_core.closure.decision import departing_twist
+from grasp_core.closure.decision import (
+    DECIDED,
+    INTERIOR,
+    NEWTON_STEPS,
+    TOUCHING,
+    Answer,
+    departing_twist,
+    null_space,
+)
+from grasp_core.closure.friction_interval import FRICTIONLESS, NEARLY_AT_REST
+from grasp_core.closure.friction_search import (
+    FIRST_TRIAL,
+    FRICTION_ACCURACY,
+    HALVING,
+    MOST_TRIALS,
+    NUDGE,
+    slightly_past,
+)
 from grasp_core.closure.proofs import RANK, SMALLEST_NORMAL
 from grasp_core.closure.soft_contacts import (
     LOCAL,
@@ -46,57 +63,21 @@ from grasp_core.closure.soft_contacts import (
 from grasp_core.errors import SolverError
 from grasp_core.solvers.conic import ConicProgram, minimize
 
-DECIDED = 1e-9
-"""Distance of a margin from zero below which a certificate alone decides: a hundred times the
-tolerance that the solver is asked for."""
-INTERIOR = 1e-6
-"""Depth in a cone above which a force counts as interior, if normal parts sum to 1: far more than
-the solver leaves on a boundary."""
-TOUCHING = 1e-9
-"""Supports of a unit twist above minus this value count as zero: the tolerance of the solver."""
-NEWTON_STEPS = 3
-LEAST_FRICTION = 1e-6
-"""Smallest friction that is tried, as for hard contacts."""
-ACCURACY = 5e-8
-"""Width of the final interval relative to its upper end, as for hard contacts."""
-FIRST_TRIAL = 0.5
-MOST_TRIALS = 80
-"""Largest number of trials: ten are usual."""
-HALVING = 6
-"""Number of trials after which the interval is halved once, whatever Newton's method suggests."""
-NUDGE = 0.4
-"""Share of the accuracy by which trials pass the expected threshold, to close in from both sides.
-"""
 INFLATED = (1e-9, 1e-8)
 """Relative amounts by which the friction (2) is raised before its proof, tried in turn."""
-AT_REST = 1e-9
-"""Speed below which a contact counts as at rest, for unit twists."""
 WIDENED = 4.0
 """Factor by which trials go away from a friction at which nothing can be proved."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SoftAnswer:
-    """The solution of the program (1), and the verdict on force closure that it proves."""
-
-    margin: float
-    """Optimum of the program as the solver found it, dimensionless; only `closed` is proved."""
-    local: Array
-    """Balancing local coordinates, (k, 4); they prove closure if `closed` is True."""
-    twist: Array
-    """Twist of the dual program, (6,); it refutes closure if `closed` is False."""
-    closed: bool | None
-    """The verdict; None where neither closure nor its opposite is proved."""
-
-
-def decide(contacts: SoftContacts) -> SoftAnswer:
-    """Decide force closure of soft contacts at unit size."""
+def decide(contacts: SoftContacts) -> Answer:
+    """Decide force closure of soft contacts at unit size; forces are local coordinates (k, 4)."""
     try:
         margin, local, twist = margin_program(contacts.matrix, contacts.shares)
     except SolverError:
-        return SoftAnswer(math.nan, *_nothing(len(contacts.friction)), closed=None)
+        nothing = np.zeros((len(contacts.friction), LOCAL))
+        return Answer(math.nan, nothing, np.zeros(WRENCH), closed=None)
     if proved_margin(contacts, local) > 0.0:
-        return SoftAnswer(margin, local, twist, closed=True)
+        return Answer(margin, local, twist, closed=True)
     candidates = [twist]
     if abs(margin) < DECIDED:
         candidates.append(_touching(contacts, twist))
@@ -104,8 +85,8 @@ def decide(contacts: SoftContacts) -> SoftAnswer:
     candidates += [] if sparing is None else [sparing, _touching(contacts, sparing)]
     for each in candidates:
         if margin_ceiling(contacts, each) <= 0.0:
-            return SoftAnswer(margin, local, each, closed=False)
-    return SoftAnswer(margin, local, twist, closed=None)
+            return Answer(margin, local, each, closed=False)
+    return Answer(margin, local, twist, closed=None)
 
 
 def margin_program(balance: Array, shares: Array) -> tuple[float, Array, Array]:
@@ -132,10 +113,6 @@ def margin_program(balance: Array, shares: Array) -> tuple[float, Array, Array]:
     # what the solver leaves of the imbalance is taken off by least squares
     x = x - np.asarray(np.linalg.lstsq(balance, balance @ x, rcond=None)[0], dtype=np.float64)
     return float(solution.x[-1]) / least, x.reshape(k, LOCAL), -solution.z[:m]
-
-
-def _nothing(count: int) -> tuple[Array, Array]:
-    return np.zeros((count, LOCAL)), np.zeros(WRENCH)
 
 
 def _touching(contacts: SoftContacts, twist: Array) -> Array:
@@ -169,7 +146,7 @@ def _sparing(contacts: SoftContacts, local: Array) -> Array | None:
             return None
         # a force inside its cone can work along all that its contact feels, so that must be zero
         held = contacts.A[rest[balanced]].transpose(0, 2, 1).reshape(-1, WRENCH)
-        twists = _null_space(held @ twists, twists)
+        twists = null_space(held @ twists, twists)
         rest = rest[~balanced]
         if not twists.shape[1]:
             return None
@@ -184,12 +161,6 @@ def _sparing(contacts: SoftContacts, local: Array) -> Array | None:
             return twists @ reduced
         if margin > DECIDED:
             return None
-
-
-def _null_space(rows: Array, basis: Array) -> Array:
-    """Return a basis of the vectors in the span of `basis` (columns) that `rows` maps to 0."""
-    _, values, right = np.linalg.svd(rows)
-    return basis @ right[int((values > RANK).sum()) :].T
 
 
 @dataclass(slots=True)
@@ -215,14 +186,16 @@ class SoftInterval:
     @property
     def narrow(self) -> bool:
         """Whether the interval is as narrow as asked for."""
-        return self.upper - self.lower <= ACCURACY * self.lower or self.upper <= LEAST_FRICTION
+        return (
+            self.upper - self.lower <= FRICTION_ACCURACY * self.lower or self.upper <= FRICTIONLESS
+        )
 
     def close(self, forces: Array, torques: Array, friction: float) -> None:
         """Lower the upper end to the friction that forces need, or at which they were found."""
         contacts = self.contacts
         needed = needed_friction(contacts, forces, torques)
         for tried in (*(needed * (1.0 + more) for more in INFLATED), friction):
-            tried = max(tried, LEAST_FRICTION)
+            tried = max(tried, FRICTIONLESS)
             if not tried <= min(friction, self.upper):
                 continue
             local = contacts.at_friction(tried).local(forces, torques)
@@ -239,7 +212,7 @@ class SoftInterval:
 
     def _separated(self, twist: Array) -> float:
         slopes = self.contacts.at_friction(1.0).slopes(twist)
-        slopes = slopes[np.abs(slopes).max(axis=1) > AT_REST * float(np.linalg.norm(twist))]
+        slopes = slopes[np.abs(slopes).max(axis=1) > NEARLY_AT_REST * float(np.linalg.norm(twist))]
         along, across = np.minimum(slopes[:, 0], 0.0), np.hypot(slopes[:, 1], slopes[:, 2])
         room = np.sqrt(np.maximum(along**2 - slopes[:, 3] ** 2, 0.0))
         tiny = np.finfo(np.float64).tiny
@@ -265,14 +238,14 @@ def friction_interval(contacts: SoftContacts, highest: float) -> SoftInterval:
     for count in range(MOST_TRIALS):
         if found.narrow or not math.isfinite(found.upper):
             break
-        root = _try(found, max(trial, LEAST_FRICTION))
+        root = _try(found, max(trial, FRICTIONLESS))
         if found.lower < trial < found.upper:
             # nothing is proved at the trial, probably the threshold: close in from both sides
-            away = max(WIDENED * away, NUDGE * ACCURACY * trial)
+            away = max(WIDENED * away, NUDGE * FRICTION_ACCURACY * trial)
             above = trial + away if trial + away < found.upper else found.upper
             below = max(trial - away, found.lower)
             _try(found, above)
-            _try(found, max(below, LEAST_FRICTION))
+            _try(found, max(below, FRICTIONLESS))
             if found.upper <= above and found.lower >= below:
                 break
             continue
@@ -283,10 +256,7 @@ def friction_interval(contacts: SoftContacts, highest: float) -> SoftInterval:
 def _next(found: SoftInterval, root: float, trial: float, *, halve: bool) -> float:
     lower, upper = found.lower, found.upper
     if lower < root < upper and not halve:
-        past = NUDGE * ACCURACY * root + (root - trial) ** 2 / root
-        if upper - root > root - lower:
-            return root + min(past, 0.5 * (upper - root))
-        return root - min(past, 0.5 * (root - lower))
+        return slightly_past(root, trial, lower, upper)
     return math.sqrt(lower * upper) if lower > 0.0 else 0.1 * upper
 
 
