@@ -132,8 +132,8 @@ class Answer:
     margin: float
     """Optimum of the program as the solver found it, dimensionless; only `closed` is proved."""
     forces: Array
-    """Balancing forces, (k, 3), or local coordinates of soft ones, (k, 4); they prove closure if `closed`
-    is True."""
+    """Balancing forces, (k, 3), or local coordinates of soft contacts, (k, 4); they prove closure
+    if `closed` is True."""
     twist: Array
     """Twist of the dual program, (6,); it refutes closure if `closed` is False."""
     closed: bool | None

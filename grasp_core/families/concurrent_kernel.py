@@ -32,7 +32,6 @@ from grasp_core.families.kernel_tables import (
 )
 from grasp_core.geometry.polygons import ON_LINE
 from grasp_core.geometry.vectors_kernel import across, balancing_weights, dotted
-from grasp_core.solvers.lp_kernel import Rows
 from grasp_core.solvers.ties import SAME_SHARE
 from grasp_core.values import FINGERS
 
@@ -66,8 +65,12 @@ def place(
             )
             row = 0
             for finger in range(FINGERS):
+                facets, r = (turns, patterns[p, finger]), FIRST_RADIUS + finger
                 place = (a, finger, row)
-                row = _finger_rows(faces, attempts, place, (turns, patterns[p, finger]), program)
+                row = _finger_rows(faces, attempts, place, facets, program.A, program.b, r)
+                # r <= r_i: the program maximises the smallest radius
+                program.A[row, LEAST], program.A[row, r] = 1.0, -1.0
+                row += 1
             end, merit = largest_discs(program, worth, x)
             if end == LEFT:
                 placed.ends[a] = LEFT
@@ -84,14 +87,16 @@ def _finger_rows(
     attempts: Attempts,
     place: tuple[int, int, int],
     facets: tuple[Array, float],
-    program: Program,
+    A: Array,
+    b: Array,
+    r: int,
 ) -> int:
-    """Fill in the rows of one finger from a place on; return the next place."""
-    (a, finger, row), (turns, side), A, b = place, facets, program.A, program.b
+    """Fill in rows (1) and (2) of one finger, its radius in column r; return the next place."""
+    (a, finger, row), (turns, side) = place, facets
     sine, cosine = facet_sines(attempts.half_angles[a], len(turns))
     # (4): the sign of the facets is the side
     sine, cosine = side * sine, side * cosine
-    face, y, r = attempts.faces[a, finger], 3 + 2 * finger, FIRST_RADIUS + finger
+    face, y = attempts.faces[a, finger], 3 + 2 * finger
     axis, T, o = attempts.axes[a, finger], faces.frames[face], faces.origins[face]
     first, second = across(axis, T)
     for m in range(len(turns)):
@@ -103,7 +108,7 @@ def _finger_rows(
             flat_too += g * T[j, 1]
             height += g * o[j]
             lean += g * faces.normals[face, j]
-        # (1), with the radius r_i of this disc
+        # r |T'g| of (1), for this disc
         A[row, y], A[row, y + 1] = flat, flat_too
         A[row, r] = np.sqrt(flat * flat + flat_too * flat_too)
         # (3) takes eps |g.n| from the limit
@@ -114,9 +119,7 @@ def _finger_rows(
         A[row, y], A[row, y + 1] = faces.E[face, e, 0], faces.E[face, e, 1]
         A[row, r], b[row] = 1.0, faces.b[face, e]
         row += 1
-    # r <= r_i: the program maximises the smallest radius
-    A[row, LEAST], A[row, r] = 1.0, -1.0
-    return row + 1
+    return row
 
 
 @loop("numpy")
@@ -281,52 +284,6 @@ def concurrent_bounds(
                 continue
             row = 0
             for finger in range(FINGERS):
-                row = _aim_rows(faces, attempts, (a, finger), (turns, side), rows, row)
-                row = _inside_rows(faces, attempts.faces[a, finger], finger, rows, row)
+                place, r = (a, finger, row), BOUND_VARIABLES - 1
+                row = _finger_rows(faces, attempts, place, (turns, side), rows.At.T, rows.b, r)
             bounds[a] = max(bounds[a], bounded(rows, max(least, bounds[a])))
-
-
-@loop()
-def _aim_rows(
-    faces: FaceTable,
-    attempts: Attempts,
-    place: tuple[int, int],
-    facets: tuple[Array, float],
-    rows: Rows,
-    row: int,
-) -> int:
-    """Fill in rows (1), which keep the focus x0 in the cones of every point of a disc."""
-    (a, finger), (turns, side) = place, facets
-    sine, cosine = facet_sines(attempts.half_angles[a], len(turns))
-    # (4): a focus behind the finger turns the facets round
-    sine, cosine = side * sine, side * cosine
-    face, y, r = attempts.faces[a, finger], 3 + 2 * finger, BOUND_VARIABLES - 1
-    axis, T, o = attempts.axes[a, finger], faces.frames[face], faces.origins[face]
-    first, second = across(axis, T)
-    for m in range(len(turns)):
-        flat, flat_too, height, lean = 0.0, 0.0, 0.0, 0.0
-        for j in range(3):
-            g = sine * axis[j] - cosine * (turns[m, 0] * first[j] + turns[m, 1] * second[j])
-            rows.At[j, row] = -g
-            flat += g * T[j, 0]
-            flat_too += g * T[j, 1]
-            height += g * o[j]
-            lean += g * faces.normals[face, j]
-        rows.At[y, row], rows.At[y + 1, row] = flat, flat_too
-        # r |T'g| of (1)
-        rows.At[r, row] = np.sqrt(flat * flat + flat_too * flat_too)
-        # (3) takes eps |g.n| from the limit
-        rows.b[row] = -height - faces.depths[face] * abs(lean)
-        row += 1
-    return row
-
-
-@loop()
-def _inside_rows(faces: FaceTable, face: int, finger: int, rows: Rows, row: int) -> int:
-    """Fill in rows (2), which keep a disc inside its face."""
-    y, r = 3 + 2 * finger, BOUND_VARIABLES - 1
-    for e in range(faces.edges[face]):
-        rows.At[y, row], rows.At[y + 1, row] = faces.E[face, e, 0], faces.E[face, e, 1]
-        rows.At[r, row], rows.b[row] = 1.0, faces.b[face, e]
-        row += 1
-    return row

@@ -54,7 +54,14 @@ def place(
             _cone_rows(faces, attempts, a, s, program)
             row = _edge_rows(faces, attempts, a, C, q, program)
             if sign == SIGN_B:
-                _near_rows(faces, attempts, (a, row, u), s, program)
+                for finger in range(FINGERS):
+                    depth = (
+                        s[finger],
+                        s[finger, VARIABLES],
+                        (1.0 if finger < FINGERS // 2 else -1.0),
+                    )
+                    place, r = (a, finger, row + finger), FIRST_RADIUS + finger
+                    _near_row(faces, attempts, place, u, depth, program.A, program.b, r)
             end, merit = largest_discs(program, worth, x)
             if end == LEFT:
                 placed.ends[a] = LEFT
@@ -131,28 +138,30 @@ def _edge_rows(
 
 
 @loop("numpy")
-def _near_rows(
+def _near_row(
     faces: FaceTable,
     attempts: Attempts,
-    place: tuple[int, int, Array],
-    s: Array,
-    program: Program,
+    place: tuple[int, int, int],
+    u: Array,
+    depth: tuple[Array, float, float],
+    A: Array,
+    b: Array,
+    r: int,
 ) -> None:
-    """Fill in the rows (5), which keep the foci of cell B near each other, one per finger."""
-    (a, row, u), A, b = place, program.A, program.b
-    for finger in range(FINGERS):
-        face = attempts.faces[a, finger]
-        T, along = faces.frames[face], dotted(attempts.axes[a, finger], u)
-        toward = along if finger < FINGERS // 2 else -along
-        for j in range(K + 1):
-            A[row, j] = -toward * s[finger, j]
-        A[row, K] += 2.0
-        # r |T'u| of (5)
-        A[row, FIRST_RADIUS + finger] = np.hypot(dotted(T[:, 0], u), dotted(T[:, 1], u))
-        # eps |n.u| off the limit by (6)
-        aside = faces.depths[face] * abs(dotted(faces.normals[face], u))
-        b[row] = toward * s[finger, VARIABLES] - aside
-        row += 1
+    """Fill in row (5), by which a focus of cell B does not pass the other pair's crossing point.
+
+    Takes `depth`, the finger's s as a linear function: slopes, constant and the sign of k u.
+    """
+    (a, finger, row), (s, s0, sign) = place, depth
+    face = attempts.faces[a, finger]
+    T, toward = faces.frames[face], sign * dotted(attempts.axes[a, finger], u)
+    for j in range(K + 1):
+        A[row, j] = -toward * s[j]
+    A[row, K] += 2.0
+    # r |T'u| of (5)
+    A[row, r] = np.hypot(dotted(T[:, 0], u), dotted(T[:, 1], u))
+    # (6) takes eps |n.u| from the limit
+    b[row] = toward * s0 - faces.depths[face] * abs(dotted(faces.normals[face], u))
 
 
 @loop("numpy")
@@ -208,7 +217,9 @@ def pencil_bounds(
                 row = _bound_ball_row(faces, attempts, (a, finger), depth, rows, row)
                 row = _bound_edge_rows(faces, attempts, (a, finger, u), depth, rows, row)
                 if near:
-                    row = _bound_near_row(faces, attempts, (a, finger, u), depth, rows, row)
+                    place, r = (a, finger, row), BOUND_VARIABLES - 1
+                    _near_row(faces, attempts, place, u, depth, rows.At.T, rows.b, r)
+                    row += 1
             bounds[a] = max(bounds[a], bounded(rows, max(least, bounds[a])))
 
 
@@ -283,27 +294,3 @@ def _bound_edge_rows(
         rows.b[row] = faces.b[face, e] + back * s0 + high
         row += 1
     return row
-
-
-@loop()
-def _bound_near_row(
-    faces: FaceTable,
-    attempts: Attempts,
-    setting: tuple[int, int, Array],
-    depth: tuple[Array, float, float],
-    rows: Rows,
-    row: int,
-) -> int:
-    """Fill in row (5), by which a focus of cell B does not pass the other pair's crossing point."""
-    (a, finger, u), (s, s0, sign) = setting, depth
-    face = attempts.faces[a, finger]
-    toward = sign * dotted(attempts.axes[a, finger], u)
-    across, T = abs(dotted(faces.normals[face], u)), faces.frames[face]
-    for j in range(K + 1):
-        rows.At[j, row] = -toward * s[j]
-    rows.At[K, row] += 2.0
-    # r |T'u| of (5)
-    rows.At[-1, row] = np.hypot(dotted(T[:, 0], u), dotted(T[:, 1], u))
-    # (6) takes eps |n.u| from the limit
-    rows.b[row] = toward * s0 - faces.depths[face] * across
-    return row + 1
