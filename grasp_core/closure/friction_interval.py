@@ -339,7 +339,19 @@ class FrictionInterval(ByValue):
 
     def verify(self) -> bool:
         """Check both ends again, in rational arithmetic and without any solver."""
-        return self._fits() and self._open_below() and self._closed_above()
+        # without a twist nothing is claimed from below, without forces nothing from above; and
+        # nothing is proved by an end that is not a number
+        if not (self._fits() and 0.0 <= self.lower <= self.upper):
+            return False
+        contacts = self.positions, self.normals
+        if self.twist is None:
+            below = self.lower == 0.0
+        else:
+            below = self.lower > 0.0 and separates(self.twist, *contacts, self.lower)
+        if self.forces is None:
+            return below and self.upper == math.inf
+        bounded = below and self.upper <= LARGEST_FRICTION
+        return bounded and closes(self.forces, *contacts, self.upper)
 
     def _fits(self) -> bool:
         count = len(self.normals) if is_array(self.normals, None, 3) else 0
@@ -351,22 +363,6 @@ class FrictionInterval(ByValue):
             and (self.twist is None or is_array(self.twist, WRENCH))
             and is_number(self.lower, most=math.inf)
             and is_number(self.upper, most=math.inf)
-        )
-
-    def _open_below(self) -> bool:
-        if not 0.0 <= self.lower <= self.upper:  # nor if one is not a number
-            return False
-        # without a twist nothing is claimed from below
-        if self.twist is None:
-            return self.lower == 0.0
-        return self.lower > 0.0 and separates(self.twist, self.positions, self.normals, self.lower)
-
-    def _closed_above(self) -> bool:
-        # without forces nothing is claimed from above
-        if self.forces is None:
-            return self.upper == math.inf
-        return self.upper <= LARGEST_FRICTION and closes(
-            self.forces, self.positions, self.normals, self.upper
         )
 
 

@@ -152,7 +152,9 @@ class AttemptBounds:
             np.ascontiguousarray(attempts.half_angles),
         )
         if construction.limits is None:
-            return self._of_reguli(attempts)
+            merits, _ = regulus_bounds(self._table, attempts, -np.inf)
+            # merits are no radii: only a proof that excludes all slopes tells anything
+            return np.where(merits == -np.inf, -np.inf, np.inf)
         # hulls stand for faces of several pieces: they offer no less than any piece
         kernel = compiled(KERNELS[construction.family])
         bounds = np.empty(len(attempts.faces))
@@ -163,13 +165,6 @@ class AttemptBounds:
             kernel.concurrent_bounds(self._table, attempts, turns, least, bounds)
         # a proved bound may be off by what the check of multipliers allows
         return bounds + RESIDUAL
-
-    def _of_reguli(self, attempts: Attempts) -> Array:
-        bounds = np.full(len(attempts.faces), np.inf)
-        merits, _ = regulus_bounds(self._table, attempts, -np.inf)
-        # merits are no radii: only a proof that excludes all slopes tells anything
-        bounds[merits == -np.inf] = -np.inf
-        return bounds
 
     @cached_property
     def _table(self) -> FaceTable:

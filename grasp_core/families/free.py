@@ -193,7 +193,10 @@ def grasp_from_patch(
             for i in range(FINGERS)
         ]
     )
-    return _held_at(pieces, centers, friction)
+    inset = min(piece.inset(at) for piece, at in zip(pieces, centers, strict=True))
+    if inset < LEAST_INSET or _on_one_line(centers):
+        return None
+    return closed_at(pieces, centers, friction, inset)
 
 
 def smallest_forces(
@@ -272,14 +275,6 @@ def _nearest_to_middles(
     y = start + free @ (free.T @ (middles - start))
     (step,) = least_distance(rows @ free, (limits - rows @ y)[None])
     return start if np.isnan(step).any() else y + free @ step
-
-
-def _held_at(pieces: Sequence[FacePiece], positions: Array, friction: float) -> Placement | None:
-    """Make a placement at given contacts if they are in force closure; None otherwise."""
-    inset = min(piece.inset(at) for piece, at in zip(pieces, positions, strict=True))
-    if inset < LEAST_INSET or _on_one_line(positions):
-        return None
-    return closed_at(pieces, positions, friction, inset)
 
 
 def closed_at(

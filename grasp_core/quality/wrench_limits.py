@@ -499,12 +499,8 @@ def _descend(body: WrenchBody, start: WrenchLimit, scale: Array) -> WrenchLimit:
     for _ in range(MAX_STEPS):
         # (4): the wrench that the limiting facet points at, by the scaled product of wrenches
         facing = -best.facet * scale**2
-        found = limit_of(body, _unit(facing, scale))
+        found = limit_of(body, facing / float(np.linalg.norm(facing / scale)))
         if found.limit > best.limit * (1.0 - SETTLED):
             break
         best = found
     return best
-
-
-def _unit(wrench: Array, scale: Array) -> Array:
-    return wrench / float(np.linalg.norm(wrench / scale))

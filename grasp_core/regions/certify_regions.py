@@ -195,7 +195,7 @@ def _placed(
         borders=four(unit.back(grounds.places(i)) for i in range(len(grounds.pieces))),
         radius=unit.scale * _radius_held(grounds, proved, trimmed),
         centers=centers,
-        limit=math.inf if choice is None else _farthest(choice, centers),
+        limit=math.inf if choice is None else float(np.linalg.norm(choice - centers, axis=1).max()),
         open_choice=choice,
         open_wrench=None if opened is None else opened.separating_wrench,
         friction=grounds.friction,
@@ -205,10 +205,6 @@ def _placed(
         cover=proved.cover,
         scale=unit.scale,
     )
-
-
-def _farthest(points: Array, centers: Array) -> float:
-    return float(np.linalg.norm(points - centers, axis=1).max())
 
 
 def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> float:

@@ -151,10 +151,10 @@ def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
         twists = rays @ proved.cover.axes
         twists = (twists / np.linalg.norm(twists, axis=2, keepdims=True)).reshape(-1, 6)
         powers, falls, moves = np.zeros(len(twists)), np.zeros(len(twists)), list[Array]()
-        for piece, point, F in zip(
-            grounds.pieces, points, proved.cover.forces[where].swapaxes(0, 1), strict=True
-        ):
-            each = np.repeat(F / _sizes(proved.cover.forces[where]), rays.shape[1], axis=0)
+        forces = proved.cover.forces[where]
+        sizes = np.sqrt(np.einsum("mki,mki->m", forces, forces))[:, None]
+        for piece, point, F in zip(grounds.pieces, points, forces.swapaxes(0, 1), strict=True):
+            each = np.repeat(F / sizes, rays.shape[1], axis=0)
             slope, at_origin = power_of(each, twists[:, None])
             slope, across = slope[:, 0], slope[:, 0] @ piece.frame
             powers += at_origin[:, 0] + slope @ point - piece.depth * np.abs(slope @ piece.normal)
@@ -186,8 +186,3 @@ def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
     return np.array([
         nearest_point(piece.corners, y) for piece, y in zip(grounds.pieces, moved, strict=True)
     ])  # fmt: skip
-
-
-def _sizes(forces: Array) -> Array:
-    """Return the length of all forces of each cone together, (m, 1)."""
-    return np.sqrt(np.einsum("mki,mki->m", forces, forces))[:, None]
