@@ -3,7 +3,6 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.families import free
-from grasp_core.families import free as patch
 from grasp_core.families.free import Absence, Undecided, close_patch
 from grasp_core.families.placements import Placement
 from grasp_core.objects.booleans import extrusion
@@ -195,9 +194,9 @@ def test_splitting_proves_absence_where_the_patch_of_the_whole_faces_is_closed()
     climb(np.random.default_rng(5), pieces, friction, samples=400, steps=200)
 
 
-@pytest.mark.parametrize("restarts", [0, patch.RESTARTS])
+@pytest.mark.parametrize("restarts", [0, free.RESTARTS])
 def test_splitting_finds_a_grasp_that_restarts_miss(monkeypatch, restarts):
-    monkeypatch.setattr(patch, "RESTARTS", restarts)
+    monkeypatch.setattr(free, "RESTARTS", restarts)
     name, indices, friction = NEEDS_A_SPLIT
     pieces = quadruple(name, indices)
     assert place(pieces, friction) == Undecided(1.0)
@@ -208,16 +207,16 @@ def test_splitting_finds_a_grasp_that_restarts_miss(monkeypatch, restarts):
 
 def test_restarts_and_splits_stand_in_for_the_first_try(monkeypatch):
     """With the forces of the whole patch unused, half of the ways still lead to a grasp."""
-    tried = patch.grasp_from_patch
+    tried = free.grasp_from_patch
 
     def only_smaller(pieces, part, certificate, friction):
         whole = all(one is piece.corners for one, piece in zip(part, pieces, strict=True))
         return None if whole else tried(pieces, part, certificate, friction)
 
-    monkeypatch.setattr(patch, "grasp_from_patch", only_smaller)
+    monkeypatch.setattr(free, "grasp_from_patch", only_smaller)
     cases = of_kind(Placement)[::5]
     restarted = [place(pieces, friction) for pieces, friction, _ in cases]
-    monkeypatch.setattr(patch, "RESTARTS", 0)
+    monkeypatch.setattr(free, "RESTARTS", 0)
     split = [place(pieces, friction, cells=20) for pieces, friction, _ in cases]
     for found in (restarted, split):
         held = 0
