@@ -77,10 +77,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         if "" in arguments:
             said = "an argument is empty, perhaps from a variable that is not set"
             raise FlagsError(f"{said}; leave the argument out, or give it a value")
-        if any(word.partition("=")[0] == "--cells" for word in arguments):
-            raise FlagsError(
-                "--cells is called --max-face-parts now; write --max-face-parts instead"
-            )
         flags = with_config(arguments, COMMANDS)
     except InputError as error:
         return _complain(str(error), exit_code(error))

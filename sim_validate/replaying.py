@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from grasp_core.closure.contact_arrays import contacts_sha256, stacked
+from grasp_core.closure.contacts import contacts_sha256, stacked
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError

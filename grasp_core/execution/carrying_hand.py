@@ -21,7 +21,7 @@ prove (3); `ball_in_hull` shows that by triangles.
 
     y.(G f) = (G'y - L'u).f + u.(L f + W v) - u.(W v),
 
-and (3) of `wrench_body` bounds the sum of the first two by h(y, u). With G f = -m g v for forces:
+and (3) of `wrench_limits` bounds the sum of the first two by h(y, u). With G f = -m g v for forces:
 
     (W'u - g m y_F).d  <=  h(y, u)    wherever m is held under d,                       (4)
 
@@ -59,14 +59,13 @@ import numpy as np
 from grasp_core.arrays import SHIFT, Array, Indices, cross, of_order_one
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST
+from grasp_core.closure.contacts import WRENCH, contact_frames, in_frames
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.closure.wrenches import WRENCH, contact_frames, in_frames
 from grasp_core.execution.ball_in_hull import ball_in
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.fields import are_frictions, are_units, is_a, is_array, is_indices, is_number
 from grasp_core.quality.motors import Motors
-from grasp_core.quality.wrench_body import WrenchBody
-from grasp_core.quality.wrench_limit import HELD
+from grasp_core.quality.wrench_limits import HELD, WrenchBody
 from grasp_core.short_text import summary
 
 ROUNDING = 1e-9

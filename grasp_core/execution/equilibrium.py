@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.closure.wrenches import WRENCH, grasp_map
+from grasp_core.closure.contacts import WRENCH, grasp_map
 from grasp_core.errors import SolverError
 from grasp_core.execution.grips import Grip
 

@@ -11,7 +11,7 @@ The finite model follows the equilibrium (see `equilibrium`): at each pose (1) s
 load can grow if the response stays as it is; the load is raised by that, or by as much as moves the
 object by a small step, and the response is taken anew. The steps to the root become Newton's, and
 the root is met to `MET`. A finger with a limit on its push is also checked against it: beyond the
-limit no closed grasp is sure to resist (see `wrench_body`), so that a first slip with limits is
+limit no closed grasp is sure to resist (see `wrench_limits`), so that a first slip with limits is
 never above the closure limit.
 
 Motors may be at the limit of their torques first. With the torque tau_j = (L f + g)_j of a joint

@@ -49,8 +49,16 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, frozen, frozen_each
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, instance, several
-from grasp_core.closure.contact_arrays import FEWEST, contact_arrays, contact_frictions, stacked
-from grasp_core.closure.wrenches import WRENCH, contact_frames, cross_matrix, grasp_map
+from grasp_core.closure.contacts import (
+    FEWEST,
+    WRENCH,
+    contact_arrays,
+    contact_frames,
+    contact_frictions,
+    cross_matrix,
+    grasp_map,
+    stacked,
+)
 from grasp_core.errors import InputError
 from grasp_core.execution.springs import are_springs, springs
 from grasp_core.fields import are_frictions, are_units, is_array

@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.wrenches import in_frames
+from grasp_core.closure.contacts import in_frames
 from grasp_core.quality.motors import Motors
 
 ROUNDING = 1e-9

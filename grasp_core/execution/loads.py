@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, frozen
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, number, positive
-from grasp_core.closure.wrenches import WRENCH
+from grasp_core.closure.contacts import WRENCH
 from grasp_core.errors import InputError
 from grasp_core.fields import is_array
 

@@ -12,7 +12,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST
-from grasp_core.closure.wrenches import WRENCH
+from grasp_core.closure.contacts import WRENCH
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet
 from grasp_core.execution.squeeze_rows import Cuts, Survival

@@ -32,7 +32,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, of_order_one
 from grasp_core.by_value import ByValue
-from grasp_core.closure.wrenches import grasp_map, in_frames
+from grasp_core.closure.contacts import grasp_map, in_frames
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.joint_torques import JointTorques
 from grasp_core.execution.loads import LoadSet

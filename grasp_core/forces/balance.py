@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
-from grasp_core.closure.wrenches import contact_frames, grasp_map, in_frames
+from grasp_core.closure.contacts import contact_frames, grasp_map, in_frames
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns, inscribed_share
 
 FORCE_RESIDUAL = 1e-6

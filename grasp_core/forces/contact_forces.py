@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import SMALLEST_SIZE, Array, frozen
 from grasp_core.checked import LARGEST, SMALLEST, number, one_of, several, shown
-from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions
+from grasp_core.closure.contacts import contact_arrays, contact_frictions
 from grasp_core.errors import InputError, NoForcesError, SolverError
 from grasp_core.forces.balance import Balance, needed_friction
 from grasp_core.forces.force_programs import (

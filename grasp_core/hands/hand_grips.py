@@ -39,7 +39,7 @@ import numpy as np
 
 from grasp_core.arrays import UNIT_SLACK, Array, cross
 from grasp_core.checked import LARGEST, SMALLEST
-from grasp_core.closure.wrenches import WRENCH, cross_matrix
+from grasp_core.closure.contacts import WRENCH, cross_matrix
 from grasp_core.execution.grips import Grip
 from grasp_core.fields import is_array, is_number
 from grasp_core.hands.hand import Hand

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import frozen, frozen_copy
 from grasp_core.checked import LARGEST, positive
-from grasp_core.closure.contact_arrays import contact_frictions
+from grasp_core.closure.contacts import contact_frictions
 from grasp_core.execution.carried_mass import GAP, carried_mass
 from grasp_core.execution.carrying_hand import CarryingHand, HandPayload
 from grasp_core.hands.hand import Hand

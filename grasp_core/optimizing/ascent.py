@@ -24,8 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.closure.contacts import contact_frames
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.closure.wrenches import contact_frames
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.quality.ferrari_canny import FerrariCanny, wrench_set_quality
 from grasp_core.quality.inner_polytope import InnerPolytope

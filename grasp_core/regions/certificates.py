@@ -9,7 +9,7 @@ import numpy as np
 from grasp_core.arrays import Array, frozen
 from grasp_core.by_value import ByValue
 from grasp_core.checked import SMALLEST, instance, number, positive, several
-from grasp_core.closure.contact_arrays import contact_frictions
+from grasp_core.closure.contacts import contact_frictions
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.errors import InputError
 from grasp_core.fields import are_frictions, are_units, is_a, is_array, is_number, is_tuple_of

@@ -18,7 +18,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, frozen, to_digits
 from grasp_core.checked import BOUNDS, LARGEST, SMALLEST, instance, number, positive
-from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map
+from grasp_core.closure.contacts import WRENCH, contact_frames, grasp_map
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip, check_grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2

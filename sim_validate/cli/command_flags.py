@@ -176,9 +176,6 @@ class Regions:
     """Coulomb coefficient of the proof; if not given, the one planned for."""
     reserve: Annotated[float, within("reserve")] = 0.0
     """Share of the friction that the proof does not count on."""
-    balance: Literal["radius", "area"] = "radius"
-    """Prefer large discs for all fingers (radius), or large regions in total (area), whose discs
-    may be smaller and which take several times longer."""
     recenter: bool = False
     """Move the regions to where discs inside the faces can be largest; contacts may then lie
     outside their regions."""

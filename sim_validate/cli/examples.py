@@ -32,7 +32,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "regions": (
         "regions plan/grasps.json --out plan",
-        "regions plan/grasps.json --reserve 0.1 --balance area --limit 5 --out smaller",
+        "regions plan/grasps.json --reserve 0.1 --recenter --limit 5 --out smaller",
     ),
     "replay": (
         "replay graspproof-out/wedge --grasp c-0-1-2-7 --out replay",

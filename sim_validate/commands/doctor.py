@@ -9,7 +9,7 @@ from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import compiled, state_of
 from grasp_core.cones.pyramids import inscribed_share
-from grasp_core.families.discs import KEPT
+from grasp_core.families.placements import KEPT
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.provenance import versions

@@ -25,7 +25,7 @@ def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
         raise InputError(f"{command.grasps}: expected {wanted} to certify, found none")
     asked = Asked(
         saved.friction if command.friction is None else command.friction,
-        command.reserve, command.balance, command.recenter, command.edge_clearance_m,
+        command.reserve, command.recenter, command.edge_clearance_m,
         command.max_cones,
     )  # fmt: skip
     with alone_in(command.out):

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.wrenches import grasp_map
+from grasp_core.closure.contacts import grasp_map
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.first_slip import first_slip
 from grasp_core.execution.grips import Grip

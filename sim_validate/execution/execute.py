@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
 from grasp_core.checked import instance, several, switch, whole
-from grasp_core.closure.contact_arrays import FEWEST, contact_arrays, stacked
+from grasp_core.closure.contacts import FEWEST, contact_arrays, stacked
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.grips import Grip

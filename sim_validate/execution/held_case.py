@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.contact_arrays import contact_frictions
+from grasp_core.closure.contacts import contact_frictions
 from grasp_core.execution.grips import grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.objects.polyhedron import Polyhedron

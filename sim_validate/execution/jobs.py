@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from grasp_core.checked import one_of
-from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import NoForcesError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp

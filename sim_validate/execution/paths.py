@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.wrenches import WRENCH
+from grasp_core.closure.contacts import WRENCH
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from scenes.execution.held_mjcf import SAMPLE_S
 from sim_validate.simulation.schedules import Clock, smooth

@@ -39,7 +39,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.closure.wrenches import cross_matrix, grasp_map
+from grasp_core.closure.contacts import cross_matrix, grasp_map
 from grasp_core.execution.beyond_slip import loss_multiples
 from grasp_core.execution.first_slip import slip_steps
 from grasp_core.execution.grips import Grip

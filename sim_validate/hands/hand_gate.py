@@ -27,7 +27,7 @@ from grasp_core.errors import UnfaithfulError
 from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.quality.wrench_limit import limit_of
+from grasp_core.quality.wrench_limits import limit_of
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
 from scenes.hands.hand_mjcf import HandScene, build_hand_scene, limited

@@ -20,7 +20,6 @@ from grasp_core.compiled import wait_for
 from grasp_core.kept_loops import is_kept
 from grasp_core.planning.planner import plan
 from grasp_core.quality.ferrari_canny import ferrari_canny
-from grasp_core.quality.wrench_limits import many_limits
 from grasp_core.solvers.nearest_point import least_distance
 from scenes.example_objects import example_object
 from sim_validate.parallel.processes import local_processes
@@ -36,13 +35,6 @@ Calls: TypeAlias = Mapping[str, Call]
 def _closure(points: Array, normals: Array) -> None:
     force_closure(points, normals, FRICTION)
     critical_friction(points, normals)
-
-
-def _limits(points: Array, normals: Array) -> None:
-    inside = force_closure(points, normals, FRICTION).forces
-    if inside is not None:
-        many_limits(points, normals, FRICTION, np.eye(6), inside, max_normal_force=1.0,
-                    center=np.zeros(3))  # fmt: skip
 
 
 def _last_family(_points: Array, _normals: Array) -> None:
@@ -62,7 +54,6 @@ BESIDE: Calls = {
     "grasp_core.closure.critical_friction_kernel": _closure,
     "grasp_core.quality.ferrari_canny_kernel": _quality,
     "grasp_core.families.regulus_kernel": _last_family,
-    "grasp_core.quality.wrench_limits_kernel": _limits,
 }
 """For each kernel to compile beside a plan, in the order in which the plan and the pages after it
 need them, a call that compiles it."""

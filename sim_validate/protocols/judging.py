@@ -17,7 +17,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import coefficient, instance, one_of, several
-from grasp_core.closure.contact_arrays import FEWEST
+from grasp_core.closure.contacts import FEWEST
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand

@@ -8,7 +8,7 @@ from typing import Any
 from grasp_core.arrays import Array
 from grasp_core.closure.friction_interval import FrictionInterval
 from grasp_core.provenance import versions
-from grasp_core.quality.wrench_limit import WrenchLimit
+from grasp_core.quality.wrench_limits import WrenchLimit
 from sim_validate.contact_analysis import Analysis, Bounds, Outcome, Question, Resisted
 
 

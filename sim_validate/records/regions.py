@@ -15,7 +15,7 @@ from typing_extensions import TypedDict
 
 from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
 from grasp_core.checked import path_of
-from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError, SolverError
 from grasp_core.files.complaints import record_of
 from grasp_core.files.json_text import text_of
@@ -98,7 +98,6 @@ class RegionsFile(TypedDict):
     object: ObjectRecord
     friction: Positive
     reserve: NotRequired[Finite]
-    balance: NotRequired[str]
     recenter: NotRequired[bool]
     edge_clearance_m: NotRequired[Finite]
     cones: NotRequired[int]
@@ -119,7 +118,6 @@ def write_regions(
         "object": {"name": body.name, "content_sha256": body.content_sha256},
         "friction": asked.friction,
         "reserve": asked.reserve,
-        "balance": asked.balance,
         "recenter": asked.recenter,
         "edge_clearance_m": asked.clearance,
         "cones": asked.max_cones,

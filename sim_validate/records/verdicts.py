@@ -17,7 +17,7 @@ from typing_extensions import TypedDict
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import MOST_RANDOM_WRENCHES, path_of
-from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
 from grasp_core.files.json_text import text_of

@@ -53,7 +53,7 @@ from functools import lru_cache
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.closure.wrenches import cross_matrix
+from grasp_core.closure.contacts import cross_matrix
 from scenes.layout import Layout, grasp_size
 from sim_validate.simulation.bench import Mask
 from sim_validate.simulation.schedules import Schedule

@@ -17,7 +17,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, cross, to_digits
 from grasp_core.by_value import ByValue
-from grasp_core.closure.contact_arrays import stacked
+from grasp_core.closure.contacts import stacked
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.errors import SolverError, UndecidedError

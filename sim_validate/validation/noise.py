@@ -24,9 +24,8 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.contact_arrays import stacked
+from grasp_core.closure.contacts import contact_frames, stacked
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.closure.wrenches import contact_frames
 from grasp_core.errors import UndecidedError
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron

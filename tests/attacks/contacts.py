@@ -11,7 +11,7 @@ import numpy as np
 
 import grasp_core as gc
 from grasp_core.closure import force_closure as closure
-from grasp_core.closure import rational_proofs
+from grasp_core.closure import friction_interval
 from tests.attacks.searching import Attack, cycled, power, tiny
 from tests.grasp_core.exact_judges import closed_exactly, open_exactly
 from tests.judges import random_contacts
@@ -200,11 +200,11 @@ def put_to_rest(rng):
 
 def at_any_length(monkeypatch):
     """Speeds count as none however short the twist is that is left."""
-    departs = rational_proofs._departs
+    departs = friction_interval._departs
     monkeypatch.setattr(
-        rational_proofs,
+        friction_interval,
         "_departs",
-        lambda v, n, slope, _: departs(v, n, slope, rational_proofs.SAME),
+        lambda v, n, slope, _: departs(v, n, slope, friction_interval.SAME),
     )
 
 

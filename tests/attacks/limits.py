@@ -11,11 +11,11 @@ import numpy as np
 
 import grasp_core as gc
 import grasp_core.execution.payload as payloads
-import grasp_core.quality.wrench_limit as checked
+import grasp_core.quality.wrench_limits as checked
 from grasp_core.execution import carrying_hand, squeeze_certificate, squeeze_rows
 from grasp_core.execution.payload import Payload
 from grasp_core.execution.squeeze_rows import Survival
-from grasp_core.quality.wrench_limit import WrenchLimit, body_of
+from grasp_core.quality.wrench_limits import WrenchLimit, body_of
 from tests.attacks.searching import Attack, always, cycled, power, tiny
 from tests.tampering import table
 from tests.tampering.exact_closure import conic, locals_of, unit_arms

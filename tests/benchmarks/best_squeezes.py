@@ -21,7 +21,7 @@ from scipy.linalg import null_space
 from scipy.optimize import minimize
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import grasp_map, in_frames
+from grasp_core.closure.contacts import grasp_map, in_frames
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from sim_validate.parallel.processes import each
 from tests.benchmarks import held_grasps as held

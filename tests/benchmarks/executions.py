@@ -39,7 +39,7 @@ from scipy import sparse
 
 import grasp_core as gc
 import sim_validate as sv
-from grasp_core.closure.wrenches import contact_frames, grasp_map
+from grasp_core.closure.contacts import contact_frames, grasp_map
 from grasp_core.geometry.nearest_points import nearest_on_surface
 from scenes.execution.held_mjcf import build_held_scene
 from sim_validate.execution.execute import chosen_squeeze

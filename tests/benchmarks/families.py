@@ -13,25 +13,28 @@ from itertools import combinations
 import numpy as np
 
 from grasp_core.cones.pyramids import inscribed_facets
-from grasp_core.disc_bounds.program_bounds import KERNELS, AttemptBounds
 from grasp_core.families.concurrent import BEFORE, BEHIND
 from grasp_core.families.concurrent import _rows as concurrent_rows
 from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS
+from grasp_core.families.disc_bounds import KERNELS, AttemptBounds
 from grasp_core.families.free import place_free
 from grasp_core.families.kernel_tables import Attempts
 from grasp_core.families.pencil import CELL_A, CELL_B, _discs, _near_rows
 from grasp_core.families.pencil import _rows as pencil_rows
 from grasp_core.families.placements import focus_direction
-from grasp_core.families.regulus import CHOICES, SIDES, SLOPES, regulus_bounds
-from grasp_core.families.regulus_program import (
+from grasp_core.families.regulus import (
+    CHOICES,
+    SIDES,
+    SLOPES,
     frames_of_pairs,
     line_of,
+    regulus_bounds,
     regulus_program,
     slope_at,
 )
 from grasp_core.objects.face_pieces import face_shapes
-from grasp_core.planning.blocks import spanning_blocks
 from grasp_core.planning.planned_cones import NORMAL, PlannedCones
+from grasp_core.planning.quadruples import spanning_blocks
 from grasp_core.solvers.lp import LinearProgram, Optimum, _by_highs
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object

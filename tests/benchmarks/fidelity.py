@@ -19,10 +19,9 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
-from grasp_core.closure.contact_arrays import contact_frictions
-from grasp_core.closure.soft.contacts import contact_torsions
-from grasp_core.quality.wrench_body import WrenchBody
-from grasp_core.quality.wrench_limit import limit_of
+from grasp_core.closure.contacts import contact_frictions
+from grasp_core.closure.soft_contacts import contact_torsions
+from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from scenes.physics import PhysicsSettings
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.records.verdicts import verdicts_to_json

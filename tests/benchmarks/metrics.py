@@ -168,10 +168,6 @@ BATCHES = {
     "critical friction": ("critical_frictions, all at once", lambda every: gc.critical_frictions(
         np.array([c.x for c in every]), np.array([c.n for c in every])
     )),
-    "min-weight": ("min_weights, 8 edges, all at once", lambda every: gc.min_weights(
-        np.array([c.x for c in every]), np.array([c.n for c in every]),
-        np.array([[c.mu] * 4 for c in every]),
-    )),
 }  # fmt: skip
 """A first contender of some groups, which gets all cases together."""
 PER_WRENCH = {f"contact_forces least_norm, batch of {WRENCHES}": WRENCHES}

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import contact_frames
+from grasp_core.closure.contacts import contact_frames
 from grasp_core.objects.face_pieces import piece_of
 
 STARTS, FINE = 6, 0.02

@@ -20,8 +20,8 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 import grasp_core as gc
-from grasp_core.disc_bounds.program_bounds import AttemptBounds
-from grasp_core.families import discs, regulus
+from grasp_core.families import placements, regulus
+from grasp_core.families.disc_bounds import AttemptBounds
 from grasp_core.solvers import lp
 from scenes.example_objects import example_object
 
@@ -50,7 +50,7 @@ def programs(count):
             raise EnoughError
         return solve(program, cutoff)
 
-    lp.maximize_above = discs.maximize_above = record
+    lp.maximize_above = placements.maximize_above = record
     bounds, choice = AttemptBounds.of, regulus._best_choice
     AttemptBounds.of = lambda *args: np.full(len(args[2].faces), np.inf)  # by whole programs
     regulus._best_choice = lambda *_: None
@@ -61,7 +61,7 @@ def programs(count):
         pass
     finally:
         AttemptBounds.of, regulus._best_choice = bounds, choice
-        lp.maximize_above = discs.maximize_above = solve
+        lp.maximize_above = placements.maximize_above = solve
     return found
 
 

@@ -42,7 +42,6 @@ WAYS = {
     "fast": {"max_cones": CONES // 8},
     "more cones": {"max_cones": 5 * CONES},
     "recentered": {"recenter": True},
-    "area": {"balance": "area"},
 }
 
 
@@ -250,7 +249,7 @@ def show(family, answers):
     close = [a for a in done if np.isfinite(a.possible)]
     for way in WAYS:
         shares = [a.sizes[way][0] / a.possible for a in close if way in a.sizes]
-        if shares and way not in {"recentered", "area"}:
+        if shares and way != "recentered":
             print(f"  {way}: {np.median(shares):.2f} of the largest disc possible (median of "
                   f"{len(shares)}; least {min(shares):.2f})")  # fmt: skip
     return opened + dropped + unverified + early
@@ -265,7 +264,7 @@ def told(far):
 
 def table(done):
     """Medians of sizes, of all and of those that were looked at closely."""
-    closely = [answer for answer in done if "area" in answer.sizes]
+    closely = [answer for answer in done if "recentered" in answer.sizes]
     for whose, answers in ((f"all {len(done)}", done), (f"{len(closely)} closely", closely)):
         print(f"  {whose}, medians in object radii: disc, least inscribed, total area, seconds")
         for way in ("paper", *WAYS, "squares"):

@@ -113,9 +113,6 @@ CALLS = [
     Call("gc.min_weight", two_arrays(friction=0.5), contacts() | {
         "friction": each_of(FRICTION, "zero"), "edges": COUNT | {"two": 2, "a million": 10**6},
     }),
-    Call("gc.min_weights", many_arrays, contacts(many=True) | {
-        "friction": each_of(FRICTION, "zero"), "edges": COUNT | {"two": 2, "a million": 10**6},
-    }),
     Call("gc.smallest_singular_value", lambda: {"positions": TETRA_CENTERS, "torque_scale": 1.0}, {
         "positions": spread(TETRA_CENTERS), "center": CENTERED, "torque_scale": POSITIVE,
     }),
@@ -198,10 +195,8 @@ CALLS = [
     Call("gc.certify_regions", of_grasp(friction=0.5), BODY_AND_GRASP | {
         "friction": FRICTION,
         "reserve": NOT_NEGATIVE | {"all": 1.0},
-        "balance": WORD,
         "recenter": SWITCH,
         "clearance": NOT_NEGATIVE | {"larger than the object": 1.0},
         "max_cones": COUNT | {"few": 63},
-        "cones": {"a count": 1000, "text": "many"},
     }),
 ]  # fmt: skip

@@ -17,8 +17,7 @@ from grasp_core.execution.carried_mass import carried_mass
 from grasp_core.execution.carrying_hand import CarryingHand
 from grasp_core.families.free import Absence, place_free
 from grasp_core.objects.face_pieces import unit_pieces
-from grasp_core.quality.measures import Measure
-from grasp_core.quality.resisted_loads import resisted_loads
+from grasp_core.quality.measures import Measure, resisted_loads
 from grasp_core.regions.certify_regions import certify_regions
 from sim_validate.records.regions import SHAPES, proof_arrays, regions_of
 from tests.judges import random_contacts

@@ -15,7 +15,7 @@ import numpy as np
 
 from grasp_core.errors import InputError
 from grasp_core.families.constructions import point_region, regions_of
-from grasp_core.families.free_contacts import closed_at, of_general_type
+from grasp_core.families.free import closed_at, of_general_type
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.grounds import grounds_of
 from grasp_core.optimizing.best.incumbents import begin, climbed, piece_at

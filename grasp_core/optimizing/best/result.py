@@ -11,8 +11,7 @@ from grasp_core.optimizing.best.contacts_of_proof import are_contacts_of
 from grasp_core.optimizing.best.searching.search import EXACT_GAP
 from grasp_core.optimizing.best.support_cuts import CutTree
 from grasp_core.quality.ferrari_canny import FerrariCanny
-from grasp_core.quality.measures import Measure, MeasureName
-from grasp_core.quality.resisted_loads import ResistedLoads, measured_set
+from grasp_core.quality.measures import Measure, MeasureName, ResistedLoads, measured_set
 from grasp_core.values import Grasp
 
 Ended: TypeAlias = Literal["gap", "time", "interrupt", "undivided"]

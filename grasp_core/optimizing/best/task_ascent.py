@@ -4,7 +4,7 @@ Solved, locally: maximise over positions x_i on the faces the least of the large
 loads w_j that contact forces with normal parts of sum one resist.
 
 Derivation. The program for m_j has forces F_i and a twist (v, omega) as its answer, which asks for
-one of w_j, see `resisted_loads`. When contacts move by d_i and take the forces along, the wrench
+one of w_j, see `measures`. When contacts move by d_i and take the forces along, the wrench
 changes by (0, sum_i d_i x F_i), and the optimum by its product with the twist,
 
     m_j changes by  sum_i d_i . (F_i x omega).                                              (1)
@@ -20,8 +20,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.closure.contacts import contact_frames
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.closure.wrenches import contact_frames
 from grasp_core.optimizing.ascent import (
     FIRST_REACH,
     GOOD,
@@ -34,10 +34,10 @@ from grasp_core.optimizing.ascent import (
     ContactFaces,
 )
 from grasp_core.quality.ferrari_canny import wrench_set_quality
-from grasp_core.quality.measures import Measure
-from grasp_core.quality.resisted_loads import (
+from grasp_core.quality.measures import (
     CLOSED_GAP,
     THIN,
+    Measure,
     ResistedLoads,
     resisted_loads,
     task_limits,

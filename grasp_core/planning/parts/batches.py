@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from itertools import combinations, islice
 
-from grasp_core.families.batches.settling import chosen_shapes
+from grasp_core.families.placing import chosen_shapes
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Certified
 from grasp_core.planning.family_search import MethodSearch

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_core.closure.contact_arrays import stacked
+from grasp_core.closure.contacts import stacked
 from grasp_core.cones.spanning import span_angle
 from grasp_core.errors import GraspError
 from grasp_core.execution.best_squeeze import best_squeeze

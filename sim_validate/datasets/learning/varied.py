@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError, NoForcesError, UnfaithfulError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp

@@ -5,7 +5,6 @@ The maps use Hammer's projection, which keeps areas; +x is in the middle and -x 
 
 import math
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from grasp_core.checked import positive
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.quality.wrench_limits import many_limits
+from grasp_core.quality.wrench_limits import wrench_limits
 from grasp_core.values import Grasp
 from scenes.drawing.colours import BAD, LEVELS, NEUTRAL, PAPER, levels_of
 from scenes.drawing.panels import SMALL, ticks_in
@@ -101,22 +100,21 @@ def margins(
         )
     ways = np.zeros((LATITUDES * LONGITUDES, 6))
     ways[:, :3] = directions_of_map().reshape(-1, 3)
-    find = partial(_limits, body, grasp, friction, max_normal_force_n, certificate.forces)
-    forces = find(ways)
+    forces = _limits(body, grasp, friction, max_normal_force_n, ways)
     ways = np.roll(ways, 3, axis=1) * body.radius
-    torques = find(ways)
+    torques = _limits(body, grasp, friction, max_normal_force_n, ways)
     return forces, MILLI * body.radius * torques
 
 
 def _limits(
-    body: Polyhedron, grasp: Grasp, friction: float, largest: float, inside: Array, wrenches: Array
-) -> Array:  # fmt: skip
+    body: Polyhedron, grasp: Grasp, friction: float, largest: float, wrenches: Array
+) -> Array:
     """Compute how far each wrench of a map is resisted, (LATITUDES, LONGITUDES)."""
     different, same = np.unique(np.round(wrenches, SAME), axis=0, return_inverse=True)
-    limits = many_limits(
-        grasp.positions, grasp.normals, friction, different, inside, max_normal_force=largest,
-        center=body.center_of_mass,
-    )  # fmt: skip
+    found = wrench_limits(
+        grasp, None, friction, different, max_normal_force=largest, center=body.center_of_mass
+    )
+    limits = np.array([each.limit for each in found])
     return limits[same.reshape(-1)].reshape(LATITUDES, LONGITUDES)
 
 

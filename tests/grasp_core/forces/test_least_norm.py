@@ -7,7 +7,7 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import nnls
 
-from grasp_core.closure.wrenches import contact_frames, grasp_map, normal_and_tangential
+from grasp_core.closure.contacts import contact_frames, grasp_map, normal_and_tangential
 from grasp_core.cones.pyramids import PYRAMID_SIDES
 from grasp_core.errors import NoForcesError
 from grasp_core.forces import force_programs

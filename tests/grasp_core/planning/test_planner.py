@@ -279,12 +279,6 @@ def test_grasps_are_streamed_as_they_are_found():
     assert everything == {grasp.id for grasp in gc.plan(body, 0.4).grasps}
 
 
-def test_the_old_name_of_max_face_parts_is_refused_with_the_new_one():
-    for planner in (gc.plan, gc.iter_grasps):
-        with pytest.raises(gc.InputError, match="max_face_parts"):
-            planner(example_object("tetrahedron"), cells=2)
-
-
 @pytest.mark.parametrize("name", ["hexagonal-pyramid", *more("l-bracket")])
 def test_turned_scaled_and_shaken_objects_have_the_same_faces_and_families(name):
     """All methods, where much is symmetric and faces are not convex."""

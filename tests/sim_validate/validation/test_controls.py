@@ -10,7 +10,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.families.regulus_program import LEAST_DEPTH
+from grasp_core.families.regulus import LEAST_DEPTH
 from sim_validate.simulation import schedules
 from sim_validate.simulation.schedules import HoldProtocol
 from sim_validate.simulation.setup import Agenda, Setup

@@ -14,7 +14,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.optimizing.best.grounds import ROOM
 from grasp_core.quality.ferrari_canny import FerrariCanny
-from grasp_core.quality.resisted_loads import ResistedLoads
+from grasp_core.quality.measures import ResistedLoads
 from grasp_core.values import FINGERS
 
 Nodes: TypeAlias = tuple[Array, Indices, Indices]

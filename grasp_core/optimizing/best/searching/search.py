@@ -37,8 +37,7 @@ from grasp_core.optimizing.best.searching.parts import (
     room,
 )
 from grasp_core.optimizing.best.searching.stop import Stop
-from grasp_core.quality.measures import FERRARI_CANNY, Measure
-from grasp_core.quality.resisted_loads import measured_set
+from grasp_core.quality.measures import FERRARI_CANNY, Measure, measured_set
 from grasp_core.solvers.ties import on_grid
 from grasp_core.values import FINGERS
 

@@ -19,8 +19,7 @@ from grasp_core.optimizing.best.searching.search import Searching
 from grasp_core.optimizing.best.searching.stop import Stop
 from grasp_core.optimizing.best.support_cuts import ROUNDING, CutTree
 from grasp_core.optimizing.best.task_ascent import _weakest
-from grasp_core.quality.measures import Measure
-from grasp_core.quality.resisted_loads import ResistedLoads, resisted_loads
+from grasp_core.quality.measures import Measure, ResistedLoads, resisted_loads
 from scenes.example_objects import example_object
 from tests.grasp_core.optimizing.best.independent_replay import replays
 from tests.grasp_core.optimizing.best.supports_of_contacts import supports

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.contact_arrays import stacked
+from grasp_core.closure.contacts import stacked
 from grasp_core.geometry.nearest_points import nearest_on_triangles
 from grasp_core.hands.kinematics import places
 from grasp_core.objects.symmetries import orbit_sizes
