@@ -26,9 +26,9 @@ from sim_validate.records.regions import load_regions as load_regions
 from sim_validate.records.saved_verdicts import SavedVerdict as SavedVerdict
 from sim_validate.records.saved_verdicts import SavedVerdicts as SavedVerdicts
 from sim_validate.records.saved_verdicts import load_verdicts as load_verdicts
-from sim_validate.records.transfers.saved_transfer import SavedCarriedGrasp as SavedCarriedGrasp
-from sim_validate.records.transfers.saved_transfer import SavedTransfer as SavedTransfer
-from sim_validate.records.transfers.saved_transfer import load_transfer as load_transfer
+from sim_validate.records.transfers import SavedCarriedGrasp as SavedCarriedGrasp
+from sim_validate.records.transfers import SavedTransfer as SavedTransfer
+from sim_validate.records.transfers import load_transfer as load_transfer
 from sim_validate.reports.charts.margin_charts import margin_figure as margin_figure
 from sim_validate.reports.charts.wrench_charts import wrench_figure as wrench_figure
 from sim_validate.reports.report import write_report as write_report

@@ -14,7 +14,6 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
 from grasp_core.records.grasps_json import surface_record
 from grasp_core.short_text import vector
-from grasp_core.transferring.face_places import face_in_words
 from scenes.drawing.pictures import MOST_NUMBERED, write_object_picture
 from scenes.example_objects import example_names
 from sim_validate.cli import command_flags
@@ -25,6 +24,10 @@ from sim_validate.commands.asked.objects import load_object
 MM, CM3 = 1e3, 1e6
 MM2 = 1e6
 COLUMNS = ("face", "where it is", "area mm^2")
+ALONG = 1e-4
+"""Largest angle from an axis at which a face counts as facing along it [rad]."""
+NOTHING_MM = 1e-6
+"""Coordinate that is written as zero [mm]."""
 
 
 def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
@@ -76,14 +79,28 @@ def _face_list(body: Polyhedron) -> list[dict[str, Any]]:
             "normal": face.normal.tolist(),
             "area_m2": face.area,
             "center_m": face.centroid.tolist(),
-            "place": face_in_words(face),
+            "place": _place(face),
         }
         for number, face in enumerate(body.faces)
     ]
 
 
 def _row(number: int, face: Face) -> tuple[str, ...]:
-    return str(number), face_in_words(face), f"{MM2 * face.area:.5g}"
+    return str(number), _place(face), f"{MM2 * face.area:.5g}"
+
+
+def _place(face: Face) -> str:
+    """Say where a face is and what it faces, outwards, such as `facing +x at x = 60 mm`."""
+    outward = (-face.normal).tolist()
+    axis = max(range(3), key=lambda index: abs(outward[index]))
+    across = math.hypot(*(each for index, each in enumerate(outward) if index != axis))
+    center = [f"{0.0 if abs(MM * each) < NOTHING_MM else MM * each:.5g}"
+              for each in face.centroid.tolist()]  # fmt: skip
+    if across <= ALONG:
+        name, sign = "xyz"[axis], "+" if outward[axis] > 0.0 else "-"
+        return f"facing {sign}{name} at {name} = {center[axis]} mm"
+    side = ", ".join(f"{round(each, 2) + 0.0:g}" for each in outward)
+    return f"facing ({side}) around ({', '.join(center)}) mm"
 
 
 def _sentences(body: Polyhedron, spanning: int | None) -> Iterator[str]:

@@ -26,8 +26,7 @@ class HandRecord(TypedDict):
     fingers: list[str]
     sources: list[str]
     torque_source: str
-    model: NotRequired[ModelRecord]
-    """Absent in files of versions that did not draw hands."""
+    model: ModelRecord
 
 
 class ReachedContactRecord(TypedDict):
@@ -44,8 +43,8 @@ class PoseRecord(TypedDict):
 
     palm_pose: tuple[Row, Row, Row, Row]
     joints_rad: list[Finite]
-    used: NotRequired[Annotated[list[Contact], Field(min_length=FEWEST_FINGERS)]]
-    """Indices of the grasp's contacts at which fingers stand; all of them where it is missing."""
+    used: Annotated[list[Contact], Field(min_length=FEWEST_FINGERS)]
+    """Indices of the grasp's contacts at which fingers stand."""
     contacts: Annotated[
         list[ReachedContactRecord], Field(min_length=FEWEST_FINGERS, max_length=FINGERS)
     ]  # fmt: skip
@@ -125,8 +124,8 @@ class ReachRecord(TypedDict):
     """Fields about one grasp."""
 
     id: str
-    contacts_sha256: NotRequired[str]
-    """Hash of the planned contacts; absent in files of versions that did not draw hands."""
+    contacts_sha256: str
+    """Hash of the planned contacts."""
     reached: bool
     reason: ReachReason
     explanation: str
@@ -148,9 +147,8 @@ class ReachesSummary(TypedDict):
     limit: Count
     collision: Count
     not_found: Count
-    no_closure: NotRequired[Count]
-    """Grasps no three of whose contacts close, for a hand with three fingers; none where it is
-    missing."""
+    no_closure: Count
+    """Grasps no three of whose contacts close, for a hand with three fingers."""
     complete: bool
 
 

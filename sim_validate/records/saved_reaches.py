@@ -1,8 +1,7 @@
 """Reads from `reaches.json` where a hand stands in grasps, so that it can be drawn.
 
-The file holds the hand's parts. Files of earlier versions have only its name: then the built-in
-hand of that name is taken, if there is one. Either way the hand is taken only if its fingertips
-touch at the contacts of the file, and otherwise a sentence says why it cannot be drawn.
+The file holds the hand's parts. They are taken only if the fingertips touch at the contacts of the
+file; otherwise a sentence says why the hand cannot be drawn.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,10 +17,9 @@ from grasp_core.files.text_files import read_text
 from grasp_core.frames import POSE
 from grasp_core.hands.distances.collisions import tip_distances
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.named_hands import HANDS, load_hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.values import Contact
-from sim_validate.records.hand_model import ModelRecord, hand_of_model
+from sim_validate.records.hand_model import hand_of_model
 from sim_validate.records.reaches_json import SCHEMA
 from sim_validate.records.reaches_schema import (
     AskedRecord,
@@ -146,7 +144,7 @@ def _reach(hand: HandRecord, record: ReachRecord, clearance_m: float) -> HandRea
         within_regions=tuple(each["within_region"] for each in contacts),
         pregrasp=_array(pose["pregrasp_joints_rad"]),
         approach=_array(pose["approach"]),
-        used=np.array(pose["used"]) if "used" in pose else None,
+        used=np.array(pose["used"]),
     )  # fmt: skip
 
 
@@ -164,15 +162,10 @@ def _array(values: Sequence[float] | None) -> Array | None:
 def _hand(record: HandRecord, reached: Sequence[HandReach]) -> tuple[Hand | None, str]:
     """Return the hand of a file, or None and the reason why it cannot be drawn."""
     name = record["name"]
-    if "model" in record:
-        hand = _modelled(name, record, record["model"])
-    elif name in HANDS:
-        hand = load_hand(name)
-    else:
-        return None, (
-            f"The hand {name} cannot be drawn: reaches.json is of a version that kept no more of a "
-            "hand than its name. Run `graspproof reach` again."
-        )
+    try:
+        hand = hand_of_model(name, record["model"], record["sources"], record["torque_source"])
+    except InputError as error:
+        raise InputError(f"hand.model of {name} is none that a hand can have: {error}") from error
     same = [joint.name for joint in hand.joints] == record["joints"] and (
         [finger.name for finger in hand.fingers] == record["fingers"]
     )
@@ -183,13 +176,6 @@ def _hand(record: HandRecord, reached: Sequence[HandReach]) -> tuple[Hand | None
         "not touch at the contacts there, so it is another hand of that name. Run `graspproof "
         "reach` again."
     )
-
-
-def _modelled(name: str, record: HandRecord, model: ModelRecord) -> Hand:
-    try:
-        return hand_of_model(name, model, record["sources"], record["torque_source"])
-    except InputError as error:
-        raise InputError(f"hand.model of {name} is none that a hand can have: {error}") from error
 
 
 def _touches(hand: Hand, reached: Sequence[HandReach]) -> bool:

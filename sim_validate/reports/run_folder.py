@@ -159,12 +159,9 @@ def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
 
     found, record = read_reaches(path)
     _check_object(path, record["object"]["content_sha256"], saved)
-    own = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
-    listed = [
-        (each["id"], each.get("contacts_sha256", own.get(each["id"], "")))
-        for each in record["reaches"]
-    ]  # fmt: skip
-    _check_contacts(path, listed, saved)
+    _check_contacts(
+        path, [(each["id"], each["contacts_sha256"]) for each in record["reaches"]], saved
+    )
     return found
 
 

@@ -29,8 +29,7 @@ from sim_validate.records.regions_schema import RegionsFile
 from sim_validate.records.saved_reaches import reaches_from_json
 from sim_validate.records.saved_verdicts import verdicts_of
 from sim_validate.records.setup_toml import setup_from_tables, tables_of
-from sim_validate.records.transfers.saved_transfer import transfer_from_json
-from sim_validate.records.transfers.transfer_json import transfer_to_json
+from sim_validate.records.transfers import transfer_from_json, transfer_to_json
 from sim_validate.records.wrenches import wrenches_from_json
 from sim_validate.simulation.setup import Setup
 from tests.fuzzing.targets import Target

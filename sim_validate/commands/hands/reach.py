@@ -144,7 +144,7 @@ def _show(
             f"limit, and for {counts['not_found']} no pose was found; more --starts may find some"
         )
     reporter.say(said)
-    if unclosed := counts.get("no_closure"):
+    if unclosed := counts["no_closure"]:
         reporter.say(
             f"{unclosed} have no {len(hand.fingers)} contacts that are in force closure alone, "
             "which is proved; more friction may help, and other grasps"

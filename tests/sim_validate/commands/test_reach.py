@@ -151,9 +151,6 @@ def test_poses_of_coupled_joints_obey_and_are_kept_with_the_couplings(grasps, tm
     assert [(c.joint, c.driver, c.ratio) for c in saved.hand.couplings] == [
         ("left_curl", "left_bend", 1.0), ("right_curl", "right_bend", 1.0),
     ]  # fmt: skip
-    old = json.loads(text)
-    del old["hand"]["model"]["couplings"], old["hand"]["model"]["notes"]
-    assert record_of(ReachesFile, json.dumps(old), REACHES, schema=1)
 
 
 @pytest.mark.parametrize("flags", [("--simulate",), ("--mass-kg", "0.05")])

@@ -10,8 +10,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.files.text_files import write_text
-from sim_validate.records.transfers.saved_transfer import transfer_from_json
-from sim_validate.records.transfers.transfer_json import transfer_to_json
+from sim_validate.records.transfers import transfer_from_json, transfer_to_json
 from tests.changed_parts import with_face_moved, with_hole
 
 METRES, RADIANS = 0.5e-12, math.radians(0.5e-9)
@@ -84,18 +83,6 @@ def test_faces_and_rules_are_as_they_were_found(both):
         assert here.turn == pytest.approx(there.turn, rel=SAME, abs=RADIANS)
         assert here.old_area == pytest.approx(there.old_area, rel=SAME, abs=AREA)
         assert here.new_area == pytest.approx(there.new_area, rel=SAME, abs=AREA)
-
-
-def test_files_that_do_not_say_where_faces_are_are_still_read(both):
-    """Earlier versions wrote none of these fields."""
-    found, _ = both
-    record = json.loads(transfer_to_json(found))
-    for face in record["faces"]:
-        for name in ("normal", "center_m", "likely", "likely_turned_deg"):
-            del face[name]
-    read = transfer_from_json(json.dumps(record))
-    assert {face.center for face in read.faces} == {None}
-    assert "facing" not in read.faces_in_words
 
 
 def test_the_changes_reach_every_ending(box):
