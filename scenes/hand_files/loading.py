@@ -13,8 +13,8 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.checked import path_of, several, text
 from grasp_core.errors import InputError
+from grasp_core.hands.collisions import overlapping_pairs
 from grasp_core.hands.couplings import Coupling
-from grasp_core.hands.distances.collisions import overlapping_pairs
 from grasp_core.hands.hand import (
     FEWEST_FINGERS,
     MOST_FINGERS,

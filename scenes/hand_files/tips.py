@@ -90,6 +90,6 @@ def _corners(model: HandModel, geom: int) -> tuple[Array, float]:
         return points, ROUNDING
     ways = np.random.default_rng(0).normal(size=(MOST_WAYS, 3))
     kept, near, other = points[np.unique(np.argmax(points @ ways.T, axis=0))], *np.empty((2, 3))
-    kernel = compiled("grasp_core.hands.distances.hulls_kernel")
+    kernel = compiled("grasp_core.hands.distances_kernel")
     beyond = [kernel.hull_hull(kept, point[None], np.inf, near, other) for point in points]
     return kept, ROUNDING + max(beyond)

@@ -30,8 +30,7 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import direction, hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians
-from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import Stance, stance_of, uncoupled
+from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors

@@ -31,8 +31,7 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_grips import HandGrip
 from grasp_core.hands.hand_motors import hand_motors
 from grasp_core.hands.kinematics import HandPlaces, places
-from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import Stance, stance_of, uncoupled
+from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from scenes.execution.held import FingersSeen, HeldLayout, HeldSettings, held_layout

@@ -19,12 +19,11 @@ from grasp_core.arrays import Array, to_digits
 from grasp_core.checked import coefficient, instance, number, positive, text
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
-from grasp_core.hands.distances.collisions import tip_gaps
+from grasp_core.hands.collisions import tip_gaps
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import chains, hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians
-from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import Stance, stance_of, uncoupled
+from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact

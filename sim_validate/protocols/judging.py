@@ -14,8 +14,7 @@ from grasp_core.checked import coefficient, instance, one_of, seed_of, several
 from grasp_core.closure.contact_arrays import FEWEST
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import stance_of
+from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp

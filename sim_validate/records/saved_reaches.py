@@ -15,7 +15,7 @@ from grasp_core.errors import InputError
 from grasp_core.files.complaints import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.frames import POSE
-from grasp_core.hands.distances.collisions import tip_distances
+from grasp_core.hands.collisions import tip_distances
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.values import Contact

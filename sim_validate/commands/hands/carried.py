@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.carrying_hand import HandPayload
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_payload import hand_payload
+from grasp_core.hands.hand_motors import hand_payload
 from grasp_core.hands.reach import HandReach
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli.console import Reporter

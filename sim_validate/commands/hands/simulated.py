@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import uncoupled
+from grasp_core.hands.reach import HandReach, uncoupled
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut

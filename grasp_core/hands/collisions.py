@@ -1,23 +1,69 @@
 """Measures how far a hand is from itself, from an object and from a table: this decides.
 
 Distances are exact, between boxes with rounded edges and triangles. A shape wholly inside the
-object counts as overlapping it.
+object counts as overlapping it. The triangles of a surface are sorted into a tree of balls, in
+which compiled loops find near ones.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.frames import POSE
-from grasp_core.hands.distances.surface import surface_tree
 from grasp_core.hands.hand import PALM, SAME, Hand
-from grasp_core.hands.hand_arrays import hand_arrays
+from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree, hand_arrays, kept_by_identity
 from grasp_core.hands.kinematics import places
-from grasp_core.hands.loop_values import HandArrays
 from grasp_core.objects.polyhedron import Polyhedron
+
+LEAF = 4
+"""Largest number of triangles of a node without children."""
+
+
+@kept_by_identity(8)
+@lru_cache(maxsize=8)
+def surface_tree(body: Polyhedron) -> SurfaceTree:
+    """Sort the triangles of an object; equal objects share the tree."""
+    triangles = body.vertices[body.triangles]
+    middles, order = triangles.mean(axis=1), np.arange(len(triangles))
+    balls: list[tuple[Array, float]] = []
+    links: list[tuple[int, int]] = []
+
+    def add(first: int, end: int) -> int:
+        part = order[first:end]
+        corners = triangles[part].reshape(-1, 3)
+        middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+        balls.append((middle, float(np.linalg.norm(corners - middle, axis=1).max())))
+        links.append((-(end - first), first))
+        return len(balls) - 1
+
+    ahead = [(add(0, len(order)), 0, len(order))]
+    while ahead:
+        node, first, end = ahead.pop()
+        if end - first <= LEAF:
+            continue
+        at = middles[order[first:end]]
+        axis = int(np.argmax(np.ptp(at, axis=0)))
+        order[first:end] = order[first:end][np.argsort(at[:, axis], kind="stable")]
+        half = (first + end) // 2
+        children = add(first, half), add(half, end)
+        links[node] = children
+        ahead += [(children[0], first, half), (children[1], half, end)]
+    corners = triangles[order]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sizes = np.linalg.norm(across, axis=1, keepdims=True)
+    return SurfaceTree(
+        np.ascontiguousarray(corners),
+        np.divide(across, sizes, out=np.zeros_like(across), where=sizes > 0.0),
+        order.astype(np.int64),
+        np.array([middle for middle, _ in balls]),
+        np.array([radius for _, radius in balls]),
+        np.array(links, np.int64),
+    )
+
 
 FAR = 0.02
 """Distance up to which clearances are measured [m]."""
@@ -52,7 +98,7 @@ def clearances(
     """
     arrays, tree = hand_arrays(hand), surface_tree(body)
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
-    kernel, worst = compiled("grasp_core.hands.distances.collisions_kernel"), np.empty(2, np.int64)
+    kernel, worst = compiled("grasp_core.hands.collisions_kernel"), np.empty(2, np.int64)
     touching = np.isin(arrays.shape_tips, fingers)
     never = np.full(len(touching), -np.inf)
     apart = [
@@ -87,7 +133,7 @@ def tip_gaps(
     """
     arrays, tree = hand_arrays(hand), surface_tree(body)
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
-    kernel = compiled("grasp_core.hands.distances.collisions_kernel")
+    kernel = compiled("grasp_core.hands.collisions_kernel")
     near, other = np.empty((len(fingers), 3)), np.empty((len(fingers), 3))
     apart = np.empty(len(fingers))
     for k, finger in enumerate(fingers):
@@ -106,7 +152,7 @@ def tip_distances(
 
     Takes `joints` (j,) [rad]; `palm_pose` (4, 4); `fingers` (k,); `points` (k, 3) [m].
     """
-    arrays, kernel = hand_arrays(hand), compiled("grasp_core.hands.distances.collisions_kernel")
+    arrays, kernel = hand_arrays(hand), compiled("grasp_core.hands.collisions_kernel")
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
     return np.array([
         kernel.tip_point(arrays, turned, middles, finger, point)
@@ -118,7 +164,7 @@ def _shapes(hand: Hand, arrays: HandArrays, joints: Array, palm_pose: Array) -> 
     """Return axes and middles of the shapes of a hand in the object's frame."""
     found = places(hand, joints, palm_pose)
     turned, middles = np.empty_like(arrays.shape_rotations), np.empty_like(arrays.shape_positions)
-    compiled("grasp_core.hands.distances.collisions_kernel").place_shapes(
+    compiled("grasp_core.hands.collisions_kernel").place_shapes(
         arrays, palm_pose[:3, :3].copy(), palm_pose[:3, 3].copy(), found.link_rotations[0],
         found.link_positions[0], turned, middles,
     )  # fmt: skip
@@ -130,7 +176,7 @@ def overlapping_pairs(hand: Hand, joints: Array) -> set[tuple[str, str]]:
 
     Takes `joints` (j,) [rad].
     """
-    arrays, kernel = hand_arrays(hand), compiled("grasp_core.hands.distances.collisions_kernel")
+    arrays, kernel = hand_arrays(hand), compiled("grasp_core.hands.collisions_kernel")
     turned, middles = _shapes(hand, arrays, joints, np.eye(POSE))
     names = [PALM, *(link.name for link in hand.links)]
     found, way, point = set[tuple[str, str]](), np.empty(3), np.empty(3)

@@ -14,7 +14,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import cross, dotted
-from grasp_core.hands.distances.collisions_kernel import (
+from grasp_core.hands.collisions_kernel import (
     core_in,
     is_block,
     may_be_near,
@@ -22,9 +22,9 @@ from grasp_core.hands.distances.collisions_kernel import (
     pair_distance,
     place_shapes,
 )
-from grasp_core.hands.distances.surface_kernel import nearest
+from grasp_core.hands.distances_kernel import nearest
+from grasp_core.hands.hand_arrays import HandArrays, Pose, Sums, SurfaceTree, Targets, Wanted
 from grasp_core.hands.kinematics_kernel import chains, moved
-from grasp_core.hands.loop_values import HandArrays, Pose, Sums, SurfaceTree, Targets, Wanted
 
 MOVES = 6
 """Unknowns of the palm."""

@@ -10,11 +10,11 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
-from grasp_core.hands.distances.boxes_kernel import into_frame
-from grasp_core.hands.distances.collisions_kernel import tip_surface
+from grasp_core.hands.collisions_kernel import tip_surface
+from grasp_core.hands.distances_kernel import into_frame
+from grasp_core.hands.hand_arrays import HandArrays, Pose, Sums, SurfaceTree, Targets, Wanted
 from grasp_core.hands.kinematics_kernel import moved, product, turn
-from grasp_core.hands.loop_values import HandArrays, Pose, Sums, SurfaceTree, Targets, Wanted
-from grasp_core.hands.posing.pose_rows_kernel import MOVES, ON_SURFACE, place, residuals
+from grasp_core.hands.pose_rows_kernel import MOVES, ON_SURFACE, place, residuals
 
 SCALE_MOVE, SCALE_TURN = 1e6, 2.5e3
 """Squares of the millimetres by which one metre of a move, and one radian, moves a fingertip."""

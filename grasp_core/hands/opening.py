@@ -12,11 +12,9 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
-from grasp_core.hands.distances.surface import surface_tree
-from grasp_core.hands.hand_arrays import hand_arrays
-from grasp_core.hands.loop_values import Pose, Targets, Wanted
-from grasp_core.hands.posing.pose_search import Asked, FoundPose, blocking
-from grasp_core.hands.posing.targets import targets
+from grasp_core.hands.collisions import surface_tree
+from grasp_core.hands.hand_arrays import Pose, Targets, Wanted, hand_arrays
+from grasp_core.hands.pose_search import Asked, FoundPose, blocking, targets
 
 GAPS_M = (0.015, 0.01, 0.006, 0.003)
 """Distances of fingertips from the surface that are tried, the largest first [m]."""
@@ -58,7 +56,7 @@ def opened(asked: Asked, found: FoundPose) -> Opening:
 def _open_joints(asked: Asked, found: FoundPose) -> Array | None:
     """Return joint angles at which fingertips are off the surface and nothing overlaps."""
     arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
-    kernel = compiled("grasp_core.hands.posing.pose_kernel")
+    kernel = compiled("grasp_core.hands.pose_kernel")
     contacts = found.certificate
     for gap in GAPS_M:
         aims = _pulled_back(asked, found, gap)
@@ -71,7 +69,7 @@ def _open_joints(asked: Asked, found: FoundPose) -> Array | None:
         )  # fmt: skip
         sums = kernel.empty_sums(arrays, aims)
         kernel.settle(arrays, tree, aims, wanted, pose, sums, STEPS, 1e3 * 0.1 * gap)
-        compiled("grasp_core.hands.posing.pose_rows_kernel").place(arrays, aims, pose)
+        compiled("grasp_core.hands.pose_rows_kernel").place(arrays, aims, pose)
         away = np.einsum("ki,ki->k", contacts.positions - pose.fronts, contacts.normals)
         open_by = away - arrays.tip_roundings[found.fingers]
         if open_by.min() >= LEAST_GAP * gap and not blocking(asked, pose, None, asked.clearance):
@@ -118,12 +116,12 @@ def _is_free(asked: Asked, found: FoundPose, joints: Array, way: Array) -> bool:
     """Return whether the open hand is free at all steps of a straight way in."""
     arrays = hand_arrays(asked.hand)
     aims = _aims(asked, found)
-    kernel = compiled("grasp_core.hands.posing.pose_kernel")
+    kernel = compiled("grasp_core.hands.pose_kernel")
     pose: Pose = kernel.empty_pose(arrays, len(found.used))
     pose.palm[:], pose.q[:] = found.palm_pose[:3, :3], joints
     for back in np.arange(TICK, LINE + 0.5 * TICK, TICK):
         pose.origin[:] = found.palm_pose[:3, 3] - back * way
-        compiled("grasp_core.hands.posing.pose_rows_kernel").place(arrays, aims, pose)
+        compiled("grasp_core.hands.pose_rows_kernel").place(arrays, aims, pose)
         if blocking(asked, pose, None, asked.clearance):
             return False
     return True

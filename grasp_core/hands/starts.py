@@ -76,7 +76,7 @@ def postures(hand: Hand, seed: int) -> Postures:
     share = rng.uniform(*INNER, (TRIES, len(low)))
     angles = hand.drives.obeyed(low + (high - low) * share)
     kept, tips = np.empty(POSTURES, np.int64), np.empty((POSTURES + 1, len(arrays.tip_radii), 3))
-    kernel = compiled("grasp_core.hands.posing.postures_kernel")
+    kernel = compiled("grasp_core.hands.collisions_kernel")
     count = kernel.free_postures(arrays, angles, APART, WIDEST, kept, tips)
     return Postures(angles[kept[:count]], tips[:count])
 

@@ -8,12 +8,11 @@ import numpy as np
 
 from grasp_core.compiled import compiled
 from grasp_core.frames import plane_tangents
-from grasp_core.hands.distances.surface import surface_tree
+from grasp_core.hands.collisions import surface_tree
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_arrays import hand_arrays
-from grasp_core.hands.loop_values import Pose, Targets, Wanted
-from grasp_core.hands.posing.starts import postures
-from grasp_core.hands.posing.targets import SOFT
+from grasp_core.hands.hand_arrays import Pose, Targets, Wanted, hand_arrays
+from grasp_core.hands.pose_search import SOFT
+from grasp_core.hands.starts import postures
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import FINGERS
 
@@ -23,7 +22,7 @@ AXIS = (0.0, 0.0, 1.0)
 def compile_posing(hand: Hand, body: Polyhedron) -> None:
     """Compile what moves a hand until its fingertips touch."""
     arrays, tree = hand_arrays(hand), surface_tree(body)
-    kernel = compiled("grasp_core.hands.posing.pose_kernel")
+    kernel = compiled("grasp_core.hands.pose_kernel")
     count = min(len(hand.fingers), FINGERS)
     normals = np.tile(AXIS, (count, 1))
     aims = Targets(
@@ -37,14 +36,14 @@ def compile_posing(hand: Hand, body: Polyhedron) -> None:
     pose.palm[:], pose.origin[:], pose.q[:] = np.eye(3), 1.0, hand.ranges.mean(axis=1)
     kernel.settle(arrays, tree, aims, wanted, pose, kernel.empty_sums(arrays, aims), 0, 1.0)
     kernel.lay(arrays, tree, aims, pose, np.empty((count, 3)))
-    compiled("grasp_core.hands.posing.pose_rows_kernel").place(arrays, aims, pose)
+    compiled("grasp_core.hands.pose_rows_kernel").place(arrays, aims, pose)
 
 
 def compile_checks(hand: Hand, body: Polyhedron, seed: int) -> None:
     """Compile what chooses postures and checks distances; the postures are kept."""
     postures(hand, seed)
     arrays, worst = hand_arrays(hand), np.empty(2, np.int64)
-    kernel = compiled("grasp_core.hands.distances.collisions_kernel")
+    kernel = compiled("grasp_core.hands.collisions_kernel")
     turned, middles = np.array(arrays.shape_rotations), np.array(arrays.shape_positions)
     needs = np.zeros(len(middles))
     kernel.of_itself(arrays, turned, middles, 0.0, worst)

@@ -1,29 +1,144 @@
 """Looks for a pose in which a hand's fingertips touch an object in a grasp, and nothing overlaps.
 
-From each start, a hand is moved until its fingertips touch and balls that stand for its parts are
-clear of the object. Then fingertips are laid on the surface itself, and exact distances decide.
-Finally force closure is proved with the contacts that are reached.
+A hand with four fingers or more stands at all contacts. One with three stands at three of them, and
+only at three that are proved to be in force closure without the fourth. That proof is about the
+planned contacts; where fingertips come to rest in their regions, closure is proved again.
+
+From each start, a hand is moved until its fingertips touch, anywhere in their regions or at the
+contacts themselves, and balls that stand for its parts are clear of the object. Then fingertips are
+laid on the surface itself, and exact distances decide.
 """
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
-from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.arrays import Array, Indices, cross
+from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.compiled import compiled
-from grasp_core.frames import POSE
-from grasp_core.hands.distances.surface import surface_tree
+from grasp_core.errors import SolverError, UndecidedError
+from grasp_core.frames import POSE, plane_tangents
+from grasp_core.hands.collisions import surface_tree
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_arrays import hand_arrays
-from grasp_core.hands.loop_values import Pose, Targets, Wanted
-from grasp_core.hands.posing.contact_choices import proved_closure
-from grasp_core.hands.posing.starts import Start, starts
-from grasp_core.hands.posing.targets import is_within, targets
+from grasp_core.hands.hand_arrays import Pose, Targets, Wanted, hand_arrays
+from grasp_core.hands.starts import Start, starts
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.values import Grasp
+from grasp_core.solvers.ties import largest_first
+from grasp_core.values import FINGERS, ContactRegion, Grasp
+
+NARROW = 1e-4
+"""Least inscribed radius of a region that is aimed at; in smaller ones the contact is [m]."""
+SOFT = 2e-3
+"""How far corners of a block below the farthest count while a pose is sought [m]."""
+SHORT = 1e-9
+"""Length below which an edge of a region is left out [m]."""
+
+
+def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: float) -> Targets:
+    """Say where fingertips are to touch, with finger k at the k-th of the contacts that are used.
+
+    Takes `used` (k,); `up` (3,); `height` [m].
+    """
+    normals, own = grasp.normals[used], [grasp.regions[int(contact)] for contact in used]
+    aimed = [regions and _is_wide(region) for region in own]
+    rows = [
+        (finger, *row)
+        for finger, region in enumerate(own)
+        if aimed[finger]
+        for row in _edges(region.polygon, normals[finger])
+    ]
+    return Targets(
+        np.arange(len(used), dtype=np.int64),
+        grasp.positions[used],
+        normals,
+        np.array([plane_tangents(*normal) for normal in normals.tolist()]),
+        np.where(aimed, 0.0, 1.0),
+        np.full((len(used), 3), np.nan),
+        SOFT,
+        np.array([row[0] for row in rows], np.int64),
+        np.array([row[1] for row in rows]).reshape(-1, 3),
+        np.array([row[2] for row in rows]).reshape(-1, 3),
+        np.array(up),
+        height,
+    )
+
+
+def _is_wide(region: ContactRegion) -> bool:
+    return region.kind != "point" and region.inscribed_radius > NARROW
+
+
+def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
+    """Return a point of each edge and the unit vector from it into the convex polygon."""
+    along = np.roll(polygon, -1, axis=0) - polygon
+    kept = np.linalg.norm(along, axis=1) > SHORT
+    starts, inward = polygon[kept], cross(normal, along[kept])
+    sides = np.einsum("ej,ej->e", inward, polygon.mean(axis=0) - starts)
+    inward *= np.copysign(1.0 / np.linalg.norm(inward, axis=1), sides)[:, None]
+    return list(zip(starts, inward, strict=True))
+
+
+def is_within(targets: Targets, contact: int, position: Array, slack: float) -> bool:
+    """Return whether a position is in the region that one finger aimed at.
+
+    Takes `position` (3,) [m]; `slack` [m].
+    """
+    if targets.pinned[contact] > 0.0:
+        return bool(np.linalg.norm(position - targets.origins[contact]) <= slack)
+    own = targets.edge_contacts == contact
+    inside = np.einsum("ej,ej->e", position - targets.edge_points[own], targets.edge_inward[own])
+    return bool(inside.min(initial=np.inf) >= -slack)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactChoices:
+    """Which of a grasp's contacts may be used, and proofs about those that may not."""
+
+    closed: tuple[tuple[int, ...], ...]
+    """Indices of contacts at which fingers may stand, the best choice first."""
+    open: tuple[ClosureCertificate, ...] = ()
+    """Proofs that contacts are not in force closure, one for each choice that is left out."""
+    undecided: int = 0
+    """Number of choices whose closure could be neither proved nor disproved."""
+
+
+def contact_choices(grasp: Grasp, friction: float, fingers: int) -> ContactChoices:
+    """Choose contacts for the fingers of a hand.
+
+    Gives all contacts, if there is a finger for each. Otherwise the choices of as many contacts as
+    there are fingers which alone are in force closure, the largest margin first; equal ones, by
+    `solvers.ties`, stay in the order of their indices.
+    """
+    if fingers >= FINGERS:
+        return ContactChoices((tuple(range(FINGERS)),))
+    closed = list[tuple[int, ...]]()
+    margins, refuted, undecided = list[float](), list[ClosureCertificate](), 0
+    for chosen in combinations(range(FINGERS), fingers):
+        kept = list(chosen)
+        proof = proved_closure(grasp.positions[kept], grasp.normals[kept], friction)
+        if proof is None:
+            undecided += 1
+        elif proof.closed:
+            closed.append(chosen)
+            margins.append(proof.margin)
+        else:
+            refuted.append(proof)
+    order = largest_first(margins) if margins else []
+    return ContactChoices(tuple(closed[n] for n in order), tuple(refuted), undecided)
+
+
+def proved_closure(points: Array, normals: Array, friction: float) -> ClosureCertificate | None:
+    """Prove that contacts are in force closure, or that they are not; None if neither succeeds.
+
+    Takes `points` (k, 3) [m]; `normals` (k, 3).
+    """
+    try:
+        return force_closure(points, normals, friction)
+    except (UndecidedError, SolverError):
+        return None
+
 
 TOUCHING = 1e-5
 """Largest gap or overlap of a fingertip that counts as touching [m]: a tenth of the overlap that
@@ -122,7 +237,7 @@ def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | N
 def _tried(asked: Asked, used: Indices, aims: Targets, start: Start) -> FoundPose | str:
     """Move the hand from one start; return a pose, or what is in the way."""
     arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
-    kernel = compiled("grasp_core.hands.posing.pose_kernel")
+    kernel = compiled("grasp_core.hands.pose_kernel")
     pose: Pose = kernel.empty_pose(arrays, len(used))
     pose.palm[:], pose.origin[:], pose.q[:] = start.rotation, start.position, start.joints
     sums = kernel.empty_sums(arrays, aims)
@@ -155,7 +270,7 @@ def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Target
     Gives the planes that are touched and the contacts, (k, 3); None if fingertips do not rest.
     """
     arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
-    kernel = compiled("grasp_core.hands.posing.pose_kernel")
+    kernel = compiled("grasp_core.hands.pose_kernel")
     laid = aims._replace(
         origins=np.array(aims.origins), normals=np.array(aims.normals),
         touching=np.array(aims.touching), soft=HARD,
@@ -182,7 +297,7 @@ def blocking(asked: Asked, pose: Pose, fingers: Indices | None, clearance: float
     Takes `clearance` [m].
     """
     arrays, worst = hand_arrays(asked.hand), np.empty(2, np.int64)
-    kernel = compiled("grasp_core.hands.distances.collisions_kernel")
+    kernel = compiled("grasp_core.hands.collisions_kernel")
     needs = np.full(len(arrays.shape_links), clearance)
     if fingers is not None:
         needs[np.isin(arrays.shape_links, arrays.starts[fingers + 1] - 1)] = 0.0
