@@ -18,7 +18,7 @@ from grasp_core.errors import SolverError as SolverError
 from grasp_core.errors import UndecidedError as UndecidedError
 from grasp_core.errors import UnfaithfulError as UnfaithfulError
 from grasp_core.execution.best_squeeze import best_squeeze as best_squeeze
-from grasp_core.execution.carrying_hand import HandPayload as HandPayload
+from grasp_core.execution.carried_mass import HandPayload as HandPayload
 from grasp_core.execution.first_slip import FirstSlip as FirstSlip
 from grasp_core.execution.first_slip import first_slip as first_slip
 from grasp_core.execution.grips import Grip as Grip

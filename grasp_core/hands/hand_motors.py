@@ -23,8 +23,7 @@ from grasp_core.arrays import Array, cross, frozen, frozen_copy
 from grasp_core.checked import LARGEST, positive, switch
 from grasp_core.closure.contact_arrays import contact_frictions
 from grasp_core.errors import InputError
-from grasp_core.execution.carried_mass import GAP, carried_mass
-from grasp_core.execution.carrying_hand import CarryingHand, HandPayload
+from grasp_core.execution.carried_mass import GAP, CarryingHand, HandPayload, carried_mass
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.kinematics import HandPlaces, places

@@ -7,7 +7,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contact_arrays import contacts_sha256
-from grasp_core.execution.carrying_hand import HandPayload
+from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.files.json_text import text_of
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from grasp_core.errors import InputError, SolverError
-from grasp_core.execution.carrying_hand import HandPayload
+from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_payload
 from grasp_core.hands.reach import HandReach

@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 
-from grasp_core.execution.carrying_hand import HandPayload
+from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.files.text_files import write_text
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach

@@ -10,7 +10,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
-from grasp_core.optimizing.best.searching.cuts_kernel import SLOPES, Pieces, slopes
+from grasp_core.optimizing.best.cuts_kernel import SLOPES, Pieces, slopes
 
 TWIST = 6
 OVER = 1.0 + 4e-16

@@ -1,20 +1,24 @@
 """Searches for a tree of cuts that refutes a threshold, on all cores, the same tree on any number.
 
 A level of the search refutes one threshold. Its tree is begun by one thread up to a depth; each
-node left there is a part of its own, searched with its own twists. A part that has visited many
-nodes leaves those that wait to parts of their own, which begin with its twists. Parts are searched
-in waves of a fixed number. After a wave its newest twists, part by part, join those that parts of
-the trunk begin with. So nothing depends on which thread does what, or when; and numbers are on a
-grid, so that nothing depends on last digits (see `support_cuts`). Inside a level depth comes first:
-a tree that refutes one threshold must visit all of its nodes in any order, and the best node first
-means here the loosest threshold first (see `best_grasp`).
+node left there is a part of its own, searched with its own twists. A part is a subtree with the
+memory that compiled code works in, which grows where it is full: a stack of nodes that wait, a tree
+of nodes that were visited, and a pool of twists. A part that has visited many nodes leaves those
+that wait to parts of their own, which begin with its twists. Parts are searched in waves of a fixed
+number. After a wave its newest twists, part by part, join those that parts of the trunk begin with.
+So nothing depends on which thread does what, or when; and numbers are on a grid, so that nothing
+depends on last digits (see `support_cuts`). Inside a level depth comes first: a tree that refutes
+one threshold must visit all of its nodes in any order, and the best node first means here the
+loosest threshold first (see `best_grasp`).
 """
 
 import math
+import threading
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -22,29 +26,213 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
-from grasp_core.optimizing.best.grounds import SEARCH_DIGITS, Grounds
-from grasp_core.optimizing.best.searching.parts import (
-    NODES,
-    POOL,
-    Found,
-    Nodes,
-    Part,
-    Steps,
-    enlarge,
-    joined,
-    leave,
-    part_from,
-    room,
-)
-from grasp_core.optimizing.best.searching.stop import Stop
+from grasp_core.optimizing.best.grounds import ROOM, SEARCH_DIGITS, Grounds
+from grasp_core.quality.ferrari_canny import FerrariCanny
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
-from grasp_core.quality.resisted_loads import measured_set
+from grasp_core.quality.resisted_loads import ResistedLoads, measured_set
 from grasp_core.solvers.ties import on_grid
 from grasp_core.values import FINGERS
 
-KERNEL = "grasp_core.optimizing.best.searching.search_kernel"
-CUTS = "grasp_core.optimizing.best.searching.cuts_kernel"
-TWISTS = "grasp_core.optimizing.best.searching.twists_kernel"
+
+class Stop:
+    """Tells threads to stop, after a time or when asked."""
+
+    def __init__(self) -> None:
+        self._event = threading.Event()
+
+    def __call__(self) -> bool:
+        """Return whether to stop."""
+        return self._event.is_set()
+
+    def now(self) -> None:
+        """Stop."""
+        self._event.set()
+
+    def spend(self, nodes: int) -> None:
+        """Take note that a thread has visited so many nodes."""
+
+
+class StopAfter(Stop):
+    """Stops one thread after a number of nodes, which does not depend on the clock."""
+
+    def __init__(self, nodes: int) -> None:
+        super().__init__()
+        self._left = nodes
+
+    def spend(self, nodes: int) -> None:
+        """Count nodes, and stop when there were enough."""
+        self._left -= nodes
+        if self._left <= 0:
+            self.now()
+
+
+@contextmanager
+def stopping(seconds: float | None) -> Generator[Stop]:
+    """Yield what stops a search after a time."""
+    stop = Stop()
+    timer = None if seconds is None else threading.Timer(seconds, stop.now)
+    if timer is not None:
+        timer.daemon = True
+        timer.start()
+    try:
+        yield stop
+    finally:
+        if timer is not None:
+            timer.cancel()
+
+
+Nodes: TypeAlias = tuple[Array, Indices, Indices]
+"""Where fingers may be at each of some nodes, as `first_nodes` returns them: corners (n, 4, p,
+any, 2), how many count (n, 4, p), and which fingers are fresh (n, 4)."""
+NODES = "grasp_core.optimizing.best.search_kernel"
+POOL = 512
+"""Twists that a search keeps: asking is most of its work, and takes as long as there are twists."""
+DEEP, FIRST_ROOM = 24, 256
+"""Nodes that may wait in a part at first, and nodes for which its tree has room: most parts are
+small, and clearing more memory took longer than searching them. Room is doubled where it is full.
+"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """Contacts whose quality, or multiple of a task's loads, is known."""
+
+    pieces: tuple[int, ...]
+    """The piece of each contact, (4,)."""
+    at: Array
+    """Plane coordinates, (4, 2)."""
+    quality: FerrariCanny | ResistedLoads
+
+    def __post_init__(self) -> None:
+        self.at.setflags(write=False)
+
+
+@dataclass(slots=True, eq=False)
+class Part:
+    """A subtree and the state of its search."""
+
+    stack: Any
+    tree: Any
+    pool: Any
+    found: list[Found] = field(default_factory=list[Found])
+    finished: bool = False
+    left: list[Nodes] = field(default_factory=list[Nodes])
+    """Nodes that are left to parts of their own, in the order of the tree."""
+    parts: list["Part"] = field(default_factory=list["Part"])
+    """These parts, in the same order."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Steps:
+    """The nodes of a tree as `CutTree` lists them."""
+
+    deeds: Indices
+    asked: Indices
+    twists: Array
+    lines: Array
+
+
+def leave(part: Part) -> None:
+    """Leave a part's next node, alone, in as little memory as it takes: thousands may wait."""
+    stack, place = part.stack, int(part.stack.top[0]) - 1
+    counts = stack.counts[place : place + 1].copy()
+    corners = stack.corners[place : place + 1, :, :, : counts.max()].copy()
+    part.left.append((corners, counts, stack.fresh[place : place + 1].copy()))
+    stack.top[0] = place
+
+
+def part_from(first: Nodes, pool: Any) -> Part:
+    """Return a part that begins with nodes and the twists of a pool."""
+    nodes = compiled(NODES)
+    corners, counts, fresh = first
+    deep, pieces = max(DEEP, len(corners) + FINGERS + 1), counts.shape[2]
+    stack = nodes.Stack(
+        np.zeros((deep, FINGERS, pieces, ROOM, 2)),
+        np.zeros((deep, FINGERS, pieces), np.int64),
+        np.zeros((deep, FINGERS), np.int64), np.zeros(deep, np.int64), np.zeros(1, np.int64),
+    )  # fmt: skip
+    n = len(corners)
+    # the last one is searched first
+    stack.corners[:n, :, :, : corners.shape[3]] = corners[::-1]
+    stack.counts[:n], stack.fresh[:n] = counts[::-1], fresh[::-1]
+    stack.top[0] = n
+    tree = nodes.Tree(
+        np.zeros(FIRST_ROOM, np.int64), np.zeros(FIRST_ROOM, np.int64),
+        np.zeros((FIRST_ROOM, 6)), np.zeros((FIRST_ROOM, 3)), np.zeros(3, np.int64),
+    )  # fmt: skip
+    return Part(stack, tree, _copied(pool))
+
+
+def _copied(pool: Any) -> Any:
+    """Return a pool with the same twists, all used before a tree begins, which has named none."""
+    copies = type(pool)(*(array.copy() for array in pool))
+    copies.names[:] = -1
+    copies.used[:] -= copies.used.max() + 1
+    return copies
+
+
+def enlarge(part: Part) -> None:
+    """Make room in what is full of a part's stack and tree; few twists serve many nodes."""
+    stack, tree = part.stack, part.tree
+    if int(stack.top[0]) + FINGERS >= len(stack.depths):
+        part.stack = type(stack)(*map(_doubled, stack[:4]), stack.top)
+    sizes = [int(tree.sizes[k]) for k in (0, 0, 1, 2)]
+    arrays = [
+        _doubled(array) if size + 1 >= len(array) else array
+        for array, size in zip(tree[:4], sizes, strict=True)
+    ]
+    part.tree = type(tree)(*arrays, tree.sizes)
+
+
+def _doubled(array: Any) -> Any:
+    return np.concatenate([array, np.zeros_like(array)])
+
+
+def room() -> Any:
+    """Return the memory in which a node is looked at."""
+    return compiled(NODES).Work(
+        np.zeros((FINGERS, POOL)), np.zeros((FINGERS, POOL)), np.zeros(POOL), np.zeros(POOL),
+        np.zeros(FINGERS), np.zeros((FINGERS, 2)), np.zeros(FINGERS, np.int64),
+        np.full(1, -1),
+    )  # fmt: skip
+
+
+def joined(trunk: Part, parts: Sequence[Part]) -> Steps:
+    """Put the trees of parts into their places in the trunk's tree, and in each other's."""
+    nodes = compiled(NODES)
+    every = [trunk, *parts]
+    sizes = np.array([part.tree.sizes for part in every], dtype=np.int64)
+    starts = np.cumsum(sizes, axis=0) - sizes
+    asked: dict[int, Indices] = {}
+    for part, (n, _, _), (_, twists, lines) in zip(every, sizes, starts, strict=True):
+        shifts = np.where(part.tree.deeds[:n] < int(nodes.BY_PIECES), int(twists), int(lines))
+        asked[id(part)] = np.asarray(part.tree.asked[:n], dtype=np.int64) + shifts
+    rows = list(_in_order(trunk, int(nodes.SPLICE)))
+    return Steps(
+        np.concatenate([part.tree.deeds[some] for part, some in rows]),
+        np.concatenate([asked[id(part)][some] for part, some in rows]),
+        np.concatenate([part.tree.twists[:m] for part, m in zip(every, sizes[:, 1], strict=True)]),
+        np.concatenate([part.tree.lines[:m] for part, m in zip(every, sizes[:, 2], strict=True)]),
+    )
+
+
+def _in_order(trunk: Part, splice: int) -> Iterator[tuple[Part, slice]]:
+    """Yield the nodes of parts in the order of the whole tree: children's trees in their places."""
+    path = [(trunk, 0, 0)]
+    while path:
+        part, start, child = path.pop()
+        deeds = part.tree.deeds[: part.tree.sizes[0]]
+        if child == len(part.parts):
+            yield part, slice(start, len(deeds))
+            continue
+        hole = start + int(np.argmax(deeds[start:] == splice))
+        yield part, slice(start, hole)
+        path += [(part, hole + 1, child + 1), (part.parts[child], 0, 0)]
+
+
+KERNEL = "grasp_core.optimizing.best.search_kernel"
+CUTS = "grasp_core.optimizing.best.cuts_kernel"
+TWISTS = "grasp_core.optimizing.best.twists_kernel"
 PART_DEPTH = 7
 """Nodes with several children above a node that becomes a part of its own: a full tree has at least
 128 such parts, four waves of them."""
