@@ -5,7 +5,7 @@ from sim_validate.execution.settings import ExecutionSettings as ExecutionSettin
 from sim_validate.execution.verdict import Execution as Execution
 from sim_validate.execution.verdict import ExecutionTrial as ExecutionTrial
 from sim_validate.hands.execute_hand import execute_hand as execute_hand
-from sim_validate.hands.hand_verdict import HandVerdict as HandVerdict
+from sim_validate.hands.validate_hand import HandVerdict as HandVerdict
 from sim_validate.hands.validate_hand import hand_setup as hand_setup
 from sim_validate.hands.validate_hand import validate_hand as validate_hand
 from sim_validate.peer_files.dexgraspbench_records import DexRecord as DexRecord

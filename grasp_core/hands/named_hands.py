@@ -180,8 +180,8 @@ def _finger(
     made = tuple(
         Link(
             f"{name}_{link}",
-            Joint(f"{name}_j{i}", np.array(offset), _rotation(turn), np.array(axis), *ends,
-                  torque_limit),
+            Joint(f"{name}_j{i}", np.array(offset), _rotation(turn), np.array(axis), ends[0],
+                  ends[1], torque_limit),
             shapes, mass, None if center is None else np.array(center),
         )
         for i, (link, offset, turn, axis, ends, shapes, mass, center) in enumerate(links)

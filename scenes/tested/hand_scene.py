@@ -29,10 +29,10 @@ from scenes.hands.chains_mjcf import (
     add_exclusions,
     add_fingers,
     add_servo,
+    hand_inertials,
     placed,
 )
-from scenes.hands.hand_layout import hand_layout
-from scenes.hands.link_masses import hand_inertials
+from scenes.hands.hand_scene import hand_layout
 from scenes.mjcf_text import Element, add_element, as_texts, quaternion
 from scenes.physics import PhysicsSettings
 from scenes.tested.tested_object import TestedScene, begun, ended, mass_properties

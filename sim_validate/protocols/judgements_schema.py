@@ -6,7 +6,7 @@ from pydantic import ConfigDict, with_config
 from typing_extensions import TypedDict
 
 from sim_validate.protocols.published import From
-from sim_validate.records.reaches_schema import NotNegative, Triple
+from sim_validate.records.reaches import NotNegative, Triple
 from sim_validate.records.verdicts_schema import Count, ObjectRecord, Positive
 
 

@@ -18,7 +18,7 @@ from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.hands.hand_mjcf import build_hand_scene
+from scenes.hands.hand_scene import build_hand_scene
 from scenes.tested.fingertip_scene import fingertip_scene
 from scenes.tested.hand_scene import HandServos, hand_scene, planned_postures
 from sim_validate.hands.hand_gate import require_faithful_hands

@@ -24,7 +24,7 @@ from sim_validate.reports.agreement import BAD, Record, said_of
 from sim_validate.reports.best_possible import Possible, read_possible
 
 if TYPE_CHECKING:
-    from sim_validate.records.saved_reaches import SavedReaches
+    from sim_validate.records.reaches import SavedReaches
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"
 Read = TypeVar("Read", VerdictsFile, RegionsFile, JudgementsFile)
@@ -155,7 +155,7 @@ def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
     path = grasps.with_name(REACHES)
     if not path.is_file():
         return None
-    from sim_validate.records.saved_reaches import read_reaches  # runs without a hand need none
+    from sim_validate.records.reaches import read_reaches  # runs without a hand need none
 
     found, record = read_reaches(path)
     _check_object(path, record["object"]["content_sha256"], saved)

@@ -25,8 +25,8 @@ from sim_validate.datasets.manifest import Listed, Manifest, manifest_from_json,
 from sim_validate.datasets.quarantine import left_out_from
 from sim_validate.files.toml_tables import tables_of_toml
 from sim_validate.records.executions_json import executions_from_json, executions_to_json
+from sim_validate.records.reaches import reaches_from_json
 from sim_validate.records.regions_schema import RegionsFile
-from sim_validate.records.saved_reaches import reaches_from_json
 from sim_validate.records.saved_verdicts import verdicts_of
 from sim_validate.records.setup_toml import setup_from_tables, tables_of
 from sim_validate.records.transfers import transfer_from_json, transfer_to_json

@@ -13,14 +13,13 @@ from grasp_core.files.complaints import record_of
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.hand_flags import Reach
-from sim_validate.commands.hands import simulated
-from sim_validate.commands.hands.reach import say_where_to_look
+from sim_validate.commands import reach as simulated
+from sim_validate.commands.reach import say_where_to_look
 from sim_validate.files.stale_results import REACHES
-from sim_validate.hands.jobs import held_by_hands
+from sim_validate.hands.execute_hand import held_by_hands
 from sim_validate.hands.validate_hand import MOST_PUSH_N
 from sim_validate.main import main
-from sim_validate.records.reaches_schema import ReachesFile
-from sim_validate.records.saved_reaches import read_reaches
+from sim_validate.records.reaches import ReachesFile, read_reaches
 from tests.grasp_core.hands.gripping import plain_hand
 from tests.hand_models import hand_mjcf
 from tests.three_fingers import THREE_TIPS, three_fingers_file

@@ -5,7 +5,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.compiled import compiled
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.hands import reach
+from sim_validate.commands import reach
 from sim_validate.main import main
 from sim_validate.parallel import compiling_hands
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled

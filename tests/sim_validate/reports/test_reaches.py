@@ -12,7 +12,7 @@ from scenes.drawing.turntable import UNITS
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.records.saved_reaches import read_reaches
+from sim_validate.records.reaches import read_reaches
 from sim_validate.reports.report import write_report
 from tests.scenes.drawing.hands.standing import (
     FRICTION,
