@@ -19,6 +19,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, to_digits
 from grasp_core.hands.hand import PALM, Hand, HandFinger, Link, LinkShape
+from grasp_core.hands.kinematics import rotation_about
 from scenes.mjcf_text import Element, add_element, quaternion
 
 DENSITY_KG_M3 = 1000.0
@@ -147,13 +148,6 @@ def _link(parent: Element, chains: Chains, numbered: tuple[Link, bool], angle: f
 def placed(position: Array, rotation: Array) -> dict[str, object]:
     """Return the attributes of a body or shape at a position (3,) [m] with axes (3, 3)."""
     return {"pos": to_digits(position), "quat": quaternion(rotation)}
-
-
-def rotation_about(axis: Array, angle: float) -> Array:
-    """Return the rotation by an angle about a unit axis, (3, 3)."""
-    x, y, z = axis.tolist()
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
 
 
 def _shape(

@@ -1,18 +1,29 @@
-"""Finds the palm and the fingers of a compiled model from its fingertips.
+"""Finds the palm, the fingers and the fingertips of a compiled model from the fingertips' names.
 
 The palm is the last body that all fingertips hang on. Each body below it belongs to the link of the
 nearest joint on the way to a fingertip; what hangs on no such way, and what is above the palm,
 stays where the model's reference pose has it, fixed to the link or palm that carries it.
+
+A fingertip that is a site or a sphere is the ball itself. A capsule gives the ball at the end that
+is farther from the last joint. Any other geom is a block: a mesh the hull of its corners, anything
+else its box. A block has sharp edges, so that its corners are given a rounding, by which it is
+larger all around. The ball that stands for it lies in its box, at the end that is farther from the
+last joint.
 """
 
+import importlib
 from dataclasses import dataclass
+from itertools import product
+from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.checked import shown
+from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
-from scenes.hand_files.model import HandModel
+from grasp_core.hands.hand import SAME, LinkShape
+from scenes.hand_files.model import HandModel, mesh_points
 
 WORLD = 0
 
@@ -77,16 +88,16 @@ def _tip(model: HandModel, name: str, file: str) -> Tip:
     """Find what a name stands for: a site, else a geom, else a body."""
     if name and name in model.site_names:
         site = model.site_names.index(name)
-        return Tip(name, int(model.site_bodies[site]), None, site)
+        return Tip(name, int(model.raw.site_bodyid[site]), None, site)
     if name and name in model.geom_names:
         geom = model.geom_names.index(name)
-        return Tip(name, int(model.geom_bodies[geom]), geom, None)
+        return Tip(name, int(model.raw.geom_bodyid[geom]), geom, None)
     if name and name in model.body_names:
         body = model.body_names.index(name)
-        own = [g for g in _solid(model) if model.geom_bodies[g] == body]
+        own = [g for g in _solid(model) if model.raw.geom_bodyid[g] == body]
         balls = [g for g in own if model.geom_kinds[g] in {"sphere", "capsule"}]
         geom = (balls or own)[-1] if own else _nearest(model, body, name, file)
-        return Tip(name, int(model.geom_bodies[geom]), geom, None)
+        return Tip(name, int(model.raw.geom_bodyid[geom]), geom, None)
     known = [each for each in (*model.site_names, *model.geom_names, *model.body_names) if each]
     raise InputError(
         f"{file}: there is no site, geom or body {shown(name)}; fingertips are named by these, "
@@ -96,8 +107,8 @@ def _tip(model: HandModel, name: str, file: str) -> Tip:
 
 def _nearest(model: HandModel, body: int, name: str, file: str) -> int:
     """Return the geom of a link whose box is nearest to a body of the link that has no geom."""
-    links = _owners(model, WORLD, set(range(len(model.joint_bodies))))
-    own = [g for g in _solid(model) if links[int(model.geom_bodies[g])] == links[body]]
+    links = _owners(model, WORLD, set(range(len(model.raw.jnt_bodyid))))
+    own = [g for g in _solid(model) if links[int(model.raw.geom_bodyid[g])] == links[body]]
     if not own:
         raise InputError(
             f"{file}: fingertip {shown(name)} and the link that it is on have no shape; give it "
@@ -105,10 +116,10 @@ def _nearest(model: HandModel, body: int, name: str, file: str) -> int:
         )
 
     def away(g: int) -> float:
-        R, p = model.rotations[model.geom_bodies[g]], model.positions[model.geom_bodies[g]]
-        local = R.T @ (model.positions[body] - p) - model.geom_positions[g]
-        off = np.abs(model.geom_rotations[g].T @ local - model.geom_boxes[g, :3])
-        return float(np.linalg.norm(np.maximum(off - model.geom_boxes[g, 3:], 0.0)))
+        R, p = model.rotations[model.raw.geom_bodyid[g]], model.positions[model.raw.geom_bodyid[g]]
+        local = R.T @ (model.positions[body] - p) - model.raw.geom_pos[g]
+        off = np.abs(model.geom_rotations[g].T @ local - model.raw.geom_aabb[g, :3])
+        return float(np.linalg.norm(np.maximum(off - model.raw.geom_aabb[g, 3:], 0.0)))
 
     return min(own, key=away)
 
@@ -125,18 +136,18 @@ def path_of_body(model: HandModel, body: int) -> list[int]:
     """Return the bodies from the world to one."""
     path = [body]
     while path[-1] != WORLD:
-        path.append(int(model.parents[path[-1]]))
+        path.append(int(model.raw.body_parentid[path[-1]]))
     return path[::-1]
 
 
 def _joints_of(model: HandModel, body: int) -> tuple[int, ...]:
-    return tuple(int(j) for j in np.flatnonzero(model.joint_bodies == body))
+    return tuple(int(j) for j in np.flatnonzero(model.raw.jnt_bodyid == body))
 
 
 def _owners(model: HandModel, palm: int, used: set[int]) -> tuple[int, ...]:
     """Find which joint of a finger moves each body."""
     found = list[int]()
-    for body in range(len(model.parents)):
+    for body in range(len(model.raw.body_parentid)):
         moving = [j for b in path_of_body(model, body) for j in _joints_of(model, b) if j in used]
         apart = body == WORLD and palm != WORLD  # the floor is no part of a hand
         found.append(-2 if apart else moving[-1] if moving else -1)
@@ -151,7 +162,82 @@ def frames(model: HandModel, found: Chains) -> dict[int, tuple[Array, Array]]:
     """
     placed = {-1: (model.rotations[found.palm], model.positions[found.palm])}
     for joint in (joint for chain in found.joints for joint in chain):
-        body = int(model.joint_bodies[joint])
+        body = int(model.raw.jnt_bodyid[joint])
         R = model.rotations[body]
-        placed[joint] = R, model.positions[body] + R @ model.joint_positions[joint]
+        placed[joint] = R, model.positions[body] + R @ model.raw.jnt_pos[joint]
     return placed
+
+
+ACROSS = {0: (1, 2), 1: (0, 2), 2: (0, 1)}
+
+
+SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
+ROUNDING = 1e-4
+"""Least rounding of a block [m]."""
+MOST_WAYS = 180
+"""Number of directions in which the corners of a mesh are taken that has more of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class TipBall:
+    """A fingertip in the frame of its body: its ball, and its block if it is one."""
+
+    center: Array
+    radius: float
+    corners: Array | None = None
+    """Corners of the block, (m, 3) [m]; None for a ball."""
+    rounding: float = 0.0
+    cover: LinkShape | None = None
+    """Box that covers the block, in place of its geom; None to keep the geom."""
+
+
+def tip_ball(model: HandModel, tip: Tip, joint: Array, name: str) -> TipBall:
+    """Find the ball of a fingertip.
+
+    Takes `joint` (3,) [m].
+    """
+    if tip.site is not None:
+        radius = float(model.raw.site_size[tip.site, 0])
+        if radius <= 0.0:
+            raise InputError(f"{name}: site {tip.name} must have a size, the ball's radius")
+        return TipBall(model.raw.site_pos[tip.site], radius, None)
+    geom = int(tip.geom or 0)
+    R, kind = model.geom_rotations[geom], model.geom_kinds[geom]
+    if kind == "sphere":
+        return TipBall(model.raw.geom_pos[geom], float(model.raw.geom_size[geom, 0]), None)
+    middle = model.raw.geom_pos[geom] + R @ model.raw.geom_aabb[geom, :3]
+    half = model.raw.geom_aabb[geom, 3:].copy()
+    if kind == "capsule":
+        axis, radius = 2, float(model.raw.geom_size[geom, 0])
+    else:
+        axis = int(np.argmax(np.abs(R.T @ (middle - joint))))
+        radius = float(half[list(ACROSS[axis])].min())
+        half[axis] = max(half[axis], radius)
+    sign = 1.0 if R[:, axis] @ (middle - joint) >= 0.0 else -1.0
+    center = middle + sign * (half[axis] - radius) * R[:, axis]
+    if kind == "capsule":
+        return TipBall(center, radius, None)
+    corners, rounding = _corners(model, geom)
+    low, high = corners.min(axis=0) - rounding, corners.max(axis=0) + rounding
+    cover = LinkShape(
+        model.raw.geom_pos[geom] + R @ (0.5 * (low + high)), R, 0.5 * (high - low) + SAME, 0.0
+    )
+    return TipBall(
+        center, radius, model.raw.geom_pos[geom] + corners @ R.T, rounding, cover
+    )  # fmt: skip
+
+
+def _corners(model: HandModel, geom: int) -> tuple[Array, float]:
+    """Return corners in a geom's frame, (m, 3), whose hull, less a rounding, holds the geom."""
+    box, points = model.raw.geom_aabb[geom], mesh_points(model, geom)
+    if len(points) == 0:
+        return box[:3] + SIGNS * box[3:], ROUNDING
+    spatial: Any = importlib.import_module("scipy.spatial")
+    points = points[spatial.ConvexHull(points, qhull_options="QJ Pp").vertices]
+    if len(points) <= MOST_WAYS:
+        return points, ROUNDING
+    ways = np.random.default_rng(0).normal(size=(MOST_WAYS, 3))
+    kept, near, other = points[np.unique(np.argmax(points @ ways.T, axis=0))], *np.empty((2, 3))
+    kernel = compiled("grasp_core.hands.distances_kernel")
+    beyond = [kernel.hull_hull(kept, point[None], np.inf, near, other) for point in points]
+    return kept, ROUNDING + max(beyond)
