@@ -212,7 +212,7 @@ def _names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> tuple[str,
 
 
 def mesh_points(model: HandModel, geom: int) -> Array:
-    """Return the corners of a geom that is a mesh in the geom's frame, (v, 3) [m]; none of others."""
+    """Return the corners of a geom that is a mesh, in its frame, (v, 3) [m]; none of others."""
     raw = model.raw
     if raw.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
         return np.empty((0, 3))
