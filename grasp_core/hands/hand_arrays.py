@@ -18,9 +18,7 @@ Value = TypeVar("Value")
 Result = TypeVar("Result")
 
 
-def kept_by_identity(
-    most: int,
-) -> Callable[[Callable[[Value], Result]], Callable[[Value], Result]]:
+def kept_by_identity(most: int) -> Callable[[Callable[[Value], Result]], Callable[[Value], Result]]:
     """Return a decorator that keeps results for at most so many arguments, and these alive."""
 
     def decorated(function: Callable[[Value], Result]) -> Callable[[Value], Result]:

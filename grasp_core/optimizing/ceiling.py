@@ -32,12 +32,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.best_grasp import FINER, lowered_twists, refuted_by_one
 from grasp_core.optimizing.best.grounds import Grounds, first_nodes, grounds_on
 from grasp_core.optimizing.best.search import Searching, StopAfter
-from grasp_core.optimizing.best.support_cuts import (
-    LEAST_THRESHOLD,
-    SEARCHED_BELOW,
-    CutTree,
-    Slack,
-)
+from grasp_core.optimizing.best.support_cuts import LEAST_THRESHOLD, SEARCHED_BELOW, CutTree, Slack
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.solvers.ties import few_digits

@@ -191,11 +191,7 @@ def _joint_name(model: HandModel, joint: int) -> str:
 
 
 def _joint(
-    model: HandModel,
-    joint: int,
-    position: Array,
-    rotation: Array,
-    ends: tuple[float, float],
+    model: HandModel, joint: int, position: Array, rotation: Array, ends: tuple[float, float]
 ) -> Joint:
     """Make a joint whose angle zero is the file's zero, not the pose in which the file draws it."""
     axis = model.raw.jnt_axis[joint]

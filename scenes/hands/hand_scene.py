@@ -45,13 +45,7 @@ from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from scenes.fingertips import FingerSettings
-from scenes.hands.chains_mjcf import (
-    Chains,
-    add_exclusions,
-    add_fingers,
-    add_servo,
-    placed,
-)
+from scenes.hands.chains_mjcf import Chains, add_exclusions, add_fingers, add_servo, placed
 from scenes.layout import SQUEEZE, Layout, arrange
 from scenes.mjcf import Scene, add_object, opened
 from scenes.mjcf_text import Element, add_element, as_texts, document

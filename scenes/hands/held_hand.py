@@ -48,13 +48,7 @@ from scenes.execution.held_mjcf import (
     held_physics,
     opened,
 )
-from scenes.hands.chains_mjcf import (
-    Chains,
-    add_exclusions,
-    add_fingers,
-    add_servo,
-    placed,
-)
+from scenes.hands.chains_mjcf import Chains, add_exclusions, add_fingers, add_servo, placed
 from scenes.hands.hand_scene import mean_lever, touching
 from scenes.mjcf_text import add_element, document
 from scenes.physics import PhysicsSettings

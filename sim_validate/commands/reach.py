@@ -26,11 +26,7 @@ from sim_validate.cli.flag_bounds import FlagsError
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
 from sim_validate.commands.hand import asked_hand
 from sim_validate.commands.judging.by_protocols import judge_hands
-from sim_validate.execution.verdict import (
-    Execution,
-    held_controls_in_words,
-    loss_in_words,
-)
+from sim_validate.execution.verdict import Execution, held_controls_in_words, loss_in_words
 from sim_validate.files.folder_lock import alone_in
 from sim_validate.files.stale_results import REACHES, remove_reaches
 from sim_validate.hands.execute_hand import (
