@@ -244,10 +244,7 @@ class CarryingHand(ByValue):
         return -GRAVITY_M_PER_S2 * facet[:3], self.weights.T @ multipliers
 
     def most(self, facet: Array, multipliers: Array, rounding: float = 1.0) -> float:
-        """Return the mass above which (5) fails [kg]; infinite if there is none.
-
-        Takes `facet` (6,); `multipliers` (joints,).
-        """
+        """Return the mass above which (5) fails [kg]; infinite if there is none."""
         # facets of any length mean the same
         facet, multipliers = of_order_one(facet, multipliers)
         a, b = self.sides(facet, multipliers)

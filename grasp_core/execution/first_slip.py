@@ -77,10 +77,7 @@ def at_rest(grip: Grip) -> Held:
 
 
 def under(held: Held, start: Grip, load: Array) -> Held:
-    """Find the equilibrium under a load, starting from one under a load nearby.
-
-    Takes `load` (6,) [N, N m].
-    """
+    """Find the equilibrium under a load, starting from one under a load nearby."""
     size = start.size
     scale = np.repeat([1.0, size], 3)
     unit = np.linalg.norm(start.squeeze, axis=1).sum() + float(np.linalg.norm(load / scale))
@@ -95,10 +92,7 @@ def under(held: Held, start: Grip, load: Array) -> Held:
 
 
 def stepped(held: Held, start: Grip, step: Array) -> Held:
-    """Move the object by a translation and a turn, and let the tips follow.
-
-    Takes `step` (6,) [m, rad].
-    """
+    """Move the object by a translation and a turn, and let the tips follow."""
     shift, turn = step[:3], step[3:]
     R = rotation(turn)
     grip = held.grip
@@ -327,7 +321,10 @@ def _finite(start: Grip, load: Array, most: _Limits) -> FirstSlip:
         further, event, place = _next_event(held, load, most)
         if further <= MET * reached:
             return _ended(held, reached, event, place)
-        step = min(further, part * STEP / _pace(held.grip, load))
+        motion = held.grip.compliance @ load
+        shift = float(np.linalg.norm(motion[:3])) / held.grip.size
+        pace = max(shift, float(np.linalg.norm(motion[3:])))
+        step = min(further, part * STEP / pace)
         if reached + step > farthest:
             return _ended(held, math.inf, "none", -1)
         try:
@@ -337,12 +334,6 @@ def _finite(start: Grip, load: Array, most: _Limits) -> FirstSlip:
             continue
         held, reached, part = moved, multiple, min(1.0, 2.0 * part)
     raise SolverError("the load of first slip was not met; the grip may be nearly unstable")
-
-
-def _pace(grip: Grip, load: Array) -> float:
-    """Motion of the object per multiple of a load, in arms' lengths or radians."""
-    motion = grip.compliance @ load
-    return max(float(np.linalg.norm(motion[:3])) / grip.size, float(np.linalg.norm(motion[3:])))
 
 
 def _followed(
@@ -391,10 +382,7 @@ def _ended(held: Held, multiple: float, event: Event, place: int) -> FirstSlip:
 
 
 def torque_steps(torques: Array, rates: Array, limits: Array) -> Array:
-    """Find the further multiple of a load at which each torque reaches its limit, (joints,).
-
-    Takes `torques`, `limits` (joints,) [N m]; `rates` (joints,).
-    """
+    """Find the further multiple of a load at which each torque reaches its limit, (joints,)."""
     # a torque grows towards the limit of its own sign, or falls to that of the other
     left = np.maximum(limits - np.sign(rates) * torques, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -402,10 +390,7 @@ def torque_steps(torques: Array, rates: Array, limits: Array) -> Array:
 
 
 def torque_excess(torques: Array, rates: Array, limits: Array) -> float:
-    """Find how much less load brings joints that are just beyond their limits back, or zero.
-
-    Takes `torques`, `limits` (joints,) [N m]; `rates` (joints,).
-    """
+    """Find how much less load brings joints that are just beyond their limits back, or zero."""
     growing = np.sign(torques) * rates
     with np.errstate(divide="ignore", invalid="ignore"):
         back = (np.abs(torques) - limits) / growing

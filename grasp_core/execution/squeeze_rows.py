@@ -100,10 +100,7 @@ class JointTorques:
         return np.vstack([one_way, -one_way]), np.append(swing, swing), room
 
     def under(self, local: Array) -> Array:
-        """Compute the torques in the middle of the loads, (groups, joints) [N].
-
-        Takes `local` (k, 3) [N].
-        """
+        """Compute the torques in the middle of the loads, (groups, joints) [N]."""
         return self.start + self.levers @ local.ravel()
 
     def scales(self, local: Array) -> Array:
@@ -236,10 +233,7 @@ class Survival:
         )  # fmt: skip
 
     def bound(self, cuts: Cuts, multipliers: Array, balance: Array, max_push_n: float) -> float:
-        """Bound by (4) the scale that any squeeze with this response survives; infinite if none.
-
-        Takes `multipliers` (r + 2 cases + joint rows,); `balance` (6,).
-        """
+        """Bound by (4) the scale that any squeeze with this response survives; infinite if none."""
         rows = self.rows(cuts)
         # multipliers of any length mean the same
         multipliers, balance = of_order_one(multipliers, balance)

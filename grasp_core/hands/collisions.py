@@ -92,10 +92,7 @@ def clearances(
     up: Array | None = None,
     height: float = 0.0,
 ) -> Clearances:
-    """Measure the distances of a hand from itself, an object and a table.
-
-    Takes `joints` (j,) [rad]; `palm_pose` (4, 4); `up` (3,); `height` [m].
-    """
+    """Measure the distances of a hand from itself, an object and a table."""
     arrays, tree = hand_arrays(hand), surface_tree(body)
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
     kernel, worst = compiled("grasp_core.hands.collisions_kernel"), np.empty(2, np.int64)
@@ -127,10 +124,7 @@ class TipGaps:
 def tip_gaps(
     hand: Hand, body: Polyhedron, joints: Array, palm_pose: Array, fingers: Indices
 ) -> TipGaps:
-    """Measure how far fingertips are from an object.
-
-    Takes `joints` (j,) [rad]; `palm_pose` (4, 4); `fingers` (k,).
-    """
+    """Measure how far fingertips are from an object."""
     arrays, tree = hand_arrays(hand), surface_tree(body)
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
     kernel = compiled("grasp_core.hands.collisions_kernel")
@@ -148,10 +142,7 @@ def tip_gaps(
 def tip_distances(
     hand: Hand, joints: Array, palm_pose: Array, fingers: Iterable[int], points: Array
 ) -> Array:
-    """Measure how far points are from fingertips: zero where these touch them, (k,) [m].
-
-    Takes `joints` (j,) [rad]; `palm_pose` (4, 4); `fingers` (k,); `points` (k, 3) [m].
-    """
+    """Measure how far points are from fingertips: zero where these touch them, (k,) [m]."""
     arrays, kernel = hand_arrays(hand), compiled("grasp_core.hands.collisions_kernel")
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
     return np.array([
@@ -172,10 +163,7 @@ def _shapes(hand: Hand, arrays: HandArrays, joints: Array, palm_pose: Array) -> 
 
 
 def overlapping_pairs(hand: Hand, joints: Array) -> set[tuple[str, str]]:
-    """Return the names of links, in order of the alphabet, that overlap at some joint angles.
-
-    Takes `joints` (j,) [rad].
-    """
+    """Return the names of links, in order of the alphabet, that overlap at some joint angles."""
     arrays, kernel = hand_arrays(hand), compiled("grasp_core.hands.collisions_kernel")
     turned, middles = _shapes(hand, arrays, joints, np.eye(POSE))
     names = [PALM, *(link.name for link in hand.links)]

@@ -41,10 +41,7 @@ def place_shapes(
 
 @loop()
 def near_links(hand: HandArrays, middles: Array, limit: float, near: NDArray[np.bool_]) -> None:
-    """Fill in which links, the palm first, may be as near to each other as a limit, by their balls.
-
-    Takes `middles` (s, 3); `near` (j + 1, j + 1).
-    """
+    """Fill in which links, the palm first, may be as near as a limit, by their balls."""
     for a in range(len(hand.link_shapes)):
         for b in range(a):
             one, other, square = hand.link_shapes[a], hand.link_shapes[b], 0.0
@@ -60,8 +57,6 @@ def may_be_near(middles: Array, reaches: Array, i: int, j: int, limit: float) ->
     """Return whether two shapes may be as near as a limit, by the balls that hold them.
 
     A call with few arguments costs less than one with a whole hand.
-
-    Takes `middles` (s, 3); `reaches` (s,).
     """
     square = 0.0
     for k in range(3):
@@ -100,8 +95,6 @@ def core_in(hand: HandArrays, R: Array, middle: Array, s: int) -> tuple[Array, f
     """Return corners (m, 3) whose hull is a shape but for its rounding, and that.
 
     For a shape that covers a block they are the block's.
-
-    Takes `R` (3, 3); `middle` (3,).
     """
     if not is_block(hand, s):
         corners = np.empty((8, 3))
@@ -162,10 +155,7 @@ def pair_distance(
     hand: HandArrays, turned: Array, middles: Array, i: int, j: int, limit: float, way: Array,
     point: Array,
 ) -> float:  # fmt: skip
-    """Return the signed distance of two shapes of a hand.
-
-    Takes `turned` (s, 3, 3); `middles` (s, 3); `way`, `point` (3,).
-    """
+    """Return the signed distance of two shapes of a hand."""
     both = hand.shape_radii[i] + hand.shape_radii[j]
     h, g = hand.shape_sizes[i], hand.shape_sizes[j]
     apart = _apart_by_faces(hand, turned, middles, i, j) - both
@@ -197,10 +187,7 @@ def pair_distance(
 def of_itself(
     hand: HandArrays, turned: Array, middles: Array, need: float, worst: Indices
 ) -> float:
-    """Return the least distance between shapes of a hand that must not overlap.
-
-    Takes `turned` (s, 3, 3); `middles` (s, 3); `worst` (2,).
-    """
+    """Return the least distance between shapes of a hand that must not overlap."""
     best, way, point = np.nextafter(need, np.inf), np.empty(3), np.empty(3)
     near = np.empty((len(hand.link_shapes), len(hand.link_shapes)), np.bool_)
     near_links(hand, middles, best, near)
@@ -226,8 +213,6 @@ def tip_surface(
     """Return the distance of a surface from the hull of a tip's corners, zero if they overlap.
 
     The tip touches where the distance is its rounding.
-
-    Takes `turned` (s, 3, 3); `middles` (s, 3); `near`, `other` (3,).
     """
     s, square = hand.tip_shapes[finger], 0.0
     if is_block(hand, s):
@@ -244,10 +229,7 @@ def tip_surface(
 
 @loop()
 def deepest(corners: Array, tree: SurfaceTree, near: Array, other: Array) -> float:
-    """Return the signed distance from a surface of the corner that is deepest in it.
-
-    Takes `corners` (m, 3); `near`, `other` (3,).
-    """
+    """Return the signed distance from a surface of the corner that is deepest in it."""
     best, at = np.inf, np.empty(3)
     for c in range(len(corners)):
         nearest(corners[c], np.inf, tree.corners, tree.middles, tree.radii, tree.links, at)
@@ -262,10 +244,7 @@ def deepest(corners: Array, tree: SurfaceTree, near: Array, other: Array) -> flo
 
 @loop()
 def tip_point(hand: HandArrays, turned: Array, middles: Array, finger: int, point: Array) -> float:
-    """Return the distance of a point from a fingertip, negative within it by its rounding at most.
-
-    Takes `turned` (s, 3, 3); `middles` (s, 3); `point` (3,).
-    """
+    """Return the distance of a point from a fingertip, negative within its rounding."""
     s = hand.tip_shapes[finger]
     corners, rounding = core_in(hand, turned[s], middles[s], s)
     alone, near, other = np.empty((1, 3)), np.empty(3), np.empty(3)
@@ -277,10 +256,7 @@ def tip_point(hand: HandArrays, turned: Array, middles: Array, finger: int, poin
 def of_object(
     hand: HandArrays, turned: Array, middles: Array, tree: SurfaceTree, needs: Array, worst: Indices
 ) -> float:  # fmt: skip
-    """Return the least distance of shapes from a surface, beyond what each of them needs.
-
-    Takes `turned` (s, 3, 3); `middles` (s, 3); `needs` (s,); `worst` (1,).
-    """
+    """Return the least distance of shapes from a surface, beyond what each of them needs."""
     best, near, other = np.inf, np.empty(3), np.empty(3)
     worst[0] = -1
     low, high = tree.corners[0, 0].copy(), tree.corners[0, 0].copy()
@@ -316,10 +292,7 @@ def of_object(
 def of_table(
     hand: HandArrays, turned: Array, middles: Array, up: Array, height: float, worst: Indices
 ) -> float:  # fmt: skip
-    """Return the least height of a hand's shapes over a plane.
-
-    Takes `turned` (s, 3, 3); `middles` (s, 3); `up` (3,); `worst` (1,).
-    """
+    """Return the least height of a hand's shapes over a plane."""
     best = np.inf
     for s in range(len(hand.shape_links)):
         if is_block(hand, s):

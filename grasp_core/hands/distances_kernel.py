@@ -34,8 +34,6 @@ def point_triangle(p: Array, T: Array, near: Array, weights: Array) -> float:
     The last two corners may be one point.
 
     Source: C. Ericson, Real-Time Collision Detection, section 5.1.5 (regions of Voronoi).
-
-    Takes `p`, `near` (3,); `weights` (2,).
     """
     ab, ac, ap = T[1] - T[0], T[2] - T[0], p - T[0]
     d1, d2 = dotted(ab, ap), dotted(ac, ap)
@@ -161,10 +159,7 @@ def _gap(axis: Array, h: Array, points: Array) -> float:
 
 @loop()
 def box_triangle(h: Array, T: Array, limit: float) -> float:
-    """Return the signed distance of the box |x_i| <= h_i from a triangle, (3, 3) in its frame.
-
-    Takes `h` (3,).
-    """
+    """Return the signed distance of the box |x_i| <= h_i from a triangle, (3, 3) in its frame."""
     axis, unit, sides = np.empty(3), np.zeros(3), np.empty((CORNERS, 3))
     for k in range(CORNERS):
         for j in range(3):
@@ -223,10 +218,7 @@ def _try_axis(axis: Array, h: Array, points: Array, widest: float, best: Array) 
 def box_box(
     h: Array, g: Array, R: Array, middle: Array, limit: float, way: Array, point: Array
 ) -> float:  # fmt: skip
-    """Return the signed distance of the box |x_i| <= h_i from another box.
-
-    Takes `h`, `g`, `middle`, `way`, `point` (3,); `R` (3, 3).
-    """
+    """Return the signed distance of the box |x_i| <= h_i from another box."""
     others = np.empty((8, 3))
     corners_of(g, R, middle, others)
     axis, unit, widest = np.empty(3), np.zeros(3), -np.inf
@@ -363,8 +355,6 @@ def hull_hull(
     """Return the distance between the hulls of two sets of corners, zero where they overlap.
 
     It is that of two planes between which no hull is, so that rounding never makes it too large.
-
-    Takes `corners` (m, 3); `others` (n, 3); `near`, `other` (3,).
     """
     at, S, w, zero = corners[0] - others[0], np.empty((3, 3)), np.empty(3), np.zeros(3)
     pairs, weights, apart = np.zeros((3, 2), np.int64), np.empty(2), 0.0
@@ -487,10 +477,7 @@ def box_surface(
     h: Array, R: Array, middle: Array, limit: float, corners: Array, middles: Array, radii: Array,
     links: Indices,
 ) -> float:  # fmt: skip
-    """Return the signed distance of a box from a surface, or some number above the limit.
-
-    Takes `h`, `middle` (3,); `R` (3, 3); `middles` (n, 3); `radii` (n,); `links` (n, 2).
-    """
+    """Return the signed distance of a box from a surface, or some number above the limit."""
     stack, depth, local, T = np.empty(DEEPEST, np.int64), 1, np.empty(3), np.empty((3, 3))
     best = np.nextafter(limit, np.inf)
     stack[0] = 0

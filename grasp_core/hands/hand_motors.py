@@ -82,8 +82,19 @@ def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
     """Return where the hand's links are, the levers of its contacts and the torque limits."""
     found = places(hand, stance.joints, stance.palm_pose)
     points = np.array([contact.position for contact in stance.contacts])
-    levers = hand.drives.carried(_levers(hand, found, points, stance.fingers))
-    return found, levers, _limits(hand)
+    levers, own = np.zeros((len(hand.joints), len(points), 3)), chains(hand)
+    for contact, finger in enumerate(stance.fingers):  # the first factors of (1)
+        joints = list(own[finger])
+        arms = points[contact] - found.link_positions[0, joints]
+        levers[joints, contact] = cross(found.joint_axes[0, joints], arms)
+    missing = [joint.name for joint in hand.free_joints if joint.torque_limit_n_m is None]
+    if missing:
+        raise InputError(
+            f"hand must have a torque limit for each joint, got none for {missing[0]}: "
+            f"{hand.torque_source}; give your own with hand.with_torque_limits(limits, source)"
+        )
+    limits = np.array([joint.torque_limit_n_m for joint in hand.free_joints])
+    return found, hand.drives.carried(levers.reshape(len(levers), -1)), limits
 
 
 def direction(down: ArrayLike) -> Array:
@@ -95,31 +106,10 @@ def direction(down: ArrayLike) -> Array:
     return way / length
 
 
-def _limits(hand: Hand) -> Array:
-    missing = [joint.name for joint in hand.free_joints if joint.torque_limit_n_m is None]
-    if missing:
-        raise InputError(
-            f"hand must have a torque limit for each joint, got none for {missing[0]}: "
-            f"{hand.torque_source}; give your own with hand.with_torque_limits(limits, source)"
-        )
-    return np.array([joint.torque_limit_n_m for joint in hand.free_joints])
-
-
 def chains(hand: Hand) -> list[range]:
     """Return the numbers of each finger's joints."""
     ends = np.cumsum([0, *(len(finger.links) for finger in hand.fingers)]).tolist()
     return [range(first, end) for first, end in pairwise(ends)]
-
-
-def _levers(hand: Hand, found: HandPlaces, points: Array, fingers: tuple[int, ...]) -> Array:
-    """Return the first factors of (1) for all contacts, (joints, 3k) [m]."""
-    own = chains(hand)
-    levers = np.zeros((len(hand.joints), len(points), 3))
-    for contact, finger in enumerate(fingers):
-        joints = list(own[finger])
-        arms = points[contact] - found.link_positions[0, joints]
-        levers[joints, contact] = cross(found.joint_axes[0, joints], arms)
-    return levers.reshape(len(levers), -1)
 
 
 def _weights(hand: Hand, found: HandPlaces) -> Array:

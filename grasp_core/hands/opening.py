@@ -5,7 +5,6 @@ normals as far as the joints allow. The way in is a straight line of the palm wi
 Both are checked by exact distances; the line at steps of `TICK`.
 """
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -31,26 +30,19 @@ DIGITS = 9
 """Digits to which these cosines are compared."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Opening:
-    """How a hand gets to a pose."""
+def opened(asked: Asked, found: FoundPose) -> tuple[Array | None, Array | None]:
+    """Open the fingers and look for a straight way in.
 
-    joints: Array | None
-    """Joint angles with the fingers open, (j,) [rad]; None if none were found."""
-    approach: Array | None
-    """Unit vector along which the palm moves in, in the object's frame, (3,); None if no straight
-    way was found."""
-
-
-def opened(asked: Asked, found: FoundPose) -> Opening:
-    """Open the fingers and look for a straight way in."""
+    Gives joint angles with the fingers open, and the unit vector along which the palm moves in, in
+    the object's frame; None for what was not found.
+    """
     joints = _open_joints(asked, found)
     if joints is None:
-        return Opening(None, None)
+        return None, None
     for way in _ways(asked, found):
         if _is_free(asked, found, joints, way):
-            return Opening(joints, way)
-    return Opening(joints, None)
+            return joints, way
+    return joints, None
 
 
 def _open_joints(asked: Asked, found: FoundPose) -> Array | None:
@@ -59,7 +51,10 @@ def _open_joints(asked: Asked, found: FoundPose) -> Array | None:
     kernel = compiled("grasp_core.hands.pose_kernel")
     contacts = found.certificate
     for gap in GAPS_M:
-        aims = _pulled_back(asked, found, gap)
+        aims = _aims(asked, found)._replace(
+            origins=contacts.positions - gap * contacts.normals, normals=np.array(contacts.normals),
+            touching=found.touching,
+        )  # fmt: skip
         pose: Pose = kernel.empty_pose(arrays, len(found.used))
         pose.palm[:], pose.origin[:] = found.palm_pose[:3, :3], found.palm_pose[:3, 3]
         pose.q[:] = found.joints
@@ -77,21 +72,9 @@ def _open_joints(asked: Asked, found: FoundPose) -> Array | None:
     return None
 
 
-def _pulled_back(asked: Asked, found: FoundPose, gap: float) -> Targets:
-    """Return targets at a distance from the contacts that are reached."""
-    aims = _aims(asked, found)
-    held = found.certificate
-    return aims._replace(
-        origins=held.positions - gap * held.normals, normals=np.array(held.normals),
-        touching=found.touching,
-    )  # fmt: skip
-
-
 def _aims(asked: Asked, found: FoundPose) -> Targets:
     """Return targets at the planned contacts."""
-    aims = targets(
-        asked.grasp, found.used, regions=False, up=asked.up, height=asked.height
-    )  # fmt: skip
+    aims = targets(asked.grasp, found.used, regions=False, up=asked.up, height=asked.height)
     return aims._replace(fingers=found.fingers)
 
 

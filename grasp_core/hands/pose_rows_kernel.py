@@ -67,8 +67,6 @@ def _ahead(
     the turn moves a point of the block, with
 
         M = sum of w (c - p) ((c - p) x n)' / s.                                           (2)
-
-    Takes `R`, `roll` (3, 3); `point` (3,).
     """
     finger, n, way, arm = targets.fingers[k], targets.normals[k], np.empty(3), np.empty(3)
     first, count = hand.tip_firsts[finger], hand.tip_firsts[finger + 1] - hand.tip_firsts[finger]
@@ -191,10 +189,7 @@ def _touching(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, su
 
 @loop()
 def _outward(center: Array, need: float, tree: SurfaceTree, along: Array) -> float:
-    """Return the signed distance of a point from a surface, and fill in the way out.
-
-    Takes `center`, `along` (3,).
-    """
+    """Return the signed distance of a point from a surface, and fill in the way out."""
     near, square = np.empty(3), 0.0
     for j in range(3):
         square += (center[j] - tree.middles[0, j]) ** 2
@@ -278,10 +273,7 @@ def _links(hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums) -> None:
 def _farthest(
     hand: HandArrays, pose: Pose, s: int, origin: Array, way: Array, left_out: Array, x: Array
 ) -> float:  # fmt: skip
-    """Return how far a shape reaches beyond a plane, and fill in its corner there.
-
-    Takes `origin`, `way`, `left_out`, `x` (3,).
-    """
+    """Return how far a shape reaches beyond a plane, and fill in its corner there."""
     (corners, rounding), farthest = core_in(hand, pose.turned[s], pose.middles[s], s), -np.inf
     for c in range(len(corners)):
         square, height = 0.0, rounding

@@ -27,7 +27,7 @@ from grasp_core.hands.hand_arrays import Pose, Targets, Wanted, hand_arrays
 from grasp_core.hands.starts import Start, starts
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import largest_first
-from grasp_core.values import FINGERS, ContactRegion, Grasp
+from grasp_core.values import FINGERS, Grasp
 
 NARROW = 1e-4
 """Least inscribed radius of a region that is aimed at; in smaller ones the contact is [m]."""
@@ -38,12 +38,9 @@ SHORT = 1e-9
 
 
 def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: float) -> Targets:
-    """Say where fingertips are to touch, with finger k at the k-th of the contacts that are used.
-
-    Takes `used` (k,); `up` (3,); `height` [m].
-    """
+    """Say where fingertips are to touch, finger k at the k-th of the contacts that are used."""
     normals, own = grasp.normals[used], [grasp.regions[int(contact)] for contact in used]
-    aimed = [regions and _is_wide(region) for region in own]
+    aimed = [regions and each.kind != "point" and each.inscribed_radius > NARROW for each in own]
     rows = [
         (finger, *row)
         for finger, region in enumerate(own)
@@ -66,10 +63,6 @@ def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: fl
     )
 
 
-def _is_wide(region: ContactRegion) -> bool:
-    return region.kind != "point" and region.inscribed_radius > NARROW
-
-
 def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
     """Return a point of each edge and the unit vector from it into the convex polygon."""
     along = np.roll(polygon, -1, axis=0) - polygon
@@ -81,10 +74,7 @@ def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
 
 
 def is_within(targets: Targets, contact: int, position: Array, slack: float) -> bool:
-    """Return whether a position is in the region that one finger aimed at.
-
-    Takes `position` (3,) [m]; `slack` [m].
-    """
+    """Return whether a position is in the region that one finger aimed at."""
     if targets.pinned[contact] > 0.0:
         return bool(np.linalg.norm(position - targets.origins[contact]) <= slack)
     own = targets.edge_contacts == contact
@@ -130,10 +120,7 @@ def contact_choices(grasp: Grasp, friction: float, fingers: int) -> ContactChoic
 
 
 def proved_closure(points: Array, normals: Array, friction: float) -> ClosureCertificate | None:
-    """Prove that contacts are in force closure, or that they are not; None if neither succeeds.
-
-    Takes `points` (k, 3) [m]; `normals` (k, 3).
-    """
+    """Prove that contacts are in force closure, or that they are not; None if neither succeeds."""
     try:
         return force_closure(points, normals, friction)
     except (UndecidedError, SolverError):
@@ -206,18 +193,12 @@ class FoundPose:
     """Number of starts that were tried."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class NoPose:
-    """What was met where no pose was found."""
+def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | Counter[str]:
+    """Look for a pose from one start after the other; without one, count how starts ended.
 
-    tally: Counter[str]
-    """How starts ended: `away` (fingertips do not touch), `limit` (the same, with a joint at a
-    limit), `self`, `object`, `table` (what overlaps), `open` (no force closure)."""
-    starts: int
-
-
-def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | NoPose:
-    """Look for a pose from one start after the other."""
+    They end `away` (fingertips do not touch), at a `limit` (the same, with a joint at one), with an
+    overlap (`self`, `object`, `table`), or `open` (no force closure).
+    """
     tally: Counter[str] = Counter()
     for chosen in choices:
         used = np.array(chosen, np.int64)
@@ -231,7 +212,7 @@ def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | N
             if not isinstance(ended, str):
                 return replace(ended, starts=tally.total() + 1)
             tally[ended] += 1
-    return NoPose(tally, tally.total())
+    return tally
 
 
 def _tried(asked: Asked, used: Indices, aims: Targets, start: Start) -> FoundPose | str:
@@ -256,8 +237,10 @@ def _tried(asked: Asked, used: Indices, aims: Targets, start: Start) -> FoundPos
     certificate = proved_closure(points, targets.normals, asked.friction)
     if certificate is None or not certificate.closed:
         return "open"
+    palm_pose = np.eye(POSE)
+    palm_pose[:3, :3], palm_pose[:3, 3] = pose.palm, pose.origin
     return FoundPose(
-        used, start.fingers, pose.q, _as_pose(pose), certificate,
+        used, start.fingers, pose.q, palm_pose, certificate,
         _are_within(aims, certificate.positions, MARGIN), targets.touching,
     )  # fmt: skip
 
@@ -292,10 +275,7 @@ def _are_within(aims: Targets, points: Array, slack: float) -> tuple[bool, ...]:
 
 
 def blocking(asked: Asked, pose: Pose, fingers: Indices | None, clearance: float) -> str:
-    """Return what a placed hand overlaps: `self`, `object`, `table`, or nothing.
-
-    Takes `clearance` [m].
-    """
+    """Return what a placed hand overlaps: `self`, `object`, `table`, or nothing."""
     arrays, worst = hand_arrays(asked.hand), np.empty(2, np.int64)
     kernel = compiled("grasp_core.hands.collisions_kernel")
     needs = np.full(len(arrays.shape_links), clearance)
@@ -318,9 +298,3 @@ def blocking(asked: Asked, pose: Pose, fingers: Indices | None, clearance: float
 def _why_away(hand: Hand, q: Array) -> str:
     low, high = hand.ranges.T
     return "limit" if (((q <= low) | (q >= high)) & (low < high)).any() else "away"
-
-
-def _as_pose(pose: Pose) -> Array:
-    found = np.eye(POSE)
-    found[:3, :3], found[:3, 3] = pose.palm, pose.origin
-    return found

@@ -36,12 +36,10 @@ from grasp_core.errors import InputError
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.kinematics import places
-from grasp_core.hands.opening import Opening, opened
+from grasp_core.hands.opening import opened
 from grasp_core.hands.pose_search import (
     Asked,
     ContactChoices,
-    FoundPose,
-    NoPose,
     contact_choices,
     find_pose,
 )
@@ -166,7 +164,9 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
     Raises:
         InputError: An argument is refused.
     """
-    _check(hand, body, grasp)
+    instance(hand, Hand, "hand", "load_hand makes one")
+    check_body(body)
+    instance(grasp, Grasp, "grasp", "plan finds some")
     up, height = _table(body, table_down)
     switch(regions, "regions")
     asked = Asked(
@@ -178,16 +178,16 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
     if not choices.closed:
         return _unclosed(asked, choices)
     found = find_pose(asked, choices.closed)
-    if isinstance(found, NoPose):
+    if isinstance(found, Counter):
         reason, said = _why(found)
-        return HandReach(hand.name, grasp.id, reason, said, found.starts, clearance_m)
-    return _reached(asked, found, opened(asked, found))
-
-
-def _check(hand: Hand, body: Polyhedron, grasp: Grasp) -> None:
-    instance(hand, Hand, "hand", "load_hand makes one")
-    check_body(body)
-    instance(grasp, Grasp, "grasp", "plan finds some")
+        return HandReach(hand.name, grasp.id, reason, said, found.total(), clearance_m)
+    joints, way = opened(asked, found)
+    proof = found.certificate
+    contacts = tuple(map(Contact, proof.positions, proof.normals))
+    return HandReach(
+        hand.name, grasp.id, "", "", found.starts, clearance_m, found.fingers, found.joints,
+        found.palm_pose, contacts, proof, found.within, joints, way, found.used,
+    )  # fmt: skip
 
 
 def _table(body: Polyhedron, down: ArrayLike | None) -> tuple[Array, float]:
@@ -200,16 +200,6 @@ def _table(body: Polyhedron, down: ArrayLike | None) -> tuple[Array, float]:
         raise InputError("table_down must be a direction, got a vector of length zero")
     up = -way / length
     return up, float((body.vertices @ up).min())
-
-
-def _reached(asked: Asked, found: FoundPose, opening: Opening) -> HandReach:
-    proof = found.certificate
-    contacts = tuple(map(Contact, proof.positions, proof.normals))
-    return HandReach(
-        asked.hand.name, asked.grasp.id, "", "", found.starts, asked.clearance, found.fingers,
-        found.joints, found.palm_pose, contacts, proof, found.within, opening.joints,
-        opening.approach, found.used,
-    )  # fmt: skip
 
 
 def _unclosed(asked: Asked, choices: ContactChoices) -> HandReach:
@@ -228,10 +218,9 @@ def _unclosed(asked: Asked, choices: ContactChoices) -> HandReach:
     )  # fmt: skip
 
 
-def _why(found: NoPose) -> tuple[ReachReason, str]:
+def _why(tally: Counter[str]) -> tuple[ReachReason, str]:
     """Say what was in the way most often."""
-    tried = f"from {found.starts} starts no pose was found"
-    tally: Counter[str] = found.tally
+    tried = f"from {tally.total()} starts no pose was found"
     blocked = {name: tally[name] for name in OVERLAPS if tally[name]}
     if blocked:
         most = max(blocked, key=lambda name: blocked[name])
@@ -327,8 +316,6 @@ def with_balls(
 
     Scenes and drawings know fingertips as balls on the last links. Which part of a block touches is
     the pose's.
-
-    Takes `joints` (j,) [rad]; `palm_pose` (4, 4).
     """
     touching = {f: each for f, each in zip(fingers, contacts, strict=True)
                 if hand.fingers[f].tip.corners is not None}  # fmt: skip

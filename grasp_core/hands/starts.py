@@ -82,10 +82,7 @@ def postures(hand: Hand, seed: int) -> Postures:
 
 
 def starts(hand: Hand, positions: Array, normals: Array, *, seed: int, count: int) -> list[Start]:
-    """Choose where to start from, best first.
-
-    Takes `positions` (k, 3) [m]; `normals` (k, 3).
-    """
+    """Choose where to start from, best first."""
     found, arrays = postures(hand, seed), hand_arrays(hand)
     if not len(found.joints):
         return []
@@ -109,7 +106,9 @@ def starts(hand: Hand, positions: Array, normals: Array, *, seed: int, count: in
     ours = np.concatenate([tips - held[:, None], ARM * inward[which[:, None], orders[order]]], 1)
     center = middles.mean(axis=0)
     theirs = np.concatenate([middles - center, ARM * normals])
-    turns = _best_turns(ours, theirs)
+    U, _, Vt = np.linalg.svd(np.einsum("nki,kj->nij", ours, theirs))
+    Vt[:, 2] *= np.sign(np.linalg.det(U) * np.linalg.det(Vt))[:, None]
+    turns = np.einsum("nji,nkj->nik", Vt, U)  # lay ours best over theirs
     rests = ((np.einsum("nij,nkj->nki", turns, ours) - theirs) ** 2).sum(axis=(1, 2))
     best = np.argsort((rests / ARM**2).round(ROUND), kind="stable")[:count]
     return [
@@ -119,10 +118,3 @@ def starts(hand: Hand, positions: Array, normals: Array, *, seed: int, count: in
         )
         for n in best
     ]  # fmt: skip
-
-
-def _best_turns(ours: Array, theirs: Array) -> Array:
-    """Return the rotations that lay points (n, k, 3) best over others (k, 3), (n, 3, 3)."""
-    U, _, Vt = np.linalg.svd(np.einsum("nki,kj->nij", ours, theirs))
-    Vt[:, 2] *= np.sign(np.linalg.det(U) * np.linalg.det(Vt))[:, None]
-    return np.einsum("nji,nkj->nik", Vt, U)

@@ -180,10 +180,7 @@ class ContactFaces:
     def step(
         self, y: Array, lower: float, planes: tuple[Array, Array], reach: float
     ) -> tuple[Array, float]:
-        """Find the best move within the trust region, and the gain that it predicts.
-
-        Takes `y` (k, 2); `planes` (m,) or (m, 2k).
-        """
+        """Find the best move within the trust region, and the gain that it predicts."""
         distances, slopes = planes
         n = y.size
         rows = [np.hstack([-slopes, np.ones((len(slopes), 1))])]
@@ -236,10 +233,7 @@ class ContactFaces:
 
 
 def climbs_for_weight(faces: ContactFaces, y: Array) -> Iterator[Array]:
-    """Yield where contacts in force closure come to by climbing for the weight, (k, 2) each.
-
-    Takes `y` (k, 2).
-    """
+    """Yield where contacts in force closure come to by climbing for the weight, (k, 2) each."""
     forces = _spread()
     for _ in range(ROUNDS):
         loads = np.hstack([forces, np.zeros_like(forces)])

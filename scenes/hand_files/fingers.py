@@ -192,10 +192,7 @@ class TipBall:
 
 
 def tip_ball(model: HandModel, tip: Tip, joint: Array, name: str) -> TipBall:
-    """Find the ball of a fingertip.
-
-    Takes `joint` (3,) [m].
-    """
+    """Find the ball of a fingertip."""
     if tip.site is not None:
         radius = float(model.raw.site_size[tip.site, 0])
         if radius <= 0.0:

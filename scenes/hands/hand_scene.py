@@ -148,10 +148,7 @@ def hand_layout(
 
 
 def touching(stance: Stance, centers: Array) -> Array:
-    """Turn the joints by the least angles that put fingertips on their places, (j,) [rad].
-
-    Takes `centers` (k, 3) [m].
-    """
+    """Turn the joints by the least angles that put fingertips on their places, (j,) [rad]."""
     joints, used = stance.joints, list(stance.fingers)
     for _ in range(REFINED):
         tips = places(stance.hand, joints, stance.palm_pose).tips[0, used]

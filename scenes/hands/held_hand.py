@@ -236,10 +236,7 @@ def held_hand_layout(
     hand: Hand, body: Polyhedron, reach: HandReach, grip: Grip, mass_kg: float,
     settings: HeldSettings, reach_m: float | None = None,
 ) -> HeldHandLayout:  # fmt: skip
-    """Place an object of a given mass in a hand.
-
-    Takes `mass_kg` [kg].
-    """
+    """Place an object of a given mass in a hand."""
     base = held_layout(body, grip, mass_kg, settings, reach_m)
     stance, motors = stance_of(hand, reach), strong_motors(hand, reach)
     size = mean_lever(motors) ** 2

@@ -89,10 +89,7 @@ def execute_hand(
 
 
 def hand_execution_settings(mass_kg: float) -> ExecutionSettings:
-    """Return the usual settings for hands, in which motors alone limit how hard fingers push.
-
-    Takes `mass_kg` [kg].
-    """
+    """Return the usual settings for hands, in which motors alone limit how hard fingers push."""
     return ExecutionSettings(mass_kg=mass_kg, push_n=MOST_PUSH_N)
 
 

@@ -75,10 +75,7 @@ def lowered_twists(searching: Searching, rng: np.random.Generator) -> Array:
 def refuted_by_one(
     searching: Searching, cases: int, slack: Slack, twists: Array
 ) -> tuple[Steps, float]:
-    """Return the tree that asks a single twist, and the least threshold that it refutes.
-
-    Takes `twists` (n, 6).
-    """
+    """Return the tree that asks a single twist, and the least threshold that it refutes."""
     support, slopes = compiled(CUTS).support, compiled(CUTS).slopes
     pieces, at = searching.pieces, np.empty(6)
     reached = np.full(len(twists), -math.inf)

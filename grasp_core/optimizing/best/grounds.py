@@ -113,10 +113,7 @@ class Grounds(ByValue):
 
 
 def grounds_of(body: Polyhedron, clearance: float) -> Grounds:
-    """Return where contacts may be on an object.
-
-    Takes `clearance` [m].
-    """
+    """Return where contacts may be on an object."""
     pieces: list[FacePiece] = []
     for face, rooms in enumerate(pieces_by_face(body)):
         if len(rooms) == 1:

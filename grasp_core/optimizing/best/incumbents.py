@@ -36,10 +36,7 @@ pieces end in several local optima."""
 
 
 def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Found | None:
-    """Return good contacts, or None if no random ones are in force closure.
-
-    Takes `twists` (n, 6).
-    """
+    """Return good contacts, or None if no random ones are in force closure."""
     alike, climbs = Counter[tuple[int, ...]](), 0
     best: Found | None = None
     for on, at in _closed_sets(searching, twists, rng):

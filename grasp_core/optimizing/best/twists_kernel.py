@@ -125,10 +125,7 @@ def multiple(support: float, asked: float) -> float:
 
 @loop("numpy")
 def highest(pieces: Pieces, points: Array, on: Indices, m: int, y: Array, slope: Array) -> float:
-    """Return the largest support of contacts at points in a direction; fill in its wrench, (6,).
-
-    Takes `points` (m, 3); `on` (m,); `y`, `slope` (6,).
-    """
+    """Return the largest support of contacts at points in a direction; fill in its wrench, (6,)."""
     best, first = -np.inf, 0
     for i in range(m):
         u0, u1, u2 = _velocity(points[i], y)
