@@ -96,6 +96,22 @@ gap between the bounds."""
 LOST = 64.0 * float(np.finfo(np.float64).eps)
 """Rounding of products in (5) and (6): sums in them have six components of a wrench, three of each
 contact or one of each joint, a few tens in all."""
+GAP = 1e-3
+"""Gap between the bounds, relative to the lower one, at which no more rays follow."""
+FINEST_GAP = 1e-4
+"""Smallest gap that may be asked for: what forces may lack of the weight where they are large."""
+RAYS = 500
+"""Most rays, ten times as many as are usual: twenty to forty bring the bounds to 1e-3 of each
+other, and to 1e-4, with motors and without."""
+NOTHING, HARDLY = 1e-6, 1e-9
+"""Weight that is none, over the largest of the forces that hold it, and over the largest push:
+programs' forces are balanced to a tenth of the former, and known to a tenth of the latter."""
+WEAKER, TIMES = 1e-3, 3
+"""Share of the largest push with which forces are sought again that are not balanced well enough,
+and how often: a thousand times smaller ones are known a thousand times better, and after three
+times the largest push that is taken, 1e9 N, is one newton."""
+FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+"""Directions of the first rays, whose hull contains the origin."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -286,24 +302,6 @@ class CarryingHand(ByValue):
         return body.holds(local.reshape(len(local), -1), loads, slack) and body.is_strong_enough(
             torques, spare
         )
-
-
-GAP = 1e-3
-"""Gap between the bounds, relative to the lower one, at which no more rays follow."""
-FINEST_GAP = 1e-4
-"""Smallest gap that may be asked for: what forces may lack of the weight where they are large."""
-RAYS = 500
-"""Most rays, ten times as many as are usual: twenty to forty bring the bounds to 1e-3 of each
-other, and to 1e-4, with motors and without."""
-NOTHING, HARDLY = 1e-6, 1e-9
-"""Weight that is none, over the largest of the forces that hold it, and over the largest push:
-programs' forces are balanced to a tenth of the former, and known to a tenth of the latter."""
-WEAKER, TIMES = 1e-3, 3
-"""Share of the largest push with which forces are sought again that are not balanced well enough,
-and how often: a thousand times smaller ones are known a thousand times better, and after three
-times the largest push that is taken, 1e9 N, is one newton."""
-FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
-"""Directions of the first rays, whose hull contains the origin."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

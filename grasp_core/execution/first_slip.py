@@ -48,6 +48,24 @@ SETTLED = 1e-11
 """Largest wrench that is left, relative to the pushes and the load."""
 MOST_NEWTON = 50
 """Newton steps for one load; four or five are usual."""
+Event: TypeAlias = Literal["slip", "push limit", "torque limit", "unstable", "none"]
+"""What ends the growth of a load: a contact slips, a finger reaches its limit, a joint its torque,
+the equilibrium is not stable any more, or nothing up to `FARTHEST`."""
+Model: TypeAlias = Literal["finite", "linear"]
+"""Whether the object's motion is followed, or taken to be small."""
+FARTHEST = 1e6
+"""Largest load that is tried, in units of the largest push at rest."""
+STEP = 0.02
+"""Largest motion of the object in one step, in arms' lengths or radians."""
+MET = 1e-9
+"""How near the load of first slip is met, relative to it."""
+CORRECTIONS = 6
+"""Most steps back to the torque of a joint; each squares the error."""
+MOST_STEPS = 1000
+SMALLEST_STEP = 1e-6
+"""Part of a step at which the equilibrium ends, rather than that Newton's method fails."""
+AT_REST = 1e-9
+"""How far a squeeze may leave a cone or limit at rest, in largest pushes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,27 +135,6 @@ def rotation(turn: Array) -> Array:
     C = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     # sin(a) / a and (1 - cos(a)) / a^2, the second without cancellation
     return np.eye(3) + np.sinc(angle / np.pi) * C + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * C @ C
-
-
-Event: TypeAlias = Literal["slip", "push limit", "torque limit", "unstable", "none"]
-"""What ends the growth of a load: a contact slips, a finger reaches its limit, a joint its torque,
-the equilibrium is not stable any more, or nothing up to `FARTHEST`."""
-Model: TypeAlias = Literal["finite", "linear"]
-"""Whether the object's motion is followed, or taken to be small."""
-
-FARTHEST = 1e6
-"""Largest load that is tried, in units of the largest push at rest."""
-STEP = 0.02
-"""Largest motion of the object in one step, in arms' lengths or radians."""
-MET = 1e-9
-"""How near the load of first slip is met, relative to it."""
-CORRECTIONS = 6
-"""Most steps back to the torque of a joint; each squares the error."""
-MOST_STEPS = 1000
-SMALLEST_STEP = 1e-6
-"""Part of a step at which the equilibrium ends, rather than that Newton's method fails."""
-AT_REST = 1e-9
-"""How far a squeeze may leave a cone or limit at rest, in largest pushes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

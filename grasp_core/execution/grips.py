@@ -59,6 +59,14 @@ from grasp_core.values import Contact, Grasp
 
 SYMMETRIC = 1e-9
 """How far the matrix of a spring may be from symmetric, relative to its largest eigenvalue."""
+STIFFNESS_N_PER_M = 2000.0
+"""Stiffness of a fingertip unless stated: a soft pad or a compliant finger, 5 N at 2.5 mm."""
+TIP_RADIUS_M = 0.01
+"""Radius of a fingertip unless stated: that of a human one, and of many that are sold [m]."""
+STIFF = 1e-9
+"""Share of the largest stiffness that is none: two fingers alone leave as little by rounding."""
+BALANCED = 1e-6
+"""Largest wrench of a squeeze, relative to the sum of its forces (times the longest arm)."""
 
 
 def springs(stiffness: ArrayLike, count: int) -> Array:
@@ -85,16 +93,6 @@ def are_springs(K: Array) -> bool:
     values = np.linalg.eigvalsh(K)
     odd = np.abs(K - np.swapaxes(K, 1, 2)).max(axis=(1, 2))
     return bool((values >= SMALLEST).all() and (odd <= SYMMETRIC * values[:, -1]).all())
-
-
-STIFFNESS_N_PER_M = 2000.0
-"""Stiffness of a fingertip unless stated: a soft pad or a compliant finger, 5 N at 2.5 mm."""
-TIP_RADIUS_M = 0.01
-"""Radius of a fingertip unless stated: that of a human one, and of many that are sold [m]."""
-STIFF = 1e-9
-"""Share of the largest stiffness that is none: two fingers alone leave as little by rounding."""
-BALANCED = 1e-6
-"""Largest wrench of a squeeze, relative to the sum of its forces (times the longest arm)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

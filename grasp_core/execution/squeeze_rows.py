@@ -49,6 +49,10 @@ from grasp_core.quality.motors import Motors, motors_for
 
 ROUNDING = 1e-9
 """How far a torque may exceed its limit by rounding, relative to the limit."""
+STARTS = 8
+"""Tangent directions of each case in the first program."""
+BOUNDING = 1e-6
+"""Least c.y of (4), relative to |c| |y|, that bounds the scale."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,12 +131,6 @@ class JointTorques:
         """Return whether a load, scale times z as `place`, takes a joint to its limit."""
         torque = self.under(local)[0, joint] + self.change[0, joint] @ place
         return bool(abs(torque) >= self.limits[joint])
-
-
-STARTS = 8
-"""Tangent directions of each case in the first program."""
-BOUNDING = 1e-6
-"""Least c.y of (4), relative to |c| |y|, that bounds the scale."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

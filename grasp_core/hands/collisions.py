@@ -21,6 +21,8 @@ from grasp_core.objects.polyhedron import Polyhedron
 
 LEAF = 4
 """Largest number of triangles of a node without children."""
+FAR = 0.02
+"""Distance up to which clearances are measured [m]."""
 
 
 @kept_by_identity(8)
@@ -63,10 +65,6 @@ def surface_tree(body: Polyhedron) -> SurfaceTree:
         np.array([radius for _, radius in balls]),
         np.array(links, np.int64),
     )
-
-
-FAR = 0.02
-"""Distance up to which clearances are measured [m]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,12 @@ PARALLEL = 1e-10
 """Sine of the angle between edges below which their cross product is no axis."""
 CORNERS = 3
 BOX_CORNERS, BOX_EDGES = 8, 12
+MOST_STEPS = 100
+"""Largest number of corners that are tried: the bound of the loop, which ends after ten or so."""
+CLOSE = 1e-13
+"""Share of a squared distance by which a corner must be nearer to the origin to count."""
+DEEPEST = 64
+"""Places on the stack of a walk through the tree; a tree of 2^32 triangles needs fewer."""
 
 
 @loop()
@@ -295,12 +301,6 @@ def _nearest_features(
     return distance
 
 
-MOST_STEPS = 100
-"""Largest number of corners that are tried: the bound of the loop, which ends after ten or so."""
-CLOSE = 1e-13
-"""Share of a squared distance by which a corner must be nearer to the origin to count."""
-
-
 @loop()
 def _reaching(points: Array, way: Array, sign: float) -> int:
     """Return the number of the point that reaches farthest along sign * way."""
@@ -428,10 +428,6 @@ def hull_surface(
                 stack[depth], gaps[depth] = links[node, side], gap2[side]
                 depth += 1
     return found
-
-
-DEEPEST = 64
-"""Places on the stack of a walk through the tree; a tree of 2^32 triangles needs fewer."""
 
 
 @loop()

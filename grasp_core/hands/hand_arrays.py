@@ -16,6 +16,16 @@ from grasp_core.hands.hand import PALM, SAME, Hand, HandFinger, LinkShape
 
 Value = TypeVar("Value")
 Result = TypeVar("Result")
+LEAST_BALL = 0.008
+"""Least radius of the balls that stand for a shape while a pose is sought [m]: thinner parts of a
+link lie beside thicker ones."""
+ROUNDED = 1.12
+"""Radius of a ball over the smallest half-size of its box: between a ball inside the box and one
+through its edges."""
+BALLS_APART = 1.7
+"""Largest distance between neighbouring balls of a shape, in the smallest half-size."""
+OUTSIDE = 0.006
+"""How far a ball must stick out of every larger ball of its link to be kept [m]."""
 
 
 def kept_by_identity(most: int) -> Callable[[Callable[[Value], Result]], Callable[[Value], Result]]:
@@ -216,18 +226,6 @@ class Sums(NamedTuple):
     parts: Array
     """The largest distance from touching [mm], the squares of touching and of being in regions, and
     those of overlaps [mm^2], (3,)."""
-
-
-LEAST_BALL = 0.008
-"""Least radius of the balls that stand for a shape while a pose is sought [m]: thinner parts of a
-link lie beside thicker ones."""
-ROUNDED = 1.12
-"""Radius of a ball over the smallest half-size of its box: between a ball inside the box and one
-through its edges."""
-BALLS_APART = 1.7
-"""Largest distance between neighbouring balls of a shape, in the smallest half-size."""
-OUTSIDE = 0.006
-"""How far a ball must stick out of every larger ball of its link to be kept [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -35,6 +35,26 @@ SOFT = 2e-3
 """How far corners of a block below the farthest count while a pose is sought [m]."""
 SHORT = 1e-9
 """Length below which an edge of a region is left out [m]."""
+TOUCHING = 1e-5
+"""Largest gap or overlap of a fingertip that counts as touching [m]: a tenth of the overlap that
+simulators and makers of hands allow."""
+MOST_STEPS = 60
+GOOD_MM, ROUGH_MM, FINE_MM = 0.05, 1.0, 1e-6
+"""Distances from touching at which the search for a pose ends, from which fingertips are laid on
+the surface, and at which they lie on a flat one [mm]."""
+MOST_TOUCHES, TOUCH_STEPS = 12, 8
+"""Largest number of planes that a fingertip tries on a curved surface, and of steps to each."""
+SETTLED, RESTING_MM = 1e-9, 1e-9
+"""Change of a distance below which a fingertip rests on a surface [m], and distance from touching
+at which it does [mm]."""
+HARD = 1e-4
+"""How far corners of a block below the farthest still count when fingertips are laid down [m]."""
+ROOM = 0.0015
+"""Distance beyond the one asked for that the search keeps from the object [m]."""
+PULL = 0.03
+MARGIN, LEAST_MARGIN = 5e-4, 1e-4
+"""Distances from the edges of regions that are sought, and kept when fingertips are laid down [m].
+"""
 
 
 def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: float) -> Targets:
@@ -125,28 +145,6 @@ def proved_closure(points: Array, normals: Array, friction: float) -> ClosureCer
         return force_closure(points, normals, friction)
     except (UndecidedError, SolverError):
         return None
-
-
-TOUCHING = 1e-5
-"""Largest gap or overlap of a fingertip that counts as touching [m]: a tenth of the overlap that
-simulators and makers of hands allow."""
-MOST_STEPS = 60
-GOOD_MM, ROUGH_MM, FINE_MM = 0.05, 1.0, 1e-6
-"""Distances from touching at which the search for a pose ends, from which fingertips are laid on
-the surface, and at which they lie on a flat one [mm]."""
-MOST_TOUCHES, TOUCH_STEPS = 12, 8
-"""Largest number of planes that a fingertip tries on a curved surface, and of steps to each."""
-SETTLED, RESTING_MM = 1e-9, 1e-9
-"""Change of a distance below which a fingertip rests on a surface [m], and distance from touching
-at which it does [mm]."""
-HARD = 1e-4
-"""How far corners of a block below the farthest still count when fingertips are laid down [m]."""
-ROOM = 0.0015
-"""Distance beyond the one asked for that the search keeps from the object [m]."""
-PULL = 0.03
-MARGIN, LEAST_MARGIN = 5e-4, 1e-4
-"""Distances from the edges of regions that are sought, and kept when fingertips are laid down [m].
-"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

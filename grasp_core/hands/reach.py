@@ -53,6 +53,8 @@ ReachReason: TypeAlias = Literal["", "limit", "collision", "not found", "no clos
 overlapped, or neither; or, proved, no three contacts close for a hand with three fingers; empty
 where a pose was found."""
 OVERLAPS = {"self": "the hand itself", "object": "the object", "table": "the table"}
+OBEYED = 1e-6
+"""By how much a joint may be off the angle that follows from another: rounding of a file [rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -236,10 +238,6 @@ def _why(tally: Counter[str]) -> tuple[ReachReason, str]:
     if tally["open"]:
         return "not found", f"{tried}: the contacts that were touched are not in force closure"
     return "not found", f"{tried}: fingertips did not get to their contacts; more starts may do"
-
-
-OBEYED = 1e-6
-"""By how much a joint may be off the angle that follows from another: rounding of a file [rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,6 +26,12 @@ from grasp_core.hands.hand import SAME, LinkShape
 from scenes.hand_files.model import HandModel, mesh_points
 
 WORLD = 0
+ACROSS = {0: (1, 2), 1: (0, 2), 2: (0, 1)}
+SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
+ROUNDING = 1e-4
+"""Least rounding of a block [m]."""
+MOST_WAYS = 180
+"""Number of directions in which the corners of a mesh are taken that has more of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,16 +172,6 @@ def frames(model: HandModel, found: Chains) -> dict[int, tuple[Array, Array]]:
         R = model.rotations[body]
         placed[joint] = R, model.positions[body] + R @ model.raw.jnt_pos[joint]
     return placed
-
-
-ACROSS = {0: (1, 2), 1: (0, 2), 2: (0, 1)}
-
-
-SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
-ROUNDING = 1e-4
-"""Least rounding of a block [m]."""
-MOST_WAYS = 180
-"""Number of directions in which the corners of a mesh are taken that has more of them."""
 
 
 @dataclass(frozen=True, slots=True)

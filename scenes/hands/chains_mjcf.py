@@ -28,6 +28,14 @@ BALL = LinkShape(np.zeros(3), np.eye(3), np.zeros(3), 0.01)
 """What a link without shapes is taken for."""
 LEAST_KG, LEAST_M = 1e-6, 1e-6
 """Least mass of a link [kg], and least length of a shape [m]: the simulator refuses none at all."""
+NOMINAL_KG = 1e-3
+"""Mass of a link whose own is not known, or does not count [kg]."""
+NOMINAL_M = 0.01
+"""Radius of gyration of links [m]: small beside the inertia that servos are given."""
+THIN_M = 1e-6
+"""Least half-size of a box, for shapes that are flat [m]."""
+SHAPES = 1 << 20
+"""Bit of what the shapes of links may touch."""
 
 
 def hand_inertials(hand: Hand) -> dict[str, dict[str, object]]:
@@ -62,16 +70,6 @@ def _volume(shape: LinkShape) -> float:
     (a, b, c), r = np.maximum(2.0 * shape.half_sizes, LEAST_M).tolist(), shape.radius
     area, edges = 2.0 * (a * b + b * c + c * a), a + b + c
     return a * b * c + area * r + math.pi * r**2 * edges + 4.0 / 3.0 * math.pi * r**3
-
-
-NOMINAL_KG = 1e-3
-"""Mass of a link whose own is not known, or does not count [kg]."""
-NOMINAL_M = 0.01
-"""Radius of gyration of links [m]: small beside the inertia that servos are given."""
-THIN_M = 1e-6
-"""Least half-size of a box, for shapes that are flat [m]."""
-SHAPES = 1 << 20
-"""Bit of what the shapes of links may touch."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

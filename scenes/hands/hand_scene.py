@@ -57,6 +57,15 @@ digits leave open."""
 SIMULATION = "a simulation of the hand"
 REFINED = 3
 """Newton steps that put fingertips on their faces: from 10 micrometres to rounding."""
+SCALED = (
+    "A hand holds an object. Joints stand at the angles of the pose. The object's mass and the "
+    "inertia of the joints are scaled to suit the grasp; torque limits are the motors'."
+)
+"""Comment at the top of every scene."""
+IMPEDANCE = 0.999
+"""Impedance of contacts. Links are light along some directions, so contacts give way by more than
+under fingertips on slides, and stiff chains of joints lose force by it: with 0.99, up to half a
+percent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
@@ -171,17 +180,6 @@ def mean_lever(motors: Motors) -> float:
     """Return the root mean square distance of contacts from the joints that they load [m]."""
     squares = (motors.levers.reshape(len(motors.limits), -1, 3) ** 2).sum(axis=2)
     return math.sqrt(float(squares[squares > 0.0].mean()))
-
-
-SCALED = (
-    "A hand holds an object. Joints stand at the angles of the pose. The object's mass and the "
-    "inertia of the joints are scaled to suit the grasp; torque limits are the motors'."
-)
-"""Comment at the top of every scene."""
-IMPEDANCE = 0.999
-"""Impedance of contacts. Links are light along some directions, so contacts give way by more than
-under fingertips on slides, and stiff chains of joints lose force by it: with 0.99, up to half a
-percent."""
 
 
 def hand_physics() -> PhysicsSettings:

@@ -57,6 +57,10 @@ EXECUTION = "an execution with the hand"
 STRETCHED = 0.02
 """Least singular value of a finger's levers, over the root mean square of all, with which it
 counts as free to move in all directions."""
+WRIST = "wrist"
+LIGHT_KG = 1e-5
+"""Mass of links: ten thousand times less than objects', so that no joint feels the wrist's motion
+through them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -261,12 +265,6 @@ def held_hand_layout(
 
 def _rounded(value: float) -> float:
     return float(to_digits(np.array(value)))
-
-
-WRIST = "wrist"
-LIGHT_KG = 1e-5
-"""Mass of links: ten thousand times less than objects', so that no joint feels the wrist's motion
-through them."""
 
 
 def held_hand_scene(

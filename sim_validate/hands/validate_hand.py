@@ -40,6 +40,10 @@ from sim_validate.simulation.wrench_limits import (
 )
 from sim_validate.validation.wrench_verdict import WrenchVerdict
 
+MOST_PUSH_N = 100.0
+"""Largest normal force of a fingertip in predictions, unless stated [N]: more than hands' motors
+give, so that they are what limits."""
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class HandControlVerdict(ByValue):
@@ -113,11 +117,6 @@ class HandVerdict(ByValue):
     def __repr__(self) -> str:
         told = "held" if self.held else f"{len(self.failures)} of {len(self.wrenches)} not held"
         return summary("HandVerdict", self.hand, self.grasp, told)
-
-
-MOST_PUSH_N = 100.0
-"""Largest normal force of a fingertip in predictions, unless stated [N]: more than hands' motors
-give, so that they are what limits."""
 
 
 def hand_setup() -> Setup:

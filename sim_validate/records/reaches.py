@@ -39,6 +39,9 @@ NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Index = Annotated[int, Field(ge=0, lt=FINGERS)]
 Triple = tuple[Finite, Finite, Finite]
 Row = tuple[Finite, Finite, Finite, Finite]
+SCHEMA = 1
+TOUCHING_M = 1e-4
+"""How far a fingertip of the file may be from its contact [m]: ten times what `reach` allows."""
 
 
 class HandRecord(TypedDict):
@@ -201,9 +204,6 @@ class ReachesFile(TypedDict):
     versions: dict[str, str]
 
 
-SCHEMA = 1
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class HandTrials:
     """What the hand carries and did in simulation, by the ids of grasps, as far as it was tried."""
@@ -359,10 +359,6 @@ def _triple(vector: Array) -> Triple:
 def _row(row: Array) -> Row:
     x, y, z, w = row.tolist()
     return x, y, z, w
-
-
-TOUCHING_M = 1e-4
-"""How far a fingertip of the file may be from its contact [m]: ten times what `reach` allows."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -46,6 +46,16 @@ FIRST_STEPS = 60
 """Steps of these descents: they settle within it."""
 ROUNDED_UP = 1e-6
 """Share by which a threshold is rounded up at least, and less than three times as much."""
+WIDEST = 0.4
+"""Gap of the first level at most: a level is cheap down to it, as the search is for one twist."""
+AIMED = 0.999
+"""Share of the gap that is aimed at, as the grasp's quality is measured anew in the end."""
+FINER = 64.0
+"""How much finer than the gap the steps are in which qualities and bounds count."""
+SAME = 1e-9
+"""Share of a bound that rounding may cost it."""
+MOST_JOBS = 256
+"""Most threads: no machine that is known has more use for them."""
 
 
 def lowered_twists(searching: Searching, rng: np.random.Generator) -> Array:
@@ -101,16 +111,6 @@ def refuted_by_one(
         np.empty((0, 3)),
     )  # fmt: skip
     return steps, threshold
-
-
-WIDEST = 0.4
-"""Gap of the first level at most: a level is cheap down to it, as the search is for one twist."""
-AIMED = 0.999
-"""Share of the gap that is aimed at, as the grasp's quality is measured anew in the end."""
-FINER = 64.0
-"""How much finer than the gap the steps are in which qualities and bounds count."""
-SAME = 1e-9
-"""Share of a bound that rounding may cost it."""
 
 
 class Levels:
@@ -223,10 +223,6 @@ class Levels:
             f"{[piece.face for piece in pieces]}, can be certified, and they cannot; try another "
             "seed"
         )
-
-
-MOST_JOBS = 256
-"""Most threads: no machine that is known has more use for them."""
 
 
 def best_grasp(  # noqa: PLR0913 - each is a quantity of its own

@@ -57,6 +57,13 @@ LARGEST = 2.0
 HALF = 0.5
 SEARCH_DIGITS = 11
 """Digits after the point that a search is given of polygons (see `support_cuts`)."""
+EXACT = 1e-9
+"""Largest distance between a piece's corner, or normal, as a map moves it, and another's."""
+WIDENED = 1e-8
+MOST_MAPS = 128
+ASIDE = (0.37, 0.11)
+"""Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
+KERNEL = "grasp_core.optimizing.best.cuts_kernel"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -167,15 +174,6 @@ def _is_convex(corners: Array) -> bool:
     angles = np.arctan2(turns, along)
     one_way = (angles > -UNIT).all() or (angles < UNIT).all()
     return bool(one_way and abs(abs(float(angles.sum())) - 2.0 * np.pi) < UNIT)
-
-
-EXACT = 1e-9
-"""Largest distance between a piece's corner, or normal, as a map moves it, and another's."""
-WIDENED = 1e-8
-MOST_MAPS = 128
-ASIDE = (0.37, 0.11)
-"""Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
-KERNEL = "grasp_core.optimizing.best.cuts_kernel"
 
 
 def exact_maps(body: Polyhedron, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> Array:

@@ -19,6 +19,9 @@ from grasp_core.values import FINGERS, Grasp
 
 SAME = 1e-7
 """Largest distance between equal points, and directions, in object radii."""
+Ended: TypeAlias = Literal["gap", "time", "interrupt", "undivided"]
+"""Why a search ended: the gap is reached, time is up, it was interrupted, or polygons became too
+small, or too many, to be divided further."""
 
 
 def are_contacts_of(grasp: Grasp, wrenches: WrenchSet, proof: CutTree) -> bool:
@@ -61,11 +64,6 @@ def _is_on(proof: CutTree, point: Array, normal: Array) -> bool:
         ):
             return True
     return False
-
-
-Ended: TypeAlias = Literal["gap", "time", "interrupt", "undivided"]
-"""Why a search ended: the gap is reached, time is up, it was interrupted, or polygons became too
-small, or too many, to be divided further."""
 
 
 @dataclass(frozen=True, slots=True)

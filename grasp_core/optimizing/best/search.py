@@ -33,6 +33,47 @@ from grasp_core.quality.resisted_loads import ResistedLoads, measured_set
 from grasp_core.solvers.ties import on_grid
 from grasp_core.values import FINGERS
 
+Nodes: TypeAlias = tuple[Array, Indices, Indices]
+"""Where fingers may be at each of some nodes, as `first_nodes` returns them: corners (n, 4, p,
+any, 2), how many count (n, 4, p), and which fingers are fresh (n, 4)."""
+NODES = "grasp_core.optimizing.best.search_kernel"
+POOL = 512
+"""Twists that a search keeps: asking is most of its work, and takes as long as there are twists."""
+DEEP, FIRST_ROOM = 24, 256
+"""Nodes that may wait in a part at first, and nodes for which its tree has room: most parts are
+small, and clearing more memory took longer than searching them. Room is doubled where it is full.
+"""
+KERNEL = "grasp_core.optimizing.best.search_kernel"
+CUTS = "grasp_core.optimizing.best.cuts_kernel"
+TWISTS = "grasp_core.optimizing.best.twists_kernel"
+PART_DEPTH = 7
+"""Nodes with several children above a node that becomes a part of its own: a full tree has at least
+128 such parts, four waves of them."""
+PART_NODES = 4000
+"""Nodes after which a part leaves those that wait to parts of their own: some parts have a
+hundred times as many as most, and one thread would search them while others wait."""
+MOST_DEPTH = 10**9
+MOST_NODES = 10**10
+"""Nodes after which a search ends as undivided: a core visits about 1e4 in a second."""
+WAVE = 32
+"""Parts that are searched from the same twists: more threads would find nothing to do, and twists
+that a part finds are of no use to the others of its wave."""
+KEPT = 384
+"""Twists that a wave hands on at most: three quarters of a pool, so that as many of the old ones
+stay."""
+BUDGET = 2000
+"""Nodes after which a thread looks whether it should stop: some tenths of a second."""
+MUCH = 1.1
+"""Ratio of qualities from which on contacts are a better start for other thresholds, where the
+measure is not the usual one and the first contacts may be poor."""
+ASIDE = 1.4
+"""Factor that keeps loads of round sizes away from powers of two."""
+SETTLED = 1.0 - 1e-6
+"""Share of a threshold below which contacts count as refuted."""
+EXACT_GAP = 1e-5
+"""Gap between the bounds of the measure of contacts that may be better: a tenth of the smallest gap
+that a search may be asked for."""
+
 
 class Stop:
     """Tells threads to stop, after a time or when asked."""
@@ -79,18 +120,6 @@ def stopping(seconds: float | None) -> Generator[Stop]:
     finally:
         if timer is not None:
             timer.cancel()
-
-
-Nodes: TypeAlias = tuple[Array, Indices, Indices]
-"""Where fingers may be at each of some nodes, as `first_nodes` returns them: corners (n, 4, p,
-any, 2), how many count (n, 4, p), and which fingers are fresh (n, 4)."""
-NODES = "grasp_core.optimizing.best.search_kernel"
-POOL = 512
-"""Twists that a search keeps: asking is most of its work, and takes as long as there are twists."""
-DEEP, FIRST_ROOM = 24, 256
-"""Nodes that may wait in a part at first, and nodes for which its tree has room: most parts are
-small, and clearing more memory took longer than searching them. Room is doubled where it is full.
-"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -229,37 +258,6 @@ def _in_order(trunk: Part, splice: int) -> Iterator[tuple[Part, slice]]:
         yield part, slice(start, hole)
         path += [(part, hole + 1, child + 1), (part.parts[child], 0, 0)]
 
-
-KERNEL = "grasp_core.optimizing.best.search_kernel"
-CUTS = "grasp_core.optimizing.best.cuts_kernel"
-TWISTS = "grasp_core.optimizing.best.twists_kernel"
-PART_DEPTH = 7
-"""Nodes with several children above a node that becomes a part of its own: a full tree has at least
-128 such parts, four waves of them."""
-PART_NODES = 4000
-"""Nodes after which a part leaves those that wait to parts of their own: some parts have a
-hundred times as many as most, and one thread would search them while others wait."""
-MOST_DEPTH = 10**9
-MOST_NODES = 10**10
-"""Nodes after which a search ends as undivided: a core visits about 1e4 in a second."""
-WAVE = 32
-"""Parts that are searched from the same twists: more threads would find nothing to do, and twists
-that a part finds are of no use to the others of its wave."""
-KEPT = 384
-"""Twists that a wave hands on at most: three quarters of a pool, so that as many of the old ones
-stay."""
-BUDGET = 2000
-"""Nodes after which a thread looks whether it should stop: some tenths of a second."""
-MUCH = 1.1
-"""Ratio of qualities from which on contacts are a better start for other thresholds, where the
-measure is not the usual one and the first contacts may be poor."""
-ASIDE = 1.4
-"""Factor that keeps loads of round sizes away from powers of two."""
-SETTLED = 1.0 - 1e-6
-"""Share of a threshold below which contacts count as refuted."""
-EXACT_GAP = 1e-5
-"""Gap between the bounds of the measure of contacts that may be better: a tenth of the smallest gap
-that a search may be asked for."""
 
 _Waiting: TypeAlias = tuple[Part, Nodes, Any]
 """A node that waits, with the part that left it and the pool of twists that it begins with."""

@@ -24,6 +24,24 @@ SEVERAL = 2.0
 """Extent that counts for a finger with several pieces, larger than that of any piece."""
 ALL = -1
 """Says that all fingers have changed."""
+TRIALS = 6
+"""Twists whose cuts are measured before one of them is asked."""
+THIN = 0.03
+"""Weight of a polygon's squared extent beside its area, so that thin ones count."""
+MOST_LEFT = 0.9
+"""Share of a finger's polygons above which an answer among several makes no headway."""
+SHRUNK = 0.97
+"""Cost of a question with one answer, up to which it is asked."""
+BESIDE = 1.5
+"""Estimated cost, over the least cost measured, up to which a question is measured."""
+DONE, PAUSED, FULL, PART, FOUND, LOST = 0, 1, 2, 3, 4, 5
+"""Why a run ends: nothing left, budget of nodes spent, no room in the tree, a node that is to be a
+part of its own, contacts that may reach the threshold, a node too small to be divided."""
+ASKED_ABOVE = 1.05
+"""Cost of a question up to which it is asked rather than dividing a polygon, which costs 1.41. It
+was measured: after a division more twists have a single answer."""
+STEPS, CLOSE_STEPS = 40, 120
+"""Steps of descents for a node, and for its middle."""
 
 
 class Stack(NamedTuple):
@@ -204,18 +222,6 @@ def _halve(stack: Stack, node: int, i: int, line: Array) -> None:
             kept = clip(stack.corners[place, i, p], count, line, side, rest)
             stack.counts[place, i, p] = kept
             stack.corners[place, i, p, :kept] = rest[:kept]
-
-
-TRIALS = 6
-"""Twists whose cuts are measured before one of them is asked."""
-THIN = 0.03
-"""Weight of a polygon's squared extent beside its area, so that thin ones count."""
-MOST_LEFT = 0.9
-"""Share of a finger's polygons above which an answer among several makes no headway."""
-SHRUNK = 0.97
-"""Cost of a question with one answer, up to which it is asked."""
-BESIDE = 1.5
-"""Estimated cost, over the least cost measured, up to which a question is measured."""
 
 
 @loop("numpy")
@@ -401,16 +407,6 @@ def _cut_to(search: Search, place: int, i: int, k: int) -> None:
             kept = cut(stack.corners[place, i, p], count, at, pieces.friction, t, rest)
             stack.counts[place, i, p] = kept
             stack.corners[place, i, p, :kept] = rest[:kept]
-
-
-DONE, PAUSED, FULL, PART, FOUND, LOST = 0, 1, 2, 3, 4, 5
-"""Why a run ends: nothing left, budget of nodes spent, no room in the tree, a node that is to be a
-part of its own, contacts that may reach the threshold, a node too small to be divided."""
-ASKED_ABOVE = 1.05
-"""Cost of a question up to which it is asked rather than dividing a polygon, which costs 1.41. It
-was measured: after a division more twists have a single answer."""
-STEPS, CLOSE_STEPS = 40, 120
-"""Steps of descents for a node, and for its middle."""
 
 
 @loop("numpy", beside=True)
