@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.hands.hand import PALM, SAME, Hand, HandFinger, LinkShape
+from grasp_core.hands.hand import PALM, SAME, Hand, LinkShape
 
 Value = TypeVar("Value")
 Result = TypeVar("Result")
@@ -246,7 +246,12 @@ def hand_arrays(hand: Hand) -> HandArrays:
     lengths = [len(finger.links) for finger in hand.fingers]
     starts = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
     ends = starts[1:] - 1
-    tips = [_tip_shape(finger) for finger in hand.fingers]
+    # what stands for a fingertip: its ball, or what covers its corners
+    tips = [
+        LinkShape(each.tip.center, np.eye(3), np.zeros(3), each.tip.radius)
+        if each.tip.corners is None else each.links[-1].shapes[-1]
+        for each in hand.fingers
+    ]  # fmt: skip
     parts += [
         _Part(int(end), tip)
         for end, tip, finger in zip(ends, tips, hand.fingers, strict=True)
@@ -255,6 +260,8 @@ def hand_arrays(hand: Hand) -> HandArrays:
     corners = [finger.tip.core[0] for finger in hand.fingers]
     free = _free_links(hand, starts)
     where = np.array([part.link for part in parts], np.int64)
+    one, other = np.triu_indices(len(where), 1)
+    kept = free[where[one] + 1, where[other] + 1] > 0.0  # pairs that must not overlap
     balls = _balls([part for part in parts if part.link not in ends])
     at = np.array([link for link, _, _ in balls], np.int64)
     shapes = [part.shape for part in parts]
@@ -292,7 +299,7 @@ def hand_arrays(hand: Hand) -> HandArrays:
         shape_tips=_shape_tips(hand, parts, ends.tolist(), tips),
         link_shapes=np.array([shape for shape, _ in held], np.int64),
         link_reaches=np.array([reach for _, reach in held]),
-        pairs=_pairs(where, free),
+        pairs=np.column_stack([one[kept], other[kept]]).astype(np.int64),
         ball_links=at,
         ball_centers=np.array([center for _, center, _ in balls]).reshape(-1, 3),
         ball_radii=np.array([radius for _, _, radius in balls]),
@@ -335,13 +342,6 @@ def _free_links(hand: Hand, starts: Indices) -> Array:
     return free
 
 
-def _pairs(links: Indices, free: Array) -> Indices:
-    """Return pairs of things on links that must not overlap, (n, 2)."""
-    one, other = np.triu_indices(len(links), 1)
-    kept = free[links[one] + 1, links[other] + 1] > 0.0
-    return np.column_stack([one[kept], other[kept]]).astype(np.int64)
-
-
 def _balls(parts: list[_Part]) -> list[tuple[int, Array, float]]:
     """Cover shapes roughly with balls: their links, middles and radii, the largest first."""
     found: list[tuple[int, Array, float]] = []
@@ -367,14 +367,6 @@ def _balls(parts: list[_Part]) -> list[tuple[int, Array, float]]:
         if not inside:
             kept.append((link, center, radius))
     return kept
-
-
-def _tip_shape(finger: HandFinger) -> LinkShape:
-    """Return the shape that stands for a fingertip: its ball, or what covers its corners."""
-    tip = finger.tip
-    if tip.corners is not None:
-        return finger.links[-1].shapes[-1]
-    return LinkShape(tip.center, np.eye(3), np.zeros(3), tip.radius)
 
 
 def _shape_tips(

@@ -162,7 +162,11 @@ def _successor(
 ) -> int | None:
     """Find the nearest like face among some of the changed part; None if none is within reach."""
     like = new.normals @ face.normal >= math.cos(rule.angle + SAME)
-    centers, weights = _representatives(face)
+    centers = np.array([piece.mean(axis=0) for piece in face.pieces])
+    weights = np.array([  # twice the areas of the pieces
+        float(np.linalg.norm(cross(piece[1:-1] - piece[0], piece[2:] - piece[0]).sum(axis=0)))
+        for piece in face.pieces
+    ])  # fmt: skip
     best, least = None, math.inf
     for index in (each for each in candidates if like[each]):
         # planes are nowhere nearer than this, so most faces are left out at once
@@ -174,16 +178,6 @@ def _successor(
         if mean <= reach and mean < least - rule.same:
             best, least = index, mean
     return best
-
-
-def _representatives(face: Face) -> tuple[Array, Array]:
-    """Return the centre of each convex piece of a face, (k, 3) [m], and twice its area, (k,)."""
-    centers = np.array([piece.mean(axis=0) for piece in face.pieces])
-    areas = [
-        float(np.linalg.norm(cross(piece[1:-1] - piece[0], piece[2:] - piece[0]).sum(axis=0)))
-        for piece in face.pieces
-    ]
-    return centers, np.array(areas)
 
 
 def _distance(face: Face, point: Array) -> float:

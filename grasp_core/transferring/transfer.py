@@ -216,7 +216,12 @@ class _Judge:
             return CarriedGrasp(grasp, "gone", "; ".join(lost), contacts, before, None, None)
         name = _free_id(_id_on(grasp, contacts), taken)
         try:
-            now = judged(self.new, _seated(self.new, contacts), self.friction, name)
+            seated = Seated(
+                self.new, four(each.new_face for each in contacts if each.new_face is not None),
+                four(each.contact for each in contacts if each.contact is not None),
+                float(np.max([each.distance for each in contacts])),
+            )  # fmt: skip
+            now = judged(self.new, seated, self.friction, name)
         except UndecidedError as error:
             why = f"whether its contacts are still in force closure is too close to call: {error}"
             return CarriedGrasp(grasp, "gone", why, contacts, before, None, None)
@@ -268,13 +273,6 @@ class _Judge:
             return now.grasp
         found = reached(self.new, now.grasp, self.finger)
         return f"out of reach: {found}" if isinstance(found, str) else found
-
-
-def _seated(new: Polyhedron, contacts: Iterable[CarriedContact]) -> Seated:
-    placed = [(c.new_face, c.contact, c.distance) for c in contacts]
-    faces = four(face for face, *_ in placed if face is not None)
-    return Seated(new, faces, four(at for _, at, _ in placed if isinstance(at, Contact)),
-                  float(np.max([far for *_, far in placed])))  # fmt: skip
 
 
 def _id_on(grasp: Grasp, contacts: Iterable[CarriedContact]) -> str:

@@ -10,7 +10,7 @@ has its true volume, and the inertia of the box around it.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -96,6 +96,22 @@ class Chains:
     """Mass and inertia of links by name, in place of those above."""
     stops: bool = False
     """Whether joints stop at the ends of their ranges."""
+
+
+def add_hand(
+    root: Element, parent: Element, pose: Array, chains: Chains, limits: Iterable[float],
+    stiffness: float, damping: float,
+) -> None:  # fmt: skip
+    """Add a hand to a body at a pose of the palm, with a servo for each joint.
+
+    Takes `limits` [N m]; `stiffness` [N m/rad]; `damping` [N m s/rad].
+    """
+    palm = add_element(parent, "body", {"name": PALM, **placed(pose[:3, 3], pose[:3, :3])})
+    add_fingers(palm, chains)
+    add_exclusions(add_element(root, "contact", {}), chains.hand)
+    actuators = add_element(root, "actuator", {})
+    for joint, limit in zip(chains.hand.joints, limits, strict=True):
+        add_servo(actuators, joint.name, stiffness, damping, limit)
 
 
 def add_fingers(palm: Element, chains: Chains) -> None:

@@ -37,7 +37,7 @@ from grasp_core.arrays import Array, to_digits
 from grasp_core.checked import instance, path_of
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.files.whole_files import write_parts
-from grasp_core.hands.hand import PALM, Hand
+from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import direction, hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
@@ -45,10 +45,10 @@ from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from scenes.fingertips import FingerSettings
-from scenes.hands.chains_mjcf import Chains, add_exclusions, add_fingers, add_servo, placed
+from scenes.hands.chains_mjcf import Chains, add_hand
 from scenes.layout import SQUEEZE, Layout, arrange
 from scenes.mjcf import Scene, add_object, opened
-from scenes.mjcf_text import Element, add_element, as_texts, document
+from scenes.mjcf_text import as_texts, document
 from scenes.physics import PhysicsSettings
 
 TOUCH = 3e-6
@@ -245,26 +245,15 @@ def hand_text(layout: HandLayout, physics: PhysicsSettings) -> str:
     root, world = opened(layout, physics, SCALED)
     contact = as_texts(physics.contact())
     add_object(world, layout, contact, weightless=bool(layout.gravity.any()))
-    _add_hand(root, world, layout, physics)
-    return document(root)
-
-
-def _add_hand(root: Element, world: Element, layout: HandLayout, physics: PhysicsSettings) -> None:
-    """Add the hand with its servos to a scene; the palm is fixed to its world."""
-    contact = as_texts(physics.contact())
-    pose = layout.palm_pose
-    palm = add_element(world, "body", {"name": PALM, **placed(pose[:3, 3], pose[:3, :3])})
     tips = tuple(_tip(layout, number, contact) for number in range(len(layout.hand.fingers)))
     chains = Chains(
         layout.hand, layout.joints, layout.armature_kg_m2, tips, weighs=bool(layout.gravity.any())
     )
-    add_fingers(palm, chains)
-    add_exclusions(add_element(root, "contact", {}), layout.hand)
-    actuators = add_element(root, "actuator", {})
-    for joint, limit in zip(layout.hand.joints, layout.motors.limits.tolist(), strict=True):
-        add_servo(
-            actuators, joint.name, layout.servo_n_m_per_rad, layout.damping_n_m_s_per_rad, limit
-        )
+    add_hand(
+        root, world, layout.palm_pose, chains, layout.motors.limits.tolist(),
+        layout.servo_n_m_per_rad, layout.damping_n_m_s_per_rad,
+    )  # fmt: skip
+    return document(root)
 
 
 def _tip(layout: HandLayout, finger: int, contact: Mapping[str, object]) -> Mapping[str, object]:

@@ -32,7 +32,7 @@ from grasp_core.arrays import Array, cross, to_digits
 from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
-from grasp_core.hands.hand import PALM, Hand
+from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_grips import HandGrip
 from grasp_core.hands.hand_motors import hand_motors
 from grasp_core.hands.kinematics import HandPlaces, places
@@ -48,9 +48,9 @@ from scenes.execution.held_mjcf import (
     held_physics,
     opened,
 )
-from scenes.hands.chains_mjcf import Chains, add_exclusions, add_fingers, add_servo, placed
+from scenes.hands.chains_mjcf import Chains, add_hand
 from scenes.hands.hand_scene import mean_lever, touching
-from scenes.mjcf_text import add_element, document
+from scenes.mjcf_text import document
 from scenes.physics import PhysicsSettings
 
 EXECUTION = "an execution with the hand"
@@ -281,28 +281,18 @@ def held_hand_text(layout: HeldHandLayout, physics: PhysicsSettings) -> str:
     """Write the MJCF text of an object held by a hand; equal layouts give equal texts."""
     root, world = opened(layout, physics)
     wrist = add_palm(world, layout, WRIST)
-    pose = layout.palm_pose
-    palm = add_element(wrist, "body", {"name": PALM, **placed(pose[:3, 3], pose[:3, :3])})
     tips = [dict[str, object]() for _ in layout.hand.fingers]
     for contact, finger in enumerate(layout.used_fingers):
-        tips[finger] = {"conaffinity": FINGERTIPS, "friction": _rubbing(layout, contact),
-                        **physics.contact()}  # fmt: skip
+        rubbing = float(layout.friction[contact]), 0.0, 0.0
+        tips[finger] = {"conaffinity": FINGERTIPS, "friction": rubbing, **physics.contact()}
     touching = {**physics.contact(), "friction": (float(layout.friction.max()), 0.0, 0.0)}
     chains = Chains(
         layout.hand, layout.angles, layout.armature_kg_m2, tuple(tips), light_kg=LIGHT_KG,
         touches=FINGERTIPS, contact=touching,
     )  # fmt: skip
-    add_fingers(palm, chains)
-    add_exclusions(add_element(root, "contact", {}), layout.hand)
-    actuators = add_element(root, "actuator", {})
-    limits = layout.motors.limits.tolist()
-    for joint, limit in zip(layout.hand.joints, limits, strict=True):
-        add_servo(
-            actuators, joint.name, layout.servo_n_m_per_rad, layout.damping_n_m_s_per_rad, limit
-        )
+    add_hand(
+        root, wrist, layout.palm_pose, chains, layout.motors.limits.tolist(),
+        layout.servo_n_m_per_rad, layout.damping_n_m_s_per_rad,
+    )  # fmt: skip
     add_start(root, layout)
     return document(root)
-
-
-def _rubbing(layout: HeldHandLayout, contact: int) -> tuple[float, float, float]:
-    return float(layout.friction[contact]), 0.0, 0.0

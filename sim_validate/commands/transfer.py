@@ -59,7 +59,9 @@ def transfer_file(command: transfer_flags.Transfer, reporter: Reporter) -> int:
             _write(command.out, found, saved, text, reporter)
     reporter.text(text)
     _show(found, reporter)
-    return _code(found)
+    if not found.carried:
+        return Exit.NONE
+    return Exit.NEGATIVE if any(map(found.count, BAD)) else Exit.GOOD
 
 
 def _check_elsewhere(grasps: Path, out: Path | None) -> None:
@@ -96,12 +98,6 @@ def _write(
     grasps = write_text(folder / GRASPS, carried_to_json(found, saved))
     path = write_text(folder / TRANSFER, text)
     reporter.say(f"wrote {grasps} and {path}")
-
-
-def _code(found: Transfer) -> Exit:
-    if not found.carried:
-        return Exit.NONE
-    return Exit.NEGATIVE if any(map(found.count, BAD)) else Exit.GOOD
 
 
 def _show(found: Transfer, reporter: Reporter) -> None:

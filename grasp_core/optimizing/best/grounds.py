@@ -213,17 +213,14 @@ def _images(maps: Array, grounds: Grounds) -> Indices:
     turned = grounds.normals @ maps.transpose(0, 2, 1)
     apart = np.abs(turned[:, :, None] - grounds.normals[None, None]).max(axis=3)
     for g, p, q in np.argwhere(apart <= EXACT).tolist():
-        same = len(in_space[p]) == len(in_space[q])
-        if same and _same_points(in_space[p] @ maps[g].T, in_space[q]):
-            found[g, p] = q
+        if len(in_space[p]) == len(in_space[q]):
+            corners = in_space[p] @ maps[g].T
+            off = np.abs(corners[:, None] - in_space[q][None]).max(axis=2)
+            nearest = off.argmin(axis=1)
+            near = off[np.arange(len(corners)), nearest].max() <= EXACT
+            if near and len(set(nearest.tolist())) == len(corners):
+                found[g, p] = q
     return found
-
-
-def _same_points(images: Array, others: Array) -> bool:
-    apart = np.abs(images[:, None] - others[None]).max(axis=2)
-    nearest = apart.argmin(axis=1)
-    near = apart[np.arange(len(images)), nearest].max() <= EXACT
-    return bool(near) and len(set(nearest.tolist())) == len(images)
 
 
 def first_nodes(
