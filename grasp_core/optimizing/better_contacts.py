@@ -138,7 +138,7 @@ def _quality(body: Polyhedron, grasp: Grasp, friction: float) -> FerrariCanny:
 
 
 def pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
-    """Return the convex piece of a face that each contact is deepest in, the first of equal ones."""
+    """Return the piece of a face that each contact is deepest in, the first of equal ones."""
     pieces = pieces_by_face(body)
     return tuple(
         pieces[face][first_best([piece.inset(point) for piece in pieces[face]], SAME_CORNER)]
