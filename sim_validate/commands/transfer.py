@@ -25,7 +25,8 @@ from sim_validate.records.transfers import TRANSFER, carried_to_json, transfer_t
 MM = 1e3
 GRASPS = "grasps.json"
 ABSENT = "-"
-COLUMNS = ("grasp", "status", "mm moved", "deg turned", "mu*", "now", "quality N", "now", "faces")
+COLUMNS = ("grasp", "status", "mm", "deg", "mu*", "now", "quality N", "now", "faces")
+"""How far contacts moved and turned, what they reach, and faces under them that changed."""
 BAD: tuple[Change, ...] = ("worse", "gone")
 """What becomes of a grasp if its part should not have changed like that."""
 
