@@ -171,3 +171,9 @@ def overlapping_pairs(hand: Hand, joints: Array) -> set[tuple[str, str]]:
             pair = sorted(names[1 + int(arrays.shape_links[each])] for each in (i, j))
             found.add((pair[0], pair[1]))
     return found
+
+
+def beyond_hull(corners: Array, points: Array) -> list[float]:
+    """Measure how far points (n, 3) are outside the hull of corners (m, 3), zero inside."""
+    kernel, near, other = compiled("grasp_core.hands.distances_kernel"), *np.empty((2, 3))
+    return [kernel.hull_hull(corners, point[None], np.inf, near, other) for point in points]

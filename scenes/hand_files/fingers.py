@@ -20,8 +20,8 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.checked import shown
-from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
+from grasp_core.hands.collisions import beyond_hull
 from grasp_core.hands.hand import SAME, LinkShape
 from scenes.hand_files.model import HandModel, mesh_points
 
@@ -230,7 +230,5 @@ def _corners(model: HandModel, geom: int) -> tuple[Array, float]:
     if len(points) <= MOST_WAYS:
         return points, ROUNDING
     ways = np.random.default_rng(0).normal(size=(MOST_WAYS, 3))
-    kept, near, other = points[np.unique(np.argmax(points @ ways.T, axis=0))], *np.empty((2, 3))
-    kernel = compiled("grasp_core.hands.distances_kernel")
-    beyond = [kernel.hull_hull(kept, point[None], np.inf, near, other) for point in points]
-    return kept, ROUNDING + max(beyond)
+    kept = points[np.unique(np.argmax(points @ ways.T, axis=0))]
+    return kept, ROUNDING + max(beyond_hull(kept, points))
