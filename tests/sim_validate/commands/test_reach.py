@@ -173,14 +173,6 @@ def test_where_no_three_contacts_close_the_command_says_so(tmp_path, capsys):
     assert record["reaches"][0]["reason"] == "no closure"
 
 
-def test_files_from_before_hands_with_three_fingers_are_read(grasps, tmp_path):
-    main(["reach", str(grasps), "--limit", "1", "--out", str(tmp_path), "-q"])
-    old = json.loads((tmp_path / REACHES).read_text())
-    del old["summary"]["no_closure"], old["reaches"][0]["pose"]["used"]
-    read = record_of(ReachesFile, json.dumps(old), REACHES, schema=1)
-    assert len(read["reaches"][0]["pose"]["contacts"]) == 4
-
-
 def test_a_simulated_hand_holds_and_its_grasps_are_ranked(grasps, tmp_path, capsys):
     shutil.copy(grasps, tmp_path / "grasps.json")
     words = ["reach", str(tmp_path / "grasps.json"), "--hand", "allegro", "--limit", "2"]
