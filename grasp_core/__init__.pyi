@@ -18,7 +18,7 @@ from grasp_core.errors import SolverError as SolverError
 from grasp_core.errors import UndecidedError as UndecidedError
 from grasp_core.errors import UnfaithfulError as UnfaithfulError
 from grasp_core.execution.best_squeeze import best_squeeze as best_squeeze
-from grasp_core.execution.carrying_hand import HandPayload as HandPayload
+from grasp_core.execution.carried_mass import HandPayload as HandPayload
 from grasp_core.execution.first_slip import FirstSlip as FirstSlip
 from grasp_core.execution.first_slip import first_slip as first_slip
 from grasp_core.execution.grips import Grip as Grip
@@ -32,7 +32,7 @@ from grasp_core.execution.squeeze_certificate import BestSqueeze as BestSqueeze
 from grasp_core.forces.contact_forces import contact_forces as contact_forces
 from grasp_core.hands.hand import Hand as Hand
 from grasp_core.hands.hand_motors import hand_motors as hand_motors
-from grasp_core.hands.hand_payload import hand_payload as hand_payload
+from grasp_core.hands.hand_motors import hand_payload as hand_payload
 from grasp_core.hands.named_hands import load_hand as load_hand
 from grasp_core.hands.reach import HandReach as HandReach
 from grasp_core.hands.reach import reach_with as reach_with
@@ -67,9 +67,9 @@ from grasp_core.records.grasps_files import save_grasps as save_grasps
 from grasp_core.records.own_plans import plan_of as plan_of
 from grasp_core.regions.certificates import CertifiedRegions as CertifiedRegions
 from grasp_core.regions.certify_regions import certify_regions as certify_regions
-from grasp_core.transferring.contacts import CarriedContact as CarriedContact
 from grasp_core.transferring.face_changes import FaceChange as FaceChange
 from grasp_core.transferring.judging import GraspFigures as GraspFigures
+from grasp_core.transferring.transfer import CarriedContact as CarriedContact
 from grasp_core.transferring.transfer import CarriedGrasp as CarriedGrasp
 from grasp_core.transferring.transfer import Transfer as Transfer
 from grasp_core.transferring.transfer import transfer as transfer

@@ -43,19 +43,13 @@ from scenes.hands.chains_mjcf import (
     add_exclusions,
     add_fingers,
     add_servo,
+    hand_inertials,
     placed,
 )
-from scenes.hands.hand_layout import hand_layout
-from scenes.hands.link_masses import hand_inertials
+from scenes.hands.hand_scene import hand_layout
 from scenes.layout import SQUEEZE, Layout, arrange
 from scenes.mjcf import AXES
-from scenes.mjcf_text import (
-    Element,
-    add_element,
-    as_texts,
-    document,
-    quaternion,
-)
+from scenes.mjcf_text import Element, add_element, as_texts, document, quaternion
 from scenes.physics import PhysicsSettings, add_free_body, begin_scene
 
 COMMENT = (

@@ -11,7 +11,7 @@ from sim_validate.execution.verdict import ExecutedGrasp as ExecutedGrasp
 from sim_validate.execution.verdict import Execution as Execution
 from sim_validate.execution.verdict import ExecutionTrial as ExecutionTrial
 from sim_validate.hands.execute_hand import execute_hand as execute_hand
-from sim_validate.hands.hand_verdict import HandVerdict as HandVerdict
+from sim_validate.hands.validate_hand import HandVerdict as HandVerdict
 from sim_validate.hands.validate_hand import hand_setup as hand_setup
 from sim_validate.hands.validate_hand import validate_hand as validate_hand
 from sim_validate.protocols.judging import Judgement as Judgement
@@ -23,9 +23,9 @@ from sim_validate.protocols.published import protocol_names as protocol_names
 from sim_validate.records.executions import Executions as Executions
 from sim_validate.records.executions import load_executions as load_executions
 from sim_validate.records.regions import load_regions as load_regions
-from sim_validate.records.transfers.saved_transfer import SavedCarriedGrasp as SavedCarriedGrasp
-from sim_validate.records.transfers.saved_transfer import SavedTransfer as SavedTransfer
-from sim_validate.records.transfers.saved_transfer import load_transfer as load_transfer
+from sim_validate.records.transfers import SavedCarriedGrasp as SavedCarriedGrasp
+from sim_validate.records.transfers import SavedTransfer as SavedTransfer
+from sim_validate.records.transfers import load_transfer as load_transfer
 from sim_validate.records.verdicts import SavedVerdict as SavedVerdict
 from sim_validate.records.verdicts import SavedVerdicts as SavedVerdicts
 from sim_validate.records.verdicts import load_verdicts as load_verdicts

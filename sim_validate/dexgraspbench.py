@@ -39,12 +39,11 @@ from grasp_core.files.json_text import text_of
 from grasp_core.files.strict_json import shown
 from grasp_core.files.text_files import read_bytes, write_text
 from grasp_core.files.whole_files import write_parts
-from grasp_core.hands.distances.collisions import tip_gaps
+from grasp_core.hands.collisions import tip_gaps
 from grasp_core.hands.hand import PALM, Hand
 from grasp_core.hands.hand_motors import chains, hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians
-from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import Stance, stance_of, uncoupled
+from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.objects.convexity import is_convex
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron

@@ -29,7 +29,7 @@ DOORS = {
         "scenes/silent_mujoco.py",
         "scenes/drawing/frames.py",
     ),
-    "mujoco_menagerie": "scenes/hand_files/menagerie.py",
+    "mujoco_menagerie": "scenes/hand_files/loading.py",
     "PIL": "scenes/drawing/frames.py",
     "resvg_py": "scenes/drawing/sheets.py",
     "jinja2": "scenes/drawing/pages.py",

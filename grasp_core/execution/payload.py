@@ -115,7 +115,7 @@ class Payload(ByValue):
                 and is_a(self.free, FreeMass)
                 and self.fixed.verify()
                 and _is_weight(self.fixed)
-                and _turns_with_hand(self.fixed.motors)
+                and (self.fixed.motors is None or not self.fixed.motors.gravity.any())
                 and is_tuple_of(self.free.rays, WrenchLimit)
                 and is_number(self.free.lower, least=0.0)
                 and is_number(self.free.upper, least=self.free.lower)
@@ -176,24 +176,15 @@ def payload(
     """
     start = unsqueezed(body, contacts, friction, stiffness=stiffness, tip_radius_m=tip_radius_m)
     most = positive(max_push_n, "max_push_n")
-    _check_turning(motors, len(start.friction))
-    fixed = searched(start, any_direction(1.0), most, motors)
-    return Payload(fixed, _free_mass(_body(start, most, motors)))
-
-
-def _check_turning(motors: Motors | None, contacts: int) -> None:
-    """Refuse motors that are not those of so many contacts, or that carry links in one way only."""
-    loaded = np.flatnonzero(motors_for(motors, contacts).gravity)
+    loaded = np.flatnonzero(motors_for(motors, len(start.friction)).gravity)
     if loaded.size:
         raise InputError(
             f"motors must have no gravity for a payload, but joint {int(loaded[0])} carries links: "
             "the hand turns with its object, and so does the weight of its links; give "
             "gc.Motors.in_any_orientation(levers, limits, weights), which leaves room for it"
         )
-
-
-def _turns_with_hand(motors: Motors | None) -> bool:
-    return motors is None or not motors.gravity.any()
+    fixed = searched(start, any_direction(1.0), most, motors)
+    return Payload(fixed, _free_mass(_body(start, most, motors)))
 
 
 def _body(grip: Grip, max_push_n: float, motors: Motors | None) -> WrenchBody:

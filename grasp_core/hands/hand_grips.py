@@ -45,7 +45,7 @@ from grasp_core.fields import is_array, is_number
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import chains
 from grasp_core.hands.kinematics import places
-from grasp_core.hands.stance import Stance
+from grasp_core.hands.reach import Stance
 
 STIFFEST = 1e12
 """Condition of a finger's stiffness from which on it gives way in some direction only."""

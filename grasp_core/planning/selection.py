@@ -9,9 +9,8 @@ from grasp_core.arrays import Array
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.errors import NoForcesError
 from grasp_core.execution.best_squeeze import GAP, best_squeeze, searched
-from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip
+from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip, springs
 from grasp_core.execution.loads import any_direction
-from grasp_core.execution.springs import springs
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.certify import Certified
 from grasp_core.planning.reach import Finger

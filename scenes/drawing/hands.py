@@ -32,7 +32,7 @@ from grasp_core.frames import POSE
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays
 from grasp_core.hands.kinematics import places
-from grasp_core.hands.stance import with_balls
+from grasp_core.hands.reach import with_balls
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp

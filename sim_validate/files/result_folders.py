@@ -46,7 +46,7 @@ def remove_results(folder: Path) -> None:
     remove_judgements(folder)
     _remove(
         [
-            *_of_grasps(folder / "scenes", ".xml", b"`graspproof scene "),
+            *_of_grasps(folder / "scenes", ".xml", b"`graspproof scene"),
             *(folder / name for name in (*OF_GRASPS, *BEST)),
         ]
     )

@@ -6,16 +6,16 @@ before would each compile all of them.
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
+from grasp_core.hands.first_use import compile_checks, compile_posing
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.named_hands import load_hand
-from grasp_core.hands.posing.first_use import compile_checks, compile_posing
 from grasp_core.kept_loops import is_kept
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.example_objects import example_object
 from sim_validate.parallel.compiling import Calls, compiled_beside
 
-POSING = "grasp_core.hands.posing.pose_kernel"
-CHECKS = "grasp_core.hands.posing.postures_kernel"
+POSING = "grasp_core.hands.pose_kernel"
+CHECKS = "grasp_core.hands.collisions_kernel"
 
 
 def _posing(_points: Array, _normals: Array) -> None:

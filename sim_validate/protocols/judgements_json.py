@@ -16,7 +16,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from sim_validate.protocols.judging import Judgement
 from sim_validate.records.fields import Count, ObjectRecord, Positive, finite, object_record
-from sim_validate.records.reaches_schema import NotNegative
+from sim_validate.records.reaches import NotNegative
 
 
 class RunRecord(TypedDict):

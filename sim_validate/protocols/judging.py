@@ -21,14 +21,13 @@ from grasp_core.closure.contacts import FEWEST
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import stance_of
+from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.short_text import summary
 from grasp_core.values import Contact, Grasp
-from scenes.hands.hand_mjcf import build_hand_scene
+from scenes.hands.hand_scene import build_hand_scene
 from scenes.mjcf import Scene
 from scenes.tested import HandServos, fingertip_scene, hand_scene, planned_postures
 from sim_validate.dexgraspbench import RecordedReach, hand_file, recorded_postures

@@ -14,8 +14,7 @@ from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record
 
 if TYPE_CHECKING:
     from grasp_core.hands.reach import HandReach
-    from sim_validate.records.reaches_schema import ExecutedHandRecord
-    from sim_validate.records.saved_reaches import SavedReaches
+    from sim_validate.records.reaches import ExecutedHandRecord, SavedReaches
 
 MILLI = 1e3
 STARTS, SEED, CLEARANCE_M = 100, 0, 5e-4

@@ -21,7 +21,7 @@ from sim_validate.records.verdicts import VerdictsFile, verdicts_of
 from sim_validate.reports.agreement import BAD, Record, said_of
 
 if TYPE_CHECKING:
-    from sim_validate.records.saved_reaches import SavedReaches
+    from sim_validate.records.reaches import SavedReaches
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"
 Read = TypeVar("Read", VerdictsFile, RegionsFile, JudgementsFile, BestFile)
@@ -140,16 +140,13 @@ def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
     path = grasps.with_name(REACHES)
     if not path.is_file():
         return None
-    from sim_validate.records.saved_reaches import read_reaches  # runs without a hand need none
+    from sim_validate.records.reaches import read_reaches  # runs without a hand need none
 
     found, record = read_reaches(path)
     _check_object(path, record["object"]["content_sha256"], saved)
-    own = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
-    listed = [
-        (each["id"], each.get("contacts_sha256", own.get(each["id"], "")))
-        for each in record["reaches"]
-    ]  # fmt: skip
-    _check_contacts(path, listed, saved)
+    _check_contacts(
+        path, [(each["id"], each["contacts_sha256"]) for each in record["reaches"]], saved
+    )
     return found
 
 

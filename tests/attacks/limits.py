@@ -12,7 +12,7 @@ import numpy as np
 import grasp_core as gc
 import grasp_core.execution.payload as payloads
 import grasp_core.quality.wrench_limits as checked
-from grasp_core.execution import carrying_hand, squeeze_certificate, squeeze_rows
+from grasp_core.execution import carried_mass, squeeze_certificate, squeeze_rows
 from grasp_core.execution.payload import Payload
 from grasp_core.execution.squeeze_rows import Survival
 from grasp_core.quality.wrench_limits import WrenchLimit, body_of
@@ -359,7 +359,7 @@ HAND = Attack(
     lambda rng: cycled(rng, [hand_holds_less, hand_holds_more]),
     (
         lambda monkeypatch: monkeypatch.setattr(
-            carrying_hand, "of_order_one", lambda *arrays: list(arrays)
+            carried_mass, "of_order_one", lambda *arrays: list(arrays)
         ),
     ),
     2000,

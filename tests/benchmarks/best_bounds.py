@@ -23,8 +23,7 @@ from scipy.optimize import differential_evolution
 
 import grasp_core as gc
 from grasp_core.optimizing.best.incumbents import climbed
-from grasp_core.optimizing.best.searching.search import Searching
-from grasp_core.optimizing.best.searching.stop import Stop
+from grasp_core.optimizing.best.search import Searching, Stop
 from scenes.example_objects import example_object
 from tests.benchmarks.best_grasps import clear
 from tests.grasp_core.optimizing.best.supports_of_contacts import supports

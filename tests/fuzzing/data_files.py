@@ -25,11 +25,10 @@ from sim_validate.datasets.manifest import Listed, Manifest, manifest_from_json,
 from sim_validate.datasets.quarantine import left_out_from
 from sim_validate.files.toml_tables import tables_of_toml
 from sim_validate.records.executions import executions_from_json, executions_to_json
+from sim_validate.records.reaches import reaches_from_json
 from sim_validate.records.regions import RegionsFile
-from sim_validate.records.saved_reaches import reaches_from_json
 from sim_validate.records.setup_toml import setup_from_tables, tables_of
-from sim_validate.records.transfers.saved_transfer import transfer_from_json
-from sim_validate.records.transfers.transfer_json import transfer_to_json
+from sim_validate.records.transfers import transfer_from_json, transfer_to_json
 from sim_validate.records.verdicts import verdicts_of
 from sim_validate.records.wrenches import wrenches_from_json
 from sim_validate.simulation.setup import Setup

@@ -10,7 +10,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.errors import InputError
 from grasp_core.hands.kinematics import places
-from grasp_core.hands.stance import stance_of
+from grasp_core.hands.reach import stance_of
 from scenes.mjcf_text import quaternion
 from sim_validate.dexgraspbench import (
     FREE,

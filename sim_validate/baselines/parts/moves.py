@@ -7,8 +7,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.transferring.change_words import in_words
-from grasp_core.transferring.face_changes import FaceChange, added_faces, face_changes
+from grasp_core.transferring.face_changes import (
+    FaceChange,
+    added_faces,
+    changes_in_words,
+    face_changes,
+)
 from grasp_core.transferring.like_faces import Likeness
 from grasp_core.transferring.transfer import Transfer
 
@@ -30,7 +34,7 @@ class Moves:
     @property
     def in_words(self) -> str:
         """Say in one line which faces moved and by how much."""
-        return in_words(self.faces, self.added, self.numbers)
+        return changes_in_words(self.faces, self.added, self.numbers)
 
     def touched(self, faces: Iterable[int]) -> str:
         """Say which of some faces moved, such as `face 3, which moved`; empty if none did."""

@@ -5,15 +5,14 @@ import pytest
 import grasp_core as gc
 from grasp_core.compiled import compiled
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.hands import reach
+from sim_validate.commands import reach
 from sim_validate.main import main
 from sim_validate.parallel import compiling_hands
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
 
 LOOPS = {
-    "grasp_core.hands.posing.pose_kernel": ("settle", "lay", "empty_pose", "empty_sums"),
-    "grasp_core.hands.posing.postures_kernel": ("free_postures",),
-    "grasp_core.hands.distances.collisions_kernel": ("of_itself", "of_object"),
+    "grasp_core.hands.pose_kernel": ("settle", "lay", "empty_pose", "empty_sums"),
+    "grasp_core.hands.collisions_kernel": ("free_postures", "of_itself", "of_object"),
 }
 
 

@@ -24,7 +24,7 @@ from tests.sim_validate.plugin.project import copied, properties_in, run_pytest
 
 TOP = 3
 """The highest face of the part."""
-FACE = "face 3 (facing +z at z = 25 mm)"
+FACE = "face 3"
 
 
 @pytest.fixture(scope="module")
@@ -99,8 +99,7 @@ def test_a_grasp_that_the_changed_part_does_not_have_fails_and_is_gone(project):
     assert "1 failed" in said
     kept = kept_in(project)
     assert kept["status"] == "gone"
-    assert f"has lost {FACE}: the nearest face like it, face 3 in the numbering of" in said
-    assert "(facing +z at z = 26 mm), is 1.00 mm away, more than 0.50 mm" in said
+    assert f"has lost {FACE}: the nearest face like it is 1.00 mm away" in said
     assert f"{FACE} moved 1.00 mm outward" in " ".join(said.split())
     assert "graspproof transfer" in said
 
@@ -159,7 +158,7 @@ def test_blessing_a_changed_part_writes_its_hash_and_then_everything_is_the_same
     suite = suite_from_toml(project / "part.grasps.toml")
     (finding,) = suite.tested(suite.ids[0]).findings
     assert finding.status is Status.WITHIN
-    moved = "face 3 (facing +z at z = 26 mm) moved 0.50 mm outward"
+    moved = "face 3 moved 0.50 mm outward"
     assert f"part.obj has changed since its baseline was written: {moved}" in finding.reasons[0]
 
 
@@ -183,7 +182,7 @@ def test_the_planned_part_put_back_after_a_blessed_change_is_judged_like_any_oth
     assert code == 0, said
     kept = kept_in(project)
     assert kept["status"] == "within bands"
-    moved = "face 3 (facing +z at z = 26 mm) moved 1.00 mm inward"
+    moved = "face 3 moved 1.00 mm inward"
     assert f"{part} has changed since its baseline was written: {moved}" in kept["mesh_note"]
     baseline = str(project / "part.baseline.json")
     assert main(["baseline", "check", baseline]) == Exit.GOOD
@@ -433,16 +432,6 @@ def test_a_scale_is_said_where_a_changed_part_has_no_baseline(odd):
         assert case.body.volume == pytest.approx(volume, rel=1e-12)
     with pytest.raises(gc.InputError, match=r"changed_part.*scale"):
         grasp_cases(odd, ["grasps.json"], {"changed_part": {"scale": 0.0}})
-
-
-def test_a_shifted_part_is_said_to_be_shifted(project):
-    part = project / "part.obj"
-    rows = [row.split() for row in part.read_text().splitlines()]
-    for row in rows:
-        if row[0] == "v":
-            row[1] = repr(float(row[1]) + 1.0)
-    write_text(part, "\n".join(map(" ".join, rows)) + "\n")
-    assert "it is as if the whole part were shifted by (1, 0, 0) mm; face" in run_pytest(project)[1]
 
 
 def test_blessing_commands_and_markers_refuse_a_changed_part_too(project, capsys):
