@@ -17,7 +17,11 @@ from sim_validate.main import ACTIONS
 ROOT = Path(__file__).parent.parent
 DOORS = {
     "manifold3d": "grasp_core/objects/booleans.py",
-    "trimesh": ("grasp_core/objects/conversion.py", "scenes/exports/gltf.py"),
+    "trimesh": (
+        "grasp_core/mesh_files/glb.py",
+        "grasp_core/objects/conversion.py",
+        "scenes/exports/gltf.py",
+    ),
     "yaml": "scenes/exports/moveit.py",
     "pxr": "scenes/exports/usd.py",
     "pandas": "grasp_core/grasp_tables.py",
