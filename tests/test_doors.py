@@ -19,7 +19,7 @@ DOORS = {
     "manifold3d": "grasp_core/objects/booleans.py",
     "trimesh": (
         "grasp_core/mesh_files/glb.py",
-        "grasp_core/objects/conversion.py",
+        "grasp_core/objects/polyhedron.py",
         "scenes/exports/gltf.py",
     ),
     "yaml": "scenes/exports/moveit.py",

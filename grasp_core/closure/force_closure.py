@@ -35,7 +35,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import SMALLEST_SIZE, Array, cross, of_order_one, real_array
+from grasp_core.arrays import (
+    SMALLEST_SIZE,
+    Array,
+    are_frictions,
+    are_units,
+    cross,
+    is_array,
+    is_number,
+    of_order_one,
+    real_array,
+)
 from grasp_core.by_value import ByValue
 from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions, unit_size
 from grasp_core.closure.decision import decide
@@ -45,7 +55,6 @@ from grasp_core.closure.soft import proofs as soft_proofs
 from grasp_core.closure.soft.contacts import SoftContacts, are_torsions, contact_torsions
 from grasp_core.closure.wrenches import normal_and_tangential
 from grasp_core.errors import UndecidedError
-from grasp_core.fields import are_frictions, are_units, is_array, is_number
 from grasp_core.values import Contact, Grasp
 
 UNSAFE = 1e-6

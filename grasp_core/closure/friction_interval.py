@@ -14,13 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, cross, real_array
+from grasp_core.arrays import Array, are_units, cross, is_array, is_number, real_array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contact_arrays import FEWEST, unit_size
 from grasp_core.closure.rational_proofs import closes, separates
 from grasp_core.closure.wrenches import WRENCH
-from grasp_core.fields import are_units, is_array, is_number
 
 FRICTIONLESS = 1e-6
 """Smallest friction at which closure is sought: files that keep six digits do not place contacts

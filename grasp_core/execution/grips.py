@@ -46,14 +46,13 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, frozen_each
+from grasp_core.arrays import Array, are_frictions, are_units, frozen, frozen_each, is_array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, instance, several
 from grasp_core.closure.contact_arrays import FEWEST, contact_arrays, contact_frictions, stacked
 from grasp_core.closure.wrenches import WRENCH, contact_frames, cross_matrix, grasp_map
 from grasp_core.errors import InputError
 from grasp_core.execution.springs import are_springs, springs
-from grasp_core.fields import are_frictions, are_units, is_array
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp

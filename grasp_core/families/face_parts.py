@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array
-from grasp_core.fields import is_tuple_of
+from grasp_core.arrays import Array, is_tuple_of
 from grasp_core.geometry.polygons import clip
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.ties import first_best

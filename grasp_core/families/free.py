@@ -31,6 +31,7 @@ from heapq import heappop, heappush
 
 import numpy as np
 
+from grasp_core.arrays import are_frictions, is_a, is_tuple_of
 from grasp_core.by_value import ByValue
 from grasp_core.closure.batches.certificates import certificates
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
@@ -46,7 +47,6 @@ from grasp_core.families.face_parts import (
 )
 from grasp_core.families.free_contacts import grasp_from_patch, of_general_type
 from grasp_core.families.placements import Placement
-from grasp_core.fields import are_frictions, is_a, is_tuple_of
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.ties import graded
 from grasp_core.values import FINGERS

@@ -12,7 +12,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.files.whole_files import bounded_bytes
+from grasp_core.files.text_files import bounded_bytes
 from grasp_core.mesh_files.glb import read_glb
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.ply import read_ply

@@ -24,12 +24,11 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_core.arrays import Array, frozen, frozen_copy
+from grasp_core.arrays import Array, frozen, frozen_copy, is_a, is_array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, one_of
 from grasp_core.closure.wrenches import WRENCH
 from grasp_core.errors import InputError
-from grasp_core.fields import is_a, is_array
 
 MeasureName: TypeAlias = Literal["ferrari-canny", "weight", "task"]
 """Which loads count: wrenches of unit length, the weight in every orientation, or a user's loads.

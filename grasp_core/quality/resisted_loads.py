@@ -37,12 +37,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array, Indices, are_units, is_a, is_array, is_number
 from grasp_core.by_value import ByValue
 from grasp_core.closure.wrench_sets import WrenchSet, into_cones
 from grasp_core.closure.wrenches import WRENCH
 from grasp_core.errors import SolverError
-from grasp_core.fields import are_units, is_a, is_array, is_number
 from grasp_core.quality.ferrari_canny import (
     CHECK_SLACK,
     GAP,

@@ -12,13 +12,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, frozen_copy
+from grasp_core.arrays import Array, frozen, frozen_copy, is_array, is_number
 from grasp_core.by_value import ByValue
 from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions
 from grasp_core.closure.soft.contacts import contact_torsions
 from grasp_core.closure.wrenches import WRENCH
 from grasp_core.errors import InputError
-from grasp_core.fields import is_array, is_number
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_body import WrenchBody
 from grasp_core.values import Contact, Grasp

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.short_text import counted
+from grasp_core.by_value import counted
 from grasp_core.transferring.face_changes import TURNED, FaceChange
 from grasp_core.transferring.face_places import in_mm
 

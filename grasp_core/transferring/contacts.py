@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import cross
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, summary
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Nearest
-from grasp_core.short_text import summary
 from grasp_core.transferring.face_places import face_in_words
 from grasp_core.transferring.like_faces import (
     WIDEST_DEG,

@@ -9,7 +9,7 @@ import math
 from typing import TypeAlias
 
 from grasp_core.arrays import Array
-from grasp_core.objects.face import Face
+from grasp_core.objects.surface import Face
 
 Triple: TypeAlias = tuple[float, float, float]
 ALONG = 1e-4

@@ -18,7 +18,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from grasp_core.errors import InputError
-from grasp_core.files.whole_files import replacing, write_parts
+from grasp_core.files.text_files import replacing, write_parts
 from scenes.drawing.flat.colours import INK, LEVELS, ramp_bytes
 from scenes.drawing.flat.sheets import Area, Dots, Image, Line, Mark, Sheet, Words, closed
 from scenes.drawing.flat.svg import svg_of

@@ -15,8 +15,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.objects.convexity import is_convex
-from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from scenes.execution.clearance import Surface
 
 SLOPE = 0.05

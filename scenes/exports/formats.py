@@ -6,8 +6,7 @@ from typing import Literal, TypeAlias, get_args
 
 from grasp_core.checked import SMALLEST, instance, number, one_of, path_of
 from grasp_core.errors import InputError
-from grasp_core.files.text_files import write_text
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.text_files import write_parts, write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from scenes.exports.gltf import glb

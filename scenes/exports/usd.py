@@ -15,7 +15,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
-from grasp_core.files.whole_files import replacing
+from grasp_core.files.text_files import replacing
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.drawing.flat.colours import FINGERS, GLASS, rgb
 from scenes.exports.placed_grasps import PlacedGrasp

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from grasp_core.arrays import Array
 from grasp_core.checked import instance, path_of
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import PALM, Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron

@@ -10,8 +10,7 @@ from typing import Any, cast
 
 from grasp_core.checked import positive
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import settings_of
-from grasp_core.files.strict_json import shown
+from grasp_core.files.json_text import settings_of, shown
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.execution.held import HeldSettings
 from sim_validate.execution.settings import ExecutionSettings

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias, get_args
 
+from grasp_core.by_value import changed
 from grasp_core.checked import (
     BOUNDS,
     LARGEST,
@@ -17,7 +18,6 @@ from grasp_core.checked import (
 )
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import STIFFNESS_N_PER_M
-from grasp_core.short_text import changed
 from scenes.execution.held import HeldSettings
 
 TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misplaced"]

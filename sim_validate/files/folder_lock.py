@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from grasp_core.errors import InputError
-from grasp_core.files.whole_files import remove_unfinished
+from grasp_core.files.text_files import remove_unfinished
 from sim_validate.files.stale_results import CHARTS, CLIPS, GRASPS, PICTURES, REPORT
 
 PAGES = ("", GRASPS, PICTURES, CHARTS, CLIPS)

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.by_value import ByValue
-from grasp_core.short_text import summary
+from grasp_core.by_value import ByValue, summary
 from scenes.hands.hand_mjcf import HandScene
 from sim_validate.hands.hand_controls import HandControl
 from sim_validate.simulation.gate.case import Check

@@ -18,11 +18,10 @@ from typing import Any, cast
 import numpy as np
 
 from grasp_core.arrays import Array, frozen, real_array
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import instance, path_of, positive, text
 from grasp_core.errors import InputError
-from grasp_core.files.whole_files import write_parts
-from grasp_core.short_text import summary
+from grasp_core.files.text_files import write_parts
 from sim_validate.peer_files.pickled_records import Numbers, read_pickled
 
 FREE = 7

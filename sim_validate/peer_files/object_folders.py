@@ -13,9 +13,8 @@ from grasp_core.checked import path_of
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import text_of
 from grasp_core.files.text_files import write_text
-from grasp_core.objects.convexity import is_convex
 from grasp_core.objects.on_faces import check_body
-from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron, is_convex
 
 DENSITY = 1000.0
 

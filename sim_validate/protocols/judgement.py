@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.by_value import ByValue
-from grasp_core.short_text import summary
+from grasp_core.by_value import ByValue, summary
 from sim_validate.protocols.bench import Motion
 from sim_validate.protocols.our_verdict import OurVerdict
 from sim_validate.protocols.published import Passing, PublishedProtocol

@@ -13,8 +13,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.by_value import summary
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.short_text import summary
 from scenes.physics import PhysicsSettings
 from scenes.tested.hand_scene import Weld
 

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, NotRequired
 from pydantic import ConfigDict, Field, with_config
 from typing_extensions import TypedDict
 
-from grasp_core.geometry.flat_polygons import FEWEST_CORNERS
+from grasp_core.geometry.polygons import FEWEST_CORNERS
 from grasp_core.values import FINGERS
 from sim_validate.records.verdicts_schema import Finite, ObjectRecord, Positive
 

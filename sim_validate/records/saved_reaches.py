@@ -13,7 +13,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
+from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.frames import POSE
 from grasp_core.hands.distances.collisions import tip_distances

@@ -9,7 +9,7 @@ from typing import Any
 from grasp_core.by_value import ByValue
 from grasp_core.checked import path_of
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
+from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById, frame_of
 from sim_validate.records.verdicts_schema import SCHEMA, VerdictRecord, VerdictsFile

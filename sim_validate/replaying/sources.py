@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from grasp_core.errors import InputError
-from grasp_core.files.strict_json import value_of
+from grasp_core.files.json_text import value_of
 from grasp_core.files.text_files import read_text
 from sim_validate.baselines.baseline_json import read_baseline
 from sim_validate.baselines.settings import of_settings, setup_for

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import cast
 
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
-from grasp_core.files.strict_json import object_of
+from grasp_core.files.json_text import object_of, record_of
 from grasp_core.files.text_files import read_text
 from scenes.drawing.pages import number
 from sim_validate.records.best.best_schema import OTHER, USUAL, BestFile, BestForLoadsFile

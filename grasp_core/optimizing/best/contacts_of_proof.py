@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, is_a
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.fields import is_a
 from grasp_core.optimizing.best.support_cuts import CutTree
 from grasp_core.values import FINGERS, Grasp
 

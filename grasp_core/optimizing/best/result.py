@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from grasp_core.arrays import is_a, is_number
 from grasp_core.by_value import ByValue
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.fields import is_a, is_number
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.contacts_of_proof import are_contacts_of
 from grasp_core.optimizing.best.searching.search import EXACT_GAP

@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from grasp_core.by_value import counted
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
-from grasp_core.objects.convexity import is_convex
-from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.short_text import counted
+from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from sim_validate.cli.console import Reporter
 from sim_validate.peer_files.dexgraspbench_records import write_dex_record
 from sim_validate.peer_files.hand_records import dex_record

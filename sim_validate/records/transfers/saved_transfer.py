@@ -7,14 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import path_of
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
-from grasp_core.files.strict_json import place
+from grasp_core.files.json_text import place, record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById
-from grasp_core.short_text import counted, summary
 from grasp_core.transferring.change_words import in_words
 from grasp_core.transferring.contacts import CarriedContact
 from grasp_core.transferring.face_changes import FaceChange
