@@ -64,7 +64,6 @@ from grasp_core.quality.wrench_limit import WrenchLimit as WrenchLimit
 from grasp_core.quality.wrench_limits import max_resisted_wrench as max_resisted_wrench
 from grasp_core.quality.wrench_limits import wrench_limits as wrench_limits
 from grasp_core.records.grasps_files import load_grasps as load_grasps
-from grasp_core.records.grasps_files import plan_of as plan_of
 from grasp_core.records.grasps_files import save_grasps as save_grasps
 from grasp_core.regions.certificates import CertifiedRegions as CertifiedRegions
 from grasp_core.regions.certify_regions import certify_regions as certify_regions
