@@ -1,15 +1,11 @@
-"""Gives frozen values an equality by their fields, a short text, and pictures in notebooks.
+"""Gives frozen values an equality by their fields and a short text, and makes trusted ones.
 
 Two values are equal if they are of one class and all their fields are equal: arrays of the same
 shape entry by entry, tuples and mappings item by item, numbers exactly. Two NaN count as equal, so
 that a copy equals its original. Fields that are declared with `compare=False` do not count.
-
-This package draws nothing, and must not import the one that does. So `scenes` hands over a function
-when it is imported, and values ask for it: a notebook that has imported `scenes` shows pictures,
-any other shows the one line of `repr`.
 """
 
-from collections.abc import Callable, Mapping, Sized
+from collections.abc import Mapping, Sized
 from dataclasses import MISSING, Field, fields
 from textwrap import shorten
 from typing import Any, TypeVar, cast
@@ -174,31 +170,3 @@ def vector(value: ArrayLike) -> str:
     numbers = np.array(value, dtype=np.float64)
     numbers[np.abs(numbers) < NOTHING * np.abs(numbers).max(initial=0.0)] = 0.0
     return f"({', '.join(f'{x:.6g}' for x in numbers.tolist())})"
-
-
-Draw = Callable[[Any], str | None]
-"""A function that returns the HTML of a value, or None where it has no picture of it."""
-
-_DRAWN_WITH: list[Draw] = []
-"""The function that was handed over, or none."""
-
-
-class InNotebooks:
-    """Base of values that show a picture at the end of a notebook's cell."""
-
-    __slots__ = ()
-
-    def _repr_html_(self) -> str | None:
-        """Return HTML with a picture; None where there is none, so that notebooks show `repr`."""
-        try:
-            return self._html()
-        except Exception:  # a picture that fails must not hide the value, which still has a text
-            return None
-
-    def _html(self) -> str | None:
-        return _DRAWN_WITH[0](self) if _DRAWN_WITH else None
-
-
-def draw_with(draw: Draw) -> None:
-    """Hand over the function that draws values; a second one takes the place of the first."""
-    _DRAWN_WITH[:] = [draw]

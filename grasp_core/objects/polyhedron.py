@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices, to_digits
-from grasp_core.by_value import ByValue, InNotebooks, counted, summary
+from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import (
     LARGEST,
     instance,
@@ -32,6 +32,7 @@ from grasp_core.checked import (
 from grasp_core.errors import InputError, MeshError
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
+from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, MeshChoices, build
 from grasp_core.objects.surface import Face, FaceKind, PatchLimits, Surface
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 from textwrap import shorten
 from typing import Any, Literal, Protocol, TypeAlias
 
-from grasp_core.by_value import ByValue, InNotebooks, counted, summary
+from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.grasp_tables import ById, chosen, data_frame
+from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.values import FaceQuadruple, Grasp, Method

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from grasp_core.by_value import ByValue, InNotebooks
+from grasp_core.by_value import ByValue
+from grasp_core.notebooks import InNotebooks
 from grasp_core.values import Contact
 from scenes.mjcf import Scene
 from sim_validate.simulation.critical_friction import CriticalFriction
