@@ -151,12 +151,8 @@ def _size(value: object) -> str:
 
 def counted(number: int, thing: str) -> str:
     """Write a number with its noun, such as `1 hole` or `2 holes`."""
-    return f"{number} {thing}" if number == 1 else f"{number} {_plural(thing)}"
-
-
-def _plural(thing: str) -> str:
     irregular = {"vertex": "vertices", "patch": "patches"}
-    return irregular.get(thing, thing + "s")
+    return f"{number} {thing if number == 1 else irregular.get(thing, thing + 's')}"
 
 
 def _figure(value: object) -> str:

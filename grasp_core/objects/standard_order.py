@@ -83,7 +83,7 @@ class Standard:
 def standard(body: Polyhedron) -> Standard:
     """Put an object into standard order and handedness, which depend on its shape alone."""
     images = (body, mirror_image(body))
-    views = ((image, _frame(image, *flag)) for image in images for flag in _rarest_flags(image))
+    views = ((image, flag_frame(image, *flag)) for image in images for flag in _rarest_flags(image))
     first = min(((_looks(image, frame), image, frame) for image, frame in views), default=None,
                 key=lambda view: view[0])  # fmt: skip
     if first is None:
@@ -162,8 +162,8 @@ def _graded(numbers: Sequence[float]) -> Cells:
     return tuple(graded(np.array(numbers), CELL_DIGITS).tolist())
 
 
-def _frame(body: Polyhedron, face: int, corner: int) -> Array:
-    """Build orthonormal columns towards the corner, across it, and along the normal, (3, 3)."""
+def flag_frame(body: Polyhedron, face: int, corner: int) -> Array:
+    """Build orthonormal columns of a flag: towards the corner, across, and along the normal."""
     toward = body.faces[face].polygon[corner] - body.faces[face].centroid
     normal = body.faces[face].normal
     toward = toward - normal * float(normal @ toward)
