@@ -37,11 +37,11 @@ from grasp_core.hands.named_hands import load_hand as load_hand
 from grasp_core.hands.reach import HandReach as HandReach
 from grasp_core.hands.reach import reach_with as reach_with
 from grasp_core.mesh_files.limits import MeshLimits as MeshLimits
-from grasp_core.objects.face import Face as Face
-from grasp_core.objects.face import PatchLimits as PatchLimits
 from grasp_core.objects.polyhedron import Polyhedron as Polyhedron
 from grasp_core.objects.polyhedron import from_trimesh as from_trimesh
 from grasp_core.objects.polyhedron import load_polyhedron as load_polyhedron
+from grasp_core.objects.surface import Face as Face
+from grasp_core.objects.surface import PatchLimits as PatchLimits
 from grasp_core.objects.surface import Surface as Surface
 from grasp_core.optimizing.best.best_grasp import best_grasp as best_grasp
 from grasp_core.optimizing.best.result import BestGrasp as BestGrasp
@@ -64,7 +64,6 @@ from grasp_core.quality.wrench_limits import max_resisted_wrench as max_resisted
 from grasp_core.quality.wrench_limits import wrench_limits as wrench_limits
 from grasp_core.records.grasps_files import load_grasps as load_grasps
 from grasp_core.records.grasps_files import save_grasps as save_grasps
-from grasp_core.records.own_plans import plan_of as plan_of
 from grasp_core.regions.certificates import CertifiedRegions as CertifiedRegions
 from grasp_core.regions.certify_regions import certify_regions as certify_regions
 from grasp_core.transferring.face_changes import FaceChange as FaceChange

@@ -23,11 +23,10 @@ from grasp_core.arrays import to_digits
 from grasp_core.by_value import ByValue
 from grasp_core.checked import instance, one_of, path_of, several
 from grasp_core.errors import InputError
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.text_files import write_parts
 from grasp_core.notebooks import InNotebooks
-from grasp_core.objects.convexity import is_convex
 from grasp_core.objects.on_faces import check_body
-from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange

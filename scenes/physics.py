@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 from grasp_core.arrays import Array, Indices, frozen
+from grasp_core.by_value import changed
 from grasp_core.checked import BOUNDS, LARGEST, SMALLEST, number, one_of, switch, whole
 from grasp_core.errors import InputError
-from grasp_core.short_text import changed
 from scenes.mjcf_text import COMPILER, Element, add_comment, add_element, element, printable
 
 

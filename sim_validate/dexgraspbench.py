@@ -31,23 +31,19 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 
 from grasp_core.arrays import Array, frozen, real_array, to_digits
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import coefficient, instance, number, path_of, positive, text
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
-from grasp_core.files.json_text import text_of
-from grasp_core.files.strict_json import shown
-from grasp_core.files.text_files import read_bytes, write_text
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.json_text import shown, text_of
+from grasp_core.files.text_files import read_bytes, write_parts, write_text
 from grasp_core.hands.collisions import tip_gaps
 from grasp_core.hands.hand import PALM, Hand
 from grasp_core.hands.hand_motors import chains, hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
-from grasp_core.objects.convexity import is_convex
 from grasp_core.objects.on_faces import check_body, face_under
-from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.short_text import summary
+from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact
 from scenes.mjcf_text import quaternion
 from scenes.tested import Postures

@@ -17,7 +17,11 @@ from sim_validate.main import ACTIONS
 ROOT = Path(__file__).parent.parent
 DOORS = {
     "manifold3d": "grasp_core/objects/booleans.py",
-    "trimesh": ("grasp_core/objects/conversion.py", "scenes/exports.py"),
+    "trimesh": (
+        "grasp_core/mesh_files/glb.py",
+        "grasp_core/objects/polyhedron.py",
+        "scenes/exports.py",
+    ),
     "yaml": "scenes/exports.py",
     "pandas": "grasp_core/grasp_tables.py",
     "numba": ("grasp_core/compiled.py", "grasp_core/kept_loops.py"),

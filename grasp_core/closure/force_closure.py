@@ -36,7 +36,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_core.arrays import SMALLEST_SIZE, UNIT_SLACK, Array, cross, of_order_one, real_array
+from grasp_core.arrays import (
+    SMALLEST_SIZE,
+    UNIT_SLACK,
+    Array,
+    are_frictions,
+    are_units,
+    cross,
+    is_array,
+    is_number,
+    of_order_one,
+    real_array,
+)
 from grasp_core.by_value import ByValue, trusted
 from grasp_core.closure import soft_closure, soft_contacts
 from grasp_core.closure.contacts import (
@@ -57,7 +68,6 @@ from grasp_core.closure.proofs import (
 )
 from grasp_core.closure.soft_contacts import SoftContacts, are_torsions, contact_torsions
 from grasp_core.errors import UndecidedError
-from grasp_core.fields import are_frictions, are_units, is_array, is_number
 from grasp_core.values import Contact, Grasp
 
 UNSAFE = 1e-6

@@ -30,11 +30,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, cross, real_array
+from grasp_core.arrays import Array, Indices, are_units, cross, is_array, is_number, real_array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contacts import FEWEST, WRENCH, grasp_map, normal_and_tangential, unit_size
-from grasp_core.fields import are_units, is_array, is_number
 
 Number = TypeVar("Number", int, Fraction)
 Exact = list[Fraction]

@@ -28,7 +28,7 @@ from typing import Literal, Self, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import Array, are_frictions, frozen, is_a, is_array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import one_of, positive, shown
 from grasp_core.closure.contacts import (
@@ -42,7 +42,6 @@ from grasp_core.closure.contacts import (
 )
 from grasp_core.closure.soft_contacts import LOCAL, contact_torsions, torsion_lengths
 from grasp_core.errors import InputError
-from grasp_core.fields import are_frictions, is_a, is_array
 from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.solvers.ties import on_grid
 from grasp_core.values import Contact, Grasp

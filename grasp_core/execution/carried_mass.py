@@ -73,17 +73,28 @@ from functools import cached_property
 
 import numpy as np
 
-from grasp_core.arrays import SHIFT, Array, Indices, cross, frozen_copy, of_order_one
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import (
+    SHIFT,
+    Array,
+    Indices,
+    are_frictions,
+    are_units,
+    cross,
+    frozen_copy,
+    is_a,
+    is_array,
+    is_indices,
+    is_number,
+    of_order_one,
+)
+from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import LARGEST, SMALLEST, number
 from grasp_core.closure.contacts import WRENCH, contact_frames, in_frames
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.execution.ball_in_hull import ball_in, nearest_facet, outward
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from grasp_core.fields import are_frictions, are_units, is_a, is_array, is_indices, is_number
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import HELD, WrenchBody
-from grasp_core.short_text import summary
 from grasp_core.solvers.ties import first_best
 
 ROUNDING = 1e-9

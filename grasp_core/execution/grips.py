@@ -46,7 +46,15 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, frozen_each, real_array
+from grasp_core.arrays import (
+    Array,
+    are_frictions,
+    are_units,
+    frozen,
+    frozen_each,
+    is_array,
+    real_array,
+)
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, instance, several
 from grasp_core.closure.contacts import (
@@ -60,7 +68,6 @@ from grasp_core.closure.contacts import (
     stacked,
 )
 from grasp_core.errors import InputError
-from grasp_core.fields import are_frictions, are_units, is_array
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp

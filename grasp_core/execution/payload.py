@@ -35,8 +35,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Indices, is_a, is_indices, is_number, is_tuple_of
+from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import positive
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.errors import InputError
@@ -45,11 +45,9 @@ from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
 from grasp_core.execution.loads import GRAVITY_M_PER_S2, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
-from grasp_core.fields import is_a, is_indices, is_number, is_tuple_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit, attains, bounds, limit_of
-from grasp_core.short_text import summary
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
 

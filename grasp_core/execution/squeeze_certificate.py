@@ -9,14 +9,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, is_a, is_array, is_indices, is_number
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet
 from grasp_core.execution.squeeze_rows import Cuts, Survival
-from grasp_core.fields import is_a, is_array, is_indices, is_number
 from grasp_core.quality.motors import Motors
 
 ROUNDING = 1e-9

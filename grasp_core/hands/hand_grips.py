@@ -37,11 +37,10 @@ from functools import cached_property
 
 import numpy as np
 
-from grasp_core.arrays import UNIT_SLACK, Array, cross
+from grasp_core.arrays import UNIT_SLACK, Array, cross, is_array, is_number
 from grasp_core.checked import LARGEST, SMALLEST
 from grasp_core.closure.contacts import WRENCH, cross_matrix
 from grasp_core.execution.grips import Grip
-from grasp_core.fields import is_array, is_number
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import chains
 from grasp_core.hands.kinematics import places

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import (
     BOUNDS,
     coefficient,
@@ -45,7 +45,6 @@ from grasp_core.hands.pose_search import (
 )
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.short_text import summary
 from grasp_core.values import FINGERS, Contact, Grasp
 
 ReachReason: TypeAlias = Literal["", "limit", "collision", "not found", "no closure"]

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.standard_order import SHORTEST, flag_frame
 from grasp_core.values import FINGERS, Grasp
 
 SAME_BODY = 1e-4
@@ -36,8 +37,6 @@ of their normals and force cones: a picture of this object shows no smaller one.
 FAR = 4.0
 """Distance in object radii from which foci are compared by their direction, with the same share of
 their distance."""
-SHORTEST = 1e-3
-"""Least distance of a corner from its face's centre that gives a direction, in object radii."""
 MOST_FACES = 200
 """Largest number of faces of objects whose symmetries are looked for, as for exact planning."""
 CROWDED = 300
@@ -195,7 +194,7 @@ def _flags(body: Polyhedron) -> list[Array]:
         for corner, lengths in _corners(body, int(face))
     ]
     return [
-        _frame(body, int(face), corner)
+        flag_frame(body, int(face), corner)
         for face, corner, lengths in corners
         if math.dist(lengths, corners[0][2]) <= 2.0 * SAME_BODY
     ]
@@ -216,16 +215,6 @@ def _corners(body: Polyhedron, face: int) -> Iterator[tuple[int, tuple[float, fl
         inner = float(np.linalg.norm(at - centroid)) / body.radius
         if inner > SHORTEST:
             yield corner, (inner, float(np.linalg.norm(at - body.center_of_mass)) / body.radius)
-
-
-def _frame(body: Polyhedron, face: int, corner: int) -> Array:
-    """Return unit columns towards a corner, across, and along the face's normal, (3, 3)."""
-    normal = body.faces[face].normal
-    toward = body.faces[face].polygon[corner] - body.faces[face].centroid
-    toward = toward - normal * float(normal @ toward)
-    toward = toward / np.linalg.norm(toward)
-    columns = [toward, np.cross(normal, toward), normal]
-    return np.asarray(np.column_stack(columns), dtype=np.float64)
 
 
 def _marks(body: Polyhedron) -> tuple[Array, Array]:

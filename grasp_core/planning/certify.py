@@ -11,7 +11,6 @@ from typing import cast
 
 import numpy as np
 
-from grasp_core.angles import kept_angle
 from grasp_core.arrays import Array, frozen_copy
 from grasp_core.by_value import trusted
 from grasp_core.closure.contacts import grasp_map, normal_and_tangential
@@ -21,6 +20,7 @@ from grasp_core.closure.lines import classify_each, classify_lines
 from grasp_core.cones.spanning import span_angles
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.placements import Placement
+from grasp_core.frames import kept_angle
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny

@@ -55,13 +55,21 @@ from typing import Literal, NamedTuple, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_copy
+from grasp_core.arrays import (
+    Array,
+    Indices,
+    are_units,
+    frozen,
+    frozen_copy,
+    is_a,
+    is_array,
+    is_number,
+)
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, one_of
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import WrenchSet, into_cones
 from grasp_core.errors import InputError, SolverError
-from grasp_core.fields import are_units, is_a, is_array, is_number
 from grasp_core.quality.ferrari_canny import (
     CHECK_SLACK,
     GAP,

@@ -26,11 +26,12 @@ from grasp_core.checked import (
 from grasp_core.closure.contacts import stacked
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.errors import InputError, SolverError, UndecidedError
-from grasp_core.geometry.flat_polygons import convex_polygon, holds_disc
 from grasp_core.geometry.polygons import (
     SAME_CORNER,
     clip,
+    convex_polygon,
     edge_rows,
+    holds_disc,
     nearest_point,
     tidy,
     with_fewer_corners,

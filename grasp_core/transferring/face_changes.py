@@ -28,11 +28,11 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.objects.face import Face
+from grasp_core.by_value import counted
 from grasp_core.objects.on_faces import ON_FACE
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.surface import Face
 from grasp_core.planning.given_contacts import nearest_in
-from grasp_core.short_text import counted
 from grasp_core.transferring.like_faces import SAME, WIDEST_DEG, Likeness
 
 Triple: TypeAlias = tuple[float, float, float]

@@ -19,14 +19,13 @@ from functools import partial
 import numpy as np
 
 from grasp_core.arrays import cross
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import coefficient, instance, several
 from grasp_core.errors import UndecidedError
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated
 from grasp_core.planning.reach import Finger
-from grasp_core.short_text import counted, summary
 from grasp_core.transferring.face_changes import (
     FaceChange,
     added_faces,

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
 from grasp_core.errors import GraspError, InputError
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.text_files import write_parts
 from scenes.drawing.colours import FINGERS, rgb
 from scenes.execution.held_mjcf import HeldScene
 from scenes.mjcf import Scene

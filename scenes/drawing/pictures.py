@@ -11,9 +11,9 @@ from grasp_core.arrays import Array, cross
 from grasp_core.checked import coefficient, instance, path_of, switch
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
-from grasp_core.objects.face import Face
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.surface import Face
 from grasp_core.values import Grasp
 from scenes.drawing.colours import FINGERS, NEUTRAL
 from scenes.drawing.drawings import BAR_LENGTH, drawing_of, drawing_with_hand, finger_size, glass

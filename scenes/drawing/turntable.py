@@ -16,7 +16,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import path_of
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp

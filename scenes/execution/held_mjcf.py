@@ -22,7 +22,7 @@ from grasp_core.by_value import ByValue
 from grasp_core.checked import instance, path_of
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.text_files import write_parts
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.execution.held import HeldLayout, HeldSettings, held_layout
 from scenes.mjcf_text import (

@@ -21,8 +21,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
-from grasp_core.objects.convexity import is_convex
-from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron, is_convex
 
 TOUCHING = 1e-9
 """How far the two may overlap along an axis and count as touching, in object radii."""

@@ -36,7 +36,7 @@ import numpy as np
 from grasp_core.arrays import Array, to_digits
 from grasp_core.checked import instance, path_of
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import direction, hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians

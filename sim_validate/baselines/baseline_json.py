@@ -7,8 +7,7 @@ from pathlib import Path, PurePath
 from pydantic import TypeAdapter, ValidationError
 
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import complaint
-from grasp_core.files.strict_json import check_schema, object_of, shown
+from grasp_core.files.json_text import check_schema, complaint, object_of, shown
 from grasp_core.files.text_files import read_text, write_text
 from sim_validate.baselines.entries import Baseline, fields_of
 

@@ -10,8 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import complaint
-from grasp_core.files.strict_json import shown
+from grasp_core.files.json_text import complaint, shown
 from grasp_core.records.grasps_json import SavedGrasps
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface

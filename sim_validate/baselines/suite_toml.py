@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError
-from grasp_core.files.strict_json import place, shown
+from grasp_core.files.json_text import place, shown
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import Checked, check_one, demanded, silent

@@ -3,10 +3,10 @@
 import math
 from typing import Any
 
+from grasp_core.by_value import counted
 from grasp_core.hands.couplings import Coupling
 from grasp_core.hands.hand import Hand, HandFinger
 from grasp_core.hands.named_hands import HANDS
-from grasp_core.short_text import counted
 from scenes.hand_files.loading import load_hand
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import Reporter

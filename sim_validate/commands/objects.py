@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from grasp_core.by_value import vector
 from grasp_core.cones.spanning import count_spanning
-from grasp_core.objects.face import Face
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.surface import Face
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
 from grasp_core.records.grasps_json import surface_record
-from grasp_core.short_text import vector
 from scenes.drawing.pictures import MOST_NUMBERED, write_object_picture
 from scenes.example_objects import example_names
 from sim_validate.cli import command_flags

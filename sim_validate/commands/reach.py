@@ -9,16 +9,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from grasp_core.by_value import counted
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.files.text_files import write_text
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_payload
 from grasp_core.hands.reach import HandReach, uncoupled
-from grasp_core.objects.convexity import is_convex
-from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.records.grasps_json import SavedGrasps
-from grasp_core.short_text import counted
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit

@@ -3,12 +3,12 @@
 import math
 from pathlib import Path
 
+from grasp_core.by_value import counted
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.shells import SMALL
 from grasp_core.records.grasps_json import SavedGrasps
-from grasp_core.short_text import counted
 from grasp_core.transferring.changed_part import SURE_GROWTH, given_center, growth
 from grasp_core.transferring.judging import CHANGES, Change, GraspFigures
 from grasp_core.transferring.like_faces import check_planar

@@ -14,10 +14,10 @@ from typing import Any, Literal, TypeAlias, cast, get_args
 
 from grasp_core.checked import LARGEST_FRICTION, MOST_RANDOM_WRENCHES, positive
 from grasp_core.errors import InputError
-from grasp_core.files.strict_json import place, shown
+from grasp_core.files.json_text import place, shown
 from grasp_core.mesh_files.reading import FORMATS
-from grasp_core.objects.face import FaceKind
 from grasp_core.objects.polyhedron import UNITS_M
+from grasp_core.objects.surface import FaceKind
 from grasp_core.planning.request import METHODS, ConeKind
 from grasp_core.values import Method
 from sim_validate.datasets.columns import Tables

@@ -15,8 +15,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import complaint
-from grasp_core.files.strict_json import object_of, place, shown
+from grasp_core.files.json_text import complaint, object_of, place, shown
 from grasp_core.files.text_files import read_text, write_text
 from sim_validate.datasets.columns import Name, Tables
 from sim_validate.datasets.learning.columns import GROUPS, dataset_tables

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
-from grasp_core.files.strict_json import shown
+from grasp_core.files.json_text import shown
 from sim_validate.datasets.columns import KEYS, TABLES, Column, Name, Tables, base_tables
 
 Columns: TypeAlias = dict[str, NDArray[Any]]

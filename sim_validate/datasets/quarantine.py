@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict
 
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
+from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import read_text
 
 

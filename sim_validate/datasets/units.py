@@ -18,8 +18,8 @@ from types import MappingProxyType
 from grasp_core.errors import GraspError, InputError
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.build import MeshChoices
-from grasp_core.objects.face import FaceKind
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron, polyhedron_from_mesh
+from grasp_core.objects.surface import FaceKind
 from grasp_core.provenance import versions
 from scenes.example_objects import example_object
 from sim_validate.datasets.config import CREDITS, DatasetConfig

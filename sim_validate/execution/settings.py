@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Literal, TypeAlias, cast, get_args
 
+from grasp_core.by_value import changed
 from grasp_core.checked import (
     BOUNDS,
     LARGEST,
@@ -18,10 +19,8 @@ from grasp_core.checked import (
 )
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import STIFFNESS_N_PER_M
-from grasp_core.files.complaints import settings_of
-from grasp_core.files.strict_json import shown
+from grasp_core.files.json_text import settings_of, shown
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.short_text import changed
 from scenes.execution.held import HeldSettings
 
 TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misplaced"]

@@ -17,8 +17,7 @@ from itertools import chain
 from pathlib import Path
 
 from grasp_core.errors import InputError
-from grasp_core.files.text_files import write_text
-from grasp_core.files.whole_files import UNFINISHED, remove_unfinished
+from grasp_core.files.text_files import UNFINISHED, remove_unfinished, write_text
 
 REPORT, INDEX, GRASPS = "report", "index.html", "grasps"
 STYLE = "style.css"

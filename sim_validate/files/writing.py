@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
-from grasp_core.files.whole_files import SHOWN, UNFINISHED, write_parts
+from grasp_core.files.text_files import SHOWN, UNFINISHED, write_parts
 
 
 def write_bytes(path: Path, data: bytes) -> Path:

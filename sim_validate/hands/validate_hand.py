@@ -11,14 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import instance
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.short_text import summary
 from grasp_core.values import Contact
 from scenes.fingertips import FingerSettings
 from scenes.hands.hand_scene import HandScene, build_hand_scene, hand_physics, limited

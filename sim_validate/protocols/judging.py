@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import coefficient, instance, one_of, several
 from grasp_core.closure.contacts import FEWEST
 from grasp_core.closure.force_closure import force_closure
@@ -25,7 +25,6 @@ from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
-from grasp_core.short_text import summary
 from grasp_core.values import Contact, Grasp
 from scenes.hands.hand_scene import build_hand_scene
 from scenes.mjcf import Scene

@@ -9,7 +9,7 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
+from grasp_core.files.json_text import record_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.quality.measures import MeasureName

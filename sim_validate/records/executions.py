@@ -17,9 +17,7 @@ from grasp_core.arrays import frozen
 from grasp_core.by_value import ByValue
 from grasp_core.checked import path_of
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of, settings_of
-from grasp_core.files.json_text import text_of
-from grasp_core.files.strict_json import place
+from grasp_core.files.json_text import place, record_of, settings_of, text_of
 from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.objects.polyhedron import Polyhedron

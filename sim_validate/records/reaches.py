@@ -17,8 +17,7 @@ from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.execution.carried_mass import HandPayload
-from grasp_core.files.complaints import record_of
-from grasp_core.files.json_text import text_of
+from grasp_core.files.json_text import record_of, text_of
 from grasp_core.files.text_files import read_text
 from grasp_core.frames import POSE
 from grasp_core.hands.collisions import tip_distances

@@ -17,10 +17,9 @@ from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
 from grasp_core.checked import path_of
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError, SolverError
-from grasp_core.files.complaints import record_of
-from grasp_core.files.json_text import text_of
+from grasp_core.files.json_text import record_of, text_of
 from grasp_core.files.text_files import write_text
-from grasp_core.geometry.flat_polygons import FEWEST_CORNERS
+from grasp_core.geometry.polygons import FEWEST_CORNERS
 from grasp_core.objects.face_pieces import inscribed_disc_radius_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions

@@ -12,8 +12,7 @@ from typing import Any, cast
 from pydantic import TypeAdapter, ValidationError
 
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import complaint
-from grasp_core.files.strict_json import shown
+from grasp_core.files.json_text import complaint, shown
 from scenes.fingertips import FingerSettings
 from scenes.physics import PhysicsSettings
 from sim_validate.files.toml_tables import read_tables

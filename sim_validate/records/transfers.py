@@ -10,18 +10,15 @@ import numpy as np
 from pydantic import ConfigDict, Field, with_config
 from typing_extensions import TypedDict
 
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import path_of
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
-from grasp_core.files.json_text import text_of
-from grasp_core.files.strict_json import place
+from grasp_core.files.json_text import place, record_of, text_of
 from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.provenance import versions
 from grasp_core.records.grasps_json import SavedGrasps, plan_to_json
-from grasp_core.short_text import counted, summary
 from grasp_core.transferring.face_changes import FaceChange, changes_in_words
 from grasp_core.transferring.judging import (
     CHANGES,

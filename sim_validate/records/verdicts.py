@@ -19,8 +19,7 @@ from grasp_core.by_value import ByValue
 from grasp_core.checked import MOST_RANDOM_WRENCHES, path_of
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
-from grasp_core.files.json_text import text_of
+from grasp_core.files.json_text import record_of, text_of
 from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.objects.polyhedron import Polyhedron

@@ -13,8 +13,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
-from grasp_core.files.strict_json import place, shown
+from grasp_core.files.json_text import place, record_of, shown
 from grasp_core.files.text_files import read_text
 from sim_validate.simulation.setup import NamedWrench
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
+from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.execution.verdict import ExecutedGrasp

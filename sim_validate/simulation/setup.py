@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 
 from grasp_core.arrays import Array, frozen, to_digits
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, changed
 from grasp_core.checked import (
     BOUNDS,
     LARGEST,
@@ -27,10 +27,9 @@ from grasp_core.checked import (
     whole,
 )
 from grasp_core.errors import InputError
-from grasp_core.files.strict_json import shown
+from grasp_core.files.json_text import shown
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.short_text import changed
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, Surface, build_scene

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 
 import grasp_core as gc
 from grasp_core.families.free import Absence, place_free
-from grasp_core.geometry import flat_polygons
+from grasp_core.geometry import polygons as flat_polygons
 from grasp_core.objects.face_pieces import piece_of
 from grasp_core.regions import proof as covers
 from grasp_core.regions.certificates import CertifiedRegions

@@ -7,7 +7,7 @@ from itertools import count
 
 import pytest
 
-from grasp_core.files.whole_files import UNFINISHED, write_parts
+from grasp_core.files.text_files import UNFINISHED, write_parts
 from sim_validate.main import main
 from tests.faults.conftest import CLI, ROOT, contents
 from tests.marks import MORE, more

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from grasp_core.files.whole_files import UNFINISHED
+from grasp_core.files.text_files import UNFINISHED
 from sim_validate.main import main
 from tests.faults.conftest import CLI, ROOT, contents
 from tests.marks import MORE

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic_core import to_jsonable_python
 
 import grasp_core as gc
-from grasp_core.files.complaints import record_of
+from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import text_of
 from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
 from grasp_core.records.grasps_json import SavedGrasps, grasps_from_json, plan_to_json

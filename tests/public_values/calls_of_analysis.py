@@ -74,11 +74,6 @@ CALLS = [
         "jobs": AT_LEAST_ONE,
     }),
     Call("gc.iter_grasps", lambda: {"body": body()}, PLANNED),
-    Call("gc.plan_of", lambda: {"body": body(), "grasps": [grasp()], "friction": 0.5}, {
-        "body": VALUE,
-        "grasps": SEVERAL | {"twice": [grasp()] * 2, "an id": [grasp().id]},
-        "friction": FRICTION,
-    }),
     Call("gc.save_grasps", lambda: {"path": "grasps.json", "plan": gc.plan(body(), limit=1)}, {
         "path": PATH, "plan": VALUE,
     }, succeeds_in="tests/grasp_core/records/test_grasps_files.py"),

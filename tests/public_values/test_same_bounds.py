@@ -10,7 +10,7 @@ import grasp_core as gc
 import sim_validate as sv
 from grasp_core.checked import BOUNDS
 from grasp_core.hands.reach import HandReach
-from grasp_core.objects.face import PatchLimits
+from grasp_core.objects.surface import PatchLimits
 from scenes.example_objects import example_object
 from scenes.execution.held import HeldSettings
 from scenes.fingertips import FingerSettings

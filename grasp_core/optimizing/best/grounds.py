@@ -33,15 +33,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices
+from grasp_core.arrays import Array, Indices, frozen, frozen_indices, is_array, is_indices
 from grasp_core.by_value import ByValue
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
-from grasp_core.fields import is_array, is_indices
 from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face, unit_pieces
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.standard_order import clear_of_edges
 from grasp_core.objects.symmetries import symmetries
-from grasp_core.objects.trimmed_faces import clear_of_edges
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS
 

@@ -66,11 +66,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices
+from grasp_core.arrays import (
+    Array,
+    Indices,
+    frozen,
+    frozen_indices,
+    is_a,
+    is_array,
+    is_indices,
+    is_number,
+)
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.compiled import compiled
-from grasp_core.fields import is_a, is_array, is_indices, is_number
 from grasp_core.optimizing.best.grounds import Grounds, first_nodes, fitting
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS

@@ -13,8 +13,7 @@ from typing import TypeAlias
 
 from grasp_core.families.constructions import CONSTRUCTIONS
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.standard_order import Standard, standard
-from grasp_core.objects.trimmed_faces import clear_of_edges, with_halves
+from grasp_core.objects.standard_order import Standard, clear_of_edges, standard, with_halves
 from grasp_core.planning.certify import Certified
 from grasp_core.planning.family_search import Gathered, MethodSearch, found_in
 from grasp_core.planning.free_search import found_on, found_with_more_parts

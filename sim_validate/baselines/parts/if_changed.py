@@ -6,8 +6,7 @@ from typing import Any, cast
 
 from grasp_core.checked import BOUNDS, number, one_of, positive, switch
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import settings_of
-from grasp_core.files.strict_json import shown
+from grasp_core.files.json_text import settings_of, shown
 from grasp_core.objects.polyhedron import UNITS_M
 from grasp_core.transferring.like_faces import ANGLE_DEG
 

@@ -3,8 +3,8 @@
 import math
 from pathlib import Path
 
+from grasp_core.by_value import counted
 from grasp_core.errors import InputError
-from grasp_core.short_text import counted
 from scenes.drawing.depth.cameras import Lens
 from sim_validate.cli import dataset_flags
 from sim_validate.cli.console import Reporter

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
+from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import read_bytes, read_text
 from sim_validate.datasets.building.make_unit import Made
 from sim_validate.datasets.columns import Name

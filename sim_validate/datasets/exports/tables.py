@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
-from grasp_core.files.text_files import write_text
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.text_files import write_parts, write_text
 from sim_validate.datasets.columns import Column, Name
 from sim_validate.datasets.open_dataset import Selection
 from sim_validate.datasets.parquet import Columns, pyarrow, read_columns, schema_of

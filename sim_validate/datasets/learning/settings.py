@@ -7,8 +7,7 @@ from typing import Any, Literal, TypeAlias, cast, get_args
 
 from grasp_core.checked import one_of, positive, whole
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import settings_of
-from grasp_core.files.strict_json import shown
+from grasp_core.files.json_text import settings_of, shown
 from grasp_core.hands.named_hands import hand_names, load_hand
 from grasp_core.objects.polyhedron import UNITS_M
 

@@ -13,7 +13,7 @@ from grasp_core.arrays import Array
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import GraspError
 from grasp_core.frames import POSE
-from grasp_core.geometry.on_mesh import Surface
+from grasp_core.geometry.nearest_points import Surface
 from grasp_core.hands.collisions import clearances, tip_distances
 from grasp_core.hands.hand import Hand
 from grasp_core.objects.polyhedron import Polyhedron

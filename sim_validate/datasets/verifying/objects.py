@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from grasp_core.geometry.on_mesh import Surface
+from grasp_core.geometry.nearest_points import Surface
 from grasp_core.objects.polyhedron import Polyhedron
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.learning.objects import box_sides, rest_rows, shape_class

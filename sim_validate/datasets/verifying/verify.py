@@ -9,8 +9,8 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import GraspError, InputError, UndecidedError
-from grasp_core.files.strict_json import shown
-from grasp_core.geometry.on_mesh import Surface
+from grasp_core.files.json_text import shown
+from grasp_core.geometry.nearest_points import Surface
 from grasp_core.values import FINGERS
 from sim_validate.datasets.building.write_tables import CONFIG, QUARANTINE
 from sim_validate.datasets.columns import KEYS

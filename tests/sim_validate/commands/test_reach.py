@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.files.complaints import record_of
+from grasp_core.files.json_text import record_of
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.hand_flags import Reach

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.files.complaints import record_of
+from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import write_text
 from scenes.example_objects import example_object
 from sim_validate.cli.exit_codes import Exit
