@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 
 import grasp_core as gc
-import scenes
 import sim_validate as sv
+from tests.benchmarks.objects import scaled
 
 OBJECTS = {
     "dodecahedron": 0.032, "box": 0.033, "wedge": 0.035, "octahedron": 0.035, "icosahedron": 0.032,
@@ -33,12 +33,6 @@ OBJECTS = {
 HANDS, EACH, FRICTION, MOST_APART = ("allegro", "leap"), 8, 0.5, 3
 TORQUE_N_M = 0.7
 """Limit of joints in our own trials; DexGraspBench has none."""
-
-
-def scaled(name):
-    body = scenes.example_object(name)
-    vertices = (body.vertices - body.center_of_mass) * OBJECTS[name] / body.radius
-    return gc.Polyhedron.from_mesh(vertices, body.triangles, name=name)
 
 
 def reached(hand, body):
@@ -61,7 +55,7 @@ def write(folder, options):
     for hand in map(gc.load_hand, HANDS):
         place = folder / f"records_{hand.name}" / "graspdata"
         for name in OBJECTS:
-            body = scaled(name)
+            body = scaled(name, OBJECTS[name])
             seen = str(sv.write_dex_object(body, folder / "objects" / name).resolve())
             for number, found in enumerate(islice(reached(hand, body), EACH)):
                 gap = {"gap_m": None} if options.whole_way else {}
@@ -80,7 +74,8 @@ def compare(folder):
         for path in sorted((folder / f"records_{name}" / "graspdata").glob("*.npy")):
             judged = folder / f"records_{name}" / "evaluation" / path.name
             theirs.append(bool(np.load(judged, allow_pickle=True).item()["succ_flag"]))
-            body = scaled(path.stem.rsplit("_", 1)[0])
+            about = path.stem.rsplit("_", 1)[0]
+            body = scaled(about, OBJECTS[about])
             found = sv.reach_of_record(sv.load_dex_record(path), hand, body, FRICTION)
             verdict = sv.judge_hand_by("dexgraspbench", hand, body, found, FRICTION)
             ours.append(verdict.theirs)

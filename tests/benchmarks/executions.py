@@ -6,20 +6,14 @@ FOLDER` six of them give way to three mesh files of the folder and three of its 
 Printed are
 
 * the share that survives each kind of trial;
-* how well qualities that are known beforehand rank grasps by survival: the area under the ROC
-  curve, the chance that a grasp that survives all trials has more quality than one that does not;
+* how well figures that are known beforehand rank grasps by survival: the area under the ROC curve,
+  the chance that a grasp that survives all trials has more of it than one that does not;
 * for each family, the share of grasps that keep the object when it is 0 to 8 mm away from where
   the fingers expect it, and whether contacts inside certified regions are in force closure;
 * executions per second and core.
 
 Ends with an error if the least predicted loss ranks worse than .98, or closure is lost inside
-a certified region. The quality of DexGraspBench is the mean, over six forces along the axes, of the
-least wrench that is left when contact forces balance it, each normal force up to one and at least
-one in all; torques are about the middle of the contacts.
-
-Source of that quality: Chen, Ke and Wang, "BODex: Scalable and Efficient Robotic Dexterous Grasp
-Synthesis Using Bilevel Optimization", ICRA 2025, and its benchmark,
-github.com/JYChen18/DexGraspBench.
+a certified region.
 
     python -m tests.benchmarks.executions [--quick] [--meshes FOLDER] [--mass-kg M] [--jobs N]
 """
@@ -34,18 +28,16 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
-import qpsolvers
-from scipy import sparse
 
 import grasp_core as gc
 import sim_validate as sv
-from grasp_core.closure.wrenches import contact_frames, grasp_map
 from grasp_core.geometry.nearest_points import nearest_on_surface
 from scenes.execution.held_mjcf import build_held_scene
 from sim_validate.execution.execute import chosen_squeeze
 from sim_validate.execution.misplaced import met, misplacements
 from sim_validate.parallel.processes import each
 from tests.benchmarks import held_grasps as held
+from tests.benchmarks.objects import FAMILIES, meshes_in
 
 OBJECTS = (
     "wedge", "dodecahedron", "l-bracket", "random-8-3", "prism", "screwdriver", "box", "cross",
@@ -62,8 +54,6 @@ SLIP = "least predicted first slip"
 RANKED = 0.98
 BAR = 5.0
 """Executions per second and core."""
-ASKED = 0.1
-"""Size of the six forces of DexGraspBench, of the largest normal force."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +109,6 @@ def measure(unit):
 
 def qualities(body, grasp, done):
     """Return what is known before an execution, the higher the better."""
-    about = {"center": body.center_of_mass, "torque_scale": body.radius}
     return {
         OURS: min(one.predicted_loss for one in done.trials),
         SLIP: min(one.predicted_first_slip for one in done.trials),
@@ -127,31 +116,7 @@ def qualities(body, grasp, done):
         "Ferrari-Canny quality": grasp.ferrari_canny[0],
         "least critical friction": -grasp.critical_friction,
         "radius of discs": grasp.radius / body.radius,
-        "volume of the wrench hull": gc.hull_volume(grasp, friction=held.FRICTION, **about),
-        "min-weight": gc.min_weight(grasp, friction=held.FRICTION),
-        "smallest singular value": gc.smallest_singular_value(grasp, **about),
-        "DexGraspBench": -left_over(grasp),
     }  # fmt: skip
-
-
-def left_over(grasp):
-    """Return the quality of DexGraspBench, the smaller the better."""
-    points = np.array([one.position for one in grasp.contacts])
-    normals = np.array([one.normal for one in grasp.contacts])
-    k, mu = len(points), held.FRICTION
-    edges = np.array([[1.0, mu, 0], [1, -mu, 0], [1, 0, mu], [1, 0, -mu]])
-    forces = contact_frames(normals) @ edges.T
-    G = grasp_map(points - points.mean(axis=0)).reshape(6, k, 3).transpose(1, 0, 2) @ forces
-    G = G.transpose(1, 0, 2).reshape(6, -1)
-    limits = np.vstack([np.kron(np.eye(k), np.ones(4)), -np.ones(4 * k)])
-    left = []
-    for force in (*np.eye(6)[:3], *-np.eye(6)[:3]):
-        x = qpsolvers.solve_qp(
-            sparse.csc_matrix(G.T @ G), ASKED * force @ G, sparse.csc_matrix(limits),
-            np.append(np.ones(k), -1.0), lb=np.zeros(4 * k), solver="clarabel",
-        )  # fmt: skip
-        left.append(1.0 if x is None else float(np.linalg.norm(G @ x + ASKED * force)))
-    return float(np.mean(left))
 
 
 def inside_regions(body, grasp, settings):
@@ -255,7 +220,7 @@ def list_ranks(real, good):
 def list_misplaced(real):
     """Print what misplacements leave; whether closure is never lost inside certified regions."""
     print("kept, by mm off  " + " ".join(f"{off:>12g}" for off in OFFS_MM))
-    for family in held.FAMILIES:
+    for family in FAMILIES:
         own = [one for one in real if one.kept and one.family == family]
         cells = [
             np.sum([one.kept[off] for one in own], axis=0) if own else (0, 0) for off in OFFS_MM
@@ -288,9 +253,9 @@ def sources_of(meshes):
     """List the sources of objects: built-in ones, and half of them from files if there are any."""
     if meshes is None:
         return list(OBJECTS)
-    files = held.meshes_in(meshes)[:FILES]
+    files = list(map(str, meshes_in(meshes)[:FILES]))
     pieces = meshes / "pieces"
-    files += held.meshes_in(pieces)[:FILES] if pieces.is_dir() else []
+    files += list(map(str, meshes_in(pieces)[:FILES])) if pieces.is_dir() else []
     return list(OBJECTS[: len(OBJECTS) - len(files)]) + files
 
 

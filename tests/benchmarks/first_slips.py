@@ -30,6 +30,7 @@ import grasp_core as gc
 from grasp_core.geometry.nearest_points import nearest_on_surface, nearest_on_triangles
 from sim_validate.parallel.processes import each
 from tests.benchmarks import held_grasps as held
+from tests.benchmarks.objects import meshes_in
 
 EACH, DIRECTIONS = 20, 24
 QUICK_OBJECTS, QUICK_EACH = 5, 4
@@ -205,7 +206,7 @@ def main():
     parser.add_argument("--worst", type=int, default=8)
     options = parser.parse_args()
     begun = time.perf_counter()
-    sources = held.meshes_in(options.meshes) if options.meshes else list(held.OBJECTS)
+    sources = list(map(str, meshes_in(options.meshes))) if options.meshes else list(held.OBJECTS)
     count = QUICK_EACH if options.quick else MESH_EACH if options.meshes else EACH
     sources = sources[:: max(1, len(sources) // QUICK_OBJECTS)] if options.quick else sources
     cases = list(chain.from_iterable(map(held.planned, sources, [count] * len(sources))))

@@ -15,10 +15,10 @@ from sim_validate.simulation.traces import traces
 from sim_validate.simulation.wrench_limits import part
 from sim_validate.validation.control_trials import control_case
 from sim_validate.validation.controls import negative_controls
-from tests.benchmarks.early_ends import compared
 from tests.marks import more
 from tests.sim_validate.rigs import grasps, limiting_loads, rig_of
 from tests.sim_validate.simulation.test_traces import motion, pose
+from tests.sim_validate.simulation.whole_and_early import compared
 
 CLOCK = Clock(0.01)
 LENGTH = 66
