@@ -124,15 +124,6 @@ def farther_discs(rng):
     return lambda: with_scale(wide, rng, regions=parts)
 
 
-def wider_regions(rng):
-    """Inscribed radii that are too large or too small."""
-    r = smaller(genuine(any_seed(rng))[0], rng)
-    grown = 1.0 + power(rng, -4, 6) * rng.choice([1.0, -1e-7])
-    grown = grown if abs(grown - 1.0) > 1e-5 else 1.001
-    wider = replace(r.regions[0], inscribed_radius=grown * r.regions[0].inscribed_radius)
-    return lambda: with_scale(r, rng, regions=(wider, *r.regions[1:]))
-
-
 def regions_at_less_friction(rng):
     r, _, open_at = genuine(any_seed(rng))
     friction = np.full(4, open_at * (1.0 - power(rng, -9, 0)))
@@ -157,9 +148,7 @@ def beyond_borders(rng):
 
 
 REGIONS = Attack(
-    lambda rng: cycled(
-        rng, [farther_discs, wider_regions, regions_at_less_friction, beyond_borders]
-    ),
+    lambda rng: cycled(rng, [farther_discs, regions_at_less_friction, beyond_borders]),
     (
         lambda monkeypatch: monkeypatch.setattr(
             CertifiedRegions, "_has_fitting_scale", always(True)
