@@ -1,6 +1,6 @@
 """Our imitation of DexGraspBench's test beside its own evaluator, on 48 records of each hand.
 
-    python -m tests.benchmarks.dexgraspbench write FOLDER [--whole-way] [--open-finger]
+    python -m tests.benchmarks.dexgraspbench write FOLDER
     python -m tests.benchmarks.dexgraspbench compare FOLDER
 
 The first writes records of grasps of six built-in objects by Allegro and LEAP, for its evaluator to
@@ -9,13 +9,11 @@ judge: in its checkout, for each hand, with its own MuJoCo,
     python src/main.py hand=HAND task=eval exp_name=records save_root=FOLDER
 
 The second judges the same files here and prints how many verdicts are alike. It ends with an error
-if more than three differ. `--whole-way` has fingers come from as far as they open, each meeting the
-object when it does; `--open-finger` keeps one finger open, another in each record.
+if more than three differ.
 """
 
 import argparse
 import sys
-from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -44,24 +42,14 @@ def reached(hand, body):
             yield found
 
 
-def with_open_finger(record, number):
-    own = slice(7 + 4 * number, 11 + 4 * number)
-    grasp, squeeze = np.array(record.grasp), np.array(record.squeeze)
-    grasp[own] = squeeze[own] = record.pregrasp[own]
-    return replace(record, grasp=grasp, squeeze=squeeze)
-
-
-def write(folder, options):
+def write(folder):
     for hand in map(gc.load_hand, HANDS):
         place = folder / f"records_{hand.name}" / "graspdata"
         for name in OBJECTS:
             body = scaled(name, OBJECTS[name])
             seen = str(sv.write_dex_object(body, folder / "objects" / name).resolve())
             for number, found in enumerate(islice(reached(hand, body), EACH)):
-                gap = {"gap_m": None} if options.whole_way else {}
-                record = sv.dex_record(hand, found, seen, **gap)
-                if options.open_finger:
-                    record = with_open_finger(record, number % 4)
+                record = sv.dex_record(hand, found, seen)
                 sv.write_dex_record(record, place / f"{name}_{number}.npy")
     return 0
 
@@ -90,10 +78,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=("write", "compare"))
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--whole-way", action="store_true")
-    parser.add_argument("--open-finger", action="store_true")
     options = parser.parse_args()
-    return write(options.folder, options) if options.what == "write" else compare(options.folder)
+    return write(options.folder) if options.what == "write" else compare(options.folder)
 
 
 if __name__ == "__main__":

@@ -33,8 +33,6 @@ RADIANS = 180.0
 """Time in which a load grows, at least, in radians of the slowest natural motion at rest. The
 object lags behind the load by the inverse of that, times twice the damping ratio, and grips become
 softer as they turn: with a third of the time soft fingertips seem to hold 5 to 15 % more."""
-SPARE = 1.0
-"""How much farther a curved surface is there than fingertips come, in their radii."""
 LOST = 3.0
 """Distance at which an object is lost and its trial ends, in its radii."""
 
@@ -70,41 +68,22 @@ def planned(source: str, count: int) -> list[Case]:
     return found[:count]
 
 
-def tip_radius(body: gc.Polyhedron, contacts: gc.Grasp | list[gc.Contact]) -> float:
-    """Choose a radius of fingertips that fits."""
-    listed = contacts.contacts if isinstance(contacts, gc.Grasp) else contacts
-    points = np.array([one.position for one in listed])
-    normals = np.array([one.normal for one in listed])
-    return fitting_radius(body, points, normals)
-
-
 def squeezed(
-    body: gc.Polyhedron, contacts: gc.Grasp | list[gc.Contact], loads: gc.LoadSet,
-    stiffness: float,
-) -> gc.BestSqueeze | None:  # fmt: skip
+    body: gc.Polyhedron, grasp: gc.Grasp, loads: gc.LoadSet, stiffness: float
+) -> gc.BestSqueeze | None:
     """Find the best squeeze with pushes up to `PUSH_N`; None if there is none."""
     try:
         return gc.best_squeeze(
-            body, contacts, FRICTION, loads, max_push_n=PUSH_N, stiffness=stiffness,
-            tip_radius_m=tip_radius(body, contacts),
+            body, grasp, FRICTION, loads, max_push_n=PUSH_N, stiffness=stiffness,
+            tip_radius_m=fitting_radius(body, grasp.positions, grasp.normals),
         )  # fmt: skip
     except gc.NoForcesError:
         return None
 
 
-def bench_of(
-    body: gc.Polyhedron, grip: gc.Grip, mass_kg: float, turn_rad: float | None = None
-) -> HeldBench:
-    """Compile the scene of a squeezed object.
-
-    A curved surface is there where fingertips come if nothing slips while the object turns by no
-    more than an angle: they move along with the object, and roll by their radius times the angle.
-    """
-    reach = None
-    if turn_rad is not None and body.patches is not None:
-        reach = (1.0 + turn_rad + SPARE) * float(grip.tip_radius_m.max())
-    scene = build_held_scene(body, grip, mass_kg, reach_m=reach)
-    return HeldBench(scene, lost_m=LOST * body.radius)
+def bench_of(body: gc.Polyhedron, grip: gc.Grip, mass_kg: float) -> HeldBench:
+    """Compile the scene of a squeezed object."""
+    return HeldBench(build_held_scene(body, grip, mass_kg), lost_m=LOST * body.radius)
 
 
 def slowness(bench: HeldBench, grip: gc.Grip) -> float:
