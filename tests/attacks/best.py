@@ -58,14 +58,6 @@ def changed_numbers(t, rng):
     return {"twists": twists, "lines": lines}
 
 
-def tiny_trees(_, rng):
-    """Trees of few steps from the start."""
-    n = int(rng.integers(1, 8))
-    deeds = rng.choice([0, 0, 0, 15, 16, 17, 32, 35], size=n)
-    lines = np.array([[*rng.normal(size=2), 0.0], [1e49, -1e49, 1e49], [3.0, 0.0, 0.0]])
-    return {"deeds": deeds, "asked": rng.integers(3, size=n), "lines": lines}
-
-
 def more_maps(t, rng):
     """Maps that are no symmetries, or next to nothing, in any number."""
     angle = rng.choice([1e-10, 1e-9, 2e-9, 1e-8, np.pi, 2 * np.pi / 3])
@@ -79,9 +71,9 @@ def more_maps(t, rng):
 def lowered(t, reach, rng):
     """A tree with a threshold that contacts reach by far more than rounding, and other fields."""
     low = max((reach - (t.bound - t.threshold)) * (1.0 - power(rng, -6, -0.1)), 1e-6)
-    ways = [changed_deeds, changed_numbers, tiny_trees, more_maps]
+    ways = [changed_deeds, changed_numbers, more_maps]
     changed = {}
-    for way in rng.permutation(4)[: rng.integers(0, 3)]:
+    for way in rng.permutation(3)[: rng.integers(0, 3)]:
         changed |= ways[way](t, rng)
     most = (t.bound - t.threshold) if "maps" not in changed else 3e-7
     low = min(low, max(reach - most, 1e-6) * (1.0 - 1e-6))
