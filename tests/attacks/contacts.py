@@ -16,7 +16,6 @@ from tests.attacks.searching import Attack, cycled, power, tiny
 from tests.grasp_core.exact_judges import closed_exactly, open_exactly
 from tests.judges import random_contacts
 from tests.tampering.exact_closure import margin_of
-from tests.tampering.soft_contacts import soft_margin
 
 SEEDS = 16
 SURE = 1e-6
@@ -135,7 +134,7 @@ def soft_verdict(seed):
     found = needed(seed)
     x, n = found.positions, found.normals
     mu, mu_t = np.full(len(x), found.upper * 1.05), np.full(len(x), 0.01 * np.ptp(x))
-    return gc.force_closure(x, n, mu, torsion_m=mu_t), soft_margin(x, n, mu, mu_t)
+    return gc.force_closure(x, n, mu, torsion_m=mu_t), margin_of(x, n, mu, mu_t)
 
 
 def too_large_a_soft_margin(rng):

@@ -5,7 +5,7 @@ coefficient is that share of the object's radius, and finds limits by repeated h
 yield a little before they turn, which a ramp may read as the limit.
 
 Grasps of all families on several objects, friction 0.2 to 0.8: critical friction, largest wrench in
-random directions, holds inside and outside the predicted limit, negative controls, and speed.
+random directions, holds inside and outside the predicted limit, and negative controls.
 """
 
 import sys
@@ -13,7 +13,6 @@ import time
 from collections import Counter
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 
@@ -24,16 +23,14 @@ from grasp_core.closure.soft_contacts import contact_torsions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from scenes.physics import PhysicsSettings
 from sim_validate.parallel.processes import available_cores, each
-from sim_validate.records.verdicts import verdicts_to_json
 from sim_validate.simulation.bench import Bench
-from sim_validate.simulation.gate import require_faithful
 from sim_validate.simulation.limits import bisected_limits, part, ramped_limits, released_friction
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.simulation.traces import Outcome, judge
 from sim_validate.validation.controls import negative_controls, try_control
-from sim_validate.validation.validation import validate
+from tests.benchmarks.objects import FAMILIES
 
 OBJECTS = (
     "tetrahedron", "octahedron", "wedge", "chamfered-box", "double-wedge-bar", "box", "prism",
@@ -41,7 +38,6 @@ OBJECTS = (
     "random-16-1", "random-20-7",
 )  # fmt: skip
 FRICTIONS = (0.2, 0.35, 0.5, 0.8)
-FAMILIES = ("concurrent", "pencil", "regulus", "free")
 QUICK = (("wedge", "chamfered-box", "l-bracket", "random-12-1"), (0.3, 0.6))
 SOFT = (*QUICK[0], "box", "tetrahedron"), (0.2, 0.5)
 EACH = 3
@@ -180,48 +176,6 @@ def report(found):
     return figures
 
 
-def throughput():
-    """Full validations per second on a body of twenty faces, and what each phase takes."""
-    body = scenes.example_object("random-20-7")
-    grasps = gc.plan(body, 0.5, limit=24).grasps
-    agenda = Agenda(random_wrenches=13, controls=False)
-    print(f"{len(body.faces)} faces, 26 wrenches and the critical friction:")
-    for jobs, threads in ((1, 1), (1, 2), (available_cores(), 1)):
-        trials = [(body, grasp, agenda, threads) for grasp in grasps]
-        run = iter(each(_validated, trials * 2, jobs=jobs))
-        next(run)  # starting the processes is not what is measured
-        begun = time.perf_counter()
-        count = sum(1 for _ in run)
-        rate = count / (time.perf_counter() - begun)
-        print(f"  {jobs} processes, {threads} threads each: {rate:.1f} validations per second")
-    for wrenches in (0, 13, 39, 91):
-        begun = time.perf_counter()
-        for grasp in grasps[:8]:
-            _validated((body, grasp, replace(agenda, random_wrenches=wrenches), 1))
-        spent = (time.perf_counter() - begun) / 8
-        print(f"  {13 + wrenches:3d} wrenches: {1e3 * spent:.0f} ms, "
-              f"{1e3 * spent / (13 + wrenches):.2f} ms each")  # fmt: skip
-
-
-def _validated(trial):
-    body, grasp, agenda, threads = trial
-    return validate(body, grasp, 0.5, agenda=agenda, setup=Setup(threads=threads)).held
-
-
-def repeats():
-    """Whether results are the same at one and two threads, and again; and no file appears."""
-    body = scenes.example_object("random-12-1")
-    grasps = gc.plan(body, 0.5, limit=4, families=FAMILIES).grasps
-    before, texts = set(Path().iterdir()), set()
-    for threads in (1, 2, 2):
-        setup = Setup(threads=threads)
-        agenda = Agenda(random_wrenches=3, limits="ramp")
-        verdicts = [validate(body, grasp, 0.5, agenda=agenda, setup=setup) for grasp in grasps]
-        texts.add(verdicts_to_json(body, 0.5, verdicts, require_faithful(setup), complete=True))
-    print(f"different texts of three runs at 1, 2 and 2 threads: {len(texts)}")
-    print(f"files that appeared meanwhile: {sorted(set(Path().iterdir()) - before)}")
-
-
 def main():
     quick = "--quick" in sys.argv[1:]
     torsion = float(sys.argv[sys.argv.index("--torsion") + 1]) if "--torsion" in sys.argv else 0.0
@@ -233,9 +187,6 @@ def main():
     found = list(each(examine, chosen, jobs=available_cores()))
     print(f"examined in {time.perf_counter() - begun:.0f} s")
     figures = report(found)
-    if not quick and not torsion:
-        throughput()
-        repeats()
     wrong = [name for name in MUST_BE_ZERO if figures[name]]
     if wrong:
         sys.exit(f"these must be zero: {', '.join(wrong)}")

@@ -24,13 +24,13 @@ from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 
 import grasp_core as gc
-import scenes
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.protocols.judging import judge_by
 from sim_validate.protocols.published import PROTOCOLS
 from sim_validate.validation.controls import negative_controls
+from tests.benchmarks.objects import scaled
 
 OBJECTS = (
     "wedge", "dodecahedron", "l-bracket", "random-8-3", "prism", "screwdriver", "box", "cross",
@@ -69,17 +69,11 @@ def judged(case):
     return case.kind, found
 
 
-def scaled(name):
-    body = scenes.example_object(name)
-    vertices = (body.vertices - body.center_of_mass) * RADIUS_M / body.radius
-    return Polyhedron.from_mesh(vertices, body.triangles, name=name)
-
-
 def cases(options):
     count = QUICK_EACH if options.quick else EACH
     grasps, controls = [], []
     for name in OBJECTS:
-        body = scaled(name)
+        body = scaled(name, RADIUS_M)
         common = (tuple(options.only), options.same_friction)
         own = []
         for grasp in gc.plan(body, FRICTION, limit=count).grasps:

@@ -25,7 +25,6 @@ from tests.tampering import (
     exact_closure,
     hand_payloads,
     on_planes,
-    soft_contacts,
     squeezes,
     wrench_bounds,
 )
@@ -332,15 +331,14 @@ TABLE = {
     "TwistCover": Row(
         cover, lambda c, rng: on_planes.all_closed(c.regions, c.normals, c.friction, rng), 0.5
     ),
-    "WrenchLimit": Row(
-        wrench_limit,
-        lambda c, _: wrench_bounds.wrench_limit(c),
-    ),
+    "WrenchLimit": Row(wrench_limit, lambda c, _: wrench_bounds.wrench_limit(c)),
     "a closure certificate with torsion": Row(
-        soft_closure, lambda c, _: soft_contacts.closure(c), 2.0
+        soft_closure, lambda c, _: exact_closure.closure(c), 2.0
     ),
     "a quality with torsion": Row(soft_quality, wrench_bounds.quality),
-    "a wrench limit with torsion": Row(soft_wrench_limit, lambda c, _: soft_contacts.limit(c)),
+    "a wrench limit with torsion": Row(
+        soft_wrench_limit, lambda c, _: wrench_bounds.wrench_limit(c)
+    ),
     "BestSqueeze": Row(best_squeeze, lambda c, _: squeezes.squeeze(c), 0.8),
     "CutTree": Row(cut_tree, best_grasps.proof, 0.8),
     "BestGrasp": Row(best, best_grasps.best, 0.4),

@@ -8,7 +8,7 @@ import grasp_core as gc
 from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.planning.request import METHODS
 from scenes.example_objects import example_object
-from tests.benchmarks.planning import sphere_hull
+from tests.benchmarks.objects import sphere_hull
 from tests.judges import pyramid_margin, random_rotation
 from tests.marks import MORE, more
 

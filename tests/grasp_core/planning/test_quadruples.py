@@ -14,7 +14,7 @@ from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, TILTED, PlannedCones
 from grasp_core.planning.quadruples import LARGEST_BLOCK, all_blocks, spanning_blocks
 from scenes.example_objects import example_object
-from tests.benchmarks.planning import sphere_hull
+from tests.benchmarks.objects import sphere_hull
 from tests.grasp_core.cones.reference_tilting import lowest_heights
 from tests.grasp_core.families.reference_corner_bounds import widths
 

@@ -19,10 +19,10 @@ from sim_validate.simulation.schedules import (
 from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.traces import Outcome, displaced, judge, traces
 from sim_validate.validation.controls import control_case, negative_controls
-from tests.benchmarks.early_ends import compared
 from tests.marks import more
 from tests.sim_validate.rigs import grasps, limiting_loads, rig_of
 from tests.sim_validate.simulation.test_traces import motion, pose
+from tests.sim_validate.simulation.whole_and_early import compared
 
 CLOCK = Clock(0.01)
 LENGTH = 66
