@@ -38,7 +38,6 @@ DOORS = {
     "ray": "sim_validate/parallel/clusters.py",
     "distributed": "sim_validate/parallel/clusters.py",
     "pyarrow": ("sim_validate/datasets/parquet.py", "sim_validate/datasets/exports/tables.py"),
-    "h5py": "sim_validate/datasets/exports/tables.py",
 }
 
 
@@ -145,7 +144,6 @@ def test_a_plan_that_finds_its_loops_imports_only_what_planning_needs(tmp_path):
 def test_every_command_has_its_function():
     flags = dataset_flags
     actions = {flags.Build, flags.Import, flags.Verify, flags.Export}
-    actions |= {flags.Stats, flags.SampleRows, flags.Depth}
     actions |= {baseline_flags.Record, baseline_flags.Check}
     named = set(get_args(Command)) - {flags.Dataset, baseline_flags.Baseline} | actions
     assert set(ACTIONS) == named

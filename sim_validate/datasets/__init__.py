@@ -2,5 +2,5 @@
 
 A configuration names many objects and several frictions; the tables of a dataset hold objects,
 grasps and trials. The package `building` makes a dataset, `verifying` checks it, `describing`
-documents it, and `exports` writes it for other programs.
+documents it.
 """

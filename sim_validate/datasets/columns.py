@@ -11,12 +11,8 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 Kind: TypeAlias = Literal["text", "bool", "int", "float"]
-Name: TypeAlias = Literal["objects", "grasps", "trials", "executions", "rests"]
-OF_OBJECTS: tuple[Name, ...] = ("objects", "rests")
-"""Tables whose rows are about an object at any friction."""
+Name: TypeAlias = Literal["objects", "grasps", "trials", "executions"]
 SplitName: TypeAlias = Literal["train", "validation", "test"]
-ExportFormat: TypeAlias = Literal["csv", "jsonl", "npz", "hdf5", "isaac", "mjcf"]
-"""Names of the formats that `datasets.exports` writes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,13 +130,12 @@ def base_tables(*, executed: bool) -> Tables:
 
 KEYS: dict[Name, tuple[str, ...]] = {
     "objects": ("object_id",), "grasps": ("object_id", "grasp_id"), "trials": ("grasp_id", "trial"),
-    "executions": ("grasp_id", "trial"), "rests": ("object_id", "rest"),
+    "executions": ("grasp_id", "trial"),
 }  # fmt: skip
 """Columns by which the rows of a table are sorted; no two rows have the same values in them."""
 REFERENCES: dict[tuple[Name, str], tuple[Name, str]] = {
     ("grasps", "object_id"): ("objects", "object_id"),
     ("trials", "grasp_id"): ("grasps", "grasp_id"),
     ("executions", "grasp_id"): ("grasps", "grasp_id"),
-    ("rests", "object_id"): ("objects", "object_id"),
 }
 """Columns whose cells name a row of another table, with the column there that holds the name."""

@@ -15,7 +15,6 @@ from typing import Any, Literal, TypeAlias, cast, get_args
 from grasp_core.checked import LARGEST_FRICTION, MOST_RANDOM_WRENCHES, positive
 from grasp_core.errors import InputError
 from grasp_core.files.strict_json import place, shown
-from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.face import FaceKind
 from grasp_core.objects.polyhedron import UNITS_M
 from grasp_core.planning.request import METHODS, ConeKind
@@ -132,8 +131,6 @@ class DatasetConfig:
                 "objects: expected only one object beside `contacts`, the one that the contacts "
                 "are on"
             )
-        if self.learning is not None:
-            self.learning.check_names([Path(name).name for name in self.objects])
         if self.learning is not None and self.learning.executes and self.execution is None:
             raise InputError(
                 f"{LEARNING}.{self.learning.executes}: only executed grasps have a mass and a "
@@ -162,25 +159,11 @@ class DatasetConfig:
         return dataset_tables(executed=self.execution is not None, groups=self.groups)
 
     @property
-    def counts_splits(self) -> bool:
-        """Whether splits depend on all objects, not on the hash of each alone."""
-        return self.learning is not None and self.learning.split_by != "hash"
-
-    @property
     def groups(self) -> dict[str, int]:
         """Groups of columns that the tables have on request, with their sizes."""
-        units = {} if self.scale == 1.0 else {"units": 1}
         if self.learning is None:
-            return units
-        return units | self.learning.groups(executed=self.execution is not None)
-
-    def lengths_of(self, name: str) -> tuple[str, float]:
-        """Return unit and scale of an object: its own, or the usual ones, which are for files."""
-        of_file = Path(name).suffix.lower().lstrip(".") in FORMATS
-        scale = self.scale if of_file else 1.0
-        if self.learning is None:
-            return self.unit, scale
-        return self.learning.unit_of(name, self.unit), self.learning.scale_of(name, scale)
+            return {}
+        return self.learning.groups(executed=self.execution is not None)
 
     @property
     def sha256(self) -> str:
@@ -269,9 +252,6 @@ def _lines(values: Mapping[str, object]) -> str:
 def _as_toml(value: object) -> str:
     if isinstance(value, tuple):
         return f"[{', '.join(map(_as_toml, cast('tuple[object, ...]', value)))}]"
-    if isinstance(value, dict):
-        items = cast("dict[str, object]", value).items()
-        return f"{{{', '.join(f'{quoted(name)} = {_as_toml(each)}' for name, each in items)}}}"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):

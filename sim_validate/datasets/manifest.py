@@ -22,7 +22,7 @@ from sim_validate.datasets.columns import Name, Tables
 from sim_validate.datasets.learning.columns import GROUPS, dataset_tables
 from sim_validate.files.paths import require_inside
 
-SCHEMA = 1
+SCHEMA = 2
 MANIFEST = "manifest.json"
 STRICT = ConfigDict(strict=True, extra="forbid")
 Count = Annotated[int, Field(ge=0)]

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.objects.polyhedron import Polyhedron
-from sim_validate.datasets.learning.objects import object_cells
 from sim_validate.datasets.units import WorkUnit
 
 SPLITS = (("test", 0.1), ("validation", 0.2), ("train", 1.0))
@@ -23,11 +22,6 @@ def split_of(object_id: str, seed: int) -> str:
 
 def object_row(body: Polyhedron, unit: WorkUnit) -> Mapping[str, Any]:
     """Make the row of a unit's object."""
-    asked, config = unit.config.learning, unit.config
-    more: Mapping[str, Any] = {}
-    if asked is not None:
-        more = object_cells(body, unit.object, asked, config.seed)
-    length, scale = config.lengths_of(unit.object)
     return {
         "object_id": body.content_sha256,
         "source_name": Path(unit.object).name,
@@ -41,7 +35,4 @@ def object_row(body: Polyhedron, unit: WorkUnit) -> Mapping[str, Any]:
         "volume_source": body.surface.volume_source,
         "radius_m": body.radius,
         "center_of_mass_m": body.center_of_mass.tolist(),
-        "unit": length,
-        "scale": scale,
-        **more,
     }

@@ -17,7 +17,7 @@ from sim_validate.datasets.execution_rows import (
     for_fingers,
 )
 from sim_validate.datasets.given_contacts import GivenGrasp
-from sim_validate.datasets.learning.figures import Figures, symmetry_cells
+from sim_validate.datasets.learning.figures import Figures
 from sim_validate.datasets.learning.variants import ratio_of
 from sim_validate.datasets.learning.varied import VARIED, Tried
 from sim_validate.datasets.object_rows import split_of
@@ -218,12 +218,6 @@ class GraspRows:
             return None
         return Figures(config.learning, config.execution, config.seed)
 
-    def add_symmetries(self, grasps: Sequence[Grasp]) -> None:
-        """Add to the rows of planned grasps which are the same by symmetry of the object."""
-        names = [self.name(grasp.id) for grasp in grasps]
-        cells = dict(zip(names, symmetry_cells(self.body, grasps, names), strict=True))
-        self.grasps = [{**row, **cells.get(row["grasp_id"], {})} for row in self.grasps]
-
     def name(self, grasp: str) -> str:
         """Return the name of a grasp, which no other grasp of the dataset has."""
         return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
@@ -244,7 +238,7 @@ class GraspRows:
             "contacts": len(listed),
             "contact_points_m": for_fingers([c.position.tolist() for c in listed], [None] * 3),
             "contact_normals": for_fingers([c.normal.tolist() for c in listed], [None] * 3),
-            **({} if figures is None else figures.of_contacts(self.body, listed, friction)),
+            **({} if figures is None else figures.of_contacts(self.body, listed)),
         }
 
     def _add_trials(

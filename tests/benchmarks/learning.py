@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+import grasp_core as gc
 import sim_validate
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from tests.benchmarks.made_objects import write_objects
@@ -31,7 +32,6 @@ NETWORKS = 5
 HARD = ("planned", "moved_out", "mass_near")
 LEAST = 1e-3
 """Quality below which grasps are not told apart [N]."""
-FIGURES = ("closure_margin", "min_weight", "hull_volume_n6", "smallest_singular_value")
 SETTINGS = """\
 objects = [{objects}]
 frictions = [0.3, 0.5]
@@ -47,7 +47,6 @@ friction_above = 1
 moved_out = 2
 mass_near = 1
 figures = ["closure"]
-split_by = "object"
 """
 
 
@@ -85,7 +84,13 @@ def rows_of(folder: Path) -> Rows:
     weight = np.where(np.isnan(grasps["mass_kg"]), usual, grasps["mass_kg"]) * GRAVITY_M_PER_S2
     points = (grasps["contact_points_m"] - center[:, None]) / radius[:, None, None]
     shape = invariants(points, grasps["contact_normals"])
-    figures = np.column_stack([np.nan_to_num(grasps[name]) for name in FIGURES])
+    places = zip(points, grasps["contact_normals"], grasps["friction"], strict=True)
+    metrics = [
+        (gc.min_weight(*each), gc.hull_volume(*each, center=np.zeros(3), torque_scale=1.0))
+        for each in places
+    ]
+    known = [grasps["closure_margin"], grasps["smallest_singular_value"]]
+    figures = np.nan_to_num(np.column_stack([*known, np.array(metrics)]), neginf=0.0)
     quality = np.nan_to_num(grasps["ferrari_canny_lower_n"])
     logarithms = np.log(np.column_stack([grasps["friction"], weight, radius, quality + LEAST]))
     inputs = np.column_stack([shape, figures, logarithms, quality / weight])

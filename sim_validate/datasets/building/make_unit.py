@@ -12,7 +12,6 @@ from grasp_core.values import Grasp
 from sim_validate.datasets.columns import Column
 from sim_validate.datasets.execution_rows import Executed, executed_by
 from sim_validate.datasets.given_contacts import GivenGrasp
-from sim_validate.datasets.learning.objects import rest_rows
 from sim_validate.datasets.learning.varied import Varying, validated_with
 from sim_validate.datasets.meshes import mesh_path, mesh_text
 from sim_validate.datasets.object_rows import object_row
@@ -47,7 +46,7 @@ def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
     found = making.found
     every: Rows = {
         "objects": (row,), "grasps": tuple(found.grasps), "trials": tuple(found.trials),
-        "executions": tuple(found.executions), "rests": tuple(rest_rows(body)),
+        "executions": tuple(found.executions),
     }  # fmt: skip
     rows: Rows = {
         name: tuple(only(row, columns) for row in every[name])
@@ -76,7 +75,7 @@ class _Making:
 
     def plan(self) -> None:
         """Plan the best grasps of each family separately, and simulate them."""
-        config, every = self.unit.config, list[Grasp]()
+        config = self.unit.config
         for family in config.families:
             planned = plan(
                 self.body, self.unit.friction, families=(family,), cones=config.cones,
@@ -86,9 +85,6 @@ class _Making:
                 tried, executed = self._tried(grasp, self.body), self._executed(grasp, self.body)
                 self.found.add(grasp, tried, executed)
                 self._vary(grasp, self.body, tried, executed)
-                every.append(grasp)
-        if config.learning is not None and "symmetry" in config.learning.figures:
-            self.found.add_symmetries(every)
 
     def judge(self) -> None:
         """Judge the given grasps; a grasp that cannot be simulated gets a row with the reason."""

@@ -14,13 +14,10 @@ from pathlib import Path
 from grasp_core.files.text_files import write_text
 from grasp_core.provenance import arithmetic
 from sim_validate.datasets.building.staging import Finished, Staging
-from sim_validate.datasets.columns import OF_OBJECTS, SplitName
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.describing.card import CARD, card_text
 from sim_validate.datasets.given_contacts import given_text
-from sim_validate.datasets.learning.splitting import assigned
 from sim_validate.datasets.manifest import SCHEMA, Listed, Manifest, listed, write_manifest
-from sim_validate.datasets.parquet import read_rows
 from sim_validate.datasets.quarantine import LeftOut, left_out_text
 from sim_validate.datasets.table_files import TableFiles
 from sim_validate.datasets.units import WorkUnit, provenance, units_sha256
@@ -97,32 +94,17 @@ def _sorted_out(
     return sorted(good, key=lambda each: (each.object_id, each.unit.friction)), quarantined
 
 
-def _splits(
-    config: DatasetConfig, good: Sequence[Finished], staging: Staging
-) -> dict[str, SplitName]:
-    """Return the splits of objects whose places are counted; empty where hashes decide."""
-    if not config.counts_splits or config.learning is None:
-        return {}
-    firsts = {each.object_id: each.unit for each in reversed(good)}
-    classes = {
-        name: read_rows(staging.table(unit, "objects"), "objects", config.tables)[0]["shape_class"]
-        for name, unit in firsts.items()
-    }
-    return assigned(classes, config.learning.split_by, config.seed)
-
-
 def _write_tables(
     config: DatasetConfig, good: Sequence[Finished], staging: Staging, folder: Path
 ) -> list[Listed]:
     about = {"schema": str(SCHEMA), "config_sha256": config.sha256}
-    splits = _splits(config, good, staging)
     with TableFiles(folder / DATA, about, config.tables) as files:
-        for object_id, same in groupby(good, key=lambda each: each.object_id):
+        for _, same in groupby(good, key=lambda each: each.object_id):
             of_object = list(same)
             for name in config.tables:
-                chosen = of_object[:1] if name in OF_OBJECTS else of_object
+                chosen = of_object[:1] if name == "objects" else of_object
                 paths = [staging.table(each.unit, name) for each in chosen]
-                files.add(name, splits.get(object_id, of_object[0].split), paths)
+                files.add(name, of_object[0].split, paths)
         return [
             replace(listed(folder, each.path), table=each.name, split=each.split, rows=each.rows)
             for each in files.close()

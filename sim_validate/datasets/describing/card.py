@@ -67,7 +67,7 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
         f"```toml\n{config_to_toml(config)}```\n",
         f"## Tables\n\n{_counts(manifest)}",
         *(_table(name, columns) for name, columns in config.tables.items()),
-        f"## Splits\n\n{splitting(config)}\n",
+        f"## Splits\n\n{splitting()}\n",
         f"## Negative controls and labels\n\n{_labels()}",
         f"## Units and frames\n\n{CONVENTIONS}\n",
         f"## Limits\n\n{_list(limits(config))}",

@@ -16,7 +16,6 @@ ROWS: Mapping[Name, str] = {
     "grasps": "four contacts on an object at one friction, or a negative control made from them",
     "trials": "a grasp or control under one wrench, in simulation",
     "executions": "a grasp in one trial of its execution, in simulation",
-    "rests": "a pose in which an object rests on a table",
 }
 """Meaning of one row of each table."""
 LABELS: Mapping[str, str] = {
@@ -78,15 +77,6 @@ WITH_EXECUTIONS = {
     "alike; those in `executions` are in `mass_kg`.",
 }
 """Statements on limits that read otherwise where grasps are executed."""
-COUNTED = {
-    "object": "A tenth of the objects, at least one, is for testing, and as many for validation; "
-    "the seed chooses them. All grasps, controls and trials of an object are where the object is.",
-    "class": "Objects of one `shape_class` are in one split: classes that the seed chooses are for "
-    "testing and for validation until each has a tenth of the objects, never the largest class. Of "
-    "two classes one is for testing, and validation takes objects of the other. All grasps, "
-    "controls and trials of an object are where the object is.",
-}
-"""How objects are assigned to splits whose places are counted."""
 SOURCES = (
     "Objects are made from meshes whose own licences hold for `meshes/` and all that is derived "
     "from them; they are not recorded here, so whoever publishes the dataset has to state them."
@@ -141,10 +131,8 @@ def limits(config: DatasetConfig) -> tuple[str, ...]:
     return tuple(other.get(line, line) for line in LIMITS)
 
 
-def splitting(config: DatasetConfig) -> str:
+def splitting() -> str:
     """Say how objects are assigned to splits."""
-    if config.learning is not None and config.counts_splits:
-        return COUNTED[config.learning.split_by]
     shares, before = list[str](), 0.0
     for name, upto in SPLITS:
         shares.append(f"{name} {upto - before:.0%}")

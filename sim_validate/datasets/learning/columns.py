@@ -17,26 +17,10 @@ KINDS = (
 )  # fmt: skip
 CLOSURE = (
     Column("span_angle_rad", "float", "half-angle below which cones positively span", "rad"),
-    Column("min_weight", "float",
-           "min-weight metric of pyramids with eight edges; null if no weights balance", "1"),
-    Column("hull_volume_n6", "float", "volume of the hull of the pyramids' edges", "N6"),
     Column("smallest_singular_value", "float", "least singular value of the grasp map", "1"),
     Column("witness_forces_n", "float", "balanced forces on the object, normal parts sum to one",
            "N", (4, 3)),
 )  # fmt: skip
-SYMMETRY = (
-    Column("symmetry_class", "text", "first planned grasp that is the same by symmetry"),
-    Column("multiplicity", "int", "number of different grasps that the object's turns make of it"),
-)
-APPROACH = (
-    Column("approach_radius_m", "float", "radius of fingertips that come on free lines", "m"),
-    Column("approach_directions", "float", "along a free line to each contact; null if none", "1",
-           (4, 3)),
-)  # fmt: skip
-PAYLOAD = (
-    Column("payload_fixed_kg", "float", "mass held in any orientation, forces fixed", "kg"),
-    Column("payload_free_kg", "float", "bound of the mass held with forces chosen anew", "kg"),
-)
 MARGINS = (
     Column("predicted_loss", "float", "least multiple of a trial's load that loses it", "1"),
     Column("payload_kg", "float", "mass that the squeeze is proved to carry", "kg"),
@@ -50,20 +34,8 @@ TRIAL_MARGINS = (
     Column("predicted_loss", "float", "multiple of the load that loses it; null if none", "1"),
     Column("seed", "int", "seed that a misplaced trial was drawn by; null for others"),
 )
-SHAPE = (
-    Column("shape_class", "text", "class of the shape: as settings say, or by hull and inertia"),
-    Column("box_sides_m", "float", "sides of the box with the same inertia, descending", "m", (3,)),
-)
-UNITS = (
-    Column("unit", "text", "length of one unit in the mesh file"),
-    Column("scale", "float", "factor by which the object was scaled besides", "1"),
-)
 SIZED = -1
 """Length that stands in a column's shape for the size of its group."""
-POINTS = (
-    Column("cloud_points_m", "float", "points drawn on the surface", "m", (SIZED, 3)),
-    Column("cloud_normals", "float", "unit normals into the object at these", "1", (SIZED, 3)),
-)
 HAND = (
     Column("hand_reached", "bool", "whether a pose of the hand was found; null if not closed"),
     Column("hand_reason", "text", "why no pose was found; empty where one was"),
@@ -78,29 +50,13 @@ HAND = (
     Column("hand_approach", "float", "direction of the palm's straight way in; null if none", "1",
            (3,)),
 )  # fmt: skip
-RESTS = (
-    Column("object_id", "text", "object that rests on a table"),
-    Column("rest", "int", "number of the resting pose, the likeliest first, from 0"),
-    Column("down", "float", "direction down in the object's frame, out of the object", "1", (3,)),
-    Column("height_m", "float", "height of the centre of mass above the table", "m"),
-    Column("likelihood", "float", "share of the sphere that the face takes, seen from there", "1"),
-    Column("T_table_object_m", "float", "pose on a table z = 0, centre of mass on the z axis", "m",
-           (4, 4)),
-)  # fmt: skip
 Group: TypeAlias = Mapping[Name, tuple[Column, ...]]
 GROUPS: Mapping[str, Group] = {
     "kinds": {"grasps": KINDS},
     "closure": {"grasps": CLOSURE},
-    "symmetry": {"grasps": SYMMETRY},
-    "approach": {"grasps": APPROACH},
-    "payload": {"grasps": PAYLOAD},
     "margins": {"grasps": MARGINS, "executions": TRIAL_MARGINS},
     "least_squeeze": {"grasps": LEAST_SQUEEZE},
     "hand": {"grasps": HAND},
-    "shape": {"objects": SHAPE},
-    "units": {"objects": UNITS},
-    "points": {"objects": POINTS},
-    "rests": {"rests": RESTS},
 }
 """Columns of each group, by the table that they belong to."""
 
@@ -111,7 +67,7 @@ def dataset_tables(*, executed: bool, groups: Mapping[str, int] | None = None) -
     sizes = groups or {}
     for group, size in ((group, sizes[group]) for group in GROUPS if group in sizes):
         for name, columns in GROUPS[group].items():
-            tables[name] = (*tables.get(name, ()), *(_sized(each, size) for each in columns))
+            tables[name] = (*tables[name], *(_sized(each, size) for each in columns))
     return tables
 
 

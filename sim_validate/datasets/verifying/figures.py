@@ -1,15 +1,10 @@
-"""Checks figures that tables have on request: computed again from contacts, mesh and other cells.
+"""Checks figures that tables have on request: computed again from contacts and other cells."""
 
-Payloads are optima of programs that take long; only a sample of units computes them again.
-"""
-
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from grasp_core.arrays import Array
-from grasp_core.geometry.nearest_points import nearest_on_triangles
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
 from sim_validate.datasets.config import DatasetConfig
@@ -23,10 +18,6 @@ SAME = 1e-6
 """Share of a figure that processors may round differently."""
 OFF = 1e-9
 """Wrench that balanced forces leave, relative to the forces, at object radius one."""
-FREE = 0.999
-"""Share of the fingertip's radius that no other part of the object may be nearer than."""
-STEPS = 8
-"""Number of places on a free line at which its distance from the object is checked."""
 
 
 def figure_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> Iterator[str]:
@@ -37,15 +28,12 @@ def figure_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> Iter
     trials: dict[str, list[Row]] = {}
     for row in rows.get("executions", ()):
         trials.setdefault(row["grasp_id"], []).append(row)
-    names = {row["grasp_id"]: row for row in rows["grasps"]}
     for of_object in rows["objects"]:
         own = [row for row in rows["grasps"] if row["object_id"] == of_object["object_id"]]
         body = stored_body(folder, of_object["object_id"], of_object["source_name"], config.faces)
         for row in own:
             found = [
                 *_closure_faults(row, body, figures),
-                *_symmetry_faults(row, names),
-                *_approach_faults(row, body),
                 *_margin_faults(row, trials.get(row["grasp_id"], [])),
                 *(hand_pose_faults(row, hand_named(asked), body) if asked else ()),
             ]
@@ -53,12 +41,12 @@ def figure_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> Iter
 
 
 def _closure_faults(row: Row, body: Polyhedron, figures: Figures) -> Iterator[str]:
-    if "min_weight" not in row or row["force_closed"] is None:
+    if "span_angle_rad" not in row or row["force_closed"] is None:
         return
     count = row["contacts"]
     places = zip(row["contact_points_m"][:count], row["contact_normals"][:count], strict=True)
     contacts = [Contact(np.array(point), np.array(normal)) for point, normal in places]
-    for name, value in figures.of_contacts(body, contacts, row["friction"]).items():
+    for name, value in figures.of_contacts(body, contacts).items():
         stated = row[name]
         if (stated is None) != (value is None) or (
             value is not None and not np.isclose(stated, value, rtol=SAME, atol=SAME)
@@ -78,31 +66,6 @@ def _witness_faults(row: Row, body: Polyhedron) -> Iterator[str]:
     in_cones = (across <= row["friction"] * pushes * (1.0 + SAME) + OFF).all()
     if not in_cones or np.abs(left).max() > SAME or abs(pushes.sum() - 1.0) > SAME:
         yield "witness_forces_n are no balanced forces in the friction cones"
-
-
-def _symmetry_faults(row: Row, names: Mapping[str, Row]) -> Iterator[str]:
-    if (first := row.get("symmetry_class")) is None:
-        return
-    other = names.get(first)
-    if other is None or other["symmetry_class"] != first:
-        yield f"{first}, named in symmetry_class, is not the first of its class"
-    elif other["multiplicity"] != row["multiplicity"]:
-        yield f"multiplicity is {row['multiplicity']}, but {first} has {other['multiplicity']}"
-
-
-def _approach_faults(row: Row, body: Polyhedron) -> Iterator[str]:
-    """Check that on the way to its contact no finger meets the object, whose faces are planar."""
-    if row.get("approach_directions") is None or body.patches is not None:
-        return
-    radius, corners = row["approach_radius_m"], body.vertices[body.triangles]
-    tips = np.array(row["contact_points_m"]) - radius * np.array(row["contact_normals"])
-    ways: Array = np.array(row["approach_directions"], dtype=np.float64)
-    for tip, way in zip(tips, ways, strict=True):
-        for place in tip - np.linspace(0.0, body.radius, STEPS)[:, None] * way:
-            away = nearest_on_triangles(corners, place) - place
-            if np.linalg.norm(away, axis=1).min() < FREE * radius:
-                yield "a finger on its way along approach_directions meets the object"
-                return
 
 
 def _margin_faults(row: Row, trials: Sequence[Row]) -> Iterator[str]:

@@ -21,7 +21,7 @@ from grasp_core.files.text_files import read_text
 from grasp_core.provenance import arithmetic
 from sim_validate.datasets.building.make_unit import made_of
 from sim_validate.datasets.building.write_tables import CONFIG, CONTACTS, QUARANTINE, TWIN
-from sim_validate.datasets.columns import KEYS, OF_OBJECTS, Name, Tables
+from sim_validate.datasets.columns import KEYS, Name, Tables
 from sim_validate.datasets.config import config_from_toml
 from sim_validate.datasets.given_contacts import read_given
 from sim_validate.datasets.manifest import Manifest
@@ -114,11 +114,6 @@ class _Redoing:
             return
         tables = self._config.tables
         now: ObjectRows = {each: as_read(each, made.rows[each], tables) for each in tables}
-        if self._config.counts_splits:  # a unit alone does not know how many objects there are
-            now = {
-                each: [{**one, "split": row["split"]} if "split" in one else one for one in rows]
-                for each, rows in now.items()
-            }
         if not self._exact:
             yield from _loose_differences(stored, now)
             return
@@ -153,7 +148,7 @@ def _of_unit(rows: ObjectRows, object_id: str, friction: float) -> ObjectRows:
         name: [
             row
             for row in of_table
-            if (row["object_id"] == object_id if name in OF_OBJECTS
+            if (row["object_id"] == object_id if name == "objects"
                 else row["grasp_id"].startswith(beginning))
         ]
         for name, of_table in rows.items()

@@ -20,7 +20,6 @@ BEGINNINGS: Mapping[Name, Callable[[Row], str]] = {
     "grasps": lambda row: str(row["object_id"])[:SHORT],
     "trials": lambda row: str(row["grasp_id"])[:SHORT],
     "executions": lambda row: str(row["grasp_id"])[:SHORT],
-    "rests": lambda row: str(row["object_id"])[:SHORT],
 }
 """Functions that return the part of a row's name that all rows of its object share."""
 

@@ -25,7 +25,6 @@ from sim_validate.datasets.rows import GIVEN, NOT_TRIED
 from sim_validate.datasets.verifying.executions import execution_faults
 from sim_validate.datasets.verifying.figures import figure_faults
 from sim_validate.datasets.verifying.kinds import kind_faults
-from sim_validate.datasets.verifying.objects import object_faults, split_faults
 from sim_validate.datasets.verifying.redo import Sample, sample_faults
 from sim_validate.datasets.verifying.rows_by_object import ObjectRows, by_object
 from sim_validate.files.paths import path_inside
@@ -83,8 +82,6 @@ def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
             yield from execution_faults(folder, config, rows)
             yield from kind_faults(config, rows)
             yield from figure_faults(folder, config, rows)
-            yield from object_faults(folder, config, rows)
-    yield from split_faults(Selection(folder, manifest, None), config)
 
 
 def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:

@@ -9,6 +9,7 @@ import shutil
 
 import numpy as np
 import pytest
+from sim_validate.datasets.exports.formats import export
 
 import grasp_core as gc
 import sim_validate as sv
@@ -18,7 +19,6 @@ from sim_validate.datasets.columns import EXECUTED, EXECUTIONS, TABLES
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.describing.card import CARD
 from sim_validate.datasets.execution_rows import execution_cells, execution_rows
-from sim_validate.datasets.exports.formats import export
 from sim_validate.datasets.manifest import MANIFEST
 from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.verifying.executions import loose_difference

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from sim_validate.datasets.exports.formats import export
 
 import grasp_core as gc
 import sim_validate
@@ -13,7 +14,6 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets import units as units_module
 from sim_validate.datasets.building.build import build
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.exports.formats import export
 from sim_validate.datasets.given_contacts import read_given
 from sim_validate.datasets.verifying.redo import Sample
 from sim_validate.datasets.verifying.verify import verify

@@ -7,11 +7,6 @@ import grasp_core as gc
 from grasp_core.closure.contact_arrays import stacked
 from grasp_core.geometry.nearest_points import nearest_on_triangles
 from grasp_core.hands.kinematics import places
-from grasp_core.objects.symmetries import orbit_sizes
-from grasp_core.planning.reach import segment_distances
-from scenes.example_objects import example_object
-from sim_validate.datasets.learning.figures import Figures
-from sim_validate.datasets.learning.settings import Learning
 from sim_validate.datasets.verifying.verify import verify
 from tests.sim_validate.datasets.forging import forged
 from tests.sim_validate.datasets.learned import BODIES, rows_of
@@ -34,24 +29,10 @@ def test_closure_figures_are_those_of_the_contacts(grasps):
     rows = [row for row in grasps if row["contacts"] == 4]
     assert len({row["kind"] for row in rows}) >= 6
     for row in rows:
-        body, contacts, friction = BODIES[row["object_id"]], contacts_of(row), row["friction"]
+        body, contacts = BODIES[row["object_id"]], contacts_of(row)
         about = {"center": body.center_of_mass, "torque_scale": body.radius}
-        assert row["min_weight"] == gc.min_weight(contacts, friction=friction)
-        assert row["hull_volume_n6"] == gc.hull_volume(contacts, friction=friction, **about)
         assert row["smallest_singular_value"] == gc.smallest_singular_value(contacts, **about)
         assert row["span_angle_rad"] == gc.span_angle(stacked(contacts)[1])
-
-
-def test_what_no_weights_balance_has_no_min_weight():
-    """Tables hold no infinite numbers, so that a row and its check must agree on null."""
-    body = example_object("box")
-    top = body.vertices[:, 2].max()
-    places = [(0.01 * x, 0.01 * y, top) for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
-    contacts = [gc.Contact(np.array(place), np.array([0.0, 0.0, -1.0])) for place in places]
-    assert gc.min_weight(contacts, friction=0.5) == -np.inf
-    cells = Figures(Learning(figures=("closure",)), None).of_contacts(body, contacts, 0.5)
-    assert cells["min_weight"] is None
-    assert cells["smallest_singular_value"] is not None
 
 
 def test_witness_forces_balance_within_the_cones(grasps):
@@ -66,48 +47,6 @@ def test_witness_forces_balance_within_the_cones(grasps):
         assert np.abs(np.cross(arms, forces).sum(axis=0)).max() <= 1e-6 * size
         pushes = np.einsum("ki,ki->k", forces, np.array(row["contact_normals"]))
         assert pushes.sum() == pytest.approx(1.0, abs=1e-6)
-
-
-def test_payloads_are_those_of_the_contacts(grasps):
-    row = next(row for row in grasps if row["kind"] == "planned")
-    body, contacts = BODIES[row["object_id"]], contacts_of(row)
-    radius = row["approach_radius_m"]
-    found = gc.payload(body, contacts, row["friction"], max_push_n=10.0, tip_radius_m=radius)
-    assert row["payload_fixed_kg"] == found.mass_kg
-    assert row["payload_free_kg"] == found.bound_kg
-    assert row["payload_fixed_kg"] <= row["payload_free_kg"]
-
-
-def test_multiplicities_count_the_images_under_the_object_s_turns(grasps):
-    rows = [row for row in grasps if row["kind"] == "planned"]
-    for row in rows:
-        assert row["symmetry_class"] == row["grasp_id"]
-        assert row["multiplicity"] >= 1
-    others = [row for row in grasps if row["kind"] != "planned"]
-    assert {row["symmetry_class"] for row in others} == {None}
-
-
-def test_orbits_of_a_tetrahedron_divide_the_number_of_its_turns():
-    """A regular tetrahedron has twelve rotations; one grasp's images number twelve over those
-    that keep it."""
-    body = example_object("tetrahedron")
-    grasps = gc.plan(body, 0.5, limit=6).grasps
-    sizes = orbit_sizes(body, grasps)
-    assert len(sizes) == len(grasps) > 2
-    assert all(12 % size == 0 for size in sizes)
-
-
-def test_fingers_come_on_free_lines(grasps):
-    rows = [row for row in grasps if row["approach_directions"] is not None]
-    assert rows
-    for row in rows:
-        body, radius = BODIES[row["object_id"]], row["approach_radius_m"]
-        corners = body.vertices[body.triangles]
-        tips = np.array(row["contact_points_m"]) - radius * np.array(row["contact_normals"])
-        for tip, way in zip(tips, np.array(row["approach_directions"]), strict=True):
-            assert np.linalg.norm(way) == pytest.approx(1.0, abs=1e-12)
-            gap = segment_distances(tip - body.radius * way, tip, corners).min()
-            assert gap >= radius - 2e-6 * body.radius
 
 
 def test_margins_follow_from_the_trials(grasps, learned):
@@ -143,7 +82,6 @@ def test_a_hand_stands_where_its_joints_say(grasps):
     assert {row["hand_reached"] for row in grasps if row["force_closed"]} == {True, False}
     assert {row["hand_reached"] for row in grasps if not row["force_closed"]} == {None}
     reached = [row for row in grasps if row["hand_reached"]]
-    assert len({row["grasp_id"][:16] for row in reached}) == len(BODIES)
     for row in reached:
         body = BODIES[row["object_id"]]
         found = places(hand, row["hand_joints_rad"], np.array(row["T_object_palm_m"]))
@@ -165,11 +103,9 @@ def test_a_hand_stands_where_its_joints_say(grasps):
 @pytest.mark.parametrize(
     ("cells", "message"),
     [
-        ({"min_weight": 0.5}, "min_weight is 0.5, but from the contacts"),
-        ({"hull_volume_n6": None}, "hull_volume_n6 is None, but from the contacts"),
+        ({"span_angle_rad": 0.5}, "span_angle_rad is 0.5, but from the contacts"),
+        ({"smallest_singular_value": None}, "smallest_singular_value is None, but from the"),
         ({"witness_forces_n": [[0.1] * 3] * 4}, "no balanced forces"),
-        ({"symmetry_class": "x"}, "is not the first of its class"),
-        ({"approach_directions": [[0.0, 0.0, 1.0]] * 4}, "meets the object"),
         ({"payload_kg": 9.0}, "payload_kg is 9.0, but load_multiple times"),
         ({"predicted_loss": 9.0}, "predicted_loss is 9.0, but not by"),
         ({"least_push_n": 0.01}, "least_push_n is 0.01, but the squeeze is not proved"),
@@ -189,7 +125,7 @@ def test_a_hand_stands_where_its_joints_say(grasps):
 )
 def test_forged_figures_are_named(spoiled, cells, message):
     def change(rows):
-        next(row for row in rows if row["kind"] == "planned").update(cells)
+        next(row for row in rows if row["kind"] == "planned" and row["hand_reached"]).update(cells)
 
     forged(spoiled, "grasps", change)
     assert any(message in fault for fault in verify(spoiled))

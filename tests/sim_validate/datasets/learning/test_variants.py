@@ -10,7 +10,7 @@ from grasp_core.errors import UnfaithfulError
 from grasp_core.values import Contact, ContactRegion
 from scenes.example_objects import example_object
 from sim_validate.datasets.building.build import build
-from sim_validate.datasets.config import config_from_toml, config_to_toml
+from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
 from sim_validate.datasets.execution_rows import execution_cells
 from sim_validate.datasets.learning import varied as varied_grasps
 from sim_validate.datasets.learning.settings import OF_GRASPS, Learning
@@ -160,6 +160,18 @@ def test_settings_out_of_range_are_refused(tmp_path, text, message):
     path.write_text(f'objects = ["wedge"]\n{text}\n', encoding="utf-8")
     with pytest.raises(gc.InputError, match=message):
         config_from_toml(path)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"figures": ("beauty",)}, "figures must be"),
+        ({"seeds": (1, 1)}, "seeds: expected different items"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(settings, message):
+    with pytest.raises(gc.InputError, match=message):
+        DatasetConfig(objects=("wedge",), learning=Learning(**settings))
 
 
 def test_draws_depend_on_the_seed_and_not_on_what_else_is_asked_for():

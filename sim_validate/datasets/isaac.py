@@ -12,28 +12,28 @@ Source:
     NVIDIA, "Isaac Grasp File", nvidia-isaac-ros.github.io/concepts/manipulation/isaac_grasp.html.
 """
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact
 from scenes.fingertips import FingerSettings, fitting_radius
 from scenes.layout import arrange
-from sim_validate.datasets.columns import Name
+from sim_validate.datasets.columns import Name, SplitName
 from sim_validate.datasets.config import quoted
-from sim_validate.datasets.exports.stored_grasps import (
-    GraspedObject,
-    StoredGrasp,
-    grasped_objects,
-    new_path,
-)
-from sim_validate.datasets.meshes import mesh_path
-from sim_validate.datasets.open_dataset import Selection
-from sim_validate.datasets.rows import SHORT
-from sim_validate.files.writing import write_lines
+from sim_validate.datasets.meshes import mesh_path, stored_body
+from sim_validate.datasets.open_dataset import Selection, select
+from sim_validate.datasets.parquet import pyarrow
+from sim_validate.datasets.rows import GIVEN, SHORT
+from sim_validate.files.writing import whole_folder, write_lines
 
 AXES = "xyz"
 HEAD = """\
@@ -45,23 +45,111 @@ HEAD = """\
 # cspace_position: touching; pregrasp_cspace_position: moved back along the contacts' normals.
 # confidence: 1.0 if the object was held in every simulated trial, else 0.0.
 """
+UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
+GRASPS = ("grasp", GIVEN)
+"""Labels of rows that are grasps, not negative controls."""
+LONGEST = 150
+"""Largest number of characters in a file's name; every file system allows more."""
 
 
-def write_isaac(
-    chosen: Selection, folder: Path, report: Callable[[int, int], None]
-) -> dict[Name, int]:
+@dataclass(frozen=True, slots=True, eq=False)
+class StoredGrasp:
+    """A grasp as the tables of a dataset hold it."""
+
+    name: str
+    """Family and faces of the grasp, or the name that its file gave it."""
+    friction: float
+    held: bool
+    contacts: tuple[Contact, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GraspedObject:
+    """An object with all of its force-closed grasps."""
+
+    object_id: str
+    body: Polyhedron
+    grasps: tuple[StoredGrasp, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """The result of an export."""
+
+    files: int
+    rows: dict[Name, int]
+    """Number of objects and of grasps that were written."""
+
+
+def export(
+    folder: Path, out: Path, split: SplitName | None, report: Callable[[int, int], None]
+) -> Exported:
+    """Write the grasps of a dataset; the same dataset gives the same bytes.
+
+    Takes `report` (written, total).
+    """
+    pyarrow()  # before any work, so that a missing library is named at once
+    chosen = select(folder, split)
+    if out.resolve().is_relative_to(folder.resolve()):
+        raise InputError(
+            f"{out}: this folder is inside the dataset to export; give an --out outside of it"
+        )
+    with whole_folder(out) as place:
+        rows = _write(chosen, place, report)
+        files = sum(1 for _ in place.iterdir())
+    return Exported(files, rows)
+
+
+def _write(chosen: Selection, folder: Path, report: Callable[[int, int], None]) -> dict[Name, int]:
     """Write one file for the grasps of each object at each friction."""
     facts, total = chosen.facts(), chosen.counts()["objects"]
     objects = grasps = 0
-    for each in grasped_objects(chosen):
+    for each in _grasped_objects(chosen):
         by_friction = sorted(each.grasps, key=lambda grasp: grasp.friction)
         for friction, same in groupby(by_friction, key=lambda grasp: grasp.friction):
             name = f"{each.object_id[:SHORT]}-{friction}-{each.body.name}"
-            write_lines(new_path(folder, name, "yaml"), _lines(each, list(same), facts))
+            write_lines(_new_path(folder, name), _lines(each, list(same), facts))
         objects += 1
         grasps += len(each.grasps)
         report(objects, total)
     return {"objects": objects, "grasps": grasps}
+
+
+def _grasped_objects(chosen: Selection) -> Iterator[GraspedObject]:
+    """Yield all objects that have grasps, in the order of the tables."""
+    names = {row["object_id"]: row["source_name"] for row in chosen.rows("objects")}
+    faces = chosen.config().faces
+    planned = (
+        row for row in chosen.rows("grasps") if row["label"] in GRASPS and row["force_closed"]
+    )
+    for object_id, rows in groupby(planned, key=lambda row: row["object_id"]):
+        if object_id not in names:
+            raise InputError(
+                f"{chosen.folder}: the object {object_id} has grasps, but its row is missing in "
+                "the table of objects; see `graspproof dataset verify`"
+            )
+        body = stored_body(chosen.folder, object_id, names[object_id], faces)
+        yield GraspedObject(object_id, body, tuple(map(_grasp, rows)))
+
+
+def _grasp(row: Mapping[str, Any]) -> StoredGrasp:
+    points, normals = row["contact_points_m"], row["contact_normals"]
+    return StoredGrasp(
+        name=row["name"],
+        friction=row["friction"],
+        held=row["held"],
+        contacts=tuple(map(Contact, points, normals)),
+    )
+
+
+def _new_path(folder: Path, name: str) -> Path:
+    """Make a path for a file with a given name, whatever characters the name has."""
+    path = folder / f"{UNSAFE.sub('_', name).lstrip('.')[:LONGEST]}.yaml"
+    if path.exists():
+        raise InputError(
+            f"{name}: two grasps would get the same file name, {path.name}; rename one of them"
+        )
+    return path
 
 
 def _lines(
