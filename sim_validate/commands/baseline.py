@@ -5,13 +5,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import Checked, check
 from sim_validate.baselines.compare import Finding, Status, failing
 from sim_validate.baselines.entries import fields_of
-from sim_validate.baselines.junit import junit_text
 from sim_validate.baselines.measure import complete, measured, seen_from
 from sim_validate.baselines.parts.changed_part import Present, present, testable
 from sim_validate.baselines.parts.if_changed import IfChanged
@@ -67,9 +65,6 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     where = seen_from(command.baseline, path)
     with reporter.progress("simulating") as steps:
         done = check(before, now, where, how, command.jobs, steps.update)
-    if command.junit is not None:
-        text = junit_text(str(command.baseline), done.findings, strict=command.strict)
-        write_text(command.junit, text)
     _show(done, reporter)
     _say_mesh(now, reporter)
     if command.bless:
