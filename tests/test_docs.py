@@ -18,9 +18,8 @@ from sim_validate import main as commands
 from sim_validate.cli import command_flags
 from sim_validate.cli.execution_flags import TRIALS, Executing
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.datasets.config import DatasetConfig, config_from_toml
+from sim_validate.datasets.config import DatasetConfig, Learning, config_from_toml
 from sim_validate.datasets.given_contacts import read_given
-from sim_validate.datasets.learning.settings import Learning
 from sim_validate.execution.verdict import Fate
 from sim_validate.main import main
 from sim_validate.records.setup_toml import setup_from_file

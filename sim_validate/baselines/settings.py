@@ -1,12 +1,12 @@
 """Reads and writes the simulation settings and the choice of trials in a baseline's file."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import to_jsonable_python
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from grasp_core.errors import InputError
@@ -42,7 +42,7 @@ class _Settings(BaseModel):
     setup: dict[str, Any]
     surface: Surface
     random_wrenches: Annotated[int, Field(ge=0, le=MOST_RANDOM_WRENCHES)]
-    wrenches: dict[str, tuple[float, float, float, float, float, float]]
+    wrenches: dict[str, Annotated[list[float], Field(min_length=6, max_length=6)]]
     limits: LimitSearch
     trials: Count
     noise: dict[str, float]
@@ -75,13 +75,13 @@ def settings_of(how: How) -> dict[str, Any]:
     }
     if how.execution is not None:
         settings[TABLE] = execution_table(how.execution)
-    return json.loads(json.dumps(settings))
+    return to_jsonable_python(settings)
 
 
 def of_settings(settings: Mapping[str, Any], path: str) -> How:
     """Read how the grasps of a baseline are simulated."""
     try:
-        given = _Settings.model_validate_json(json.dumps(settings))
+        given = _Settings.model_validate(settings)
     except ValidationError as error:
         raise InputError(f"{path}: {complaint(error, _Settings, ['settings'])}") from error
     try:

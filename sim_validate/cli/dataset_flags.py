@@ -9,7 +9,7 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, subcommand
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from sim_validate.cli.flag_bounds import FINITE, at_least
 from sim_validate.cli.flag_groups import Count, Friction, Lengths, Positive, Seed, Speech
-from sim_validate.datasets.columns import SplitName
+from sim_validate.datasets.tables import SplitName
 from sim_validate.parallel.processes import available_cores
 
 Varied = Annotated[int, at_least(0, up_to=100)]

@@ -11,17 +11,14 @@ from grasp_core.planning.request import METHODS
 from sim_validate.cli import dataset_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.datasets.building.build import build
-from sim_validate.datasets.building.driver import Engine
-from sim_validate.datasets.building.worker import Limits
-from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
-from sim_validate.datasets.describing.card import CARD
+from sim_validate.datasets.build import build
+from sim_validate.datasets.card import CARD
+from sim_validate.datasets.config import CREDITS, DatasetConfig, Learning, config_from_toml
 from sim_validate.datasets.isaac import export
-from sim_validate.datasets.learning.settings import Learning
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.open_dataset import splits_in_words
-from sim_validate.datasets.verifying.redo import Sample
-from sim_validate.datasets.verifying.verify import verify
+from sim_validate.datasets.verify import Sample, verify
+from sim_validate.datasets.workers import Engine, Limits
 from sim_validate.parallel.clusters import dask_workers, ray_workers
 from sim_validate.parallel.processes import local_processes
 

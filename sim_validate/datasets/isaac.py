@@ -27,12 +27,12 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
 from scenes.fingertips import FingerSettings, fitting_radius
 from scenes.layout import arrange
-from sim_validate.datasets.columns import Name, SplitName
 from sim_validate.datasets.config import quoted
 from sim_validate.datasets.meshes import mesh_path, stored_body
 from sim_validate.datasets.open_dataset import Selection, select
 from sim_validate.datasets.parquet import pyarrow
-from sim_validate.datasets.rows import GIVEN, SHORT
+from sim_validate.datasets.rows import GIVEN
+from sim_validate.datasets.tables import SHORT, Name, SplitName
 from sim_validate.files.writing import whole_folder, write_lines
 
 AXES = "xyz"

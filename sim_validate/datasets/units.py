@@ -20,10 +20,8 @@ from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.provenance import versions
 from scenes.example_objects import example_object
-from sim_validate.datasets.config import CREDITS, DatasetConfig
+from sim_validate.datasets.config import CREDITS, LEARNING, DatasetConfig, learning_table
 from sim_validate.datasets.given_contacts import GivenGrasp, given_sha256, read_given
-from sim_validate.datasets.learning.settings import TABLE as LEARNING
-from sim_validate.datasets.learning.settings import learning_table
 from sim_validate.execution.asked import TABLE, execution_table
 
 CHUNK = 2**20

@@ -6,10 +6,10 @@ from pathlib import Path
 from grasp_core.errors import InputError
 from grasp_core.planning.given_contacts import seat
 from grasp_core.values import Contact
-from sim_validate.datasets.learning.varied import VARIED
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.open_dataset import Selection, select
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
+from sim_validate.datasets.varied import VARIED
 from sim_validate.records.grasps import NAMED, some
 from sim_validate.replaying.recorded import Recorded, Wanted
 from sim_validate.simulation.setup import Agenda, Setup

@@ -11,7 +11,7 @@ from typing import Any, cast
 from grasp_core.errors import InputError
 from grasp_core.files.strict_json import value_of
 from grasp_core.files.text_files import read_text
-from sim_validate.baselines.baseline_json import read_baseline
+from sim_validate.baselines.baseline import read_baseline
 from sim_validate.baselines.settings import of_settings, setup_for
 from sim_validate.datasets.manifest import MANIFEST
 from sim_validate.records.grasps import grasp_with_id, read_grasps, some

@@ -22,9 +22,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from sim_validate.baselines.baseline_json import read_baseline
+from sim_validate.baselines.baseline import read_baseline
 from sim_validate.baselines.check import check, silent
-from sim_validate.baselines.parts.changed_part import Present
+from sim_validate.baselines.part import Present
 from sim_validate.baselines.settings import of_settings
 from sim_validate.records.grasps import read_grasps
 

@@ -15,7 +15,7 @@ from scenes.example_objects import example_object
 from scenes.execution.held import HeldSettings
 from scenes.fingertips import FingerSettings
 from scenes.physics import PhysicsSettings
-from sim_validate.baselines.parts.if_changed import IfChanged
+from sim_validate.baselines.part import IfChanged
 from sim_validate.cli import (
     command_flags,
     dataset_flags,
@@ -25,7 +25,7 @@ from sim_validate.cli import (
     transfer_flags,
 )
 from sim_validate.cli.flag_bounds import Bound
-from sim_validate.datasets.learning.settings import Learning
+from sim_validate.datasets.config import Learning
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.simulation.noise import Noise
 from tests.sim_validate.rigs import grasps

@@ -2,8 +2,7 @@
 
 import sim_validate as sv
 from scenes.example_objects import example_object
-from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.learning.settings import Learning
+from sim_validate.datasets.config import DatasetConfig, Learning
 from sim_validate.datasets.open_dataset import select
 from sim_validate.execution.asked import AskedExecution
 

@@ -4,12 +4,11 @@ import re
 import pytest
 
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.datasets.columns import TABLES
-from sim_validate.datasets.describing.card import CARD, card_text
-from sim_validate.datasets.describing.statements import LABELS
+from sim_validate.datasets.card import CARD, LABELS, card_text
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.parquet import read_rows
-from sim_validate.datasets.verifying.verify import verify
+from sim_validate.datasets.tables import TABLES
+from sim_validate.datasets.verify import verify
 from sim_validate.main import main
 from tests.sim_validate.datasets.small import SMALL
 

@@ -20,11 +20,11 @@ from grasp_core.geometry.nearest_points import nearest_on_surface
 from sim_validate.cli.dataset_flags import SplitName
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets import isaac
-from sim_validate.datasets.building.build import build
+from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.isaac import export, yaml_number
-from sim_validate.datasets.object_rows import SPLITS
 from sim_validate.datasets.open_dataset import select
+from sim_validate.datasets.tables import SPLITS
 from sim_validate.files.writing import whole_folder
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, silent

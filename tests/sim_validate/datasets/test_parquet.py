@@ -5,11 +5,11 @@ import pytest
 
 import grasp_core as gc
 from sim_validate.datasets import parquet as tables
-from sim_validate.datasets.building.make_unit import made_of
-from sim_validate.datasets.columns import KEYS, TABLES, Column
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.object_rows import split_of
+from sim_validate.datasets.make_unit import made_of
 from sim_validate.datasets.parquet import parquet_bytes, read_rows
+from sim_validate.datasets.rows import split_of
+from sim_validate.datasets.tables import KEYS, TABLES, Column
 from sim_validate.datasets.units import body_of, units_of
 
 pytest.importorskip("pyarrow")

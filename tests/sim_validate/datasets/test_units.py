@@ -1,12 +1,10 @@
 import dataclasses
 import shutil
 
-import numpy as np
 import pytest
 import trimesh
 
 import grasp_core as gc
-from scenes.example_objects import example_object
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.units import body_of, units_of
 
@@ -64,12 +62,3 @@ def test_more_objects_and_frictions_leave_the_units_that_were_there():
 def test_objects_that_are_nowhere_are_refused_before_anything_runs(name, message):
     with pytest.raises(gc.InputError, match=message):
         units_of(DatasetConfig(objects=(name,)))
-
-
-def test_unit_and_scale_are_for_files_and_not_for_built_in_objects(tmp_path):
-    path = tmp_path / "box.obj"
-    trimesh.creation.box(extents=(0.01, 0.02, 0.03)).export(path)
-    config = DatasetConfig(objects=(str(path), "wedge"), scale=50.0, unit="cm")
-    bodies = {unit.object: body_of(unit) for unit in units_of(config)}
-    assert np.ptp(bodies[str(path)].vertices, axis=0) == pytest.approx([5e-3, 1e-2, 1.5e-2])
-    assert bodies["wedge"] == example_object("wedge")
