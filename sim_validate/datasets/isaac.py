@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -29,7 +28,7 @@ from scenes.fingertips import FingerSettings, fitting_radius
 from scenes.layout import arrange
 from sim_validate.datasets.config import quoted
 from sim_validate.datasets.meshes import mesh_path, stored_body
-from sim_validate.datasets.open_dataset import Selection, select
+from sim_validate.datasets.open_dataset import Row, Selection, select
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.rows import GIVEN
 from sim_validate.datasets.tables import SHORT, Name, SplitName
@@ -50,26 +49,6 @@ GRASPS = ("grasp", GIVEN)
 """Labels of rows that are grasps, not negative controls."""
 LONGEST = 150
 """Largest number of characters in a file's name; every file system allows more."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class StoredGrasp:
-    """A grasp as the tables of a dataset hold it."""
-
-    name: str
-    """Family and faces of the grasp, or the name that its file gave it."""
-    friction: float
-    held: bool
-    contacts: tuple[Contact, ...]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class GraspedObject:
-    """An object with all of its force-closed grasps."""
-
-    object_id: str
-    body: Polyhedron
-    grasps: tuple[StoredGrasp, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,19 +83,19 @@ def _write(chosen: Selection, folder: Path, report: Callable[[int, int], None]) 
     """Write one file for the grasps of each object at each friction."""
     facts, total = chosen.facts(), chosen.counts()["objects"]
     objects = grasps = 0
-    for each in _grasped_objects(chosen):
-        by_friction = sorted(each.grasps, key=lambda grasp: grasp.friction)
-        for friction, same in groupby(by_friction, key=lambda grasp: grasp.friction):
-            name = f"{each.object_id[:SHORT]}-{friction}-{each.body.name}"
-            write_lines(_new_path(folder, name), _lines(each, list(same), facts))
+    for object_id, body, rows in _grasped_objects(chosen):
+        of_object = sorted(rows, key=lambda row: row["friction"])
+        for friction, same in groupby(of_object, key=lambda row: row["friction"]):
+            path = _new_path(folder, f"{object_id[:SHORT]}-{friction}-{body.name}")
+            write_lines(path, _lines(object_id, body, list(same), facts))
         objects += 1
-        grasps += len(each.grasps)
+        grasps += len(rows)
         report(objects, total)
     return {"objects": objects, "grasps": grasps}
 
 
-def _grasped_objects(chosen: Selection) -> Iterator[GraspedObject]:
-    """Yield all objects that have grasps, in the order of the tables."""
+def _grasped_objects(chosen: Selection) -> Iterator[tuple[str, Polyhedron, list[Row]]]:
+    """Yield the id of each object that has grasps, the object, and their rows."""
     names = {row["object_id"]: row["source_name"] for row in chosen.rows("objects")}
     faces = chosen.config().faces
     planned = (
@@ -128,18 +107,7 @@ def _grasped_objects(chosen: Selection) -> Iterator[GraspedObject]:
                 f"{chosen.folder}: the object {object_id} has grasps, but its row is missing in "
                 "the table of objects; see `graspproof dataset verify`"
             )
-        body = stored_body(chosen.folder, object_id, names[object_id], faces)
-        yield GraspedObject(object_id, body, tuple(map(_grasp, rows)))
-
-
-def _grasp(row: Mapping[str, Any]) -> StoredGrasp:
-    points, normals = row["contact_points_m"], row["contact_normals"]
-    return StoredGrasp(
-        name=row["name"],
-        friction=row["friction"],
-        held=row["held"],
-        contacts=tuple(map(Contact, points, normals)),
-    )
+        yield object_id, stored_body(chosen.folder, object_id, names[object_id], faces), list(rows)
 
 
 def _new_path(folder: Path, name: str) -> Path:
@@ -153,38 +121,35 @@ def _new_path(folder: Path, name: str) -> Path:
 
 
 def _lines(
-    of: GraspedObject, grasps: Sequence[StoredGrasp], facts: Mapping[str, str]
+    object_id: str, body: Polyhedron, rows: Sequence[Row], facts: Mapping[str, str]
 ) -> Iterator[str]:
-    radius = min(fitting_radius(of.body, *_contacts(grasp)) for grasp in grasps)
-    source, mesh = quoted(of.body.name), mesh_path(Path(), of.object_id).as_posix()
-    friction = grasps[0].friction
+    """Yield the lines of a file about some grasps of an object, all at one friction."""
+    radius = min(fitting_radius(body, *_places(row)) for row in rows)
+    source, mesh = quoted(body.name), mesh_path(Path(), object_id).as_posix()
+    friction = rows[0]["friction"]
     yield HEAD.format(source=source, friction=friction, radius=radius, mesh=quoted(mesh))
     yield from (f"# {name}: {quoted(text)}\n" for name, text in facts.items())
     yield "format: isaac_grasp\nformat_version: 1.0\n\n"
     yield f'object_frame: {source}\ngripper_frame: "four_fingertips"\n\ngrasps:\n'
-    for grasp in grasps:
-        yield from _grasp_lines(of.body, grasp, radius)
+    for row in rows:
+        points, normals = _places(row)
+        contacts = tuple(map(Contact, points, normals))
+        layout = arrange(body, contacts, friction, FingerSettings(radius_m=radius))
+        origin = points.mean(axis=0)
+        touching = points - radius * normals - origin
+        yield f"  {quoted(row['name'])}:\n"
+        yield f"    confidence: {yaml_number(float(row['held']))}\n"
+        yield f"    position: {_list(origin)}\n"
+        yield f"    orientation: {{w: 1.0, xyz: {_list(np.zeros(3))}}}\n"
+        yield "    cspace_position:\n"
+        yield from _joint_lines(touching)
+        yield "    pregrasp_cspace_position:\n"
+        yield from _joint_lines(touching + layout.approach)
 
 
-def _grasp_lines(body: Polyhedron, grasp: StoredGrasp, radius: float) -> Iterator[str]:
-    layout = arrange(body, grasp.contacts, grasp.friction, FingerSettings(radius_m=radius))
-    points, normals = _contacts(grasp)
-    origin = points.mean(axis=0)
-    touching = points - radius * normals - origin
-    yield f"  {quoted(grasp.name)}:\n"
-    yield f"    confidence: {yaml_number(float(grasp.held))}\n"
-    yield f"    position: {_list(origin)}\n"
-    yield f"    orientation: {{w: 1.0, xyz: {_list(np.zeros(3))}}}\n"
-    yield "    cspace_position:\n"
-    yield from _joint_lines(touching)
-    yield "    pregrasp_cspace_position:\n"
-    yield from _joint_lines(touching + layout.approach)
-
-
-def _contacts(grasp: StoredGrasp) -> tuple[Array, Array]:
+def _places(row: Row) -> tuple[Array, Array]:
     """Return positions (4, 3) [m] and normals (4, 3) of a grasp's contacts."""
-    points = np.array([contact.position for contact in grasp.contacts])
-    return points, np.array([contact.normal for contact in grasp.contacts])
+    return np.array(row["contact_points_m"]), np.array(row["contact_normals"])
 
 
 def _joint_lines(places: Array) -> Iterator[str]:

@@ -7,7 +7,7 @@ touch the object at the stated contacts, the hand overlaps neither the object no
 contacts are proved to be in force closure at the row's friction.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.errors import GraspError
+from grasp_core.errors import GraspError, InputError, UndecidedError
 from grasp_core.execution.grips import grip
 from grasp_core.execution.loads import any_direction
 from grasp_core.execution.squeeze_rows import Survival
@@ -31,14 +31,23 @@ from grasp_core.values import FINGERS, Contact
 from sim_validate.datasets.build import CONFIG
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.figures import Figures, hand_named
-from sim_validate.datasets.meshes import stored_body
+from sim_validate.datasets.meshes import stored_body, stored_surface
 from sim_validate.datasets.open_dataset import ObjectRows, Row
-from sim_validate.datasets.rows import GIVEN, PLANNED
+from sim_validate.datasets.rows import GIVEN, NOT_TRIED, PLANNED
+from sim_validate.datasets.tables import KEYS
 from sim_validate.datasets.varied import RATIOS, VARIED
 from sim_validate.execution.asked import AskedExecution
 from sim_validate.execution.execute import tip_radius
-from sim_validate.execution.verdict import may_slip
 
+SAME_MARGIN = 1e-6
+"""Largest difference between a closure margin in a row and that of the contacts, relative to the
+friction."""
+ON_SURFACE, NEAR_SURFACE = 1e-5, 0.05
+"""Largest distance of contacts from the mesh, for grasps and negative controls, relative to the
+object's radius. Planar faces are as flat as six digits show. Negative controls are moved in
+the planes of patches, from which a curved surface departs."""
+UNIT = 1e-9
+"""Largest difference between a normal's length and one."""
 ROUNDING = 1e-6
 """Share of any number that processors may round differently."""
 NEAR_ZERO = 1e-7
@@ -62,20 +71,178 @@ ROUNDED = 1e-9
 from a rigid motion, or a direction from unit length."""
 
 
-def kind_faults(config: DatasetConfig, rows: ObjectRows) -> Iterator[str]:
-    """Yield sentences on what is wrong with kinds and varied grasps of one object."""
-    if config.learning is None:
-        return
-    by_name = {row["grasp_id"]: row for row in rows["grasps"]}
-    curved = {row["object_id"]: row["curved"] for row in rows["objects"]}
+def object_faults(
+    folder: Path, config: DatasetConfig, split: str, rows: ObjectRows
+) -> Iterator[str]:
+    """Yield sentences on what is wrong with the rows of one object, and with its mesh."""
+    yield from _table_faults(split, rows)
+    yield from _row_faults(rows, config.frictions)
+    yield from _mesh_faults(folder, rows)
+    if config.execution is not None or config.learning is not None:
+        yield from _requested_faults(folder, config, rows)
+
+
+def _table_faults(split: str, rows: ObjectRows) -> Iterator[str]:
+    """Check that rows are in the files of their split, and have keys of their own."""
+    for name in ("objects", "grasps"):
+        if any(row["split"] != split for row in rows[name]):
+            yield f"{name}: files of the split {split} have rows of another split"
+    for name in rows:
+        keys = [tuple(row[key] for key in KEYS[name]) for row in rows[name]]
+        if len(set(keys)) < len(keys):
+            yield f"{name}: two rows have the same {' and '.join(KEYS[name])}"
+
+
+def _row_faults(rows: ObjectRows, frictions: Sequence[float]) -> Iterator[str]:
+    splits = {row["object_id"]: row["split"] for row in rows["objects"]}
+    names = {row["grasp_id"] for row in rows["grasps"]}
+    ended: dict[str, list[str]] = {}
+    for trial in rows["trials"]:
+        ended.setdefault(trial["grasp_id"], []).append(trial["outcome"])
+    yield from (
+        f"trials: {name} has no row in the table of grasps" for name in sorted(ended.keys() - names)
+    )
     for row in rows["grasps"]:
-        if row["label"] != VARIED:
-            wanted = LABELS.get(row["label"], row["label"])
-            alike = row["kind"] == wanted
-            found = [] if alike else [f"kind is {row['kind']}, but {wanted} by label"]
-        else:
-            found = list(_varied_faults(row, by_name, is_curved=bool(curved[row["object_id"]])))
-        yield from (f"grasps: {row['grasp_id']}: {fault}" for fault in found)
+        name = row["grasp_id"]
+        faults = [
+            *_reference_faults(row, splits, names),
+            *_outcome_faults(row, ended.get(name, [])),
+        ]
+        own = row["control_of"] is None and row["label"] != VARIED
+        if own and row["friction"] not in frictions:
+            faults.append(f"friction {row['friction']} is not among those of {CONFIG}")
+        if row["outcome"] != NOT_TRIED:
+            faults += _contact_faults(row)
+        yield from (f"grasps: {name}: {fault}" for fault in faults)
+
+
+def _outcome_faults(row: Mapping[str, Any], trials: Sequence[str]) -> Iterator[str]:
+    """Check that a row agrees with its trials, and claims nothing if it was not tried."""
+    if row["outcome"] == NOT_TRIED:
+        claims = [row[name] for name in ("held", "force_closed", "closure_margin")]
+        if row["label"] != GIVEN or any(claim is not None for claim in claims) or trials:
+            yield "the row claims results, although the grasp was not tried"
+        return
+    held = all(one == "held" for one in trials)
+    if not trials or len(trials) != row["trials"] or row["held"] != held:
+        yield "the row contradicts the table of trials"
+    elif (row["outcome"] == "held") != held:
+        yield f"`outcome` is {row['outcome']!r}, but `held` is {held}"
+
+
+def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
+    """Check that meshes belong to their objects, and that contacts lie on the meshes."""
+    claimed: dict[str, list[tuple[Array, Array | None, float]]] = {
+        row["object_id"]: [] for row in rows["objects"]
+    }
+    for row in rows["grasps"]:
+        of_object = claimed.get(row["object_id"])
+        if row["outcome"] == NOT_TRIED or of_object is None:
+            continue
+        points, normals = row["contact_points_m"], row["contact_normals"]
+        for point, normal in list(zip(points, normals, strict=True))[: row["contacts"]]:
+            if row["control_of"] is None:
+                of_object.append((np.array(point), np.array(normal), ON_SURFACE))
+            else:  # some controls have a flipped normal
+                of_object.append((np.array(point), None, NEAR_SURFACE))
+    for row in rows["objects"]:
+        try:
+            mesh = stored_surface(folder, row["object_id"])
+        except InputError as error:
+            yield str(error)
+            continue
+        surface = Surface(mesh.vertices, mesh.triangles)
+        on_it = [
+            surface.holds(point, normal, slack * row["radius_m"])
+            for point, normal, slack in claimed[row["object_id"]]
+        ]
+        if off := on_it.count(False):
+            yield (
+                f"grasps: {off} contacts of {row['source_name']} are not on the object, or not "
+                "with its normals"
+            )
+
+
+def _reference_faults(
+    row: Mapping[str, Any], splits: Mapping[str, str], names: Set[str]
+) -> Iterator[str]:
+    """Yield sentences on references of a row to rows that are missing."""
+    if splits.get(row["object_id"]) != row["split"]:
+        yield "the row's object is missing, or in another split"
+    if row["control_of"] is not None and row["control_of"] not in names:
+        yield f"{row['control_of']}, named in control_of, has no row"
+
+
+def _contact_faults(row: Mapping[str, Any]) -> Iterator[str]:
+    """Check the normals of a contact set, and compute its closure from the contacts alone."""
+    count = row["contacts"]
+    closed = row["force_closed"]
+    if not 1 <= count <= FINGERS or closed is None or (closed and row["closure_margin"] is None):
+        yield "the row lacks its contacts, or results about them"
+        return
+    points = np.array(row["contact_points_m"][:count], dtype=np.float64)
+    normals = np.array(row["contact_normals"][:count], dtype=np.float64)
+    if not (np.abs(np.linalg.norm(normals, axis=1) - 1.0) <= UNIT).all():
+        yield "a contact normal is not a unit vector"
+        return
+    try:
+        certificate = force_closure(points, normals, row["friction"])
+    except UndecidedError as error:
+        if row["force_closed"]:
+            yield f"force closure of the contacts cannot be decided ({error})"
+        return
+    except GraspError as error:
+        yield f"force closure of the contacts cannot be computed ({error})"
+        return
+    if certificate.closed != row["force_closed"]:
+        yield (
+            f"force_closed is {row['force_closed']}, but from the contacts it is "
+            f"{certificate.closed}"
+        )
+    elif certificate.closed and not np.isclose(
+        certificate.margin, row["closure_margin"], rtol=0.0, atol=SAME_MARGIN * row["friction"]
+    ):
+        stated = row["closure_margin"]
+        yield (
+            f"closure margin is {stated:.9g}, but from the contacts it is {certificate.margin:.9g}"
+        )
+
+
+def _requested_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> Iterator[str]:
+    """Check the cells that tables have on request, and the trials of executions."""
+    trials: dict[str, list[Row]] = {}
+    for trial in rows.get("executions", ()):
+        trials.setdefault(trial["grasp_id"], []).append(trial)
+    by_name = {row["grasp_id"]: row for row in rows["grasps"]}
+    yield from (
+        f"executions: {name} has no row in the table of grasps"
+        for name in sorted(trials.keys() - by_name.keys())
+    )
+    for of_object in rows["objects"]:
+        name = of_object["object_id"]
+        body = stored_body(folder, name, of_object["source_name"], config.faces)
+        for row in rows["grasps"]:
+            if row["object_id"] != name:
+                continue
+            found, own = list[str](), trials.get(row["grasp_id"], [])
+            if config.execution is not None:
+                found += _execution_faults(row, own, body, config.execution)
+            if config.learning is not None:
+                found += _kind_faults(row, by_name, is_curved=bool(of_object["curved"]))
+                figures = Figures(config.learning, config.execution)
+                found += _closure_faults(row, body, figures)
+                found += _margin_faults(row, own)
+                if config.learning.hand:
+                    found += _hand_faults(row, hand_named(config.learning.hand), body)
+            yield from (f"grasps: {row['grasp_id']}: {fault}" for fault in found)
+
+
+def _kind_faults(row: Row, by_name: Mapping[str, Row], *, is_curved: bool) -> Iterator[str]:
+    """Check the kind of a row, and a varied grasp against the one that it was made from."""
+    if row["label"] == VARIED:
+        yield from _varied_faults(row, by_name, is_curved=is_curved)
+    elif row["kind"] != (wanted := LABELS.get(row["label"], row["label"])):
+        yield f"kind is {row['kind']}, but {wanted} by label"
 
 
 def _varied_faults(row: Row, by_name: Mapping[str, Row], *, is_curved: bool) -> Iterator[str]:
@@ -119,33 +286,17 @@ def _ratio_faults(row: Row) -> Iterator[str]:
             yield f"the ratio {ratio} is none of the kind {row['kind']}"
 
 
-def execution_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> Iterator[str]:
-    """Yield sentences on what is wrong with the executions of one object."""
-    asked = config.execution
-    if asked is None:
-        return
-    trials: dict[str, list[Row]] = {}
-    for row in rows["executions"]:
-        trials.setdefault(row["grasp_id"], []).append(row)
-    names = {row["grasp_id"] for row in rows["grasps"]}
-    yield from (
-        f"executions: {name} has no row in the table of grasps"
-        for name in sorted(trials.keys() - names)
-    )
-    for of_object in rows["objects"]:
-        own = [row for row in rows["grasps"] if row["object_id"] == of_object["object_id"]]
-        body: Polyhedron | None = None
-        for row in own:
-            found = list(_row_faults(row, trials.get(row["grasp_id"], [])))
-            if not found and row["executed"]:
-                body = body or stored_body(
-                    folder, of_object["object_id"], of_object["source_name"], config.faces
-                )
-                found = list(_squeeze_faults(row, body, asked))
-            yield from (f"grasps: {row['grasp_id']}: {fault}" for fault in found)
+def _execution_faults(
+    row: Row, trials: Sequence[Row], body: Polyhedron, asked: AskedExecution
+) -> Iterator[str]:
+    """Check a row against its trials and, if it agrees with them, what its squeeze carries."""
+    found = list(_trial_faults(row, trials))
+    yield from found
+    if row["executed"] and not found:
+        yield from _squeeze_faults(row, body, asked)
 
 
-def _row_faults(row: Row, trials: Sequence[Row]) -> Iterator[str]:
+def _trial_faults(row: Row, trials: Sequence[Row]) -> Iterator[str]:
     """Check that a row agrees with its trials, and claims nothing if it was not executed."""
     if row["control_of"] is not None or not row["executed"]:
         claimed = [name for name in CLAIMS if row[name] is not None]
@@ -189,10 +340,7 @@ def _proved(
         if row.get("mass_ratio") is not None:
             settings = replace(settings, mass_kg=row["mass_kg"])
         points, normals = row["contact_points_m"][:count], row["contact_normals"][:count]
-        contacts = [
-            Contact(np.array(point), np.array(normal))
-            for point, normal in zip(points, normals, strict=True)
-        ]
+        contacts = list(map(Contact, points, normals))
         if row["label"] in (GIVEN, VARIED):  # on curved surfaces they have faces of their own
             body = seat(body, points, normals).body
         held = grip(
@@ -218,45 +366,11 @@ def _proved(
         )
 
 
-def loose_difference(one: Mapping[str, Any], other: Mapping[str, Any]) -> str:
-    """Say how survival differs where numbers were rounded otherwise; empty if it does not.
-
-    A grasp whose contacts slip may be kept or lost by a hair, so it counts only where the analysis
-    lets none slip. A row of a dataset without executions has nothing to compare.
-    """
-    slips = [row.get("predicted_first_slip") for row in (one, other)]
-    survived = [row.get("survived") for row in (one, other)]
-    if survived[0] == survived[1] or any(map(may_slip, slips)):
-        return ""
-    return f"survived is {survived[0]}, but {survived[1]} when executed again"
-
-
-def figure_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> Iterator[str]:
-    """Yield sentences on what is wrong with figures of the grasps of one object."""
-    if config.learning is None:
-        return
-    figures, asked = Figures(config.learning, config.execution), config.learning.hand
-    trials: dict[str, list[Row]] = {}
-    for row in rows.get("executions", ()):
-        trials.setdefault(row["grasp_id"], []).append(row)
-    for of_object in rows["objects"]:
-        own = [row for row in rows["grasps"] if row["object_id"] == of_object["object_id"]]
-        body = stored_body(folder, of_object["object_id"], of_object["source_name"], config.faces)
-        for row in own:
-            found = [
-                *_closure_faults(row, body, figures),
-                *_margin_faults(row, trials.get(row["grasp_id"], [])),
-                *(hand_pose_faults(row, hand_named(asked), body) if asked else ()),
-            ]
-            yield from (f"grasps: {row['grasp_id']}: {fault}" for fault in found)
-
-
 def _closure_faults(row: Row, body: Polyhedron, figures: Figures) -> Iterator[str]:
     if "span_angle_rad" not in row or row["force_closed"] is None:
         return
     count = row["contacts"]
-    places = zip(row["contact_points_m"][:count], row["contact_normals"][:count], strict=True)
-    contacts = [Contact(np.array(point), np.array(normal)) for point, normal in places]
+    contacts = [*map(Contact, row["contact_points_m"][:count], row["contact_normals"][:count])]
     for name, value in figures.of_contacts(body, contacts).items():
         stated = row[name]
         if (stated is None) != (value is None) or (
@@ -290,7 +404,7 @@ def _margin_faults(row: Row, trials: Sequence[Row]) -> Iterator[str]:
         yield f"predicted_loss is {row['predicted_loss']}, but not by the table of executions"
 
 
-def hand_pose_faults(row: Row, hand: Hand, body: Polyhedron) -> Iterator[str]:
+def _hand_faults(row: Row, hand: Hand, body: Polyhedron) -> Iterator[str]:
     """Yield sentences on what is wrong with the pose of a hand in a row of grasps."""
     reached = row["hand_reached"]
     if bool(row["force_closed"]) != (reached is not None):
