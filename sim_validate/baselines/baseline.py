@@ -11,7 +11,6 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields
-from dataclasses import dataclass as plain_dataclass
 from pathlib import Path, PurePath
 from typing import Annotated, Any
 
@@ -21,7 +20,7 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import to_jsonable_python
 
 from grasp_core.closure.contact_arrays import contacts_sha256
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.complaints import complaint
 from grasp_core.files.strict_json import check_schema, object_of, shown
 from grasp_core.files.text_files import read_text, write_text
@@ -159,18 +158,6 @@ class RecordedPart:
         return found
 
 
-@plain_dataclass(frozen=True, slots=True)
-class RecordedShape:
-    """What a baseline says of the part that it was written on."""
-
-    content_sha256: str
-    """Hash of its mesh."""
-    unit: str | None
-    """Unit of length of its file; None if that is not known."""
-    part: RecordedPart | None
-    """The part; None if it is the one that the grasps were planned on."""
-
-
 def recorded_part(planned: Polyhedron, tested: Polyhedron) -> RecordedPart | None:
     """Record the part that a baseline is written on; None if it is the planned one."""
     if planned.content_sha256 == tested.content_sha256:
@@ -285,11 +272,6 @@ class Baseline:
         if len({entry.id for entry in self.entries}) < len(self.entries):
             raise ValueError("two grasps of the baseline have the same id")
 
-    @property
-    def shape(self) -> RecordedShape:
-        """Return what is recorded of the part."""
-        return RecordedShape(self.content_sha256, self.unit, self.part)
-
 
 def plain(entry: Entry | None) -> dict[str, Any] | None:
     """Turn an entry into plain values, which processes can send and any file can hold."""
@@ -379,10 +361,8 @@ def baseline_to_json(baseline: Baseline) -> str:
 
 def baseline_from_json(text: str, path: str) -> Baseline:
     """Parse the text of a baseline."""
-    try:
+    with about(path):
         return _from_text(text)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def _from_text(text: str) -> Baseline:

@@ -4,13 +4,12 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from grasp_core.errors import InputError
 from grasp_core.provenance import arithmetic, versions
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
-from sim_validate.baselines.baseline import Baseline, Entry, entry_of
+from sim_validate.baselines.baseline import Baseline, entry_of
 from sim_validate.baselines.compare import Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.part import Present
 from sim_validate.baselines.settings import How, settings_of
@@ -77,7 +76,18 @@ def measured(
         for grasp in chosen
         if grasp.id in verdicts and grasp.id not in refused
     ]
-    kept = _kept(saved, about, settings_of(how), entries)
+    kept = Baseline(
+        grasps_file=about[0],
+        limit=about[1],
+        object=saved.body.name,
+        content_sha256=saved.body.content_sha256,
+        friction=saved.friction,
+        planned_radius_m=_planned_radius(saved),
+        settings=settings_of(how),
+        versions=versions(),
+        arithmetic=arithmetic(),
+        entries=tuple(sorted(entries, key=lambda entry: entry.id)),
+    )
     return Measured(kept, verdicts, refused, executions)
 
 
@@ -90,24 +100,6 @@ def _executing(
     return [
         ExecutionJob(saved.body, grasp, saved.friction, settings, enough=False) for grasp in chosen
     ]
-
-
-def _kept(
-    saved: SavedGrasps, about: tuple[str, int | None], settings: Mapping[str, Any],
-    entries: Sequence[Entry],
-) -> Baseline:  # fmt: skip
-    return Baseline(
-        grasps_file=about[0],
-        limit=about[1],
-        object=saved.body.name,
-        content_sha256=saved.body.content_sha256,
-        friction=saved.friction,
-        planned_radius_m=_planned_radius(saved),
-        settings=settings,
-        versions=versions(),
-        arithmetic=arithmetic(),
-        entries=tuple(sorted(entries, key=lambda entry: entry.id)),
-    )
 
 
 def _try(job: Job) -> Verdict | str:

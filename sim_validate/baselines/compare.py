@@ -26,9 +26,8 @@ LEAST_DIGITS = 4
 """Least number of digits of a number that changed."""
 DECISIVE = ("graspproof", "mujoco", "machine")
 """Packages and other components whose version may change any result."""
-ASIDE = ("python", "trimesh")
-"""Components whose version changes no result; older baselines name trimesh, which read meshes then.
-"""
+ASIDE = "python"
+"""Component whose version changes no result."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,7 +308,7 @@ def bands_between(
     if carried is not None and _is_other_part(before, after):
         bands = replace(OTHER_PART, friction=FRICTION_BAND * before.friction)
         return bands, "with the bands of a changed part"
-    names = sorted({*before.versions, *after.versions} - {*ASIDE})
+    names = sorted({*before.versions, *after.versions} - {ASIDE})
     others = [
         f"{name} {before.versions.get(name)} -> {after.versions.get(name)}"
         for name in names

@@ -11,6 +11,7 @@ Faces are called by their numbers on the planned part, because ids of grasps are
 
 import hashlib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, cast
@@ -32,7 +33,7 @@ from grasp_core.transferring.changed_part import (
 from grasp_core.transferring.face_changes import FaceChange, added_faces, face_changes
 from grasp_core.transferring.like_faces import ANGLE_DEG, Likeness, check_planar, likeness
 from grasp_core.transferring.transfer import Transfer, transfer
-from sim_validate.baselines.baseline import RecordedPart, RecordedShape, recorded_part
+from sim_validate.baselines.baseline import Baseline, RecordedPart, recorded_part
 
 NOTE, FAIL = "note", "fail"
 TABLE = "changed_part"
@@ -129,11 +130,6 @@ class Moves:
         return f"{many} {', '.join(map(str, moved))}, which moved" if moved else ""
 
 
-def moves_since_planning(carried: Transfer) -> Moves:
-    """Return how faces moved since grasps that were carried over were planned."""
-    return Moves(carried.faces, carried.added)
-
-
 def moves_since_baseline(
     then: Polyhedron, planned: Polyhedron, now: Polyhedron, rule: Likeness
 ) -> Moves:
@@ -183,7 +179,9 @@ def source_of(
         return Source()
     found = [named] if named is not None else _beside(body.name, [grasps.parent, *folders])
     for path in found:
-        if (unit := _unit_of_same(path, body, scale)) is not None:
+        if hashlib.sha256(read_bytes(path)).hexdigest() == body.source_sha256:
+            return Source(file=path)  # the body was read from these very bytes, whatever their unit
+        if (unit := fitting_exactly(path, body, scale)) is not None:
             return Source(file=path, unit=unit)
     if found:
         return Source(file=found[0], changed=True)
@@ -194,50 +192,26 @@ def source_of(
 
 
 def _beside(name: str, folders: Iterable[Path]) -> list[Path]:
-    """List mesh files with a given name, sorted within their folders."""
-    unique = {folder.resolve(): folder for folder in folders}
-    return [
-        path
-        for folder in unique.values()
-        for path in _entries(folder)
-        if path.stem == name and path.suffix.lower().lstrip(".") in FORMATS and path.is_file()
-    ]
-
-
-def _entries(folder: Path) -> list[Path]:
-    """List the contents of a folder, sorted; none if it does not exist or cannot be read."""
-    try:
-        return sorted(folder.iterdir())
-    except OSError:
-        return []
-
-
-def _unit_of_same(path: Path, body: Polyhedron, scale: float | None) -> str | None:
-    """Return the unit in which a file holds a body; None if it does not.
-
-    Empty if the body was read from these very bytes, whatever their unit.
-    """
-    if hashlib.sha256(read_bytes(path)).hexdigest() == body.source_sha256:
-        return ""
-    return fitting_exactly(path, body, scale)
+    """List mesh files with a given name, sorted within each folder that can be read."""
+    found = list[Path]()
+    for folder in {folder.resolve(): folder for folder in folders}.values():
+        with suppress(OSError):
+            found += (path for path in sorted(folder.iterdir()) if path.stem == name)
+    return [path for path in found if path.suffix.lower().lstrip(".") in FORMATS and path.is_file()]
 
 
 def fitting_exactly(path: Path, body: Polyhedron, scale: float | None) -> str | None:
     """Return the unit in which a file holds the very solid of a body; None if it does in none."""
-    units = (unit for unit in UNITS_M if _content(path, unit, scale, body) == body.content_sha256)
-    return next(units, None)
-
-
-def _content(path: Path, unit: str, scale: float | None, body: Polyhedron) -> str:
-    """Hash the solid in a file; empty if the file holds no solid in this unit."""
     faces = "planar" if body.patches is None else "patches"
-    try:
-        read = load_polyhedron(
-            path, unit=unit, scale=scale or 1.0, faces=faces, patches=body.patches, limits=RECORDED
-        )
-    except MeshError:
-        return ""
-    return read.content_sha256
+    for unit in UNITS_M:
+        with suppress(MeshError):  # in another unit it may be too large for a solid
+            read = load_polyhedron(
+                path, unit=unit, scale=scale or 1.0, faces=faces, patches=body.patches,
+                limits=RECORDED,
+            )  # fmt: skip
+            if read.content_sha256 == body.content_sha256:
+                return unit
+    return None
 
 
 class ChangedPartError(InputError):
@@ -325,18 +299,15 @@ class Present:
         """Return how faces moved, since the baseline where it tells, or else since planning."""
         if self.since is not None:
             return self.since
-        return Moves() if self.carried is None else moves_since_planning(self.carried)
+        return Moves() if self.carried is None else Moves(self.carried.faces, self.carried.added)
 
     @property
     def note(self) -> str:
         """Say what readers must know about the mesh that is tested; empty if nothing."""
         if not self.change:
             return self.source.note
-        return (
-            self.change
-            if self.carried is None
-            else f"{self.change}; its grasps were carried over to it"
-        )
+        carried = "" if self.carried is None else "; its grasps were carried over to it"
+        return self.change + carried
 
     @property
     def mesh(self) -> Source:
@@ -371,7 +342,7 @@ class Present:
     def _with(self, carried: Transfer) -> "Present":
         return replace(self, saved=_tested(self.saved, carried), carried=carried)
 
-    def against(self, before: RecordedShape) -> "Present":
+    def against(self, before: Baseline) -> "Present":
         """Measure how faces moved from where they were when a baseline was written.
 
         If the baseline does not hold the part, it was written on the planned one.

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import to_jsonable_python
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.complaints import complaint
 from grasp_core.files.strict_json import shown
 from grasp_core.records.grasps_json import SavedGrasps
@@ -84,7 +84,7 @@ def of_settings(settings: Mapping[str, Any], path: str) -> How:
         given = _Settings.model_validate(settings)
     except ValidationError as error:
         raise InputError(f"{path}: {complaint(error, _Settings, ['settings'])}") from error
-    try:
+    with about(f"{path}: settings"):
         setup = setup_from_tables(given.setup, Setup(surface=given.surface), "setup")
         agenda = Agenda(
             random_wrenches=given.random_wrenches,
@@ -95,8 +95,6 @@ def of_settings(settings: Mapping[str, Any], path: str) -> How:
             seed=given.seed,
         )
         execution = None if given.execution is None else asked_execution(given.execution)
-    except InputError as error:
-        raise InputError(f"{path}: settings: {error}") from error
     return How(setup, agenda, execution)
 
 

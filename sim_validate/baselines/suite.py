@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.strict_json import place, shown
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.baseline import Baseline, check_writable, read_baseline, write_baseline
@@ -118,7 +118,7 @@ class Suite:
     @cached_property
     def compared(self) -> Present:
         """Return the grasps on their part as it is now, compared with the part of the baseline."""
-        return self.present.against(self.kept.shape)
+        return self.present.against(self.kept)
 
     @cached_property
     def kept(self) -> Baseline:
@@ -187,11 +187,9 @@ class Suite:
         given: dict[str, Any] = {name: getattr(self, name) for name in (*DIRECT, "noise")}
         if self.wrenches is not None:
             given["wrenches"] = wrenches_from_file(self.wrenches)
-        try:
-            asked = {name: value for name, value in given.items() if value is not None}
+        asked = {name: value for name, value in given.items() if value is not None}
+        with about(self.path):
             return How(setup, replace(how.agenda, **asked), execution)
-        except InputError as error:
-            raise InputError(f"{self.path}: {error}") from error
 
 
 def suite_from_toml(path: Path) -> Suite:
@@ -207,18 +205,11 @@ def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
     for name in PATHS:
         if name in settings:
             settings[name] = path.parent / settings[name]
-    if "noise" in settings:
-        try:
-            settings["noise"] = noise_from_table(settings["noise"])
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from error
-    try:
-        if TABLE in settings:
-            settings[TABLE] = asked_execution(settings[TABLE])
-        if CHANGED in settings:
-            settings[CHANGED] = if_changed(settings[CHANGED])
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+    tables = {"noise": noise_from_table, TABLE: asked_execution, CHANGED: if_changed}
+    with about(path):
+        for name, read in tables.items():
+            if name in settings:
+                settings[name] = read(settings[name])
     return Suite(path=path, **settings)
 
 

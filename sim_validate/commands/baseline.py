@@ -54,7 +54,7 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     path = command.grasps or command.baseline.parent / before.grasps_file
     saved = read_grasps(path)
     now = _present(saved, path, command.baseline, command.changed, before.scale)
-    now = now.against(before.shape)
+    now = now.against(before)
     how = of_settings(before.settings, str(command.baseline))
     if command.setup is not None:
         how = replace(how, setup=setup_from_file(command.setup, how.setup))

@@ -218,6 +218,6 @@ def _write_tables(
                 paths = [staging.table(each.unit, name) for each in chosen]
                 files.add(name, of_object[0].split, paths)
         return [
-            replace(listed(folder, each.path), table=each.name, split=each.split, rows=each.rows)
-            for each in files.close()
+            replace(listed(folder, path), table=name, split=split, rows=rows)
+            for name, split, path, rows in files.close()
         ]

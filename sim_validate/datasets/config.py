@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, cast, get_args
 
 from grasp_core.checked import LARGEST_FRICTION, MOST_RANDOM_WRENCHES, one_of, positive, whole
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.complaints import settings_of
 from grasp_core.files.strict_json import place, shown
 from grasp_core.hands.named_hands import hand_names, load_hand
@@ -260,10 +260,8 @@ class DatasetConfig:
 def config_from_toml(path: Path) -> DatasetConfig:
     """Read a configuration from a file."""
     given = read_tables(path)
-    try:
+    with about(path):
         return config_from_settings(given)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:

@@ -15,7 +15,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.complaints import complaint, record_of
 from grasp_core.files.strict_json import object_of, place, shown
 from grasp_core.files.text_files import read_text, write_text
@@ -125,10 +125,8 @@ def read_manifest(folder: Path) -> Manifest:
             "dataset build` to the end"
         )
     text = read_text(path)
-    try:
+    with about(path):
         return manifest_from_json(text)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def manifest_from_json(text: str) -> Manifest:
@@ -166,20 +164,15 @@ def left_out_text(units: Iterable[LeftOut]) -> str:
 def read_left_out(path: Path) -> list[LeftOut]:
     """Read `quarantine.jsonl`: the units of work that have no rows."""
     text = read_text(path)
-    try:
+    with about(path):
         return left_out_from(text)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def left_out_from(text: str) -> list[LeftOut]:
     """Parse the text of `quarantine.jsonl`."""
+    found = list[LeftOut]()
     lines = text.removesuffix("\n").split("\n") if text else []
-    return [_read(line, number) for number, line in enumerate(lines, start=1)]
-
-
-def _read(line: str, number: int) -> LeftOut:
-    try:
-        return record_of(LeftOut, line, "line of quarantine.jsonl")
-    except InputError as error:
-        raise InputError(f"line {number}: {error}") from error
+    for number, line in enumerate(lines, start=1):
+        with about(f"line {number}"):
+            found.append(record_of(LeftOut, line, "line of quarantine.jsonl"))
+    return found

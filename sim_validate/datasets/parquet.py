@@ -7,11 +7,9 @@ is written one group of rows after another, so that memory does not grow.
 
 import importlib
 import io
-import itertools
 import math
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO, TypeAlias
@@ -21,7 +19,7 @@ from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
 from grasp_core.files.strict_json import shown
-from sim_validate.datasets.tables import KEYS, TABLES, Column, Name, Tables, base_tables
+from sim_validate.datasets.tables import KEYS, TABLES, Column, Name, Tables
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
 TYPES = {"text": "string", "bool": "bool_", "int": "int64", "float": "float64"}
@@ -37,8 +35,6 @@ PAGES: Mapping[str, Any] = {
     "write_page_checksum": True,
     "write_page_index": True,
 }
-SPLIT = "split"
-"""Column that takes the split that the rows are added to."""
 FILE_ROWS = 500_000
 """Number of rows at which a file is closed and the next one begun, about 100 MB of grasps."""
 
@@ -63,33 +59,24 @@ def parquet_bytes(
     name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[str, str],
     tables: Tables = TABLES,
 ) -> bytes:  # fmt: skip
-    """Encode one table as the bytes of a file (see `arrow_table`)."""
-    held = io.BytesIO()
-    pyarrow_parquet().write_table(arrow_table(name, rows, about, tables), held, **PAGES)
-    return held.getvalue()
-
-
-def arrow_table(
-    name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[str, str],
-    tables: Tables = TABLES,
-) -> Any:  # fmt: skip
-    """Make an Arrow table of rows."""
-    arrow = pyarrow()
-    listed = sorted(rows, key=lambda row: _key(name, row))
-    for one, other in itertools.pairwise(listed):
-        if _key(name, one) == _key(name, other):
-            raise InputError(
-                f"table {name}: expected rows with different keys, got two rows with the key "
-                f"{_key(name, one)}"
-            )
+    """Encode the rows of one table as the bytes of a file, sorted by their keys."""
+    arrow, keys = pyarrow(), KEYS[name]
+    listed = list(rows)
+    by_key = {tuple(row[key] for key in keys): row for row in listed}
+    if len(by_key) < len(listed):
+        raise InputError(f"table {name}: two rows have the same {' and '.join(keys)}")
+    ordered = [row for _, row in sorted(by_key.items(), key=lambda pair: pair[0])]
     schema = schema_of(tables[name]).with_metadata(dict(sorted(about.items())))
-    columns = [[_cell(row.get(column.name)) for row in listed] for column in tables[name]]
     try:
-        arrays = [arrow.array(values, type=each.type)
-                  for values, each in zip(columns, schema, strict=True)]  # fmt: skip
-        return arrow.Table.from_arrays(arrays, schema=schema)
+        arrays = [
+            arrow.array([_cell(row.get(each.name)) for row in ordered], type=each.type)
+            for each in schema
+        ]
     except (arrow.ArrowInvalid, arrow.ArrowTypeError) as error:
         raise InputError(f"table {name}: a cell does not fit its column: {error}") from error
+    held = io.BytesIO()
+    pyarrow_parquet().write_table(arrow.Table.from_arrays(arrays, schema=schema), held, **PAGES)
+    return held.getvalue()
 
 
 def as_read(
@@ -100,27 +87,25 @@ def as_read(
     return pyarrow_parquet().ParquetFile(held).read().to_pylist()
 
 
-def read_rows(
-    path: Path, name: Name | None = None, tables: Tables | None = None
-) -> list[dict[str, Any]]:
+def read_rows(path: Path, name: Name, tables: Tables = TABLES) -> list[dict[str, Any]]:
     """Read the rows of a file and check all of its checksums."""
     return read_table(path, name, tables).to_pylist()
 
 
-def each_batch(path: Path, name: Name, tables: Tables | None = None) -> Iterator[Any]:
+def each_batch(path: Path, name: Name, tables: Tables = TABLES) -> Iterator[Any]:
     """Yield the rows of a file as Arrow's record batches, without holding all of them in memory."""
     with _opened(path, name, tables) as file:
         yield from file.iter_batches(GROUP_ROWS)
 
 
-def read_table(path: Path, name: Name | None = None, tables: Tables | None = None) -> Any:
+def read_table(path: Path, name: Name, tables: Tables) -> Any:
     """Read a file as an Arrow table and check all of its checksums."""
     with _opened(path, name, tables) as file:
         return file.read()
 
 
 @contextmanager
-def _opened(path: Path, name: Name | None, tables: Tables | None) -> Generator[Any]:
+def _opened(path: Path, name: Name, tables: Tables) -> Generator[Any]:
     """Open a file of one of the tables; any damage is raised as an `InputError`."""
     arrow, parquet = pyarrow(), pyarrow_parquet()
     try:
@@ -136,23 +121,14 @@ def _opened(path: Path, name: Name | None, tables: Tables | None) -> Generator[A
         ) from error
 
 
-def _check_columns(path: Path, came: Any, name: Name | None, tables: Tables | None) -> None:
-    both = [base_tables(executed=executed) for executed in (False, True)]
-    kinds = both if tables is None else [tables]
-    known = [
-        (each, schema_of(columns))
-        for kind in kinds
-        for each, columns in kind.items()
-        if name in (None, each)
-    ]
-    if any(came.names == one.names and came.types == one.types for _, one in known):
-        return
-    what = "column types" if any(came.names == one.names for _, one in known) else "columns"
-    named = " or ".join(dict.fromkeys(each for each, _ in known))
-    raise InputError(
-        f"{path}: expected the {what} of the table {named} in this version of graspproof, got "
-        "others; build the dataset again"
-    )
+def _check_columns(path: Path, came: Any, name: Name, tables: Tables) -> None:
+    wanted = schema_of(tables[name])
+    if came.names != wanted.names or came.types != wanted.types:
+        what = "column types" if came.names == wanted.names else "columns"
+        raise InputError(
+            f"{path}: expected the {what} of the table {name} in this version of graspproof, got "
+            "others; build the dataset again"
+        )
 
 
 def _check_size(path: Path, claimed: Any) -> None:
@@ -193,10 +169,6 @@ def _as_array(column: Column, rows: Sequence[Mapping[str, Any]]) -> NDArray[Any]
     return found.astype(np.int64 if column.kind == "int" else np.float64)
 
 
-def _key(name: Name, row: Mapping[str, Any]) -> tuple[Any, ...]:
-    return tuple(row[column] for column in KEYS[name])
-
-
 def _cell(value: Any) -> Any:
     """Replace every number that is not finite by None."""
     if isinstance(value, Sequence) and not isinstance(value, str):
@@ -218,16 +190,6 @@ def _field(column: Column) -> Any:
         kind = arrow.list_(kind, size)
     about = {"meaning": column.meaning} | ({"unit": column.unit} if column.unit else {})
     return arrow.field(column.name, kind, metadata=about)
-
-
-@dataclass(frozen=True, slots=True)
-class WrittenTable:
-    """A finished file of a table."""
-
-    name: Name
-    split: str
-    path: Path
-    rows: int
 
 
 class TableFiles:
@@ -261,17 +223,13 @@ class TableFiles:
             )
         if not table.num_rows:
             return
-        if SPLIT in table.column_names:
-            place = table.column_names.index(SPLIT)
-            every = arrow.array([split] * table.num_rows, type=arrow.string())
-            table = table.set_column(place, table.schema.field(place), every)
         part = self._parts.setdefault((name, split), _Part(self._folder / name, split))
         part.add(table.replace_schema_metadata(self._about))
 
-    def close(self) -> list[WrittenTable]:
-        """Write the rows that still wait, and list the files."""
+    def close(self) -> list[tuple[Name, str, Path, int]]:
+        """Write the rows that still wait; list the files with table, split and number of rows."""
         return [
-            WrittenTable(name, split, path, rows)
+            (name, split, path, rows)
             for (name, split), part in sorted(self._parts.items())
             for path, rows in part.close()
         ]

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.complaints import record_of
 from grasp_core.files.text_files import read_bytes, read_text
 from sim_validate.datasets.make_unit import Made
@@ -132,10 +132,8 @@ class Staging:
     def _record(self, unit: WorkUnit) -> UnitRecord:
         path = self._of(unit) / RECORD
         text = read_text(path)
-        try:
+        with about(path):
             return record_of(UnitRecord, text, RECORD)
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from error
 
     def _put(self, unit: WorkUnit, files: Mapping[str, bytes], **more: Any) -> None:
         hashes = {name: _sha256(data) for name, data in files.items()}

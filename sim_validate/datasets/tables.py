@@ -177,15 +177,6 @@ GROUPS: Mapping[str, Group] = {
 Tables: TypeAlias = Mapping[Name, tuple[Column, ...]]
 TABLES: dict[Name, tuple[Column, ...]] = {"objects": OBJECTS, "grasps": GRASPS, "trials": TRIALS}
 """Tables of a dataset without executions."""
-
-
-def base_tables(*, executed: bool) -> Tables:
-    """Return the tables of a dataset, with or without executions, without columns on request."""
-    if not executed:
-        return TABLES
-    return {**TABLES, "grasps": (*TABLES["grasps"], *EXECUTED), "executions": EXECUTIONS}
-
-
 KEYS: dict[Name, tuple[str, ...]] = {
     "objects": ("object_id",), "grasps": ("object_id", "grasp_id"), "trials": ("grasp_id", "trial"),
     "executions": ("grasp_id", "trial"),
@@ -199,19 +190,18 @@ REFERENCES: dict[tuple[Name, str], tuple[Name, str]] = {
 """Columns whose cells name a row of another table, with the column there that holds the name."""
 
 
-def dataset_tables(*, executed: bool, groups: Mapping[str, int] | None = None) -> Tables:
-    """Return the tables of a dataset with their columns."""
-    tables = dict(base_tables(executed=executed))
-    sizes = groups or {}
-    for group, size in ((group, sizes[group]) for group in GROUPS if group in sizes):
+def dataset_tables(*, executed: bool, groups: Mapping[str, int]) -> Tables:
+    """Return the tables of a dataset with their columns; groups of columns have their sizes."""
+    tables = dict(TABLES)
+    if executed:
+        tables |= {"grasps": (*GRASPS, *EXECUTED), "executions": EXECUTIONS}
+    for group, size in ((group, groups[group]) for group in GROUPS if group in groups):
         for name, columns in GROUPS[group].items():
-            tables[name] = (*tables[name], *(_sized(each, size) for each in columns))
+            tables[name] += tuple(
+                replace(each, shape=tuple(size if n == SIZED else n for n in each.shape))
+                for each in columns
+            )
     return tables
-
-
-def _sized(column: Column, size: int) -> Column:
-    shape = tuple(size if length == SIZED else length for length in column.shape)
-    return replace(column, shape=shape)
 
 
 def id_beginning(object_id: str, friction: float) -> str:

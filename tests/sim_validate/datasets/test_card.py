@@ -87,7 +87,9 @@ def test_every_column_is_documented_with_its_unit(folder):
 
 def test_every_label_is_explained(folder):
     _, body = split_card((folder / CARD).read_text())
-    rows = [row for path in folder.glob("data/grasps/*.parquet") for row in read_rows(path)]
+    rows = [
+        row for path in folder.glob("data/grasps/*.parquet") for row in read_rows(path, "grasps")
+    ]
     labels = {row["label"] for row in rows}
     said = dict(re.findall(r"^\| `(\w+)` \| ([^|]+) \|$", body.partition("| `label` |")[2], re.M))
     assert {"grasp"} < labels <= set(said)

@@ -19,8 +19,7 @@ from sim_validate.datasets.figures import execution_cells, execution_rows
 from sim_validate.datasets.manifest import MANIFEST
 from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.tables import EXECUTED, EXECUTIONS, TABLES
-from sim_validate.datasets.verify import Sample, verify
-from sim_validate.datasets.verify_rows import loose_difference
+from sim_validate.datasets.verify import Sample, loose_difference, verify
 from sim_validate.execution.asked import AskedExecution
 from sim_validate.execution.jobs import ExecutedGrasp
 from tests.sim_validate.datasets.engines import Here, silent
