@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from sim_validate.baselines.parts.source_file import Source
-    from sim_validate.baselines.suite_toml import Suite
+    from sim_validate.baselines.part import Source
+    from sim_validate.baselines.suite import Suite
     from sim_validate.execution.verdict import Execution
     from sim_validate.validation.verdict import Verdict
 
@@ -64,7 +64,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if marker is None or "grasp_case" not in metafunc.fixturenames:
         return
     from grasp_core.errors import GraspError
-    from sim_validate.baselines.grasp_cases import grasp_cases
+    from sim_validate.baselines.demands import grasp_cases
 
     wrong = ""
     try:
@@ -138,7 +138,7 @@ class GraspsFile(pytest.File):
     def collect(self) -> Iterator[pytest.Item]:
         """Yield a test for each grasp, or a single one if a baseline is to be written."""
         from grasp_core.errors import GraspError
-        from sim_validate.baselines.suite_toml import suite_from_toml
+        from sim_validate.baselines.suite import suite_from_toml
 
         bless = self.config.getoption("--grasp-bless")
         try:
@@ -175,10 +175,10 @@ class GraspItem(_SuiteItem):
     def runtest(self) -> None:
         """Fail if the grasp is worse, gone, missing or new, or cannot be compared."""
         from grasp_core.errors import GraspError
+        from sim_validate.baselines.baseline import plain, properties_of
         from sim_validate.baselines.compare import Status, failing
-        from sim_validate.baselines.entries import plain, properties_of
         from sim_validate.baselines.explain import explained, passing
-        from sim_validate.baselines.parts.changed_part import ChangedPartError
+        from sim_validate.baselines.part import ChangedPartError
 
         suite = self.suite
         try:
@@ -233,9 +233,8 @@ def assert_stable(
 
     def check(*case: Any, friction: float | None = None, **asked: Any) -> "Verdict":
         """Simulate a grasp with its negative controls."""
-        from sim_validate.baselines.demands import checked, demands_of
-        from sim_validate.baselines.entries import entry_of, plain
-        from sim_validate.baselines.grasp_cases import case_of
+        from sim_validate.baselines.baseline import entry_of, plain
+        from sim_validate.baselines.demands import case_of, checked, demands_of
 
         chosen = case_of(case, friction)
         verdict, why = checked(chosen, demands_of(asked))
@@ -259,8 +258,8 @@ def assert_survives(
 
     def check(*case: Any, settings: Any = None, friction: float | None = None) -> "Execution":
         """Execute a grasp with its negative controls."""
+        from sim_validate.baselines.baseline import execution_entry
         from sim_validate.baselines.demands import survival
-        from sim_validate.baselines.executions import execution_entry
 
         chosen, found, why = survival(case, friction, settings)
         for key, value in asdict(execution_entry(found)).items():

@@ -23,11 +23,11 @@ from grasp_core.values import Contact, Grasp
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene
 from sim_validate.baselines.settings import noise_from_table
-from sim_validate.datasets.learning.varied import VARIED
 from sim_validate.datasets.manifest import MANIFEST
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
+from sim_validate.datasets.varied import VARIED
 from sim_validate.records.grasps import NAMED, grasp_with_id, read_grasps, some
 from sim_validate.records.setup_toml import OF_USERS, setup_from_tables
 from sim_validate.records.verdicts import verdicts_of

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from sim_validate.baselines.baseline import Entry, ExecutionEntry
 from sim_validate.baselines.compare import Status
-from sim_validate.baselines.entries import Entry
-from sim_validate.baselines.executions import ExecutionEntry
-from sim_validate.baselines.suite_toml import KINDS, suite_from_toml
+from sim_validate.baselines.suite import KINDS, suite_from_toml
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.simulation.setup import Noise

@@ -103,7 +103,6 @@ def test_a_plan_that_finds_its_loops_imports_only_what_planning_needs(tmp_path):
 def test_every_command_has_its_function():
     flags = dataset_flags
     actions = {flags.Build, flags.Import, flags.Verify, flags.Export}
-    actions |= {flags.Stats, flags.SampleRows, flags.Depth}
     actions |= {baseline_flags.Record, baseline_flags.Check}
     named = set(get_args(Command)) - {flags.Dataset, baseline_flags.Baseline} | actions
     assert set(ACTIONS) == named

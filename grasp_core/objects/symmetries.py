@@ -21,7 +21,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.objects.polyhedron import Polyhedron
@@ -120,16 +119,6 @@ def copies_of(body: Polyhedron, grasps: Sequence[Grasp]) -> tuple[Copies, ...]:
     return tuple(classes)
 
 
-def orbit_sizes(body: Polyhedron, grasps: Sequence[Grasp]) -> tuple[int, ...]:
-    """Count the different grasps that rotations of the object make of each grasp, itself included.
-
-    That number is the number of rotations over that of those which map the grasp to itself.
-    """
-    turns = symmetries(body).rotations
-    traits = [_Traits.of(body, grasp) for grasp in grasps]
-    return tuple(len(turns) // int(each.images(each, turns).sum()) for each in traits)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Traits:
     """What must be the same in two copies, about the centre of mass and over the object's radius.
@@ -167,14 +156,10 @@ class _Traits:
 
     def is_image(self, other: "_Traits", maps: Array) -> bool:
         """Return whether one of the matrices `maps`, (n, 3, 3), makes this from another grasp."""
-        return bool(self.images(other, maps).any())
-
-    def images(self, other: "_Traits", maps: Array) -> NDArray[np.bool_]:
-        """Return which of the matrices `maps`, (n, 3, 3), make this from another grasp, (n,)."""
         images = np.einsum("nij,kvj->nkvi", maps, other.vectors)
         off = np.linalg.norm(images[:, :, None] - self.vectors[None, None], axis=4).max(axis=3)
         matched = off[:, np.arange(FINGERS), ORDERS].max(axis=2)
-        return np.asarray((matched <= SAME_GRASP).any(axis=1))
+        return bool((matched <= SAME_GRASP).any())
 
 
 def _near(points: Array) -> Array:

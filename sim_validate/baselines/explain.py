@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from grasp_core.by_value import counted
+from sim_validate.baselines.baseline import Baseline, Entry
 from sim_validate.baselines.check import Checked
 from sim_validate.baselines.compare import WORDS, Status
-from sim_validate.baselines.entries import Baseline, Entry
-from sim_validate.baselines.executions import not_survived
-from sim_validate.baselines.parts.changed_part import Present
+from sim_validate.baselines.part import Present
+from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, losses_in_words
 from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 
@@ -125,3 +125,22 @@ def _both(predicted: float, simulated: float | None, unit: str) -> str:
     """Write a number as predicted and as simulated."""
     said = "not measured in simulation" if simulated is None else f"{simulated:.4g}{unit} simulated"
     return f"{predicted:.4g}{unit} predicted, {said}"
+
+
+def not_survived(grasp: ExecutedGrasp) -> str:
+    """Say why a grasp does not survive its execution: trials, numbers, predictions.
+
+    Gives lines about the grasp; empty if it survived every trial and every control slipped.
+    """
+    found = grasp.execution
+    if found is None:
+        return f"{grasp.id} was not executed: {grasp.reason}"
+    lines = [*losses_in_words(found), *held_controls_in_words(found)]
+    if not lines:
+        return ""
+    lost = sum(not trial.survived for trial in found.trials)
+    head = (
+        f"{grasp.id} with {found.mass_kg:g} kg: {lost} of {len(found.trials)} trials lost; its "
+        f"squeeze is certified for {found.load_multiple:.4g} times the weight in any direction"
+    )
+    return "\n  ".join([head, *lines])

@@ -76,15 +76,9 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "dataset import": ("dataset import contacts.npz mug.obj --out judged",),
     "dataset verify": ("dataset verify ds",),
-    "dataset stats": ("dataset stats ds --out ds-stats",),
-    "dataset sample": ("dataset sample ds --count 50 --out ds-rows",),
-    "dataset depth": (
-        "dataset depth ds --out ds-depth",
-        "dataset depth ds --out ds-depth --on-table --width 320 --height 240",
-    ),
-    "dataset export": ("dataset export ds --to csv --out tables",),
+    "dataset export": ("dataset export ds --to isaac --out isaac",),
     "baseline record": ("baseline record grasps.json -o wedge.baseline.json",),
-    "baseline check": ("baseline check wedge.baseline.json",),
+    "baseline check": ("baseline check wedge.baseline.json --strict",),
 }
 """Examples of each command, without the program's name."""
 HELP = {"-h", "--help"}

@@ -18,11 +18,6 @@ from grasp_core.errors import InputError
 from grasp_core.files.text_files import SHOWN, UNFINISHED, write_parts
 
 
-def write_bytes(path: Path, data: bytes) -> Path:
-    """Write bytes by renaming a complete file into place; folders are made as needed."""
-    return write_parts(path, [data])
-
-
 def write_lines(path: Path, lines: Iterable[str]) -> Path:
     """Write lines as `write_text` does, one at a time; each ends with its own line break."""
     return write_parts(path, (line.encode() for line in lines))

@@ -14,15 +14,20 @@ from grasp_core.files.text_files import text_of
 from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
 from grasp_core.records.grasps_json import SavedGrasps, grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
-from sim_validate.baselines.baseline_json import baseline_from_json, baseline_to_json
+from sim_validate.baselines.baseline import baseline_from_json, baseline_to_json
 from sim_validate.baselines.settings import of_settings
-from sim_validate.baselines.suite_toml import suite_from_tables
+from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.cli.config_file import flags_from
-from sim_validate.datasets.building.staging import UnitRecord
 from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
 from sim_validate.datasets.given_contacts import given_from_json
-from sim_validate.datasets.manifest import Listed, Manifest, manifest_from_json, manifest_to_json
-from sim_validate.datasets.quarantine import left_out_from
+from sim_validate.datasets.manifest import (
+    Listed,
+    Manifest,
+    left_out_from,
+    manifest_from_json,
+    manifest_to_json,
+)
+from sim_validate.datasets.staging import UnitRecord
 from sim_validate.files.toml_tables import tables_of_toml
 from sim_validate.records.executions import executions_from_json, executions_to_json
 from sim_validate.records.reaches import reaches_from_json

@@ -13,10 +13,9 @@ from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
 from sim_validate.baselines.compare import Status
-from sim_validate.baselines.grasp_cases import grasp_cases
-from sim_validate.baselines.parts.changed_part import ChangedPartError
-from sim_validate.baselines.parts.source_file import Source, source_of
-from sim_validate.baselines.suite_toml import suite_from_toml
+from sim_validate.baselines.demands import grasp_cases
+from sim_validate.baselines.part import ChangedPartError, Source, source_of
+from sim_validate.baselines.suite import suite_from_toml
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from tests.bad_input.mesh_texts import obj
