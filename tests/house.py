@@ -34,8 +34,8 @@ def measured():
     return {
         "lines of packages": lines_of(modules),
         "modules of packages": len(modules),
-        "lines of tests": 58_050,
-        "lines of docs": 6_622,
+        "lines of tests": lines_of((ROOT / "tests").rglob("*.py")),
+        "lines of docs": lines_of((ROOT / "docs").glob("*.md")),
     }
 
 
