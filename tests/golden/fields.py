@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-ASIDE = re.compile(r"(^|\.)versions\.|seconds|\.mujoco$")
-"""Fields that tell of the machine or the moment."""
+ASIDE = re.compile(r"(^|\.)versions\.|seconds|\.mujoco$|^(files\.\*\.(sha256|bytes)|\w+_sha256)$")
+"""Fields that tell of the machine, the moment, or of code; what is hashed is all here."""
 
 NAMED_AFTER_GRASPS = re.compile(r"^([0-9a-f]{16}-[\d.]+-)?[cprfbs]-[\w-]+$")
+DIGEST = re.compile(r"\b[0-9a-f]{12,}\b")
 NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 
 
@@ -86,6 +87,7 @@ def _flat(value, name):
 
 def _words(name, text):
     """Yield the words of a text and, as another field, its numbers."""
+    text = DIGEST.sub("-", text)
     words = NUMBER.sub("#", text).split()
     if words:
         yield name, " ".join(words)
