@@ -21,7 +21,7 @@ DOORS = {
     "yaml": "scenes/exports/moveit.py",
     "pxr": "scenes/exports/usd.py",
     "pandas": "grasp_core/grasp_tables.py",
-    "numba": ("grasp_core/compiled.py", "grasp_core/kept_loops.py"),
+    "numba": "grasp_core/compiled.py",
     "highspy": "grasp_core/solvers/lp.py",
     "clarabel": "grasp_core/solvers/conic.py",
     "qpsolvers": "grasp_core/solvers/qp.py",

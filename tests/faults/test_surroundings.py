@@ -21,9 +21,9 @@ RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]
 NOWHERE = "/proc/nowhere"
 NO_HOME = {"HOME": NOWHERE, "XDG_CONFIG_HOME": NOWHERE, "XDG_CACHE_HOME": NOWHERE}
 COLD = "no folder for kernels"
-"""Compiles all loops again, beside their modules, which `test_kept_loops` sees of one of them."""
+"""Compiles all loops again, beside their modules, which `test_compiled` sees of one of them."""
 SURROUNDINGS = {
-    "no home": {**NO_HOME, "NUMBA_CACHE_DIR": str(KEPT)},
+    "no home": {**NO_HOME, "XDG_CACHE_HOME": str(KEPT.parent)},
     "no folder for matplotlib": {"MPLCONFIGDIR": NOWHERE, "MPLBACKEND": "nonsense"},
     COLD: {"NUMBA_CACHE_DIR": NOWHERE, "XDG_CACHE_HOME": NOWHERE},
     "no threads": {"OMP_NUM_THREADS": "many"},
@@ -61,8 +61,8 @@ def test_surroundings_change_no_byte(named, usual, graspproof, tmp_path):
 
 
 NO_FOLDER = """
-from grasp_core import kept_loops
-kept_loops.folders = lambda _: ()
+import grasp_core.compiled
+grasp_core.compiled.folders = lambda _: ()
 """
 """A folder is found wherever tests can run, so that the list of folders is emptied."""
 CLOSED = """
@@ -141,14 +141,15 @@ def test_a_stream_that_is_closed_does_not_stop_the_work(redirected, tmp_path):
 
 
 def test_a_working_folder_that_is_gone_matters_only_to_paths_in_it(tmp_path, monkeypatch, capsys):
-    """Also where processes are started: to compile what is not kept, and for `--jobs`."""
+    """Also where processes are started; numba itself cannot compile there, so all is kept before."""
+    plan = ["plan", "tetrahedron", "--family", "concurrent", "-q"]
+    assert main([*plan, "--regions", "--out", str(tmp_path / "kept")]) == 0
     monkeypatch.setattr(compiling, "is_kept", lambda _: False)
     monkeypatch.setattr(engines, "START_S", 0.0, raising=False)
     gone = tmp_path / "gone"
     gone.mkdir()
     monkeypatch.chdir(gone)
     gone.rmdir()
-    plan = ["plan", "tetrahedron", "--family", "concurrent", "-q"]
     assert main([*plan, "--jobs", "2", "--out", str(tmp_path / "a")]) == 0
     regions = ["regions", str(tmp_path / "a" / "grasps.json"), "--limit", "9", "-q"]
     assert main([*regions, "--jobs", "2", "--out", str(tmp_path / "c")]) == 0

@@ -49,7 +49,7 @@ class Witness:
         environment = {
             **os.environ, "AUDITED_BY": str(self.pipe), "HOME": str(self.folder / "home"),
             "TMPDIR": str(self.folder / "scratch"), "PYTHONPATH": f"{AUDITING}:{ROOT}",
-            "NUMBA_CACHE_DIR": str(KEPT),
+            "XDG_CACHE_HOME": str(KEPT.parent),
         }  # fmt: skip
         command = [
             sys.executable,
