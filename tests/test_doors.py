@@ -25,7 +25,6 @@ DOORS = {
     "highspy": "grasp_core/solvers/lp.py",
     "clarabel": "grasp_core/solvers/conic.py",
     "qpsolvers": "grasp_core/solvers/qp.py",
-    "scipy.optimize": "grasp_core/solvers/nearest_point.py",
     "mujoco": (
         "scenes/silent_mujoco.py",
         "scenes/drawing/frames.py",

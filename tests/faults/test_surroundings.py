@@ -141,7 +141,7 @@ def test_a_stream_that_is_closed_does_not_stop_the_work(redirected, tmp_path):
 
 
 def test_a_working_folder_that_is_gone_matters_only_to_paths_in_it(tmp_path, monkeypatch, capsys):
-    """Also where processes are started; numba itself cannot compile there, so all is kept before."""
+    """Also where processes are started; numba cannot compile there, so all is kept before."""
     plan = ["plan", "tetrahedron", "--family", "concurrent", "-q"]
     assert main([*plan, "--regions", "--out", str(tmp_path / "kept")]) == 0
     monkeypatch.setattr(compiling, "is_kept", lambda _: False)
