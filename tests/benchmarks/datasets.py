@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 
 import sim_validate
+from grasp_core.processes import local_processes
 from scenes.example_objects import example_names
 from sim_validate.datasets.building.build import build
 from sim_validate.datasets.building.make_unit import made_of
@@ -24,7 +25,6 @@ from sim_validate.datasets.parquet import parquet_bytes
 from sim_validate.datasets.units import body_of, units_of
 from sim_validate.datasets.verifying.redo import Sample
 from sim_validate.datasets.verifying.verify import verify
-from sim_validate.parallel.processes import local_processes
 
 FRICTIONS = (0.3, 0.5)
 PROFILED = 3

@@ -26,7 +26,7 @@ CHANGING = (
     "os.remove", "os.rename", "os.mkdir", "os.rmdir", "os.link", "os.symlink", "os.chmod",
     "os.chown", "os.truncate", "os.utime", "shutil.rmtree", "shutil.move", "shutil.copyfile",
 )  # fmt: skip
-OURS = ("grasp_core.processes.worker", "frames.py")
+OURS = ("grasp_core.processes", "frames.py")
 LIBRARIES_ASK = ("def get_version(library_handle)", "fc-list")
 """GLFW's Python package for its version, matplotlib for fonts, the first time."""
 

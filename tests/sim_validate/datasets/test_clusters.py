@@ -7,6 +7,7 @@ import time
 import pytest
 
 import grasp_core as gc
+from grasp_core.processes import local_processes
 from sim_validate.datasets.building import driver
 from sim_validate.datasets.building.build import build
 from sim_validate.datasets.building.driver import drive
@@ -15,7 +16,6 @@ from sim_validate.datasets.building.worker import Limits, do_unit
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.units import WorkerError, units_of
 from sim_validate.parallel.clusters import dask_workers, ray_workers
-from sim_validate.parallel.processes import local_processes
 from tests.sim_validate.datasets.engines import Here, contents, silent
 
 pytest.importorskip("pyarrow")

@@ -13,6 +13,7 @@ import trimesh
 
 import grasp_core as gc
 import sim_validate
+from grasp_core.processes import local_processes
 from scenes.example_objects import example_object
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets import table_files
@@ -24,7 +25,6 @@ from sim_validate.datasets.units import units_of
 from sim_validate.datasets.verifying.redo import Sample
 from sim_validate.datasets.verifying.verify import verify
 from sim_validate.main import main
-from sim_validate.parallel.processes import local_processes
 from tests.marks import more
 from tests.sim_validate.datasets.engines import Here, WorkerEndedError, contents, silent
 from tests.sim_validate.datasets.forging import forged

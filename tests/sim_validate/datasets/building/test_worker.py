@@ -9,6 +9,7 @@ import time
 import pytest
 import trimesh
 
+from grasp_core.processes import local_processes
 from sim_validate.datasets.building import driver
 from sim_validate.datasets.building import worker as tasks
 from sim_validate.datasets.building.build import build
@@ -17,7 +18,6 @@ from sim_validate.datasets.building.staging import Staging
 from sim_validate.datasets.building.worker import Limits, Task, do_task
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.units import WorkerError, provenance, units_of
-from sim_validate.parallel.processes import local_processes
 from tests.patience import HANGING_S
 from tests.sim_validate.datasets.engines import Here, silent
 
