@@ -59,10 +59,15 @@ class QuadraticProgram:
     """Upper bounds of x, (n,); infinity where there is no bound."""
 
 
+def check_solver(name: str) -> None:
+    """Refuse a solver that qpsolvers does not know or that is not installed."""
+    if name != PROXQP:  # which is not loaded for this
+        one_of(name, _qpsolvers().available_solvers, "solver")
+
+
 def minimize(program: QuadraticProgram, solver: str = PROXQP) -> Array | None:
     """Solve a quadratic program, (n,); None where the solver returns no numbers."""
     qpsolvers = _qpsolvers()
-    one_of(solver, qpsolvers.available_solvers, "solver")
     equations = (program.A, program.b) if len(program.b) else (None, None)
     asked = qpsolvers.Problem(
         program.P, program.q, program.G, program.h, *equations, lb=program.lower, ub=program.upper

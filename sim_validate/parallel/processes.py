@@ -4,14 +4,17 @@ Results do not depend on the number of processes: a unit sees only its own argum
 """
 
 import os
+import pickle
 from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, Generic, TypeVar
 
 from grasp_core.processes import local_processes
 
 Unit = TypeVar("Unit")
 Result = TypeVar("Result")
+Value = TypeVar("Value")
 
 SHARE = Path("/sys/fs/cgroup/cpu.max")
 """The Linux file that limits a container's processor time: microseconds of use per period."""
@@ -20,6 +23,8 @@ START_S = 1.0
 UNITS_PER_PROCESS = 8
 """Number of simulated grasps for which a process is better than threads of the simulator: its start
 takes as long as eight validations."""
+KEPT = 4
+"""Number of shared values that a process keeps."""
 
 
 def available_cores() -> int:
@@ -51,3 +56,28 @@ def each(
         return
     with local_processes(others, START_S) as workers:
         yield from workers.in_order(function, units, ahead=len(units))
+
+
+class Shared(Generic[Value]):
+    """A hashable value that arrives in another process as the one that arrived there before.
+
+    Otherwise each unit would bring its own copy of, say, an object, and what is kept for that
+    object from one unit to the next would be computed again for each copy.
+    """
+
+    def __init__(self, value: Value) -> None:
+        self.value = value
+
+    def __reduce__(self) -> tuple[Callable[[bytes], "Shared[Any]"], tuple[bytes]]:
+        """Pickle the value by itself, so that equal bytes tell that it is the same."""
+        return _arrived, (_packed(self.value),)
+
+
+@lru_cache(maxsize=KEPT)
+def _packed(value: object) -> bytes:
+    return pickle.dumps(value)
+
+
+@lru_cache(maxsize=KEPT)
+def _arrived(data: bytes) -> Shared[Any]:
+    return Shared(pickle.loads(data))  # noqa: S301 - the process that started this one packed it

@@ -9,8 +9,7 @@ from grasp_core.checked import coefficient, function, instance, several, whole
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
-from sim_validate.parallel.processes import each, processes
-from sim_validate.parallel.shared import Shared
+from sim_validate.parallel.processes import Shared, each, processes
 from sim_validate.simulation.gate.gate import Gate, measured_gate, remember_gate
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.validation.grasp_verdict import Verdict
