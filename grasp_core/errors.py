@@ -1,5 +1,7 @@
 """Defines the errors that graspproof raises on purpose, one class per cause."""
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from enum import StrEnum
 
 
@@ -64,3 +66,12 @@ class MeshError(InputError):
     def __str__(self) -> str:
         """Return the refusal's code and its message, on one line."""
         return f"{self.reason.value}: {self.message}"
+
+
+@contextmanager
+def about(where: object) -> Generator[None]:
+    """Put the name of a file or a place in front of what an `InputError` in the block says."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error

@@ -1,4 +1,8 @@
-"""Completes a direction to a right-handed frame, always in the same way, and a point to a pose."""
+"""Frames along directions, always completed in the same way, and angles that files keep exactly.
+
+Angles are kept in degrees. Two neighbouring numbers of radians may become the same degrees, and one
+of them stands for both: every angle of a plan is such a number, so it is read as it was written.
+"""
 
 import math
 from typing import TypeAlias
@@ -44,3 +48,19 @@ def poses_along(origins: Array, directions: Array) -> Array:
         pose[:3, :3] = np.array([*plane_tangents(x, y, z), (x, y, z)]).T
     poses[:, :3, 3] = origins
     return poses
+
+
+def radians_of(degrees: float) -> float:
+    """Return the angle [rad] that `math.degrees` turns into these degrees exactly.
+
+    Degrees that no angle becomes exactly are converted as by `math.radians`.
+    """
+    nearest = math.radians(degrees)
+    beside = (math.nextafter(nearest, math.inf), math.nextafter(nearest, -math.inf))
+    exact = (angle for angle in (nearest, *beside) if math.degrees(angle) == degrees)
+    return next(exact, nearest)
+
+
+def kept_angle(radians: float) -> float:
+    """Return the angle that files keep for one: the same, or its neighbour in the last digit."""
+    return radians_of(math.degrees(radians))

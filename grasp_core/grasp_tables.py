@@ -2,22 +2,12 @@
 
 import importlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import (
-    Any,
-    ClassVar,
-    Generic,
-    Protocol,
-    Self,
-    TypeVar,
-    cast,
-    get_args,
-    overload,
-)
+from dataclasses import replace
+from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, cast, get_args, overload
 
 import numpy as np
 
-from grasp_core.checked import number, one_of, several, shown
+from grasp_core.checked import function, number, one_of, several, shown
 from grasp_core.errors import InputError
 from grasp_core.values import Grasp, Method
 
@@ -51,6 +41,10 @@ class ById(Generic[Item]):
     ITEMS: ClassVar[str] = "grasps"
     """Name of the field with the items."""
 
+    @property
+    def _items(self) -> tuple[Item, ...]:
+        return getattr(self, self.ITEMS)
+
     def __len__(self) -> int:
         """Return the number of items."""
         return len(self._items)
@@ -65,9 +59,7 @@ class ById(Generic[Item]):
 
     def __contains__(self, wanted: object) -> bool:
         """Return whether there is an item, or an item with an id."""
-        if isinstance(wanted, str):
-            return any(item.id == wanted for item in self._items)
-        return wanted in self._items
+        return any(wanted in (item.id, item) for item in self._items)
 
     @overload
     def __getitem__(self, key: int | str) -> Item: ...
@@ -79,69 +71,53 @@ class ById(Generic[Item]):
         """Return an item by its place or its id, or a value with some of the items."""
         if isinstance(key, slice):
             return replace(cast("Any", self), **{self.ITEMS: self._items[key]})
-        return self._named(key) if isinstance(key, str) else self._items[key]
-
-    @property
-    def _items(self) -> tuple[Item, ...]:
-        return getattr(self, self.ITEMS)
-
-    def _named(self, wanted: str) -> Item:
-        found = next((item for item in self._items if item.id == wanted), None)
+        if not isinstance(key, str):
+            return self._items[key]
+        found = next((item for item in self._items if item.id == key), None)
         if found is None:
             names = ", ".join(item.id for item in self._items[:SHOWN_IDS]) or "no grasps"
             more = f" and {len(self) - SHOWN_IDS} more" if len(self) > SHOWN_IDS else ""
-            raise KeyError(f"no grasp is named {shown(wanted)}; there are {names}{more}")
+            raise KeyError(f"no grasp is named {shown(key)}; there are {names}{more}")
         return found
 
 
-@dataclass(frozen=True, slots=True)
-class Demands:
-    """What a grasp has to be like in order to be chosen; None demands nothing."""
+def chosen(
+    grasps: Sequence[Grasp],
+    where: Callable[[Grasp], bool] | None,
+    family: Method | Iterable[Method] | None,
+    min_radius_m: float | None,
+    min_closure_margin: float | None,
+    max_critical_friction: float | None,
+    min_ferrari_canny_n: float | None,
+) -> tuple[Grasp, ...]:
+    """Return the grasps that meet all demands; only figures that are asked for are computed."""
+    families = None
+    if family is not None:
+        families = several(
+            (family,) if isinstance(family, str) else family, _family, "family", "families"
+        )
+    for name, bound in (
+        ("min_radius_m", min_radius_m),
+        ("min_closure_margin", min_closure_margin),
+        ("max_critical_friction", max_critical_friction),
+        ("min_ferrari_canny_n", min_ferrari_canny_n),
+    ):
+        if bound is not None:
+            number(bound, name)
+    if where is not None:
+        function(where, "where")
 
-    families: tuple[Method, ...] | None = None
-    """Families of which a grasp must have one, or `free` for grasps of the free method."""
-    min_radius_m: float | None = None
-    """Least radius of the discs in which fingers may stand [m]."""
-    min_closure_margin: float | None = None
-    max_critical_friction: float | None = None
-    min_ferrari_canny_n: float | None = None
-    """Least proved lower bound of the quality [N]."""
-    where: Callable[[Grasp], bool] | None = None
-    """A further test of the user's own."""
-
-    def __post_init__(self) -> None:
-        figures = ("min_radius_m", "min_closure_margin", "max_critical_friction")
-        for name in (*figures, "min_ferrari_canny_n"):
-            if (least := getattr(self, name)) is not None:
-                number(least, name)
-        if self.where is not None and not callable(self.where):
-            raise InputError(
-                f"where must be a function of a grasp that gives True or False, got "
-                f"{shown(self.where)}"
-            )
-
-    def are_met_by(self, grasp: Grasp) -> bool:
-        """Return whether a grasp is chosen; only figures that are asked for are computed."""
-        most = self.max_critical_friction
+    def meets(grasp: Grasp) -> bool:
         return (
-            (self.families is None or any(_is_of(grasp, family) for family in self.families))
-            and (self.min_radius_m is None or grasp.radius >= self.min_radius_m)
-            and (self.min_closure_margin is None or grasp.closure_margin >= self.min_closure_margin)
-            and (most is None or grasp.critical_friction <= most)
-            and (
-                self.min_ferrari_canny_n is None
-                or grasp.ferrari_canny[0] >= self.min_ferrari_canny_n
-            )
-            and (self.where is None or bool(self.where(grasp)))
+            (families is None or any(_is_of(grasp, each) for each in families))
+            and (min_radius_m is None or grasp.radius >= min_radius_m)
+            and (min_closure_margin is None or grasp.closure_margin >= min_closure_margin)
+            and (max_critical_friction is None or grasp.critical_friction <= max_critical_friction)
+            and (min_ferrari_canny_n is None or grasp.ferrari_canny[0] >= min_ferrari_canny_n)
+            and (where is None or bool(where(grasp)))
         )
 
-
-def families_of(given: Method | Iterable[Method] | None) -> tuple[Method, ...] | None:
-    """Return the families that are asked for, one or several; None where any will do."""
-    if given is None:
-        return None
-    listed = (given,) if isinstance(given, str) else given
-    return several(listed, _family, "family", "families")
+    return tuple(filter(meets, grasps))
 
 
 def _family(given: Any) -> Method:

@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar, ge
 import numpy as np
 
 from grasp_core.arrays import Array, frozen, frozen_units
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, counted, summary, vector
 from grasp_core.checked import LARGEST, instance, number, one_of, several, shown, text, whole
 from grasp_core.errors import InputError
 from grasp_core.frames import poses_along
 from grasp_core.notebooks import InNotebooks
-from grasp_core.short_text import counted, summary, vector
 
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
 """The family of a grasp, by how its four lines of force meet: concurrent, pencil or regulus among

@@ -23,33 +23,28 @@ from grasp_core.arrays import to_digits
 from grasp_core.by_value import ByValue
 from grasp_core.checked import instance, one_of, path_of, several
 from grasp_core.errors import InputError
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.text_files import write_parts
 from grasp_core.notebooks import InNotebooks
-from grasp_core.objects.convexity import is_convex
 from grasp_core.objects.on_faces import check_body
-from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
 from scenes.mjcf_text import (
-    COMPILER,
     Element,
-    add_comment,
     add_element,
     as_texts,
     document,
-    element,
-    printable,
     quaternion,
 )
-from scenes.physics import PhysicsSettings
+from scenes.physics import PhysicsSettings, add_free_body, add_light, begin_scene
 
 Surface = Literal["pads", "mesh"]
 """What fingertips touch: one pad (a small box) each, or the convex hull of the object's mesh."""
 FEWEST_CONTACTS = 2
 SCALED = (
     "Masses and servos are scaled to suit the grasp: this scene is for tests of force closure. "
-    "`graspproof scene --mass-kg M` writes the object with its true mass, under gravity."
+    "The command `graspproof scene` with a mass writes the true one, under gravity."
 )
 """Comment at the top of every scene."""
 AXES = ("normal", "tangent1", "tangent2")
@@ -139,21 +134,10 @@ def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads")
 
 
 def opened(layout: Layout, physics: PhysicsSettings, comment: str) -> tuple[Element, Element]:
-    """Begin a scene: return its root, with all settings and the object's mesh, and its world."""
-    root = element("mujoco", {"model": printable(layout.name)})
-    add_comment(root, comment)
-    add_element(root, "compiler", COMPILER)
-    option = add_element(root, "option", physics.options())
-    add_element(option, "flag", physics.flags())
-    add_element(root, "statistic", {"extent": 3.0 * layout.radius_m, "center": (0.0, 0.0, 0.0)})
-    assets = add_element(root, "asset", {})
-    mesh = {"name": "object", "inertia": "shell"}
-    add_element(
-        assets, "mesh", mesh | {"vertex": layout.vertices.ravel(), "face": layout.triangles.ravel()}
-    )
-    world = add_element(root, "worldbody", {})
-    light = {"pos": (0.0, 0.0, 8.0 * layout.radius_m), "dir": (0.0, 0.0, -1.0)}
-    add_element(world, "light", light | {"type": "directional"})
+    """Begin a lit scene: return its root, with settings and the object's mesh, and its world."""
+    mesh = (layout.vertices, layout.triangles)
+    root, world = begin_scene(layout.name, comment, physics, layout.radius_m, mesh, flags={})
+    add_light(world, layout.radius_m)
     return root, world
 
 
@@ -163,14 +147,7 @@ def add_object(
 ) -> None:  # fmt: skip
     """Add the object with what fingertips touch; where there is gravity it may be weightless."""
     lifted = {"gravcomp": 1.0} if weightless else {}
-    body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)} | lifted)
-    add_element(body, "freejoint", {"name": "object"})
-    inertia = layout.inertia_kg_m2[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    add_element(
-        body,
-        "inertial",
-        {"pos": layout.center, "mass": layout.mass_kg, "fullinertia": inertia},
-    )
+    body = add_free_body(world, layout.mass_kg, layout.inertia_kg_m2, layout.center, lifted)
     hull = {"name": "object", "type": "mesh", "mesh": "object", "conaffinity": 0,
             "group": 1, "rgba": (0.55, 0.62, 0.70, 0.6), "mass": 0.0}  # fmt: skip
     if surface == "mesh":

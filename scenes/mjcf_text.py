@@ -68,7 +68,7 @@ def add_element(parent: Element, tag: str, attributes: Mapping[str, object]) -> 
 
 def add_comment(parent: Element, text: str) -> None:
     """Add a comment for people who read the file; MuJoCo does not read it."""
-    parent.inside.append(Element("", text))
+    parent.inside.append(Element("", text.replace("--", "- -")))  # XML ends comments with `--`
 
 
 def document(root: Element) -> str:

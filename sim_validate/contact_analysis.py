@@ -19,8 +19,7 @@ from grasp_core.errors import InputError, NoForcesError, SolverError, UndecidedE
 from grasp_core.forces.contact_forces import contact_forces
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.quality.metrics import hull_volume, min_weight, smallest_singular_value
-from grasp_core.quality.wrench_limit import WrenchLimit
-from grasp_core.quality.wrench_limits import axis_wrenches, wrench_limits
+from grasp_core.quality.wrench_limits import WrenchLimit, axis_wrenches, wrench_limits
 from grasp_core.records.contacts_json import ContactSet
 from grasp_core.solvers.ties import first_best
 

@@ -39,20 +39,17 @@ ACTIONS: dict[type[Any], str] = {
     command_flags.Scene: "scene:write_scenes",
     command_flags.Export: "scene:export_grasps",
     showing_flags.View: "view:view_grasp",
-    showing_flags.Report: "report:report_folder",
+    showing_flags.Report: "view:report_folder",
     command_flags.Regions: "regions:certify_file",
     command_flags.Replay: "replay:replay_trial",
     command_flags.Analyze: "analyze:analyze_file",
     transfer_flags.Transfer: "transfer:transfer_file",
-    hand_flags.Reach: "hands.reach:reach_file",
-    hand_flags.Hand: "hands.hand:show_hand",
+    hand_flags.Reach: "reach:reach_file",
+    hand_flags.Hand: "hand:show_hand",
     dataset_flags.Build: "dataset:build_dataset",
     dataset_flags.Import: "dataset:import_dataset",
     dataset_flags.Verify: "dataset:verify_dataset",
     dataset_flags.Export: "dataset:export_dataset",
-    dataset_flags.Stats: "datasets.looks:count_dataset",
-    dataset_flags.SampleRows: "datasets.looks:sample_dataset",
-    dataset_flags.Depth: "datasets.looks:draw_depths",
     baseline_flags.Record: "baseline:record_baseline",
     baseline_flags.Check: "baseline:check_baseline",
     command_flags.Inspect: "objects:inspect_object",
@@ -77,10 +74,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         if "" in arguments:
             said = "an argument is empty, perhaps from a variable that is not set"
             raise FlagsError(f"{said}; leave the argument out, or give it a value")
-        if any(word.partition("=")[0] == "--cells" for word in arguments):
-            raise FlagsError(
-                "--cells is called --max-face-parts now; write --max-face-parts instead"
-            )
         flags = with_config(arguments, COMMANDS)
     except InputError as error:
         return _complain(str(error), exit_code(error))

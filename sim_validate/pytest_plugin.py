@@ -3,7 +3,7 @@
 Nothing but pytest is imported until such a file, the fixtures or the marker are used.
 """
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,24 +11,22 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from sim_validate.baselines.parts.source_file import Source
-    from sim_validate.baselines.suite_toml import Suite
+    from sim_validate.baselines.part import Source
+    from sim_validate.baselines.suite import Suite
     from sim_validate.execution.verdict import Execution
-    from sim_validate.validation.grasp_verdict import Verdict
-
-    Entries = tuple[dict[str, Any] | None, dict[str, Any] | None]
+    from sim_validate.validation.verdict import Verdict
 
 ENDING = ".grasps.toml"
 MARKER = (
     "grasp([file], *, object=None, friction=0.5, limit=1, families, cones, seed, unit): run the "
     "test with each grasp of a grasps.json, or planned for an object, as its fixture `grasp_case`"
 )
-LINES = pytest.StashKey[list[dict[str, Any]]]()
-"""Lines of the report about grasps, kept for one phase of a test and for the whole run."""
+LINES = pytest.StashKey[list[dict[str, str]]]()
+"""What the terminal says about grasps at the end, kept for a phase of a test and the whole run."""
+MOST_TOLD = 40
+"""Largest number of grasps that the terminal lists for one mesh."""
 TRAVELS = "_graspproof"
 """Name of the attribute that carries these lines on pytest's reports between processes."""
-FOR_TERMINAL = ("told", "wrote")
-"""Parts of a line that only the terminal shows."""
 
 
 class UnstableError(AssertionError):
@@ -43,15 +41,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="make what is measured now the baselines of *.grasps.toml files",
     )
-    group.addoption(
-        "--grasp-report",
-        metavar="DIR",
-        help="write what became of every grasp to DIR/index.html and DIR/report.json",
-    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the `grasp` marker, and prepare to collect report lines from all tests."""
+    """Register the `grasp` marker, and prepare to collect the lines about grasps from all tests."""
     config.addinivalue_line("markers", MARKER)
     config.stash[LINES] = []
     config.pluginmanager.register(_Collecting(config))
@@ -71,7 +64,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if marker is None or "grasp_case" not in metafunc.fixturenames:
         return
     from grasp_core.errors import GraspError
-    from sim_validate.baselines.grasp_cases import grasp_cases
+    from sim_validate.baselines.demands import grasp_cases
 
     wrong = ""
     try:
@@ -96,20 +89,6 @@ def pytest_runtest_makereport(
     return report
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Write the report in the process that collected the results of all others."""
-    folder = session.config.getoption("--grasp-report")
-    if folder is None or hasattr(session.config, "workerinput"):
-        return
-    from sim_validate.reports.stability_page import write_report
-
-    lines = session.config.stash[LINES]
-    write_report(Path(folder), [
-        {name: said for name, said in line.items() if name not in FOR_TERMINAL} for line in lines
-    ])  # fmt: skip
-
-
 class _Collecting:
     """Collects the lines about grasps from all tests."""
 
@@ -124,12 +103,33 @@ class _Collecting:
         """List meshes that are not the planned ones, what passed on them, and new baselines."""
         if not self._lines:
             return
-        from sim_validate.reports.terminal_lines import sections
-
         for title, texts in sections(self._lines):
             terminalreporter.section(title)
             for text in texts:
                 terminalreporter.write_line(text)
+
+
+def sections(lines: Sequence[dict[str, str]]) -> list[tuple[str, list[str]]]:
+    """Write what the terminal says at the end: titles, each with at least one line.
+
+    A grasp has a line here only if it passes and is not what it was; failures speak for themselves.
+    """
+    notes = sorted({line["mesh_note"] for line in lines if line["mesh_note"]})
+    meshes = [text for note in notes for text in (note, *_told(lines, note, "  "))]
+    found = [
+        ("meshes of grasps", meshes),
+        ("grasps that are better", _told(lines, "", "")),
+        ("baselines of grasps", sorted({line["wrote"] for line in lines if line["wrote"]})),
+    ]
+    return [(title, texts) for title, texts in found if texts]
+
+
+def _told(lines: Sequence[dict[str, str]], note: str, indent: str) -> list[str]:
+    """List the grasps on a mesh that pass and are not what they were."""
+    said = sorted({line["told"] for line in lines if line["told"] and line["mesh_note"] == note})
+    more = len(said) - MOST_TOLD
+    cut = [f"and {more} more; --junitxml FILE lists all"] if more > 0 else []
+    return [f"{indent}{text}" for text in (*said[:MOST_TOLD], *cut)]
 
 
 class GraspsFile(pytest.File):
@@ -138,7 +138,7 @@ class GraspsFile(pytest.File):
     def collect(self) -> Iterator[pytest.Item]:
         """Yield a test for each grasp, or a single one if a baseline is to be written."""
         from grasp_core.errors import GraspError
-        from sim_validate.baselines.suite_toml import suite_from_toml
+        from sim_validate.baselines.suite import suite_from_toml
 
         bless = self.config.getoption("--grasp-bless")
         try:
@@ -175,28 +175,25 @@ class GraspItem(_SuiteItem):
     def runtest(self) -> None:
         """Fail if the grasp is worse, gone, missing or new, or cannot be compared."""
         from grasp_core.errors import GraspError
+        from sim_validate.baselines.baseline import plain, properties_of
         from sim_validate.baselines.compare import Status, failing
-        from sim_validate.baselines.entries import plain, properties_of
         from sim_validate.baselines.explain import explained, passing
-        from sim_validate.baselines.parts.changed_part import ChangedPartError
+        from sim_validate.baselines.part import ChangedPartError
 
         suite = self.suite
         try:
             done = suite.tested(self.name)
         except GraspError as error:
             changed = isinstance(error, ChangedPartError)
-            _note(self, self.name, "not comparable" if changed else "refused", str(error))
+            _note(self, "status", "not comparable" if changed else "refused")
             raise
         (finding,) = done.findings
         files, same = (suite.baseline, suite.grasps), finding.status is Status.SAME
         why = "" if same else explained(done, files, suite.compared)
-        before, after = plain(finding.before), plain(finding.after)
-        self.user_properties.append(("status", finding.status.value))
-        self.user_properties += properties_of(after or {}).items()
         fails = finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE)
-        entries, mesh = (before, after), suite.compared.mesh
-        line = _note(self, finding.id, finding.status.value, why, entries, mesh)
-        line["told"] = "" if fails else passing(done, suite.compared)
+        told = "" if fails else passing(done, suite.compared)
+        _note(self, "status", finding.status.value, suite.compared.mesh, told=told)
+        self.user_properties += properties_of(plain(finding.after) or {}).items()
         if fails:
             raise UnstableError(f"{why}\n  to accept the change: pytest --grasp-bless {self.path}")
 
@@ -206,17 +203,15 @@ class BlessItem(_SuiteItem):
 
     def runtest(self) -> None:
         """Simulate all grasps and write the baseline."""
-        from sim_validate.baselines.entries import plain
         from sim_validate.baselines.explain import written
 
-        found = self.suite.bless()
+        found, now = self.suite.bless(), self.suite.present
         self.user_properties.append(("grasps", len(found.entries)))
-        for name, why in self.suite.present.gone.items():
-            _note(self, name, "gone", why, source=self.suite.present.mesh)
+        for name in now.gone:
+            _note(self, f"{name}.status", "gone", now.mesh)
+        wrote = written(self.suite.baseline, found, now)
         for entry in found.entries:
-            entries, mesh = (None, plain(entry)), self.suite.present.mesh
-            line = _note(self, entry.id, "blessed", "", entries, mesh)
-            line["wrote"] = written(self.suite.baseline, found, self.suite.present)
+            _note(self, f"{entry.id}.status", "blessed", now.mesh, wrote=wrote)
 
 
 @pytest.fixture
@@ -225,7 +220,7 @@ def grasp_case(request: pytest.FixtureRequest) -> Any:
     if not hasattr(request, "param"):
         pytest.fail(f"{request.node.name}: grasp_case needs @pytest.mark.grasp(...)", pytrace=False)
     if request.param.gone:
-        _note(request.node, request.param.grasp.id, "gone", request.param.gone)
+        _note(request.node, f"{request.param.grasp.id}.status", "gone")
         pytest.fail(request.param.gone, pytrace=False)
     return request.param
 
@@ -238,9 +233,8 @@ def assert_stable(
 
     def check(*case: Any, friction: float | None = None, **asked: Any) -> "Verdict":
         """Simulate a grasp with its negative controls."""
-        from sim_validate.baselines.demands import checked, demands_of
-        from sim_validate.baselines.entries import entry_of, plain
-        from sim_validate.baselines.grasp_cases import case_of
+        from sim_validate.baselines.baseline import entry_of, plain
+        from sim_validate.baselines.demands import case_of, checked, demands_of
 
         chosen = case_of(case, friction)
         verdict, why = checked(chosen, demands_of(asked))
@@ -248,8 +242,7 @@ def assert_stable(
         entry = plain(entry_of(chosen.grasp, verdict, chosen.body.radius)) or {}
         for key, value in entry.items():
             record_property(f"{name}.{key}", value)
-        status = "unstable" if why else "stable"
-        _note(request.node, name, status, why, (None, entry), chosen.source)
+        _note(request.node, f"{name}.status", "unstable" if why else "stable", chosen.source)
         if why:
             raise UnstableError(why)
         return verdict
@@ -265,13 +258,13 @@ def assert_survives(
 
     def check(*case: Any, settings: Any = None, friction: float | None = None) -> "Execution":
         """Execute a grasp with its negative controls."""
+        from sim_validate.baselines.baseline import execution_entry
         from sim_validate.baselines.demands import survival
-        from sim_validate.baselines.executions import execution_entry
 
         chosen, found, why = survival(case, friction, settings)
         for key, value in asdict(execution_entry(found)).items():
             record_property(f"{found.id}.execution.{key}", value)
-        _note(request.node, found.id, "lost" if why else "survived", why, source=chosen.source)
+        _note(request.node, f"{found.id}.status", "lost" if why else "survived", chosen.source)
         if why or found.execution is None:
             raise UnstableError(why)
         return found.execution
@@ -280,15 +273,13 @@ def assert_survives(
 
 
 def _note(
-    item: pytest.Item, grasp: str, status: str, why: str, entries: "Entries" = (None, None),
-    source: "Source | None" = None,
-) -> dict[str, Any]:  # fmt: skip
-    """Remember the outcome of a grasp in a test, with its entries before and after."""
-    file, note = (None, "") if source is None else (source.file, source.note)
-    line: dict[str, Any] = {
-        "test": item.nodeid, "grasp": grasp, "status": status, "why": why, "before": entries[0],
-        "after": entries[1], "mesh_file": None if file is None else str(file), "mesh_note": note,
-        "told": "", "wrote": "",
-    }  # fmt: skip
-    item.stash.setdefault(LINES, []).append(line)
-    return line
+    item: pytest.Item, name: str, status: str, source: "Source | None" = None, *,
+    told: str = "", wrote: str = "",
+) -> None:  # fmt: skip
+    """Keep the status of a grasp as a property of its test, and what the terminal says at the end.
+
+    Takes `name` of the property, `told` of a grasp that passes, `wrote` of a new baseline.
+    """
+    note = "" if source is None else source.note
+    item.user_properties += [(name, status), *([("mesh_note", note)] if note else [])]
+    item.stash.setdefault(LINES, []).append({"told": told, "wrote": wrote, "mesh_note": note})

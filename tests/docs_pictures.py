@@ -3,34 +3,33 @@
 Names of pictures after the command choose some of them.
 """
 
+import io
 import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 import grasp_core as gc
 import scenes
-from scenes.drawing.canvas import figure_of, write_figure
-from scenes.drawing.flat.colours import FINGERS
-from scenes.drawing.flat.panels import Entry, Panel, keyed
-from scenes.drawing.flat.scales import Scale
-from scenes.drawing.flat.sheets import Dots, Sheet, Words, beside, moved
+from scenes.drawing.colours import FINGERS
+from scenes.drawing.panels import Entry, Panel, Scale, keyed
 from scenes.drawing.pictures import grasp_figure, grasp_sheet
+from scenes.drawing.sheets import Dots, Sheet, Words, beside, moved, png_of
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.records.executions_json import Executions
-from sim_validate.replaying.recorded import Recorded
-from sim_validate.replaying.replay import replayed
-from sim_validate.reports.charts.fidelity_charts import Agreement, fidelity_figure
+from sim_validate.records.executions import Executions
+from sim_validate.replaying import Recorded, replayed
+from sim_validate.reports.agreement import Agreement
 from sim_validate.reports.charts.margin_charts import margin_figure
-from sim_validate.reports.charts.motion_charts import motion_figure
-from sim_validate.reports.charts.survival_charts import survival_figure
+from sim_validate.reports.charts.motion_charts import motion_panels
+from sim_validate.reports.charts.run_charts import fidelity_panels, survival_sheet
 from sim_validate.reports.charts.wrench_charts import wrench_figure
 from sim_validate.reports.drawn_grasps import certified
 from sim_validate.simulation.setup import Agenda, Setup
-from tests.scenes.drawing.hands.standing import standing
+from tests.scenes.drawing.standing import standing
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
 BENCHMARKS = FOLDER.parent / "benchmarks.md"
@@ -59,7 +58,7 @@ def families():
         title = Words(0.5 * sheet.width, 14.0, case[1], "middle", 16.0, bold=True)
         marks = [moved(mark, np.array([0.0, TITLE])) for mark in sheet.marks]
         sheets.append(Sheet(sheet.width, sheet.height + TITLE, case[1], (*marks, title)))
-    return figure_of(beside(sheets))
+    return beside(sheets)
 
 
 def grasp():
@@ -98,7 +97,7 @@ def motion():
         Recorded(grasp.id, body, grasp.contacts, FRICTION, setup, Agenda(), grasp=grasp)
     )
     threshold = setup.hold.hold_threshold * found.scene.layout.grasp_size_m
-    return motion_figure(found, threshold)
+    return beside(motion_panels(found, threshold))
 
 
 def fidelity():
@@ -112,7 +111,7 @@ def fidelity():
             found = sv.simulated_critical_friction(body, grasp)
             if grasp.critical_friction > 1e-3:
                 pairs.append((grasp.critical_friction, found))
-    return fidelity_figure([Agreement("critical friction", tuple(pairs))])
+    return beside(fidelity_panels([Agreement("critical friction", tuple(pairs))]))
 
 
 def survival():
@@ -123,9 +122,7 @@ def survival():
         executed_grasp(ExecutionJob(body, grasp, FRICTION, settings))
         for grasp in gc.plan(body, FRICTION, limit=8).grasps
     ]
-    return survival_figure(
-        [Executions(body.content_sha256, FRICTION, settings, True, tuple(found))]
-    )
+    return survival_sheet([Executions(body.content_sha256, FRICTION, settings, True, tuple(found))])
 
 
 def misplaced():
@@ -149,7 +146,7 @@ def misplaced():
     key = [Entry(row[0], colour) for colour, row in zip(FINGERS, rows, strict=True)]
     below, _ = keyed(key, 70.0, 325.0, 500.0)
     names = panel.named("misplaced objects", "distance from the expected place [mm]", "share kept")
-    return figure_of(Sheet(600.0, 350.0, "share kept", (*marks, *names, *below)))
+    return Sheet(600.0, 350.0, "share kept", (*marks, *names, *below))
 
 
 def kept_by_distance():
@@ -160,7 +157,7 @@ def kept_by_distance():
     return [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[first:end]]
 
 
-PICTURES: dict[str, Callable[[], object]] = {
+PICTURES: dict[str, Callable[[], Sheet]] = {
     make.__name__: make
     for make in (
         families,
@@ -179,7 +176,10 @@ PICTURES: dict[str, Callable[[], object]] = {
 
 def main() -> None:
     for name in sys.argv[1:] or PICTURES:
-        print(write_figure(PICTURES[name](), FOLDER / f"{name}.webp"))
+        path = FOLDER / f"{name}.webp"
+        with Image.open(io.BytesIO(png_of(PICTURES[name]()))) as picture:
+            picture.convert("RGB").save(path, quality=75, method=6)
+        print(path)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 """What docs/regions.md says, done as it says it."""
 
-import dataclasses
 import json
 import re
 import shlex
@@ -12,8 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from grasp_core.regions.certify_regions import CONES, CertifiedRegions
-from sim_validate.cli import command_flags
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.records.regions import SCHEMA
@@ -94,12 +91,8 @@ def negated(proof):
     [
         (lambda p: {"region2_m": 1.4 * p["region2_m"]}, "no power"),
         (lambda p: {"friction": 0.9 * p["friction"]}, "outside"),
-        (lambda p: {"friction": 0.9 * p["friction"], "forces": 1e-200 * p["forces"]}, "outside"),
         (lambda p: {"friction": 0.99 * p["friction"], "normals": 1.02 * p["normals"]}, "units"),
         (negated, "friction"),
-        (lambda p: {"forces": -p["forces"]}, "outside"),
-        (lambda p: {"forces": 0.0 * p["forces"]}, "no force"),
-        (lambda p: {"forces": np.nan * p["forces"]}, "finite"),
         (lambda _: {"depths_m": np.full(4, 0.3)}, "no power"),
         (lambda p: {"codes": p["codes"][:-1]}, "missing"),
         (lambda p: {"forces": np.vstack([p["forces"], p["forces"][:1]])}, "left over"),
@@ -126,15 +119,3 @@ def test_the_files_hold_what_the_page_lists(folder):
     assert set(grasps[0]["regions"][0]) == {"kind", "polygon_m", "inscribed_radius_m", "area_m2"}
     with np.load(next((folder / "proofs").iterdir()), allow_pickle=False) as proof:
         assert all(f"`{name}`" in PAGE for name in proof.files if name[:6] != "region")
-
-
-def test_flags_and_arguments_are_those_of_the_page():
-    flags = {each.name.replace("_", "-") for each in dataclasses.fields(command_flags.Regions)}
-    for flag in re.findall(r"^\| `--([\w-]+)", PAGE, re.MULTILINE):
-        assert flag in flags
-    (cones,) = (
-        each for each in dataclasses.fields(command_flags.Regions) if each.name == "max_cones"
-    )
-    assert cones.default == CONES
-    kept = {each.name for each in dataclasses.fields(CertifiedRegions)}
-    assert {"limit", "open_choice"} <= kept

@@ -20,7 +20,7 @@ v_i being the velocity of contact i under the twist. Newton's method says where 
 A compiled search of the same kind comes first (see `critical_friction_kernel`). The forces and the
 twist that it finds are checked like all others; where there are none, or their interval is not
 narrow, `friction_search` goes program by program, with proofs in rational arithmetic. With torsion,
-`soft.critical_friction` searches below what hard fingers need.
+`soft_closure` searches below what hard fingers need.
 """
 
 import math
@@ -32,14 +32,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array, cross
 from grasp_core.checked import LARGEST_FRICTION
-from grasp_core.closure.contact_arrays import contact_arrays, unit_size
+from grasp_core.closure.contacts import WRENCH, contact_arrays, normal_and_tangential, unit_size
+from grasp_core.closure.decision import deepest_forces
 from grasp_core.closure.friction_interval import FRICTIONLESS, REPORTED_AS_ZERO, FrictionInterval
 from grasp_core.closure.friction_search import FRICTION_ACCURACY, SHAVED, Ends, search_interval
-from grasp_core.closure.margin_program import CHECK_SLACK, deepest_forces
-from grasp_core.closure.proofs import RANK, proves_closure
-from grasp_core.closure.soft.contacts import SoftContacts, contact_torsions
-from grasp_core.closure.soft.critical_friction import friction_interval
-from grasp_core.closure.wrenches import WRENCH, normal_and_tangential
+from grasp_core.closure.proofs import CHECK_SLACK, RANK, proves_closure
+from grasp_core.closure.soft_closure import friction_interval
+from grasp_core.closure.soft_contacts import SoftContacts, contact_torsions
 from grasp_core.compiled import compiled
 from grasp_core.values import Contact, Grasp
 

@@ -16,8 +16,8 @@ import math
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.margin_kernel import SIGN_SHARE, least_cone_sum
-from grasp_core.closure.wrenches import WRENCH
 from grasp_core.compiled import loop
 
 FIRST_TRIAL = 0.5

@@ -21,8 +21,9 @@ positive product with y, and no external wrench w with y.w < 0 can be resisted.
 Both answers are certificates: `verify` uses sums, norms and one singular value. Both also bound
 the optimum, forces from below and twists from above (see `proofs`).
 
-Soft contacts also transmit a torque about their normal; `soft` has their cones of four dimensions,
-their program and their proofs.
+Many sets of contacts are decided at once in compiled code, and checked as `verify` checks one; what
+it leaves open is decided one by one. Soft contacts also transmit a torque about their normal:
+`soft_contacts` has their cones of four dimensions and their proofs, `soft_closure` their program.
 
 Source: Sudsang & Ponce 1995, Definition 1 and Proposition 1, with the condition on the rank
 made explicit; the cone program is standard.
@@ -33,19 +34,40 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from grasp_core.arrays import SMALLEST_SIZE, Array, cross, of_order_one, real_array
-from grasp_core.by_value import ByValue
-from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions, unit_size
-from grasp_core.closure.decision import decide
-from grasp_core.closure.proofs import margin_ceiling, proved_margin
-from grasp_core.closure.soft import decision as soft_decision
-from grasp_core.closure.soft import proofs as soft_proofs
-from grasp_core.closure.soft.contacts import SoftContacts, are_torsions, contact_torsions
-from grasp_core.closure.wrenches import normal_and_tangential
+from grasp_core.arrays import (
+    SMALLEST_SIZE,
+    UNIT_SLACK,
+    Array,
+    are_frictions,
+    are_units,
+    cross,
+    is_array,
+    is_number,
+    of_order_one,
+    real_array,
+)
+from grasp_core.by_value import ByValue, trusted
+from grasp_core.closure import soft_closure, soft_contacts
+from grasp_core.closure.contacts import (
+    contact_arrays,
+    contact_frictions,
+    normal_and_tangential,
+    unit_size,
+)
+from grasp_core.closure.decision import DECIDED, FAR, PRECISE, decide, deepest_forces
+from grasp_core.closure.proofs import (
+    margin_ceiling,
+    margin_ceilings,
+    proved_margin,
+    proved_margins,
+    proves_closure,
+    refutes_closure,
+    without_giants,
+)
+from grasp_core.closure.soft_contacts import SoftContacts, are_torsions, contact_torsions
 from grasp_core.errors import UndecidedError
-from grasp_core.fields import are_frictions, are_units, is_array, is_number
 from grasp_core.values import Contact, Grasp
 
 UNSAFE = 1e-6
@@ -179,11 +201,11 @@ class ClosureCertificate(ByValue):
             missed = max(contacts.missed(forces, torques), abs(float(local[:, 0].sum()) - 1.0))
             if not missed <= SUMMED:
                 return -math.inf
-            return soft_proofs.proved_margin(contacts, local, caution)
+            return soft_contacts.proved_margin(contacts, local, caution)
         wrench = self._direction()
         if wrench is None:
             return math.inf
-        ceiling = soft_proofs.margin_ceiling(contacts, contacts.at_unit_size(wrench), caution)
+        ceiling = soft_contacts.margin_ceiling(contacts, contacts.at_unit_size(wrench), caution)
         return -math.inf if ceiling <= FAR_BELOW else ceiling
 
     def _direction(self) -> Array | None:
@@ -224,57 +246,156 @@ def force_closure(
     points, units = contact_arrays(positions, normals)
     mu = contact_frictions(friction, len(points))
     torsions = contact_torsions(torsion_m, mu)
-    if torsions is not None:
-        return _with_torsion(points, units, mu, torsions)
-    arms, center, size = unit_size(points)
-    answer = decide(arms, units, mu)
-    if answer.closed is not None:
-        forces, wrench = None, None
+    forces, wrench, torques = None, None, None
+    if torsions is None:
+        arms, center, size = unit_size(points)
+        answer = decide(arms, units, mu)
         if answer.closed:
             # (2) exactly: scaling forces leaves (1) and the sign of (3) alone
             forces = answer.forces / float(np.einsum("ki,ki->", answer.forces, units))
-        else:
-            wrench = _about_origin(answer.twist, center, size)
-        found = ClosureCertificate(answer.closed, answer.margin, points, units, mu, forces, wrench)
+        elif answer.closed is False:
+            turning = answer.twist[3:] / size
+            wrench = np.concatenate([answer.twist[:3] - cross(turning, center), turning])
+    else:
+        contacts = SoftContacts.of(points, units, mu, torsions)
+        answer = soft_closure.decide(contacts)
+        if answer.closed:
+            local = answer.forces / float(answer.forces[:, 0].sum())
+            forces, torques = contacts.in_space(local)
+        elif answer.closed is False:
+            wrench = contacts.about_origin(answer.twist)
+    if answer.closed is not None:
+        found = ClosureCertificate(
+            answer.closed, answer.margin, points, units, mu, forces, wrench, torsions, torques
+        )
         # a caution above one leaves room for `verify` to round otherwise on another processor
         found = replace(found, margin=found.proved(CAUTION))
         if found.verify():
             return found
-    raise UndecidedError(_why_undecided(answer.margin))
-
-
-def _with_torsion(
-    points: Array, units: Array, friction: Array, torsions: Array
-) -> ClosureCertificate:
-    contacts = SoftContacts.of(points, units, friction, torsions)
-    answer = soft_decision.decide(contacts)
-    if answer.closed is not None:
-        forces, wrench, torques = None, None, None
-        if answer.closed:
-            forces, torques = contacts.in_space(answer.local / float(answer.local[:, 0].sum()))
-        else:
-            wrench = contacts.about_origin(answer.twist)
-        found = ClosureCertificate(
-            answer.closed, answer.margin, points, units, friction, forces, wrench, torsions, torques
-        )
-        found = replace(found, margin=found.proved(CAUTION))
-        if found.verify():
-            return found
-    raise UndecidedError(_why_undecided(answer.margin))
-
-
-def _why_undecided(margin: float) -> str:
-    if abs(margin) < UNSAFE:
-        return (
-            f"the closure margin is {margin:.2g}, too close to zero to decide; change the "
+    if abs(answer.margin) < UNSAFE:
+        raise UndecidedError(
+            f"the closure margin is {answer.margin:.2g}, too close to zero to decide; change the "
             "friction or the contacts slightly"
         )
-    return (
-        f"neither force closure nor its opposite can be proved (margin {margin:.2g}): contacts or "
-        "normals nearly coincide, or lie nearly on a line; move them apart or leave some out"
+    raise UndecidedError(
+        f"neither force closure nor its opposite can be proved (margin {answer.margin:.2g}): "
+        "contacts or normals nearly coincide, or lie nearly on a line; move them apart or leave "
+        "some out"
     )
 
 
-def _about_origin(twist: Array, center: Array, size: Array) -> Array:
-    turning = twist[3:] / size
-    return np.concatenate([twist[:3] - cross(turning, center), turning])
+@dataclass(frozen=True, slots=True, eq=False)
+class _Decided:
+    """Verdicts of compiled code on many sets of contacts, each proved or left open."""
+
+    closed: NDArray[np.bool_]
+    """Where `forces` prove closure, (g,)."""
+    separated: NDArray[np.bool_]
+    """Where `twists` prove its opposite, (g,)."""
+    forces: Array
+    """Balancing forces whose normal parts sum to one, (g, k, 3)."""
+    wrenches: Array
+    """Separating wrenches about the frame's origin, (g, 6)."""
+    margins: Array
+    """Proved margins, (g,); NaN where nothing is proved."""
+
+
+def closing_margins(positions: Array, normals: Array, friction: float) -> Array:
+    """Compute the margins of certificates of force closure for many sets of contacts, (g,).
+
+    Each is, up to rounding, the margin of the certificate that `force_closure` gives.
+
+    Takes `positions` (g, k, 3) [m]; `normals` (g, k, 3). Gives proved margins, above zero; NaN
+    where compiled code does not prove closure, which tells nothing: `force_closure` decides such
+    contacts.
+    """
+    decided = _decided(positions, normals, friction)
+    return np.where(decided.closed, decided.margins, math.nan)
+
+
+def certificates(
+    positions: Array, normals: Array, friction: float
+) -> list[ClosureCertificate | None]:
+    """Find the certificates that `force_closure` gives for many sets of contacts.
+
+    Takes `positions` (g, k, 3) [m]; `normals` (g, k, 3). Gives a certificate for each set, as
+    `ClosureCertificate.verify` accepts it; None leaves the set undecided.
+    """
+    decided = _decided(positions, normals, friction)
+    points, units, forces, wrenches = (
+        np.array(each) for each in (positions, normals, decided.forces, decided.wrenches)
+    )
+    mu = np.full(points.shape[1], friction)
+    for array in (points, units, forces, wrenches, mu):
+        array.setflags(write=False)
+    return [
+        trusted(
+            ClosureCertificate, closed=closed, margin=margin, positions=points[i],
+            normals=units[i], friction=mu, forces=forces[i] if closed else None,
+            separating_wrench=None if closed else wrenches[i], torsion_m=None, torques=None,
+        )
+        if closed or separated
+        else None
+        for i, (closed, separated, margin) in enumerate(
+            zip(
+                decided.closed.tolist(), decided.separated.tolist(), decided.margins.tolist(),
+                strict=True,
+            )
+        )
+    ]  # fmt: skip
+
+
+def _decided(positions: Array, normals: Array, friction: float) -> _Decided:
+    """Decide what compiled code can prove, with the checks of `force_closure` and `verify`."""
+    count = len(positions)
+    if not (friction > 0.0 and count):
+        never = np.zeros(count, dtype=bool)
+        nothing = np.full(count, math.nan)
+        return _Decided(never, never, np.zeros_like(positions), np.zeros((count, 6)), nothing)
+    arms, centers, sizes = unit_size(positions)
+    every = np.full(count, friction)
+    forces, twists, margins = deepest_forces(arms, normals, every, PRECISE)
+    forces, twists = without_giants(forces, 2), without_giants(twists, 1)
+    lower, upper = margins.T
+    with np.errstate(invalid="ignore"):  # a search that broke down ends with NaN
+        close = np.abs(upper - lower) <= DECIDED * np.maximum(friction, np.abs(lower))
+        close &= np.abs(lower) <= FAR * friction
+        close &= (np.abs(np.linalg.norm(normals, axis=-1) - 1.0) <= UNIT_SLACK).all(axis=-1)
+        closed, separated = close & (lower > DECIDED), close & (upper < -DECIDED)
+    closed &= proves_closure(forces, arms, normals, every[:, None])
+    separated &= refutes_closure(twists, arms, normals, every[:, None])
+    found = np.full(count, math.nan)
+    pushes = np.einsum("gki,gki->g", forces, normals)
+    forces = forces / np.where(closed, pushes, 1.0)[:, None, None]
+    turning = twists[:, 3:] / sizes[:, None]
+    wrenches = np.concatenate([twists[:, :3] - cross(turning, centers), turning], axis=1)
+    units = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+    found[closed] = _verified_closed(forces[closed], arms[closed], units[closed], friction)
+    # `verify` moves the wrench back to the mean contact, at unit size
+    moved = wrenches[:, :3] + cross(wrenches[:, 3:], centers)
+    back = np.concatenate([moved, wrenches[:, 3:] * sizes[:, None]], axis=1)
+    found[separated] = _verified_open(back[separated], arms[separated], units[separated], friction)
+    proved = ~np.isnan(found)
+    return _Decided(closed & proved, separated & proved, forces, wrenches, found)
+
+
+def _verified_closed(forces: Array, arms: Array, normals: Array, friction: float) -> Array:
+    """Return the margins that forces prove, (g,); NaN where `verify` would not accept them."""
+    found = proved_margins(forces, arms, normals, friction, CAUTION)
+    verified = (found > 0.0) & (found <= proved_margins(forces, arms, normals, friction))
+    wrenches = np.concatenate([forces.sum(axis=1), cross(arms, forces).sum(axis=1)], axis=1)
+    pushes = np.einsum("gki,gki->g", forces, normals)
+    verified &= np.abs(wrenches).max(axis=1, initial=0.0) <= SUMMED
+    verified &= np.abs(pushes - 1.0) <= SUMMED
+    return np.where(verified, found, math.nan)
+
+
+def _verified_open(twists: Array, arms: Array, normals: Array, friction: float) -> Array:
+    """Return the margins that twists prove, (g,); NaN where `verify` would not accept them."""
+    found, bound = (
+        np.where(ceilings <= FAR_BELOW, -math.inf, ceilings)
+        for ceilings in (
+            margin_ceilings(twists, arms, normals, friction, caution) for caution in (CAUTION, 1.0)
+        )
+    )
+    return np.where((found <= 0.0) & (found >= bound), found, math.nan)

@@ -1,33 +1,302 @@
-"""Defines the interval in which the critical friction of contacts is proved to lie.
+"""Holds the interval of a critical friction, with proofs of both ends in rational arithmetic.
 
-Its upper end is proved by forces f_i that balance exactly and lie inside the cones there, its lower
-end by a twist whose velocities v_i leave each contact at rest or depart steeply enough:
+The upper end is proved by forces f_i that balance exactly and lie inside the cones there, the lower
+end by a twist whose velocities v_i leave each contact at rest or depart steeply enough.
 
-    0 < n_i.f_i,     |tangential part of f_i|  <  upper n_i.f_i,                              (1)
-    n_i.v_i <= 0,    lower |tangential part of v_i|  <=  -n_i.v_i.                            (2)
+Solved: whether numbers that a search found prove what they are meant to prove, for positions and
+normals exactly as they are given: a float is a rational number.
 
-`rational_proofs` checks both in rational arithmetic.
+Forces found in floating point balance but for rounding, and a depth in the cones that falls with
+the square of the friction is soon smaller than any bound on that. So the imbalance is removed
+exactly: by least squares first, in units of the depths, and what rounding leaves of it by six
+columns of the grasp map, those of the contacts deepest in their cones first. The corrected forces
+are compared with the cones:
+
+    0 < p = n.f  and  |f|^2 |n|^2 - p^2 < mu^2 p^2.                                     (1)
+
+A twist must leave contacts that balance each other exactly at rest. Contacts that it hardly moves
+are put to rest exactly; the others must depart, steeply enough:
+
+    p = n.v <= 0  and  mu^2 (|v|^2 |n|^2 - p^2) <= p^2.                                 (2)
+
+There is one tolerance, `SAME`, for what has no exact answer: contacts whose wrenches are dependent
+but for the rounding of their coordinates.
 """
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
+from typing import TypeVar
 
 import numpy as np
 
-from grasp_core.arrays import Array, cross, real_array
+from grasp_core.arrays import Array, Indices, are_units, cross, is_array, is_number, real_array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST_FRICTION
-from grasp_core.closure.contact_arrays import FEWEST, unit_size
-from grasp_core.closure.rational_proofs import closes, separates
-from grasp_core.closure.wrenches import WRENCH
-from grasp_core.fields import are_units, is_array, is_number
+from grasp_core.closure.contacts import FEWEST, WRENCH, grasp_map, normal_and_tangential, unit_size
 
+Number = TypeVar("Number", int, Fraction)
+Exact = list[Fraction]
+"""A vector of rational numbers, without rounding."""
+
+INDEPENDENT = (1e-6, 1e-9)
+"""Distances of a unit-size wrench from the span of others above which it is independent of them,
+tried in turn; the last one defines the rank that force closure asks for."""
+NEARLY_AT_REST = 1e-9
+"""Speed below which a contact is meant to be at rest, for twists of unit size."""
+AXES = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+SAME = Fraction(1, 10**12)
+"""Speed at which a contact that cannot be put to rest exactly still counts as at rest, for twists
+of unit size: moving it by this share of the contacts' size would put it to rest."""
 FRICTIONLESS = 1e-6
 """Smallest friction at which closure is sought: files that keep six digits do not place contacts
 more precisely."""
 REPORTED_AS_ZERO = 2.0 * FRICTIONLESS
 """Largest critical friction that is reported as zero: where the true value is zero, a proof may
 need slightly more than `FRICTIONLESS` on one machine and not on another."""
+
+
+def closes(forces: Array, positions: Array, normals: Array, friction: float) -> bool:
+    """Return whether nearby forces balance exactly, strictly inside cones of full rank.
+
+    Takes `forces`, `normals` (k, 3); `positions` (k, 3) [m].
+    """
+    return closing_forces(forces, positions, normals, friction) is not None
+
+
+def closing_forces(
+    forces: Array, positions: Array, normals: Array, friction: float
+) -> Array | None:
+    """Return the exactly balanced forces that `closes` finds as floats; None if there are none.
+
+    Takes `forces`, `normals` (k, 3); `positions` (k, 3) [m].
+    """
+    if not (np.isfinite(forces).all() and 0.0 < friction < math.inf):
+        return None
+    arms, _ = _arms(positions)
+    along, across = normal_and_tangential(forces, normals)
+    # the depth of each force in its cone says how much of the imbalance it may take
+    depths = np.maximum(friction * along - across, 0.0)
+    columns = _columns(arms, np.argsort(-depths, kind="stable"))
+    if columns is None:
+        return None
+    balanced = _balanced(_nearly_balanced(forces, arms, depths), positions, columns)
+    if balanced is None:
+        return None
+    whole, unit = balanced
+    directions, _ = _whole(normals)
+    if not all(_inside(f, n, friction) for f, n in zip(whole, directions, strict=True)):
+        return None
+    return np.array([[x / unit for x in force] for force in whole])
+
+
+def separates(twist: Array, positions: Array, normals: Array, friction: float) -> bool:
+    """Return whether, for a nearby twist, no force in the friction cones has positive power.
+
+    Takes `twist` (6,) [m/s, rad/s]; `positions` (k, 3) [m]; `normals` (k, 3).
+    """
+    arms, size = _arms(positions)
+    unit = twist * np.repeat([1.0, size], 3)
+    length = float(np.linalg.norm(unit))
+    if not (0.0 < length < math.inf and friction >= 0.0):
+        return False
+    unit /= length
+    rows = grasp_map(arms).T
+    still = np.flatnonzero(np.linalg.norm((rows @ unit).reshape(-1, 3), axis=1) <= NEARLY_AT_REST)
+    wanted = (3 * still[:, None] + np.arange(3)).ravel()
+    exact_arms = _exact_arms(positions, size)
+    # an independent choice of the velocities to be made zero: the others vanish with them
+    resting = [divmod(int(wanted[each]), 3) for each in _independent(rows[wanted], INDEPENDENT[-1])]
+    exact = _at_rest([Fraction(x) for x in unit.tolist()], exact_arms, resting)
+    if exact is None or not any(exact):
+        return False
+    # what is left of a twist that is put to rest may be short: all speeds are relative to it
+    rest = SAME * max(map(abs, exact))
+    slope = None if friction == math.inf else Fraction(friction) ** 2
+    return all(
+        _departs(_velocity(exact, arm), normal, slope, rest)
+        for arm, normal in zip(exact_arms, _vectors(normals), strict=True)
+    )
+
+
+def _arms(positions: Array) -> tuple[Array, float]:
+    """Return arms from the first contact over the longest arm, (k, 3), and that arm's length."""
+    arms = positions - positions[0]
+    size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
+    return arms / size, size
+
+
+def _vectors(rows: Array) -> list[Exact]:
+    return [[Fraction(x) for x in row] for row in rows.tolist()]
+
+
+def _exact_arms(positions: Array, size: float) -> list[Exact]:
+    exact, unit = _vectors(positions), Fraction(size)
+    return [[(x - o) / unit for x, o in zip(point, exact[0], strict=True)] for point in exact]
+
+
+def _columns(arms: Array, order: Indices) -> list[tuple[int, int]] | None:
+    """Choose six independent columns of the grasp map, as (contact, axis), in order of contacts."""
+    wrenches = grasp_map(arms).T.reshape(-1, 3, WRENCH)[order].reshape(-1, WRENCH)
+    for least in INDEPENDENT:
+        found = _independent(wrenches, least)
+        if len(found) == WRENCH:
+            return [(int(order[each // 3]), each % 3) for each in found]
+    return None
+
+
+def _nearly_balanced(forces: Array, arms: Array, depths: Array) -> Array:
+    """Change forces so that they balance up to rounding, deeper ones by more."""
+    G, room = grasp_map(arms), np.repeat(depths, 3)
+    change = np.linalg.lstsq(G * room, G @ forces.ravel(), rcond=INDEPENDENT[-1])[0]
+    return forces - (room * np.asarray(change, dtype=np.float64)).reshape(forces.shape)
+
+
+def _independent(rows: Array, least: float) -> list[int]:
+    """Choose rows of (n, 6) that are at least `least` away from the span of earlier ones."""
+    left, found = rows.copy(), list[int]()
+    for row in range(len(left)):
+        length = float(np.linalg.norm(left[row]))
+        if length > least and len(found) < WRENCH:
+            found.append(row)
+            direction = left[row] / length
+            for _ in range(2):  # once more for what rounding leaves
+                left[row + 1 :] -= np.outer(left[row + 1 :] @ direction, direction)
+    return found
+
+
+def _whole(rows: Array) -> tuple[list[list[int]], int]:
+    """Return floats as whole numbers over one power of two, which is given last."""
+    ratios = [[x.as_integer_ratio() for x in row] for row in rows.tolist()]
+    unit = max(below for row in ratios for _, below in row)
+    return [[above * (unit // below) for above, below in row] for row in ratios], unit
+
+
+def _balanced(
+    forces: Array, positions: Array, columns: list[tuple[int, int]]
+) -> tuple[list[list[int]], int] | None:
+    """Change some components of forces, listed as (contact, axis), until they balance exactly.
+
+    Gives the forces as whole numbers over one positive number, which is given last.
+    """
+    (whole, unit), (points, _) = _whole(forces), _whole(positions)
+    arms = [[x - o for x, o in zip(point, points[0], strict=True)] for point in points]
+    total = [0] * WRENCH
+    for force, arm in zip(whole, arms, strict=True):
+        wrench = [*force, *_cross(arm, force)]
+        total = [sofar + part for sofar, part in zip(total, wrench, strict=True)]
+    wrenches = [[*AXES[axis], *_cross(arms[contact], AXES[axis])] for contact, axis in columns]
+    table = [[*row, missing] for *row, missing in zip(*wrenches, total, strict=True)]
+    determinant = _eliminated(table)
+    if not determinant:
+        return None
+    side = 1 if determinant > 0 else -1
+    balanced = [[side * determinant * x for x in force] for force in whole]
+    for (contact, axis), row in zip(columns, table, strict=True):
+        balanced[contact][axis] -= side * row[WRENCH]
+    return balanced, side * determinant * unit
+
+
+def _eliminated(table: list[list[int]]) -> int:
+    """Solve six equations in whole numbers, rows of (coefficients, right side), in place.
+
+    By Bareiss's elimination, whose divisions leave no remainder.
+
+    Gives the determinant up to its sign, which is the last columns' denominator; 0 if singular.
+    """
+    before = 1
+    for k in range(WRENCH):
+        pivot = next((i for i in range(k, WRENCH) if table[i][k]), None)
+        if pivot is None:
+            return 0
+        table[k], table[pivot] = table[pivot], table[k]
+        lead = table[k]
+        for i, row in enumerate(table):
+            if i != k:
+                share = row[k]
+                table[i] = [
+                    (lead[k] * a - share * b) // before for a, b in zip(row, lead, strict=True)
+                ]
+        before = lead[k]
+    return before
+
+
+def _at_rest(twist: Exact, arms: list[Exact], resting: list[tuple[int, int]]) -> Exact | None:
+    """Change a twist so that contacts' velocities along some axes, (contact, axis), are zero."""
+    rows = [_wrench(axis, arms[contact]) for contact, axis in resting]
+    speeds = [sum((a * b for a, b in zip(row, twist, strict=True)), Fraction(0)) for row in rows]
+    changes = _solution(rows, speeds)
+    return changes and [part - change for part, change in zip(twist, changes, strict=True)]
+
+
+def _wrench(axis: int, arm: Exact) -> Exact:
+    """Return the wrench of a unit force; its product with a twist is a contact's speed."""
+    force = [Fraction(int(axis == each)) for each in range(3)]
+    return [*force, *_cross(arm, force)]
+
+
+def _velocity(twist: Exact, arm: Exact) -> Exact:
+    return [a + b for a, b in zip(twist[:3], _cross(twist[3:], arm), strict=True)]
+
+
+def _solution(rows: list[Exact], right: Exact) -> Exact | None:
+    """Solve rows @ x = right for six numbers by elimination, or return None.
+
+    Numbers that the rows leave free are zero.
+    """
+    table = [[*row, value] for row, value in zip(rows, right, strict=True)]
+    pivots = list[int]()
+    for i, row in enumerate(table):
+        pivot = max(range(WRENCH), key=lambda column, row=row: abs(row[column]))
+        if not row[pivot]:
+            return None
+        pivots.append(pivot)
+        table[i] = lead = [value / row[pivot] for value in row]
+        for j, other in enumerate(table):
+            if j != i and other[pivot]:
+                share = other[pivot]
+                table[j] = [a - share * b for a, b in zip(other, lead, strict=True)]
+    x = [Fraction(0)] * WRENCH
+    for pivot, row in zip(pivots, table, strict=True):
+        x[pivot] = row[WRENCH]
+    return x
+
+
+def _inside(force: list[int], normal: list[int], friction: float) -> bool:
+    """Return whether a force is inside its friction cone, (1)."""
+    above, below = friction.as_integer_ratio()
+    along, across = _squares(force, normal)
+    return _dot(force, normal) > 0 and across * below**2 < above**2 * along
+
+
+def _departs(velocity: Exact, normal: Exact, slope: Fraction | None, rest: Fraction) -> bool:
+    """Return whether a contact departs steeply enough, (2), or its speed is at most `rest`.
+
+    `slope` is the square of the friction; with None, (2) must hold for every friction.
+    """
+    if _dot(velocity, velocity) <= rest**2:
+        return True
+    along, across = _squares(velocity, normal)
+    steep = across <= rest**2 if slope is None else slope * across <= along
+    return steep and _dot(velocity, normal) <= 0
+
+
+def _squares(vector: list[Number], normal: list[Number]) -> tuple[Number, Number]:
+    """Return squares of a vector's parts along and across a normal, times the normal's square."""
+    along = _dot(vector, normal) ** 2
+    return along, _dot(vector, vector) * _dot(normal, normal) - along
+
+
+def _dot(a: list[Number], b: list[Number]) -> Number:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: list[Number], b: list[Number]) -> list[Number]:
+    return [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -69,7 +338,19 @@ class FrictionInterval(ByValue):
 
     def verify(self) -> bool:
         """Check both ends again, in rational arithmetic and without any solver."""
-        return self._fits() and self._open_below() and self._closed_above()
+        # without a twist nothing is claimed from below, without forces nothing from above; and
+        # nothing is proved by an end that is not a number
+        if not (self._fits() and 0.0 <= self.lower <= self.upper):
+            return False
+        contacts = self.positions, self.normals
+        if self.twist is None:
+            below = self.lower == 0.0
+        else:
+            below = self.lower > 0.0 and separates(self.twist, *contacts, self.lower)
+        if self.forces is None:
+            return below and self.upper == math.inf
+        bounded = below and self.upper <= LARGEST_FRICTION
+        return bounded and closes(self.forces, *contacts, self.upper)
 
     def _fits(self) -> bool:
         count = len(self.normals) if is_array(self.normals, None, 3) else 0
@@ -81,22 +362,6 @@ class FrictionInterval(ByValue):
             and (self.twist is None or is_array(self.twist, WRENCH))
             and is_number(self.lower, most=math.inf)
             and is_number(self.upper, most=math.inf)
-        )
-
-    def _open_below(self) -> bool:
-        if not 0.0 <= self.lower <= self.upper:  # nor if one is not a number
-            return False
-        # without a twist nothing is claimed from below
-        if self.twist is None:
-            return self.lower == 0.0
-        return self.lower > 0.0 and separates(self.twist, self.positions, self.normals, self.lower)
-
-    def _closed_above(self) -> bool:
-        # without forces nothing is claimed from above
-        if self.forces is None:
-            return self.upper == math.inf
-        return self.upper <= LARGEST_FRICTION and closes(
-            self.forces, self.positions, self.normals, self.upper
         )
 
 

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import SMALLEST_SIZE, Array, cross, frozen
-from grasp_core.closure.contact_arrays import check_spread
+from grasp_core.closure.contacts import check_spread
 from grasp_core.errors import InputError
 
 LineClass: TypeAlias = Literal["planar", "concurrent", "pencil", "regulus", "independent"]

@@ -30,7 +30,7 @@ import math
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.wrenches import WRENCH
+from grasp_core.closure.contacts import WRENCH
 from grasp_core.compiled import loop
 from grasp_core.solvers.cone_steps_kernel import (
     longest_step,

@@ -16,7 +16,7 @@ velocity; so the circular cones need no pyramid.
 
 Soft contacts have a fourth local component, u = m mu_i / mu_ti for the torque m about the normal
 and the torsional coefficient mu_ti, that is, a torque over the length mu_ti / mu_i. Their cones,
-|(t, u)| <= mu_i n, are circular too, in one dimension more; see `soft.contacts`.
+|(t, u)| <= mu_i n, are circular too, in one dimension more; see `soft_contacts`.
 
 Source: Ferrari & Canny, "Planning optimal grasps" (ICRA 1992), with circular cones.
 """
@@ -28,14 +28,20 @@ from typing import Literal, Self, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import Array, are_frictions, frozen, is_a, is_array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import one_of, positive, shown
-from grasp_core.closure.contact_arrays import check_spread, contact_arrays, contact_frictions
-from grasp_core.closure.soft.contacts import LOCAL, contact_torsions, torsion_lengths
-from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
+from grasp_core.closure.contacts import (
+    WRENCH,
+    check_spread,
+    contact_arrays,
+    contact_frames,
+    contact_frictions,
+    grasp_map,
+    in_frames,
+)
+from grasp_core.closure.soft_contacts import LOCAL, contact_torsions, torsion_lengths
 from grasp_core.errors import InputError
-from grasp_core.fields import are_frictions, is_a, is_array
 from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.solvers.ties import on_grid
 from grasp_core.values import Contact, Grasp
@@ -54,7 +60,7 @@ LARGEST_RATIO = 1e6
 """
 LONGEST_LEVER = 2e9
 """Largest entry of a matrix of wrenches: coordinates up to `LARGEST_RATIO`, and a thousand times as
-much where torques are over a thousandth of the scale (see `resisted_loads`)."""
+much where torques are over a thousandth of the scale (see `measures`)."""
 
 
 def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:

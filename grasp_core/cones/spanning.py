@@ -33,6 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 from grasp_core.arrays import Array, Indices, frozen, frozen_units
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
+from grasp_core.values import FINGERS
 
 SIGNS = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=np.float64)
 LARGEST_SPAN_ANGLE = math.asin(1.0 / 3.0)
@@ -47,6 +48,8 @@ OTHERS = ([1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2])
 """Indices of the other three cones, for each of the four."""
 DEPENDENT = 1e-12
 """Determinant below which three unit vectors count as coplanar: a few rounding errors."""
+TRIPLES = np.array(list(combinations(range(FINGERS), 3)))
+"""Indices of three of four vectors, (4, 3)."""
 
 
 def span_angle(normals: ArrayLike) -> float:
@@ -269,3 +272,38 @@ def _sorted(parts: Sequence[Indices], count: int) -> Indices:
 
 
 _TINY = float(np.finfo(np.float64).tiny)
+
+
+def span_angles(normals: Array) -> Array:
+    """Find the span angle of many quadruples of unit vectors (q, 4, 3), (q,) [rad].
+
+    Gives theta* of each; 0.0 where the vectors do not positively span R^3.
+    """
+    triples = normals[:, TRIPLES]
+    # (2), the minimum over signs being taken in `triple_sine`
+    sines = np.abs(triple_sine(triples[:, :, 0], triples[:, :, 1], triples[:, :, 2]))
+    least = sines.min(axis=1, initial=1.0)
+    return np.where(each_positively_spans(normals), np.arcsin(least), 0.0)
+
+
+def each_positively_spans(vectors: Array) -> NDArray[np.bool_]:
+    """Return which quadruples of vectors (q, 4, 3) positively span R^3, (q,)."""
+    signed = signed_determinants(vectors)
+    spans: NDArray[np.bool_] = (signed.min(axis=-1) > DEPENDENT) | (
+        signed.max(axis=-1) < -DEPENDENT
+    )
+    return spans
+
+
+def each_cones_positively_span(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
+    """Return for many quadruples of circular cones whether they satisfy the generalised P3, (q,).
+
+    Takes `axes` (q, 4, 3); `half_angles` (q, 4) [rad].
+    """
+    spans = each_positively_spans(axes)
+    triples = axes[spans][:, TRIPLES]
+    sines = np.sin(half_angles[spans])[:, TRIPLES]
+    # the corners of the box (1), whose sides differ: none may reach the unit sphere
+    corners = np.linalg.solve(triples, (SIGNS * sines[:, :, None]).swapaxes(-1, -2))
+    spans[spans] = np.linalg.norm(corners, axis=-2).max(axis=(1, 2), initial=0.0) < 1.0
+    return spans

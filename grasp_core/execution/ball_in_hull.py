@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
-from grasp_core.fields import is_indices
+from grasp_core.arrays import Array, Indices, is_indices
 from grasp_core.solvers.ties import first_best, on_grid
 
 UNITS_LOST = 16.0

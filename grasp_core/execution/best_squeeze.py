@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
 from grasp_core.checked import instance, positive
-from grasp_core.closure.wrenches import WRENCH
+from grasp_core.closure.contacts import WRENCH
 from grasp_core.errors import NoForcesError, SolverError
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
 from grasp_core.execution.loads import LoadSet

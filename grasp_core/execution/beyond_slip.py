@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
-from grasp_core.closure.wrenches import WRENCH
+from grasp_core.closure.contacts import WRENCH
 from grasp_core.execution.first_slip import slip_steps
 from grasp_core.execution.grips import Grip
 

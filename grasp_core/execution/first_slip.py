@@ -1,21 +1,28 @@
 """The smallest multiple of a load at which a contact of a grip begins to slip.
 
-The commands of the fingers stay as they are while the load grows. Contact i slips where its
-tangential force reaches the cone, |t| = mu n, which happens at n = 0 at the latest. In the linear
-model the force along the contact's axes is f + s A w (see `grips`), so with its parts (n, t) and
-those (a, b) of A w the first slip is at the least positive root s of
+*The pose under a load of any size*, as long as no contact slips. The linear response of `grips`
+holds for small motions. Soft fingertips let the object move by millimetres, so the load is raised
+in steps and the equilibrium is found anew at each: Newton steps with the stiffness (5) of `grips`
+at the pose reached. A turn by t carries tip centres along by (2) there and rolls them on their
+faces. Rolling depends on the path, of which every Newton step is a part; the steps are short, and
+what remains is of third order in their length.
+
+*The first slip.* The commands of the fingers stay as they are while the load grows. Contact i slips
+where its tangential force reaches the cone, |t| = mu n, which happens at n = 0 at the latest. In
+the linear model the force along the contact's axes is f + s A w (see `grips`), so with its parts
+(n, t) and those (a, b) of A w the first slip is at the least positive root s of
 
     |t + s b|^2 = mu^2 (n + s a)^2    with    n + s a >= 0.                               (1)
 
-The finite model follows the equilibrium (see `equilibrium`): at each pose (1) says how far the
-load can grow if the response stays as it is; the load is raised by that, or by as much as moves the
-object by a small step, and the response is taken anew. The steps to the root become Newton's, and
-the root is met to `MET`. A finger with a limit on its push is also checked against it: beyond the
-limit no closed grasp is sure to resist (see `wrench_body`), so that a first slip with limits is
-never above the closure limit.
+The finite model follows the equilibrium: at each pose (1) says how far the load can grow if the
+response stays as it is; the load is raised by that, or by as much as moves the object by a small
+step, and the response is taken anew. The steps to the root become Newton's, and the root is met to
+`MET`. A finger with a limit on its push is also checked against it: beyond the limit no closed
+grasp is sure to resist (see `wrench_limits`), so that a first slip with limits is never above the
+closure limit.
 
 Motors may be at the limit of their torques first. With the torque tau_j = (L f + g)_j of a joint
-and its change d_j = (L C w)_j per load, both in the object's axes (see `joint_torques`), that is at
+and its change d_j = (L C w)_j per load, both in the object's axes (see `squeeze_rows`), that is at
 
     s = (c_j - sign(d_j) tau_j) / |d_j|,                                                  (2)
 
@@ -29,21 +36,23 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import Array, cross, frozen
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, number, one_of
+from grasp_core.closure.contacts import WRENCH, grasp_map
 from grasp_core.errors import InputError, SolverError
-from grasp_core.execution.equilibrium import Held, at_rest, rotation, under
 from grasp_core.execution.grips import Grip, check_grip
-from grasp_core.execution.joint_torques import torque_excess, torque_steps
 from grasp_core.quality.motors import Motors, motors_for
 
+SETTLED = 1e-11
+"""Largest wrench that is left, relative to the pushes and the load."""
+MOST_NEWTON = 50
+"""Newton steps for one load; four or five are usual."""
 Event: TypeAlias = Literal["slip", "push limit", "torque limit", "unstable", "none"]
 """What ends the growth of a load: a contact slips, a finger reaches its limit, a joint its torque,
 the equilibrium is not stable any more, or nothing up to `FARTHEST`."""
 Model: TypeAlias = Literal["finite", "linear"]
 """Whether the object's motion is followed, or taken to be small."""
-
 FARTHEST = 1e6
 """Largest load that is tried, in units of the largest push at rest."""
 STEP = 0.02
@@ -57,6 +66,75 @@ SMALLEST_STEP = 1e-6
 """Part of a step at which the equilibrium ends, rather than that Newton's method fails."""
 AT_REST = 1e-9
 """How far a squeeze may leave a cone or limit at rest, in largest pushes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Held:
+    """A grip in equilibrium under a load."""
+
+    grip: Grip
+    """The grip in this pose: arms, normals and forces as they are now."""
+    moved: Array
+    """Displacement of the centre of mass, (3,) [m]."""
+    rotation: Array
+    """Orientation of the object against the one at rest, (3, 3)."""
+    tips: Array
+    """Displacements of the tips' centres, (k, 3) [m]."""
+    load: Array
+    """External wrench on the object, (6,) [N, N m], about the centre of mass."""
+
+    @property
+    def forces(self) -> Array:
+        """Contact forces on the object, world axes, (k, 3) [N]."""
+        return self.grip.squeeze
+
+
+def at_rest(grip: Grip) -> Held:
+    """Return a grip as it is before any load."""
+    return Held(grip, np.zeros(3), np.eye(3), np.zeros_like(grip.arms), np.zeros(WRENCH))
+
+
+def under(held: Held, start: Grip, load: Array) -> Held:
+    """Find the equilibrium under a load, starting from one under a load nearby."""
+    size = start.size
+    scale = np.repeat([1.0, size], 3)
+    unit = np.linalg.norm(start.squeeze, axis=1).sum() + float(np.linalg.norm(load / scale))
+    for _ in range(MOST_NEWTON):
+        left = grasp_map(held.grip.arms) @ held.forces.ravel() + load
+        if float(np.abs(left / scale).max()) <= SETTLED * unit:
+            return Held(held.grip, held.moved, held.rotation, held.tips, load)
+        held = stepped(held, start, held.grip.compliance @ left)
+        if not np.isfinite(held.grip.arms).all():
+            break
+    raise SolverError("no equilibrium of the loaded grip was found")
+
+
+def stepped(held: Held, start: Grip, step: Array) -> Held:
+    """Move the object by a translation and a turn, and let the tips follow."""
+    shift, turn = step[:3], step[3:]
+    R = rotation(turn)
+    grip = held.grip
+    radii = grip.tip_radius_m[:, None]
+    # a tip's centre is at r - rho n from the centre of mass, and rolls by rho (t x n) on the face
+    half = rotation(0.5 * turn)
+    centers = (grip.arms - radii * grip.normals) @ R.T
+    centers += radii * cross(turn, grip.normals @ half.T)
+    normals = grip.normals @ R.T
+    arms = centers + radii * normals
+    moved = held.moved + shift
+    tips = moved + centers - (start.arms - radii * start.normals)
+    forces = start.squeeze - np.einsum("kij,kj->ki", start.stiffness, tips)
+    turned = Grip(arms, normals, grip.friction, forces, grip.stiffness, grip.tip_radius_m)
+    return Held(turned, moved, R @ held.rotation, tips, held.load)
+
+
+def rotation(turn: Array) -> Array:
+    """Compute the rotation by a vector, (3,) [rad], as a matrix (3, 3)."""
+    angle = float(np.linalg.norm(turn))
+    x, y, z = turn
+    C = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # sin(a) / a and (1 - cos(a)) / a^2, the second without cancellation
+    return np.eye(3) + np.sinc(angle / np.pi) * C + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * C @ C
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -240,7 +318,10 @@ def _finite(start: Grip, load: Array, most: _Limits) -> FirstSlip:
         further, event, place = _next_event(held, load, most)
         if further <= MET * reached:
             return _ended(held, reached, event, place)
-        step = min(further, part * STEP / _pace(held.grip, load))
+        motion = held.grip.compliance @ load
+        shift = float(np.linalg.norm(motion[:3])) / held.grip.size
+        pace = max(shift, float(np.linalg.norm(motion[3:])))
+        step = min(further, part * STEP / pace)
         if reached + step > farthest:
             return _ended(held, math.inf, "none", -1)
         try:
@@ -250,12 +331,6 @@ def _finite(start: Grip, load: Array, most: _Limits) -> FirstSlip:
             continue
         held, reached, part = moved, multiple, min(1.0, 2.0 * part)
     raise SolverError("the load of first slip was not met; the grip may be nearly unstable")
-
-
-def _pace(grip: Grip, load: Array) -> float:
-    """Motion of the object per multiple of a load, in arms' lengths or radians."""
-    motion = grip.compliance @ load
-    return max(float(np.linalg.norm(motion[:3])) / grip.size, float(np.linalg.norm(motion[3:])))
 
 
 def _followed(
@@ -301,3 +376,19 @@ def _ended(held: Held, multiple: float, event: Event, place: int) -> FirstSlip:
         multiple, event, contact, held.forces, held.grip.arms, held.grip.normals,
         float(np.linalg.norm(held.moved)), math.atan2(sine, cosine), joint,
     )  # fmt: skip
+
+
+def torque_steps(torques: Array, rates: Array, limits: Array) -> Array:
+    """Find the further multiple of a load at which each torque reaches its limit, (joints,)."""
+    # a torque grows towards the limit of its own sign, or falls to that of the other
+    left = np.maximum(limits - np.sign(rates) * torques, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(rates != 0.0, left / np.abs(rates), np.inf)
+
+
+def torque_excess(torques: Array, rates: Array, limits: Array) -> float:
+    """Find how much less load brings joints that are just beyond their limits back, or zero."""
+    growing = np.sign(torques) * rates
+    with np.errstate(divide="ignore", invalid="ignore"):
+        back = (np.abs(torques) - limits) / growing
+    return float(np.max(np.where(growing > 0.0, back, 0.0), initial=0.0))

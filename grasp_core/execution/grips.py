@@ -46,18 +46,34 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, frozen_each
+from grasp_core.arrays import (
+    Array,
+    are_frictions,
+    are_units,
+    frozen,
+    frozen_each,
+    is_array,
+    real_array,
+)
 from grasp_core.by_value import ByValue
-from grasp_core.checked import LARGEST, instance, several
-from grasp_core.closure.contact_arrays import FEWEST, contact_arrays, contact_frictions, stacked
-from grasp_core.closure.wrenches import WRENCH, contact_frames, cross_matrix, grasp_map
+from grasp_core.checked import LARGEST, SMALLEST, instance, several
+from grasp_core.closure.contacts import (
+    FEWEST,
+    WRENCH,
+    contact_arrays,
+    contact_frames,
+    contact_frictions,
+    cross_matrix,
+    grasp_map,
+    stacked,
+)
 from grasp_core.errors import InputError
-from grasp_core.execution.springs import are_springs, springs
-from grasp_core.fields import are_frictions, are_units, is_array
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 
+SYMMETRIC = 1e-9
+"""How far the matrix of a spring may be from symmetric, relative to its largest eigenvalue."""
 STIFFNESS_N_PER_M = 2000.0
 """Stiffness of a fingertip unless stated: a soft pad or a compliant finger, 5 N at 2.5 mm."""
 TIP_RADIUS_M = 0.01
@@ -66,6 +82,32 @@ STIFF = 1e-9
 """Share of the largest stiffness that is none: two fingers alone leave as little by rounding."""
 BALANCED = 1e-6
 """Largest wrench of a squeeze, relative to the sum of its forces (times the longest arm)."""
+
+
+def springs(stiffness: ArrayLike, count: int) -> Array:
+    """Return one checked matrix for each fingertip, (count, 3, 3), of one number or one each.
+
+    Takes `stiffness` [N/m].
+    """
+    if real_array(stiffness, "stiffness").ndim < len(("finger", "row", "column")):
+        each = frozen_each(stiffness, count, "stiffness")
+        stiffness = each[:, None, None] * np.eye(3)
+    K = frozen(stiffness, (count, 3, 3), "stiffness")
+    if not are_springs(K):
+        raise InputError(
+            "stiffness must be positive, or matrices that are symmetric and positive definite, "
+            f"with eigenvalues from {SMALLEST:g} to {LARGEST:g} N/m"
+        )
+    return K
+
+
+def are_springs(K: Array) -> bool:
+    """Return whether matrices (k, 3, 3) are symmetric, positive definite and of plausible size."""
+    if float(np.abs(K).max()) > LARGEST:
+        return False
+    values = np.linalg.eigvalsh(K)
+    odd = np.abs(K - np.swapaxes(K, 1, 2)).max(axis=(1, 2))
+    return bool((values >= SMALLEST).all() and (odd <= SYMMETRIC * values[:, -1]).all())
 
 
 @dataclass(frozen=True, eq=False, repr=False)

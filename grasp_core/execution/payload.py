@@ -7,7 +7,7 @@ the scale of a `BestSqueeze` for the weight of one kilogram in any direction.
 1, are in the set S of forces through the centre of mass that contacts with limited pushes resist.
 S is convex, so the largest such mass is the distance from the origin to the border of S, in units
 of weight. The ray in a direction d meets the border at a mass lambda with a facet y of the body of
-wrenches (see `wrench_body`), both proved:
+wrenches (see `wrench_limits`), both proved:
 
     lambda d is in S,   and   m d' in S  implies  m <= h(y) / (-g y_F.d') for all d',     (1)
 
@@ -25,7 +25,7 @@ Where motors hold the fingertips, S is the set of forces through the centre of m
 resist within the torques of the joints, too. These are bounds that are linear in the contact
 forces, and zero meets them: the allowed forces stay a convex set around zero, and so does S, its
 image under a linear map, cut with the wrenches without torque. (1) and (2) ask for no more, with
-h(y) the support under these bounds, (3) of `wrench_body`. The hand turns with its object, and so
+h(y) the support under these bounds, (3) of `wrench_limits`. The hand turns with its object, and so
 the weight of its links turns: `Motors.in_any_orientation` has limits that leave room for it.
 """
 
@@ -35,22 +35,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Indices, is_a, is_indices, is_number, is_tuple_of
+from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import positive
-from grasp_core.closure.wrenches import WRENCH
+from grasp_core.closure.contacts import WRENCH
 from grasp_core.errors import InputError
 from grasp_core.execution.ball_in_hull import ball_in, least_distance, nearest_facet, outward
 from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
 from grasp_core.execution.loads import GRAVITY_M_PER_S2, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
-from grasp_core.fields import is_a, is_indices, is_number, is_tuple_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors, motors_for
-from grasp_core.quality.wrench_body import WrenchBody
-from grasp_core.quality.wrench_limit import WrenchLimit, attains, bounds, limit_of
-from grasp_core.short_text import summary
+from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit, attains, bounds, limit_of
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
 
@@ -116,7 +113,7 @@ class Payload(ByValue):
                 and is_a(self.free, FreeMass)
                 and self.fixed.verify()
                 and _is_weight(self.fixed)
-                and _turns_with_hand(self.fixed.motors)
+                and (self.fixed.motors is None or not self.fixed.motors.gravity.any())
                 and is_tuple_of(self.free.rays, WrenchLimit)
                 and is_number(self.free.lower, least=0.0)
                 and is_number(self.free.upper, least=self.free.lower)
@@ -177,24 +174,15 @@ def payload(
     """
     start = unsqueezed(body, contacts, friction, stiffness=stiffness, tip_radius_m=tip_radius_m)
     most = positive(max_push_n, "max_push_n")
-    _check_turning(motors, len(start.friction))
-    fixed = searched(start, any_direction(1.0), most, motors)
-    return Payload(fixed, _free_mass(_body(start, most, motors)))
-
-
-def _check_turning(motors: Motors | None, contacts: int) -> None:
-    """Refuse motors that are not those of so many contacts, or that carry links in one way only."""
-    loaded = np.flatnonzero(motors_for(motors, contacts).gravity)
+    loaded = np.flatnonzero(motors_for(motors, len(start.friction)).gravity)
     if loaded.size:
         raise InputError(
             f"motors must have no gravity for a payload, but joint {int(loaded[0])} carries links: "
             "the hand turns with its object, and so does the weight of its links; give "
             "gc.Motors.in_any_orientation(levers, limits, weights), which leaves room for it"
         )
-
-
-def _turns_with_hand(motors: Motors | None) -> bool:
-    return motors is None or not motors.gravity.any()
+    fixed = searched(start, any_direction(1.0), most, motors)
+    return Payload(fixed, _free_mass(_body(start, most, motors)))
 
 
 def _body(grip: Grip, max_push_n: float, motors: Motors | None) -> WrenchBody:

@@ -9,14 +9,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, is_a, is_array, is_indices, is_number
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST
-from grasp_core.closure.wrenches import WRENCH
+from grasp_core.closure.contacts import WRENCH
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet
 from grasp_core.execution.squeeze_rows import Cuts, Survival
-from grasp_core.fields import is_a, is_array, is_indices, is_number
 from grasp_core.quality.motors import Motors
 
 ROUNDING = 1e-9
@@ -102,14 +101,20 @@ class BestSqueeze(ByValue):
             return replace(self, grip=replace(self.grip))._is_proved()
 
     def _is_proved(self) -> bool:
-        if not (self.grip.sound() and self.grip.stable and self._has_motors()):
+        if not (self.grip.sound() and self.grip.stable):
+            return False
+        motors = self.motors
+        if motors is not None and not (
+            is_a(motors, Motors) and motors.sound(len(self.grip.friction))
+        ):
             return False
         survival = Survival.of(self.grip, self.loads, self.motors)
         return (
             self._fits(survival)
             and self._survives(survival)
             and self._ends(survival)
-            and self._is_bounded(survival)
+            and survival.bound(self.cuts, self.multipliers, self.balance, self.max_push_n)
+            <= self.upper * (1.0 + ROUNDING) + no_scale(survival, self.max_push_n)
         )
 
     def _has_numbers(self) -> bool:
@@ -121,11 +126,6 @@ class BestSqueeze(ByValue):
             and is_number(self.scale, least=0.0)
             and is_number(self.upper, least=self.scale)
         )
-
-    def _has_motors(self) -> bool:
-        if self.motors is None:
-            return True
-        return is_a(self.motors, Motors) and self.motors.sound(len(self.grip.friction))
 
     def _fits(self, survival: Survival) -> bool:
         cases = len(survival.friction)
@@ -169,10 +169,6 @@ class BestSqueeze(ByValue):
         normal, *across = (start + further * change @ self.direction).tolist()
         slipping = float(np.hypot(*across)) >= reactions.friction[self.contact] * normal
         return bool(slipping or normal >= self.max_push_n)
-
-    def _is_bounded(self, survival: Survival) -> bool:
-        bound = survival.bound(self.cuts, self.multipliers, self.balance, self.max_push_n)
-        return bound <= self.upper * (1.0 + ROUNDING) + no_scale(survival, self.max_push_n)
 
 
 def no_scale(survival: Survival, max_push_n: float) -> float:

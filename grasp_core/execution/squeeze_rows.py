@@ -13,10 +13,18 @@ between 0 and N if
 Where w0 is not zero, the same is asked of the squeeze alone: at rest nothing slips either. These
 are further *cases*, with a = B = 0 and no offset. Squeezes balance, G f = 0.
 
-Where motors hold the fingertips, their joints stay within their torques, under the loads and, where
-w0 is not zero, at rest, if with the rows of `joint_torques`, (1) there,
+The joints of a hand have the torques L f + g under contact forces f, stacked, which motors with the
+limits c hold (see `motors`). Under the loads the forces along the axes of the contacts are f + f0 +
+s C z, with f0 what the offset w0 adds, and C what unit loads add. The largest torque of joint j
+over the loads is that of the squeeze, plus s times the length of row j of L C, so that all loads
+leave all joints within their limits if, with |.| for the lengths of rows,
 
     L f + s |L C| <= c - g - L f0,    -L f + s |L C| <= c + g + L f0.                     (3)
+
+Where w0 is not zero, the same is asked at rest, with f0 = C = 0. Rows are divided by the longest
+lever of their joint, so that they are forces. L stays as it is at rest, along axes that turn with
+the object. The object moves by little against the length of the links, and that share of the
+torques is left out.
 
 Multipliers y >= 0 of some rows (1), of (2) and of (3), and z of the balance, combine the rows R f +
 s c <= b + N d. If R'y + G'z = r, then for every squeeze that survives the scale s
@@ -27,22 +35,102 @@ which bounds s where c.y > 0. The residual r is zero but for rounding.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, of_order_one
 from grasp_core.by_value import ByValue
-from grasp_core.closure.wrenches import grasp_map, in_frames
+from grasp_core.closure.contacts import grasp_map, in_frames
 from grasp_core.execution.grips import Grip
-from grasp_core.execution.joint_torques import JointTorques
 from grasp_core.execution.loads import LoadSet
 from grasp_core.execution.worst_loads import Reactions
 from grasp_core.quality.motors import Motors, motors_for
 
+ROUNDING = 1e-9
+"""How far a torque may exceed its limit by rounding, relative to the limit."""
 STARTS = 8
 """Tangent directions of each case in the first program."""
 BOUNDING = 1e-6
 """Least c.y of (4), relative to |c| |y|, that bounds the scale."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointTorques:
+    """Torques of the joints, over their longest levers, in groups: under the loads, and at rest."""
+
+    levers: Array
+    """Rows of L for forces in the contacts' frames, over the longest lever, (joints, 3k)."""
+    limits: Array
+    """Limits c, (joints,) [N]."""
+    start: Array
+    """What links and offset ask for in each group, g + L f0, (groups, joints) [N]."""
+    change: Array
+    """What the ellipsoid adds in each group, L C, (groups, joints, m) [N]."""
+
+    @classmethod
+    def of(cls, motors: Motors, frames: Array, offset: Array, change: Array) -> "JointTorques":
+        """Take the joints of contacts with given responses.
+
+        Takes `frames` (k, 3, 3); `offset` (groups k, 3) [N]; `change` (groups k, 3, m) [N].
+        """
+        k, joints = len(frames), len(motors.limits)
+        groups = len(offset) // k
+        local = in_frames(motors.levers, frames)
+        arms = np.linalg.norm(local.reshape(joints, k, 3), axis=2).max(axis=1)
+        arms = np.where(arms > 0.0, arms, 1.0)  # a joint that no contact loads
+        levers = local / arms[:, None]
+        start = motors.gravity / arms + offset.reshape(groups, 3 * k) @ levers.T
+        stacked = change.reshape(groups, 3 * k, change.shape[2])
+        return cls(levers, motors.limits / arms, start, levers @ stacked)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows (3)."""
+        return 2 * self.start.size
+
+    @cached_property
+    def swing(self) -> Array:
+        """How far each torque changes at scale one, |L C|, (groups, joints) [N]."""
+        return np.linalg.norm(self.change, axis=2)
+
+    def matrix(self) -> tuple[Array, Array, Array]:
+        """Build the rows (3), R f + s c <= b, of all groups: R (rows, 3k), c (rows,), b (rows,)."""
+        one_way = np.tile(self.levers, (len(self.start), 1))
+        swing = self.swing.ravel()
+        room = np.concatenate(
+            [(self.limits - self.start).ravel(), (self.limits + self.start).ravel()]
+        )
+        return np.vstack([one_way, -one_way]), np.append(swing, swing), room
+
+    def under(self, local: Array) -> Array:
+        """Compute the torques in the middle of the loads, (groups, joints) [N]."""
+        return self.start + self.levers @ local.ravel()
+
+    def scales(self, local: Array) -> Array:
+        """Find the scale at which each torque reaches its limit, (groups, joints)."""
+        room, swing = self.limits - np.abs(self.under(local)), self.swing
+        scales = np.where(swing > 0.0, room / np.where(swing > 0.0, swing, 1.0), np.inf)
+        return np.where(room >= -ROUNDING * self.limits, scales, -np.inf)
+
+    def shares(self, local: Array, scale: float) -> Array:
+        """Compute the largest torques up to a scale of the loads, over their limits, (joints,)."""
+        reached = np.abs(self.under(local)) + scale * self.swing
+        return (reached / self.limits).max(axis=0)
+
+    def holds(self, local: Array, scale: float) -> bool:
+        """Return whether all torques stay within their limits up to a scale of the loads."""
+        return bool((self.shares(local, scale) <= 1.0 + ROUNDING).all())
+
+    def worst_of(self, joint: int, local: Array) -> Array:
+        """Find the z, of unit length, whose load takes most torque of a joint, (m,)."""
+        way = self.change[0, joint] / self.swing[0, joint]
+        return way if self.under(local)[0, joint] >= 0.0 else -way
+
+    def is_reached(self, joint: int, local: Array, place: Array) -> bool:
+        """Return whether a load, scale times z as `place`, takes a joint to its limit."""
+        torque = self.under(local)[0, joint] + self.change[0, joint] @ place
+        return bool(abs(torque) >= self.limits[joint])
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -143,10 +231,7 @@ class Survival:
         )  # fmt: skip
 
     def bound(self, cuts: Cuts, multipliers: Array, balance: Array, max_push_n: float) -> float:
-        """Bound by (4) the scale that any squeeze with this response survives; infinite if none.
-
-        Takes `multipliers` (r + 2 cases + joint rows,); `balance` (6,).
-        """
+        """Bound by (4) the scale that any squeeze with this response survives; infinite if none."""
         rows = self.rows(cuts)
         # multipliers of any length mean the same
         multipliers, balance = of_order_one(multipliers, balance)

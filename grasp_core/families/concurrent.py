@@ -50,8 +50,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.cones.pyramids import inscribed_facets
 from grasp_core.cones.spanning import balancing_weights
-from grasp_core.families.discs import largest_discs
-from grasp_core.families.placements import NoPlacement, Placement, balanced_forces
+from grasp_core.families.placements import NoPlacement, Placement, balanced_forces, largest_discs
 from grasp_core.geometry.polygons import clip
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.ties import surpassing

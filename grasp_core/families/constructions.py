@@ -16,8 +16,7 @@ from grasp_core.families.concurrent import (
 )
 from grasp_core.families.pencil import place_pencil
 from grasp_core.families.placements import NoPlacement, Placement
-from grasp_core.families.regulus import place_regulus
-from grasp_core.families.regulus_program import nearly_symmetric
+from grasp_core.families.regulus import nearly_symmetric, place_regulus
 from grasp_core.objects.face_pieces import FacePiece, inscribed_disc_radius
 from grasp_core.values import ContactRegion, Family, ForceCone
 

@@ -55,12 +55,12 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.cones.spanning import angles_between
-from grasp_core.families.discs import largest_discs
 from grasp_core.families.placements import (
     NoPlacement,
     Placement,
     balanced_forces,
     focus_direction,
+    largest_discs,
 )
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.ties import surpassing

@@ -1,6 +1,13 @@
-"""Holds the result of a construction: contacts with the forces that prove them, or a bound.
+"""Holds placements, the results of constructions, and solves the program of their discs.
 
-Lengths are in the pieces' units, where the object has size one.
+A placement is contacts with the forces that hold them. Lengths are in the pieces' units, where the
+object has size one.
+
+Discs. A first program maximises the smallest radius. That radius may be negative, so the program is
+always feasible and the sign of its optimum, with the multipliers that prove it, decides. The
+second keeps the smallest radius and maximises the sum of the four, so that contacts whose discs
+have room do not end up against an arbitrary edge. Among its optima the point nearest to the origin
+of the variables is taken (see `ties`).
 """
 
 from collections.abc import Sequence
@@ -10,7 +17,22 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.cones.spanning import balancing_weights
+from grasp_core.errors import SolverError
 from grasp_core.objects.face_pieces import FacePiece
+from grasp_core.solvers.lp import (
+    RESIDUAL,
+    Below,
+    Infeasible,
+    LinearProgram,
+    Optimum,
+    maximize,
+    maximize_above,
+)
+from grasp_core.solvers.ties import nearest_optimum
+
+KEPT = 1e-6
+"""Share of the smallest radius that the second program may give up. With less, its optima would
+form slivers, in which rounding moves the nearest point a thousand times as far."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,3 +84,48 @@ def focus_direction(axes: Array) -> Array:
     first = np.einsum("...i,...ij->...j", balancing_weights(axes)[..., :2], axes[..., :2, :])
     w = np.asarray(first, dtype=np.float64)
     return w / np.linalg.norm(w, axis=-1, keepdims=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LargestDiscs:
+    """The variables of the disc program, and the radius that it maximised."""
+
+    x: Array
+    """Variables, (n,); the radii among them are reduced by the error of a program's answer."""
+    merit: float
+    """Largest value of the smallest radius: the same on every machine except for the last digits.
+    """
+
+
+def largest_discs(
+    A: Array, b: Array, radii: slice, smallest: int, least: float
+) -> LargestDiscs | NoPlacement:
+    """Find the largest four equal discs, then enlarge each, subject to rows A x <= b.
+
+    Takes `A` (rows, n); `b` (rows,). Gives the discs, or a proved bound below `least` on their
+    common radius.
+    """
+    n = A.shape[1]
+    common = np.eye(n)[smallest]
+    first = maximize_above(LinearProgram(common, A, b), least)
+    if isinstance(first, Infeasible):
+        raise SolverError(
+            "the solver called a disc program infeasible, though small discs always fit"
+        )
+    if isinstance(first, Below):
+        return NoPlacement(first.bound)
+    if first.value < least:
+        return NoPlacement(first.value)
+    kept = LinearProgram(
+        np.eye(n)[radii].sum(axis=0),
+        np.vstack([A, -common]),
+        np.append(b, -first.value * (1.0 - KEPT)),
+    )
+    try:
+        second = maximize(kept)
+    except SolverError:
+        second = first  # within rounding of infeasible where discs are tiny
+    x = nearest_optimum(kept, second) if isinstance(second, Optimum) else first.x
+    x = np.array(x)
+    x[radii] = np.maximum(x[radii] - RESIDUAL, 0.0)
+    return LargestDiscs(x, first.value - RESIDUAL)

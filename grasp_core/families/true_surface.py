@@ -82,15 +82,11 @@ def _aimed(
     inward = np.einsum("ki,ki->k", ways, axes)
     cosines = np.abs(inward) / np.linalg.norm(ways, axis=1)
     if (cosines < np.cos([cone.half_angle for cone in cones])).any() or not all(
-        _holds(facet, at) for facet, at in zip(facets, positions, strict=True)
+        facet.inset(at) >= -ON_EDGE for facet, at in zip(facets, positions, strict=True)
     ):
         return None
     forces = balanced_forces(facets, np.sign(inward)[:, None] * ways)
     return replace(planned, positions=positions, forces=forces)
-
-
-def _holds(facet: FacePiece, point: Array) -> bool:
-    return facet.inset(point) >= -ON_EDGE
 
 
 def _facet(

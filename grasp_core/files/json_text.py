@@ -1,12 +1,321 @@
-"""Writes a document as JSON text in which each grasp, verdict or other item has its own line.
+"""Reads JSON text as plain values or checked records, and writes it with a line for each item.
 
-Lines can be counted, searched and compared, and each of them is written by the compiled encoder of
-Python, which knows no layout but one line.
+Cases that JSON leaves open are refused: a key twice in one object, numbers that are too large or
+not finite, very deep nesting, and characters that cannot be encoded. A file of another kind that
+graspproof writes is refused by its name. What pydantic finds wrong with a record becomes a
+sentence: field, expected, found value. In a text that is written, lines can be counted, searched
+and compared.
 """
 
 import json
-from collections.abc import Mapping
-from typing import Any, cast
+import math
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
+
+from grasp_core.errors import InputError
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
+DEEPEST = 64
+"""Largest number of objects and lists inside each other; files of graspproof have less than ten."""
+LARGEST_WHOLE = 2**64 - 1
+"""Largest whole number: larger ones are no seeds, counts or indices, and arrays cannot hold them.
+"""
+LONGEST_ECHO = 40
+"""Largest number of characters of a wrong value, or of a key, that a message repeats."""
+KINDS: Mapping[str, Collection[str]] = {
+    "baseline": {"grasps_file"},
+    "verdicts.json": {"verdicts"},
+    "regions.json": {"edge_clearance_m", "grasps"},
+    "executions.json": {"executions"},
+    "manifest.json": {"units_sha256", "files"},
+    "grasps.json": {"object", "grasps"},
+    "best.json": {"clearance_m", "ended"},
+    "wrench file": {"wrenches"},
+    "contacts file": {"contacts"},
+}
+"""The JSON files of graspproof, and for each the keys that tell it from the files listed after it.
+"""
+BESIDE = ("verdicts.json", "regions.json", "executions.json", "best.json")
+"""Files that are kept in the same folder as the grasps.json that they belong to."""
+
+
+def object_of(
+    text: str, wanted: str, *, schema: int | None = None, nulls: bool = True
+) -> dict[str, Any]:
+    """Return the object that a JSON text holds."""
+    found = value_of(text, nulls=nulls)
+    if not isinstance(found, dict):
+        raise InputError(f"{_with_article(wanted)} must hold one JSON object, got {shown(found)}")
+    record = cast("dict[str, Any]", found)
+    check_kind(record, wanted)
+    if schema is not None:
+        check_schema(record, schema)
+    return record
+
+
+def value_of(text: str, *, nulls: bool = True) -> Any:
+    """Return the value that a JSON text holds."""
+    try:
+        found = json.loads(text, object_pairs_hook=_without_twins)
+    except RecursionError as error:
+        raise InputError(_too_deep()) from error
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        said = error.msg if error.msg.isprintable() else "unexpected text"
+        raise InputError(
+            f"the text is not complete JSON ({said}: {where}); write the file again"
+        ) from error
+    except ValueError as error:  # Python reads no whole number of more than 4300 digits
+        raise InputError(
+            "a whole number in the file has thousands of digits; shorten it"
+        ) from error
+    check_values(found, nulls=nulls)
+    return found
+
+
+def check_values(document: object, *, nulls: bool = True) -> None:
+    """Refuse plain values that no file of graspproof may hold, whatever its format."""
+    try:
+        _check([document], nulls, DEEPEST)
+    except _FaultError as found:
+        raise InputError(f"{place(found.trail[-2::-1])}: {found}") from None
+
+
+class _FaultError(Exception):
+    """Raised when a value is wrong; the keys that lead to the value are added on the way out."""
+
+    def __init__(self, fault: str) -> None:
+        super().__init__(fault)
+        self.trail: list[object] = []
+        """Keys that lead to the value, innermost first; the last is the document's own, 0."""
+
+
+def _check(holder: Any, nulls: bool, deeper: int) -> None:
+    if deeper < 0:
+        raise InputError(_too_deep())
+    for key, value in _items(holder):
+        try:
+            if isinstance(value, dict | list):
+                if not _all_plain(value):
+                    _check(value, nulls, deeper - 1)
+            elif fault := _fault(value, nulls=nulls):
+                raise _FaultError(fault)
+        except _FaultError as found:
+            found.trail.append(key)
+            raise
+
+
+def check_kind(found: Mapping[str, Any], wanted: str) -> None:
+    """Refuse a JSON file of graspproof that is of another kind than the one asked for."""
+    if wanted in KINDS and set(KINDS[wanted]) <= found.keys():
+        return
+    for kind, keys in KINDS.items():
+        if kind != wanted and set(keys) <= found.keys():
+            beside = " beside it" if wanted == "grasps.json" and kind in BESIDE else ""
+            raise InputError(
+                f"this is {_with_article(kind)}, not {_with_article(wanted)}; "
+                f"give the {wanted}{beside}"
+            )
+
+
+def _with_article(kind: str) -> str:
+    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
+
+
+def check_schema(found: Mapping[str, Any], schema: int) -> None:
+    """Refuse a version of the file format that this package does not read."""
+    came = found.get("schema")
+    if came is None:
+        raise InputError(f"schema: the key is missing; expected {schema}")
+    if isinstance(came, bool) or not isinstance(came, int) or came < 1:
+        raise InputError(f"schema: expected {schema}, got {shown(came)}")
+    if came > schema:
+        raise InputError(
+            f"schema: expected {schema}, got {shown(came)}: a newer graspproof wrote the file; "
+            "upgrade this one"
+        )
+    if came < schema:
+        raise InputError(
+            f"schema: expected {schema}, got {came} of an older graspproof; write the file again"
+        )
+
+
+def place(parts: Sequence[object]) -> str:
+    """Write where a value is in a document, for messages: `grasps[0].contacts[2].normal`."""
+    said = "".join(
+        f"[{part}]" if isinstance(part, int) else f".{_key(str(part))}" for part in parts
+    )
+    return said.lstrip(".") or "the document"
+
+
+def shown(value: object) -> str:
+    """Write a wrong value for a message: short, and in characters that can be printed."""
+    if isinstance(value, dict):
+        return "an object"
+    if isinstance(value, list | tuple):
+        return "a list"
+    if isinstance(value, str):
+        return json.dumps(value) if len(value) <= LONGEST_ECHO else f"text of {len(value)} letters"
+    if value is None or isinstance(value, bool):
+        return json.dumps(value)
+    if isinstance(value, int) and abs(value) > LARGEST_WHOLE:
+        return f"a whole number of {value.bit_length()} bits"
+    return _cut(ascii(value))
+
+
+def _key(key: str) -> str:
+    return _cut(key if key.isidentifier() else ascii(key))
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST_ECHO else f"{text[:LONGEST_ECHO]}..."
+
+
+def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        counts = Counter(key for key, _ in pairs)
+        twin = next(key for key, _ in pairs if counts[key] > 1)
+        raise InputError(f"{_key(twin)}: the key occurs twice in one object; remove one")
+    return found
+
+
+def _all_plain(holder: Any) -> bool:
+    """Return whether a list holds only finite floats, as most lists do."""
+    if not isinstance(holder, list):
+        return False
+    values = cast("list[Any]", holder)
+    return set(map(type, values)) == {float} and all(map(math.isfinite, values))
+
+
+def _items(holder: Any) -> Iterable[tuple[Any, Any]]:
+    if not isinstance(holder, dict):
+        return enumerate(cast("list[Any]", holder))
+    record = cast("dict[str, Any]", holder)
+    if not "".join(record).isascii():
+        for key in filter(_has_no_encoding, record):
+            raise InputError(f"{_key(key)}: the key holds half a character (a lone surrogate)")
+    return record.items()
+
+
+def _fault(value: object, *, nulls: bool) -> str | None:
+    """Return what is wrong with a value that contains no other values; None if nothing is."""
+    if isinstance(value, float):
+        return None if math.isfinite(value) else f"expected a finite number, got {value}"
+    if isinstance(value, int):
+        return None if abs(value) <= LARGEST_WHOLE else f"{shown(value)} is larger than 2^64 - 1"
+    if isinstance(value, str):
+        wrong = not value.isascii() and _has_no_encoding(value)
+        return "the text holds half a character (a lone surrogate)" if wrong else None
+    if value is None:
+        return None if nulls else "null is not allowed; give a value, or leave the key out"
+    return f"expected a number or text, got {value}; put it in quotes"  # a day or time of TOML
+
+
+def _has_no_encoding(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return True
+    return False
+
+
+def _too_deep() -> str:
+    return f"objects and lists are nested more than {DEEPEST} deep; flatten the file"
+
+
+Record = TypeVar("Record")
+BOUNDS = {"too_short": ("at least", "min_length"), "too_long": ("at most", "max_length")}
+"""Wording and key of the limit in errors about the number of items, by type of error."""
+UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+OURS = {
+    "float_type": "a number", "int_type": "a whole number", "int_from_float": "a whole number",
+    "string_type": "text", "bool_type": "true or false", "list_type": "a list",
+    "tuple_type": "a list", "dict_type": "an object", "model_type": "an object",
+    "dataclass_type": "an object", "finite_number": "a finite number",
+    "greater_than": "more than {gt}", "greater_than_equal": "at least {ge}",
+    "less_than": "less than {lt}", "less_than_equal": "at most {le}",
+}  # fmt: skip
+"""Words for kinds and ranges of values that people who write JSON or TOML use."""
+
+
+def record_of(
+    kind: type[Record], text: str, wanted: str, *, schema: int | None = None, nulls: bool = True
+) -> Record:
+    """Read the text of a JSON file as a record whose fields are checked."""
+    from pydantic import TypeAdapter, ValidationError
+
+    object_of(text, wanted, schema=schema, nulls=nulls)
+    try:
+        return TypeAdapter(kind).validate_json(text)
+    except ValidationError as error:
+        raise InputError(complaint(error, kind)) from error
+
+
+def settings_of(
+    kind: type[Record], given: Mapping[str, Any], inside: Sequence[str | int]
+) -> Record:
+    """Make settings of a class from a part of a file, with every field checked."""
+    from pydantic import TypeAdapter, ValidationError
+
+    try:
+        return TypeAdapter(kind).validate_json(json.dumps(given), strict=True)
+    except ValidationError as error:
+        raise InputError(complaint(error, kind, inside)) from error
+    except InputError as error:  # raised by the settings' own checks
+        raise InputError(f"{place(inside)}: {error}") from error
+
+
+def complaint(error: "ValidationError", kind: Any, inside: Sequence[str | int] = ()) -> str:
+    """Describe the first thing that is wrong with a record."""
+    first = error.errors(include_url=False)[0]
+    loc, fault, came = first["loc"], first["type"], first["input"]
+    where = place([*inside, *loc])
+    if fault in UNKNOWN:
+        return f"{where}: unknown key; known keys are {', '.join(_fields_at(kind, loc[:-1]))}"
+    if fault == "missing":
+        return f"{where}: missing; add it"
+    limits: Mapping[str, Any] = first.get("ctx", {})
+    if fault in BOUNDS:
+        side, key = BOUNDS[fault]
+        return f"{where}: expected {side} {limits[key]} items, got {limits['actual_length']}"
+    if fault == "value_error":
+        return f"{where}: {limits['error']}"
+    expected = OURS[fault].format(**limits) if fault in OURS else _expected(first["msg"])
+    return f"{where}: expected {expected}, got {shown(came)}"
+
+
+def _expected(said: str) -> str:
+    """Return what was expected, as pydantic's own message says it."""
+    for beginning, ours in (("Input should be ", ""), ("String should ", "text to ")):
+        if said.startswith(beginning):
+            return ours + said.removeprefix(beginning)
+    return f"something else ({said})"
+
+
+def _fields_at(kind: Any, loc: Sequence[int | str]) -> list[str]:
+    """Return the keys that a record inside another one may have."""
+    for part in loc:
+        if isinstance(part, str):
+            inner = next((f for key, f in _fields(kind).items() if key == part), None)
+            kind = None if inner is None else _record_in(inner.annotation)
+    return list(_fields(kind))
+
+
+def _fields(kind: Any) -> dict[str, Any]:
+    listed: Mapping[str, Any] = getattr(kind, "__pydantic_fields__", {})
+    return {field.alias or name: field for name, field in listed.items()}
+
+
+def _record_in(annotation: Any) -> Any:
+    """Return the class of records that a type holds, as an item or as a value that may be null."""
+    if hasattr(annotation, "__pydantic_fields__"):
+        return annotation
+    inner = (_record_in(part) for part in get_args(annotation))
+    return next((kind for kind in inner if kind is not None), None)
 
 
 def text_of(document: Mapping[str, object]) -> str:

@@ -13,10 +13,17 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import SMALLEST_SIZE, Array, frozen
 from grasp_core.checked import LARGEST, SMALLEST, number, one_of, several, shown
-from grasp_core.closure.contact_arrays import contact_arrays, contact_frictions, unit_size
-from grasp_core.closure.soft.contacts import LOCAL, contact_torsions
+from grasp_core.closure.contacts import (
+    WRENCH,
+    contact_arrays,
+    contact_frames,
+    contact_frictions,
+    grasp_map,
+    in_frames,
+    unit_size,
+)
+from grasp_core.closure.soft_contacts import LOCAL, contact_torsions
 from grasp_core.closure.wrench_sets import with_torques
-from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
 from grasp_core.errors import InputError, NoForcesError, SolverError
 from grasp_core.forces.force_programs import (
     Balance,

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map, in_frames
+from grasp_core.closure.contacts import WRENCH, contact_frames, grasp_map, in_frames
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns, inscribed_share
 from grasp_core.errors import SolverError
 from grasp_core.solvers import conic, qp

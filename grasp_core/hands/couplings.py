@@ -82,10 +82,7 @@ class Drives:
 
 
 def drives(names: Sequence[str], ranges: Array, couplings: Sequence[Coupling]) -> Drives:
-    """Lay couplings out by the numbers of joints.
-
-    Takes `ranges` (j, 2) [rad].
-    """
+    """Lay couplings out by the numbers of joints."""
     j = len(names)
     drivers, ratios, offsets = np.arange(j), np.ones(j), np.zeros(j)
     for each in couplings:

@@ -1,16 +1,21 @@
-"""Lays a hand out as arrays, in the order in which compiled loops read them."""
+"""Arrays of a hand, a surface, aims and poses, which compiled loops read and change.
 
+Hands and objects keep their arrays by identity: equal ones that are other objects share them too.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, wraps
 from itertools import pairwise
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.hands.by_identity import kept_by_identity
-from grasp_core.hands.hand import PALM, SAME, Hand, HandFinger, LinkShape
-from grasp_core.hands.loop_values import HandArrays
+from grasp_core.hands.hand import PALM, SAME, Hand, LinkShape
 
+Value = TypeVar("Value")
+Result = TypeVar("Result")
 LEAST_BALL = 0.008
 """Least radius of the balls that stand for a shape while a pose is sought [m]: thinner parts of a
 link lie beside thicker ones."""
@@ -21,6 +26,206 @@ BALLS_APART = 1.7
 """Largest distance between neighbouring balls of a shape, in the smallest half-size."""
 OUTSIDE = 0.006
 """How far a ball must stick out of every larger ball of its link to be kept [m]."""
+
+
+def kept_by_identity(most: int) -> Callable[[Callable[[Value], Result]], Callable[[Value], Result]]:
+    """Return a decorator that keeps results for at most so many arguments, and these alive."""
+
+    def decorated(function: Callable[[Value], Result]) -> Callable[[Value], Result]:
+        kept: dict[int, tuple[Value, Result]] = {}
+
+        @wraps(function)
+        def looked_up(value: Value) -> Result:
+            known = kept.get(id(value))
+            if known is None:  # a kept argument is alive, so that no other has its address
+                known = value, function(value)
+                if len(kept) >= most:
+                    kept.clear()
+                kept[id(value)] = known
+            return known[1]
+
+        return looked_up
+
+    return decorated
+
+
+class HandArrays(NamedTuple):
+    """A hand in arrays: j joints, one link each, f fingers, s shapes, b balls.
+
+    A ball stands for a part of a link before the last of its finger while a pose is sought; shapes
+    decide.
+    """
+
+    positions: Array
+    """Origins of the links' frames in those of the links before them, (j, 3) [m]."""
+    rotations: Array
+    """Axes of these frames at the angle zero, (j, 3, 3)."""
+    axes: Array
+    """Axes of the joints, (j, 3)."""
+    ranges: Array
+    """Lowest and highest angles, (j, 2) [rad]."""
+    drivers: Indices
+    """Joint that each joint follows, or its own number: see `couplings`, as for the next, (j,)."""
+    ratios: Array
+    """(j,)."""
+    offsets: Array
+    """(j,) [rad]."""
+    starts: Indices
+    """First link of each finger, and the number of links at the end, (f + 1,)."""
+    tip_centers: Array
+    """Middles of the fingertips' balls in the frames of the last links, (f, 3) [m]."""
+    tip_radii: Array
+    """Radii of these balls, (f,) [m]."""
+    tip_corners: Array
+    """Corners of all fingertips, finger by finger: for a ball its middle, (c, 3) [m]."""
+    cover_corners: Array
+    """Corners of blocks in the frames of the shapes that cover them, zeros for balls, (c, 3)."""
+    tip_firsts: Indices
+    """First corner of each finger, and the number of corners at the end, (f + 1,)."""
+    tip_roundings: Array
+    """Distances from the hulls of these corners to the tips' surfaces, (f,) [m]."""
+    tip_shapes: Indices
+    """The shape that is each finger's ball, or covers its block, (f,)."""
+    shape_links: Indices
+    """The link of each shape, -1 for the palm, (s,)."""
+    shape_positions: Array
+    """Middles of the shapes in the links' frames, (s, 3) [m]."""
+    shape_rotations: Array
+    """Axes of the shapes in the links' frames, (s, 3, 3)."""
+    shape_sizes: Array
+    """Half-sizes of the shapes' boxes, (s, 3) [m]."""
+    shape_radii: Array
+    """Distances from the boxes to the surfaces, (s,) [m]."""
+    shape_reaches: Array
+    """Largest distances of the shapes' points from their middles, (s,) [m]."""
+    shape_tips: Indices
+    """The finger whose tip a shape stands for: it shares the tip's ball or covers its corners; -1
+    for none, (s,)."""
+    link_shapes: Indices
+    """For the palm and each link, the shape about whose middle a ball holds all of its shapes, or
+    -1 if it has none, (j + 1,)."""
+    link_reaches: Array
+    """Radii of these balls, (j + 1,) [m]."""
+    pairs: Indices
+    """Pairs of shapes of one hand that must not overlap, (p, 2)."""
+    ball_links: Indices
+    """The link of each ball, -1 for the palm, (b,)."""
+    ball_centers: Array
+    """Middles of the balls in the links' frames, (b, 3) [m]."""
+    ball_radii: Array
+    """Radii of the balls, (b,) [m]."""
+
+
+class SurfaceTree(NamedTuple):
+    """Triangles of a surface in a binary tree of n balls; the first is the root."""
+
+    corners: Array
+    """Corners of the triangles, in the order of the leaves, (t, 3, 3) [m]."""
+    normals: Array
+    """Outward unit normals, (t, 3); zero for a triangle without area."""
+    numbers: Indices
+    """Number of each of these triangles in the body, (t,)."""
+    middles: Array
+    """Middles of the balls, (n, 3) [m]."""
+    radii: Array
+    """Radii of the balls, (n,) [m]."""
+    links: Indices
+    """For each ball its two children, or a negative number and the first of its triangles: minus
+    their number, (n, 2)."""
+
+
+class Targets(NamedTuple):
+    """Where fingertips are to touch: k contacts, e edges of regions in all."""
+
+    fingers: Indices
+    """The finger for each contact, (k,)."""
+    origins: Array
+    """A point of each plane, (k, 3) [m]."""
+    normals: Array
+    """Unit normals into the object, (k, 3)."""
+    tangents: Array
+    """Two unit vectors in each plane, (k, 2, 3)."""
+    pinned: Array
+    """1.0 where the contact must be at the origin, 0.0 where in its region, (k,)."""
+    touching: Array
+    """Points of the tips' hulls that touch, in the last links' frames, (k, 3) [m]; NaN where it is
+    the corner that reaches farthest along the normal."""
+    soft: float
+    """Depth of a corner of a block below the one that reaches farthest, at which it counts less by
+    the factor e as the point that touches [m]."""
+    edge_contacts: Indices
+    """The contact of each edge, (e,)."""
+    edge_points: Array
+    """A point of each edge, (e, 3) [m]."""
+    edge_inward: Array
+    """Unit vectors in the plane from the edge into the region, (e, 3)."""
+    up: Array
+    """Unit normal of the table, (3,)."""
+    height: float
+    """Height of the table along it [m]; minus infinity for none."""
+
+
+class Wanted(NamedTuple):
+    """Distances that are asked for, and what else counts."""
+
+    clear: float
+    """Distance of balls from the object and the table [m]."""
+    behind: float
+    """Distance of last links from the planes that their tips touch [m]."""
+    apart: float
+    """Distance of links from each other [m]."""
+    margin: float
+    """Distance of contacts from the edges of their regions [m]."""
+    pull: float
+    """Weight of staying near the planned contact inside a region."""
+    overlaps: bool
+    """Whether the first three count at all."""
+    palm_moves: bool
+    """Whether the palm may move."""
+
+
+class Pose(NamedTuple):
+    """A pose of a hand and where its parts are; the loops change the arrays in place."""
+
+    palm: Array
+    """Axes of the palm's frame, (3, 3)."""
+    origin: Array
+    """Its origin, (3,) [m]."""
+    q: Array
+    """Joint angles, (j,) [rad]."""
+    R: Array
+    """Axes of the links' frames, (j, 3, 3)."""
+    p: Array
+    """Their origins, (j, 3) [m]."""
+    W: Array
+    """Axes of the joints, (j, 3)."""
+    turned: Array
+    """Axes of the shapes, (s, 3, 3)."""
+    middles: Array
+    """Middles of the shapes, (s, 3) [m]."""
+    tips: Array
+    """Points of the tips' hulls that touch, by contact, (k, 3) [m]: middles of tips that are
+    balls."""
+    fronts: Array
+    """Corners of the tips that are farthest along the normals, (k, 3) [m]."""
+    rolls: Array
+    """How points that touch move on their tips as the tips turn, (k, 3, 3) [m]."""
+
+
+class Sums(NamedTuple):
+    """What is summed over all residuals r with derivatives J, for n unknowns."""
+
+    H: Array
+    """J'J, its lower half, (n, n)."""
+    g: Array
+    """J'r, (n,)."""
+    row: Array
+    """The derivatives of one residual, zero between two, (n,)."""
+    pivot: Array
+    """Point about which the palm turns, (3,) [m]."""
+    parts: Array
+    """The largest distance from touching [mm], the squares of touching and of being in regions, and
+    those of overlaps [mm^2], (3,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +246,12 @@ def hand_arrays(hand: Hand) -> HandArrays:
     lengths = [len(finger.links) for finger in hand.fingers]
     starts = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
     ends = starts[1:] - 1
-    tips = [_tip_shape(finger) for finger in hand.fingers]
+    # what stands for a fingertip: its ball, or what covers its corners
+    tips = [
+        LinkShape(each.tip.center, np.eye(3), np.zeros(3), each.tip.radius)
+        if each.tip.corners is None else each.links[-1].shapes[-1]
+        for each in hand.fingers
+    ]  # fmt: skip
     parts += [
         _Part(int(end), tip)
         for end, tip, finger in zip(ends, tips, hand.fingers, strict=True)
@@ -50,6 +260,8 @@ def hand_arrays(hand: Hand) -> HandArrays:
     corners = [finger.tip.core[0] for finger in hand.fingers]
     free = _free_links(hand, starts)
     where = np.array([part.link for part in parts], np.int64)
+    one, other = np.triu_indices(len(where), 1)
+    kept = free[where[one] + 1, where[other] + 1] > 0.0  # pairs that must not overlap
     balls = _balls([part for part in parts if part.link not in ends])
     at = np.array([link for link, _, _ in balls], np.int64)
     shapes = [part.shape for part in parts]
@@ -87,7 +299,7 @@ def hand_arrays(hand: Hand) -> HandArrays:
         shape_tips=_shape_tips(hand, parts, ends.tolist(), tips),
         link_shapes=np.array([shape for shape, _ in held], np.int64),
         link_reaches=np.array([reach for _, reach in held]),
-        pairs=_pairs(where, free),
+        pairs=np.column_stack([one[kept], other[kept]]).astype(np.int64),
         ball_links=at,
         ball_centers=np.array([center for _, center, _ in balls]).reshape(-1, 3),
         ball_radii=np.array([radius for _, _, radius in balls]),
@@ -130,13 +342,6 @@ def _free_links(hand: Hand, starts: Indices) -> Array:
     return free
 
 
-def _pairs(links: Indices, free: Array) -> Indices:
-    """Return pairs of things on links that must not overlap, (n, 2)."""
-    one, other = np.triu_indices(len(links), 1)
-    kept = free[links[one] + 1, links[other] + 1] > 0.0
-    return np.column_stack([one[kept], other[kept]]).astype(np.int64)
-
-
 def _balls(parts: list[_Part]) -> list[tuple[int, Array, float]]:
     """Cover shapes roughly with balls: their links, middles and radii, the largest first."""
     found: list[tuple[int, Array, float]] = []
@@ -162,14 +367,6 @@ def _balls(parts: list[_Part]) -> list[tuple[int, Array, float]]:
         if not inside:
             kept.append((link, center, radius))
     return kept
-
-
-def _tip_shape(finger: HandFinger) -> LinkShape:
-    """Return the shape that stands for a fingertip: its ball, or what covers its corners."""
-    tip = finger.tip
-    if tip.corners is not None:
-        return finger.links[-1].shapes[-1]
-    return LinkShape(tip.center, np.eye(3), np.zeros(3), tip.radius)
 
 
 def _shape_tips(

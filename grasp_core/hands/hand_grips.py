@@ -37,15 +37,14 @@ from functools import cached_property
 
 import numpy as np
 
-from grasp_core.arrays import UNIT_SLACK, Array, cross
+from grasp_core.arrays import UNIT_SLACK, Array, cross, is_array, is_number
 from grasp_core.checked import LARGEST, SMALLEST
-from grasp_core.closure.wrenches import WRENCH, cross_matrix
+from grasp_core.closure.contacts import WRENCH, cross_matrix
 from grasp_core.execution.grips import Grip
-from grasp_core.fields import is_array, is_number
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import chains
 from grasp_core.hands.kinematics import places
-from grasp_core.hands.stance import Stance
+from grasp_core.hands.reach import Stance
 
 STIFFEST = 1e12
 """Condition of a finger's stiffness from which on it gives way in some direction only."""

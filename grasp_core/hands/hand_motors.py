@@ -20,13 +20,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, cross, frozen, frozen_copy
-from grasp_core.checked import switch
+from grasp_core.checked import LARGEST, positive, switch
+from grasp_core.closure.contacts import contact_frictions
 from grasp_core.errors import InputError
+from grasp_core.execution.carried_mass import GAP, CarryingHand, HandPayload, carried_mass
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.kinematics import HandPlaces, places
-from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import Stance, stance_of
+from grasp_core.hands.reach import HandReach, Stance, stance_of
+from grasp_core.objects.on_faces import check_body
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.values import Contact
 
@@ -79,8 +82,19 @@ def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
     """Return where the hand's links are, the levers of its contacts and the torque limits."""
     found = places(hand, stance.joints, stance.palm_pose)
     points = np.array([contact.position for contact in stance.contacts])
-    levers = hand.drives.carried(_levers(hand, found, points, stance.fingers))
-    return found, levers, _limits(hand)
+    levers, own = np.zeros((len(hand.joints), len(points), 3)), chains(hand)
+    for contact, finger in enumerate(stance.fingers):  # the first factors of (1)
+        joints = list(own[finger])
+        arms = points[contact] - found.link_positions[0, joints]
+        levers[joints, contact] = cross(found.joint_axes[0, joints], arms)
+    missing = [joint.name for joint in hand.free_joints if joint.torque_limit_n_m is None]
+    if missing:
+        raise InputError(
+            f"hand must have a torque limit for each joint, got none for {missing[0]}: "
+            f"{hand.torque_source}; give your own with hand.with_torque_limits(limits, source)"
+        )
+    limits = np.array([joint.torque_limit_n_m for joint in hand.free_joints])
+    return found, hand.drives.carried(levers.reshape(len(levers), -1)), limits
 
 
 def direction(down: ArrayLike) -> Array:
@@ -92,31 +106,10 @@ def direction(down: ArrayLike) -> Array:
     return way / length
 
 
-def _limits(hand: Hand) -> Array:
-    missing = [joint.name for joint in hand.free_joints if joint.torque_limit_n_m is None]
-    if missing:
-        raise InputError(
-            f"hand must have a torque limit for each joint, got none for {missing[0]}: "
-            f"{hand.torque_source}; give your own with hand.with_torque_limits(limits, source)"
-        )
-    return np.array([joint.torque_limit_n_m for joint in hand.free_joints])
-
-
 def chains(hand: Hand) -> list[range]:
     """Return the numbers of each finger's joints."""
     ends = np.cumsum([0, *(len(finger.links) for finger in hand.fingers)]).tolist()
     return [range(first, end) for first, end in pairwise(ends)]
-
-
-def _levers(hand: Hand, found: HandPlaces, points: Array, fingers: tuple[int, ...]) -> Array:
-    """Return the first factors of (1) for all contacts, (joints, 3k) [m]."""
-    own = chains(hand)
-    levers = np.zeros((len(hand.joints), len(points), 3))
-    for contact, finger in enumerate(fingers):
-        joints = list(own[finger])
-        arms = points[contact] - found.link_positions[0, joints]
-        levers[joints, contact] = cross(found.joint_axes[0, joints], arms)
-    return levers.reshape(len(levers), -1)
 
 
 def _weights(hand: Hand, found: HandPlaces) -> Array:
@@ -137,3 +130,45 @@ def _weights(hand: Hand, found: HandPlaces) -> Array:
             arms = center - found.link_positions[0, before]
             weights[before] -= link.mass_kg * cross(found.joint_axes[0, before], arms)
     return hand.drives.carried(weights)
+
+
+def hand_payload(
+    hand: Hand,
+    body: Polyhedron,
+    reach: HandReach,
+    friction: ArrayLike,
+    *,
+    max_push_n: float,
+    gap: float = GAP,
+) -> HandPayload:
+    """Find the largest mass that a hand holds in every orientation, its own links included.
+
+    The hand stands still while it is turned, and forces are chosen anew for each orientation.
+
+    Args:
+        hand: The hand, with a torque limit for each joint, and the mass and centre of mass of each
+            link.
+        body: The object, of which only the centre of mass counts.
+        reach: The pose in which the hand stands (see `reach_with`).
+        friction: Coulomb coefficient, one for all contacts or one each.
+        max_push_n: Largest normal force of a finger, beside what its motors allow [N].
+        gap: Wanted (upper - lower) / lower, from 1e-4.
+
+    Returns:
+        Both bounds of the mass, with their proofs (see `HandPayload.verify`).
+
+    Raises:
+        InputError: The hand is another one or not in a pose, a joint has no torque limit, a link
+            no mass, a motor cannot carry the links in some orientation, or a number is out of
+            range.
+        SolverError: A program's answer failed its check.
+    """
+    check_body(body)
+    most = positive(max_push_n, "max_push_n")
+    motors, weights, contacts = turned_motors(hand, reach)
+    count = len(contacts)
+    points = np.array([contact.position for contact in contacts])
+    arms = frozen(points - body.center_of_mass, (count, 3), "contacts", most=LARGEST)
+    normals = frozen_copy(np.array([contact.normal for contact in contacts]))
+    mu = contact_frictions(friction, count)
+    return carried_mass(CarryingHand(arms, normals, mu, most, motors, weights), gap)

@@ -77,3 +77,10 @@ def tip_jacobians(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = N
             cross(found.joint_axes[:, first:end], arms), -1, -2
         )
     return J
+
+
+def rotation_about(axis: Array, angle: float) -> Array:
+    """Return the rotation by an angle about a unit axis by Rodrigues' formula, (3, 3)."""
+    x, y, z = axis.tolist()
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across

@@ -37,11 +37,7 @@ def chains(  # noqa: PLR0913, PLR0917 - the arrays of a hand
     positions: Array, rotations: Array, axes: Array, starts: Indices, palm_rotation: Array,
     palm_position: Array, angles: Array, R: Array, p: Array, W: Array,
 ) -> None:  # fmt: skip
-    """Fill in where links are for one set of joint angles.
-
-    Takes `rotations`, `R` (j, 3, 3); `axes`, `W` (j, 3); `starts` (f + 1,); `palm_rotation` (3, 3);
-    `palm_position` (3,) [m]; `angles` (j,) [rad]; `p` (j, 3) [m].
-    """
+    """Fill in where links are for one set of joint angles."""
     about, frame = np.empty((3, 3)), np.empty((3, 3))
     for f in range(len(starts) - 1):
         for k in range(starts[f], starts[f + 1]):

@@ -6,17 +6,20 @@ touches must only not overlap the object), and the contacts that are reached are
 force closure. No pose means that none was found from the starts that were tried, never that there
 is none. What is proved instead is that a hand with three fingers has no contacts to stand at, where
 no three of the grasp's contacts are in force closure.
+
+The stance of a pose is what mechanics and scenes need of it, with balls for all fingertips.
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import (
     BOUNDS,
     coefficient,
@@ -31,13 +34,17 @@ from grasp_core.checked import (
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE
-from grasp_core.hands.hand import Hand
-from grasp_core.hands.posing.contact_choices import ContactChoices, contact_choices
-from grasp_core.hands.posing.opening import Opening, opened
-from grasp_core.hands.posing.pose_search import Asked, FoundPose, NoPose, find_pose
+from grasp_core.hands.hand import Fingertip, Hand
+from grasp_core.hands.kinematics import places
+from grasp_core.hands.opening import opened
+from grasp_core.hands.pose_search import (
+    Asked,
+    ContactChoices,
+    contact_choices,
+    find_pose,
+)
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.short_text import summary
 from grasp_core.values import FINGERS, Contact, Grasp
 
 ReachReason: TypeAlias = Literal["", "limit", "collision", "not found", "no closure"]
@@ -45,6 +52,8 @@ ReachReason: TypeAlias = Literal["", "limit", "collision", "not found", "no clos
 overlapped, or neither; or, proved, no three contacts close for a hand with three fingers; empty
 where a pose was found."""
 OVERLAPS = {"self": "the hand itself", "object": "the object", "table": "the table"}
+OBEYED = 1e-6
+"""By how much a joint may be off the angle that follows from another: rounding of a file [rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -156,7 +165,9 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
     Raises:
         InputError: An argument is refused.
     """
-    _check(hand, body, grasp)
+    instance(hand, Hand, "hand", "load_hand makes one")
+    check_body(body)
+    instance(grasp, Grasp, "grasp", "plan finds some")
     up, height = _table(body, table_down)
     switch(regions, "regions")
     asked = Asked(
@@ -168,16 +179,16 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
     if not choices.closed:
         return _unclosed(asked, choices)
     found = find_pose(asked, choices.closed)
-    if isinstance(found, NoPose):
+    if isinstance(found, Counter):
         reason, said = _why(found)
-        return HandReach(hand.name, grasp.id, reason, said, found.starts, clearance_m)
-    return _reached(asked, found, opened(asked, found))
-
-
-def _check(hand: Hand, body: Polyhedron, grasp: Grasp) -> None:
-    instance(hand, Hand, "hand", "load_hand makes one")
-    check_body(body)
-    instance(grasp, Grasp, "grasp", "plan finds some")
+        return HandReach(hand.name, grasp.id, reason, said, found.total(), clearance_m)
+    joints, way = opened(asked, found)
+    proof = found.certificate
+    contacts = tuple(map(Contact, proof.positions, proof.normals))
+    return HandReach(
+        hand.name, grasp.id, "", "", found.starts, clearance_m, found.fingers, found.joints,
+        found.palm_pose, contacts, proof, found.within, joints, way, found.used,
+    )  # fmt: skip
 
 
 def _table(body: Polyhedron, down: ArrayLike | None) -> tuple[Array, float]:
@@ -190,16 +201,6 @@ def _table(body: Polyhedron, down: ArrayLike | None) -> tuple[Array, float]:
         raise InputError("table_down must be a direction, got a vector of length zero")
     up = -way / length
     return up, float((body.vertices @ up).min())
-
-
-def _reached(asked: Asked, found: FoundPose, opening: Opening) -> HandReach:
-    proof = found.certificate
-    contacts = tuple(map(Contact, proof.positions, proof.normals))
-    return HandReach(
-        asked.hand.name, asked.grasp.id, "", "", found.starts, asked.clearance, found.fingers,
-        found.joints, found.palm_pose, contacts, proof, found.within, opening.joints,
-        opening.approach, found.used,
-    )  # fmt: skip
 
 
 def _unclosed(asked: Asked, choices: ContactChoices) -> HandReach:
@@ -218,10 +219,9 @@ def _unclosed(asked: Asked, choices: ContactChoices) -> HandReach:
     )  # fmt: skip
 
 
-def _why(found: NoPose) -> tuple[ReachReason, str]:
+def _why(tally: Counter[str]) -> tuple[ReachReason, str]:
     """Say what was in the way most often."""
-    tried = f"from {found.starts} starts no pose was found"
-    tally: Counter[str] = found.tally
+    tried = f"from {tally.total()} starts no pose was found"
     blocked = {name: tally[name] for name in OVERLAPS if tally[name]}
     if blocked:
         most = max(blocked, key=lambda name: blocked[name])
@@ -237,3 +237,92 @@ def _why(found: NoPose) -> tuple[ReachReason, str]:
     if tally["open"]:
         return "not found", f"{tried}: the contacts that were touched are not in force closure"
     return "not found", f"{tried}: fingertips did not get to their contacts; more starts may do"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stance:
+    """A hand in a pose at its contacts."""
+
+    hand: Hand
+    """The hand, with a ball at its contact in place of each fingertip that is a block."""
+    joints: Array
+    """Joint angles, (j,) [rad]."""
+    palm_pose: Array
+    """Pose of the palm in the object's frame, (4, 4)."""
+    contacts: tuple[Contact, ...]
+    fingers: tuple[int, ...]
+    """The hand's finger at each contact."""
+    forces: Array
+    """Balanced contact forces strictly inside the friction cones, of any size, (k, 3)."""
+
+    @property
+    def tip_radii(self) -> Array:
+        """Return the radii of the fingertips at the contacts, (k,) [m]."""
+        return np.array([self.hand.fingers[finger].tip.radius for finger in self.fingers])
+
+
+def stance_of(hand: Hand, reach: HandReach) -> Stance:
+    """Return where a hand stands."""
+    instance(hand, Hand, "hand", "load_hand makes one")
+    instance(reach, HandReach, "reach", "reach_with makes one")
+    if reach.hand != hand.name:
+        raise InputError(
+            f"hand must be the one of the pose, {reach.hand}, got {hand.name}: its joints differ"
+        )
+    if (
+        reach.joints is None
+        or reach.palm_pose is None
+        or reach.contacts is None
+        or reach.fingers is None
+        or reach.certificate is None
+        or reach.certificate.forces is None
+    ):
+        raise InputError(
+            f"reach must have a pose, got none for grasp {reach.grasp}: {reach.explanation}"
+        )
+    off = float(np.abs(hand.drives.obeyed(reach.joints[None])[0] - reach.joints).max())
+    if hand.couplings and off > OBEYED:
+        raise InputError(
+            f"reach must have the joints that follow others where they follow them, got one off by "
+            f"{off:.3g} rad for grasp {reach.grasp}"
+        )
+    fingers = tuple(reach.fingers.tolist())
+    return Stance(
+        with_balls(hand, reach.joints, reach.palm_pose, fingers, reach.contacts), reach.joints,
+        reach.palm_pose, reach.contacts, fingers, reach.certificate.forces,
+    )  # fmt: skip
+
+
+def uncoupled(hand: Hand, doing: str) -> Hand:
+    """Return a hand in which no joint follows another."""
+    instance(hand, Hand, "hand", "load_hand makes one")
+    if hand.couplings:
+        listed = ", ".join(f"{each.joint} follows {each.driver}" for each in hand.couplings)
+        raise InputError(
+            f"{doing} needs a hand with a motor at each joint, got {hand.name}, where {listed}; "
+            "reach_with, hand_motors and hand_payload take such hands"
+        )
+    return hand
+
+
+def with_balls(
+    hand: Hand, joints: Array, palm_pose: Array, fingers: Iterable[int],
+    contacts: Iterable[Contact],
+) -> Hand:  # fmt: skip
+    """Put a ball that touches at its contact in place of each fingertip that is a block.
+
+    Scenes and drawings know fingertips as balls on the last links. Which part of a block touches is
+    the pose's.
+    """
+    touching = {f: each for f, each in zip(fingers, contacts, strict=True)
+                if hand.fingers[f].tip.corners is not None}  # fmt: skip
+    if not touching:
+        return hand
+    found, made = places(hand, joints, palm_pose), list(hand.fingers)
+    ends = np.cumsum([len(finger.links) for finger in hand.fingers]) - 1
+    for f, contact in touching.items():
+        radius, R = made[f].tip.radius, found.link_rotations[0, ends[f]]
+        middle = contact.position - radius * contact.normal
+        center = R.T @ (middle - found.link_positions[0, ends[f]])
+        made[f] = replace(made[f], tip=Fingertip(center, radius))
+    return replace(hand, fingers=tuple(made))

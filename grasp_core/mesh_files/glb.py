@@ -1,194 +1,200 @@
-"""Reads GLB files (binary glTF): a JSON chunk names nodes and meshes, a binary chunk holds numbers.
+"""Reads GLB files (binary glTF): trimesh decodes the meshes, and nodes say where they are.
 
 The pose of a mesh is the product of the matrices from the root of its scene down to its node. Where
 this matrix mirrors, the triangles are wound the other way, so that normals still point outwards.
-Features that would change the shape and are not read (compression, sparse accessors, skins, morph
-targets, external files) are refused.
-
-Several nodes may place the same mesh, and meshes may share their numbers. To keep a small file from
-becoming a huge scene, every primitive that is placed counts for at least one triangle of the limit.
+trimesh passes over what it does not read, and trusts the numbers of a file. So features that would
+change the shape (compression, sparse accessors, skins, morph targets, external files) and numbers
+that would make a small file huge are refused first.
 """
 
+import importlib
+import io
 import json
 import struct
 from collections.abc import Iterator
-from typing import cast
+from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_files.glb_primitives import Tree, check_place, decoded_primitive
-from grasp_core.mesh_files.polygon_soup import too_many
-from grasp_core.mesh_files.refusals import broken, not_finite, shown, unsupported
+from grasp_core.mesh_files.polygons import check_corners, too_many
 
-MAGIC, VERSION = b"glTF", 2
-HEAD, CHUNK_HEAD = 12, 8
-JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+HEAD = "<4sIIII"
+JSON_CHUNK = 0x4E4F534A
 MOST_NODES = 10_000
 MOST_VALUES = 4_000_000
-"""Largest number of JSON values allowed: each of them takes up to a quarter of a kilobyte of
-memory."""
+"""Largest number of JSON values allowed: each of them takes up to a quarter of a kilobyte."""
+MOST_SHARED = 4
+"""Largest number of times, on average, that views and accessors may use each byte of a file."""
 PLAIN_EXTENSIONS = ("KHR_materials", "KHR_texture", "KHR_lights", "EXT_texture", "KHR_xmp")
 """Prefixes of glTF extensions that change only the appearance; files with others are refused."""
-WRONG_TREE = (
-    KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError,
-)  # fmt: skip
-"""Errors that Python raises while reading JSON whose keys or values are not those of glTF."""
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+INDEX_TYPES, FLOAT_TYPE = (5121, 5123, 5125), 5126
+TRIANGLES, STRIP = 4, 5
+MODES = {TRIANGLES, STRIP}
+Tree = dict[str, Any]
+"""A JSON object of a glTF file, whose values are checked where they are used."""
 
 
-def read(data: bytes, most: int) -> tuple[Array, Indices, int]:
-    """Read the vertices (n, 3) and triangles (t, 3) of a GLB file's default scene; no digits."""
-    tree, binary = _chunks(data)
+def read_glb(data: bytes, most: int) -> tuple[Array, Indices]:
+    """Read the vertices (n, 3) and triangles (t, 3) of a GLB file's default scene."""
     try:
+        tree = _tree(data)
+        _check_features(tree)
+        _check_sizes(tree, len(data), most)
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
-            return *_scene(tree, binary, most), 0
-    except WRONG_TREE as error:
-        message = f"the JSON part of the file is not glTF ({type(error).__name__}: {shown(error)})"
-        raise MeshError(MeshRefusal.UNREADABLE, f"{message}; export it again") from error
+            return _scene(tree, data, most)
+    except (MeshError, MemoryError):
+        raise
+    except Exception as error:  # trimesh raises whatever the numbers of the file lead it to
+        raise ValueError(f"{type(error).__name__}: {error}") from error
 
 
-def _chunks(data: bytes) -> tuple[Tree, bytes]:
-    """Split a GLB file into its JSON tree and its binary chunk, which may be empty."""
-    if len(data) < HEAD:
-        broken("the header", f"expected {HEAD} bytes, got {len(data)}")
-    magic, version, length = struct.unpack_from("<4sII", data)
-    if magic != MAGIC or version != VERSION or length != len(data):
-        got = f"got glTF {version} and {length} bytes"
-        broken("the header", f"expected glTF 2 and a length of {len(data)} bytes, {got}")
-    chunks, place = list[tuple[int, bytes]](), HEAD
-    while place < len(data):
-        if place + CHUNK_HEAD > len(data):
-            broken("the end", "the head of a chunk is cut off")
-        size, kind = struct.unpack_from("<II", data, place)
-        place += CHUNK_HEAD + size
-        if place > len(data):
-            broken("the end", f"a chunk of {size} bytes is cut off")
-        chunks.append((kind, data[place - size : place]))
-    if [kind for kind, _ in chunks] not in ([JSON_CHUNK], [JSON_CHUNK, BINARY_CHUNK]):
-        broken("the chunks", "expected one JSON chunk, then at most one binary chunk")
-    return _tree(chunks[0][1]), chunks[1][1] if len(chunks) > 1 else b""
-
-
-def _tree(text: bytes) -> Tree:
+def _tree(data: bytes) -> Tree:
+    """Return the JSON part of a GLB file."""
+    _, version, length, size, chunk = struct.unpack_from(HEAD, data)
+    start = struct.calcsize(HEAD)
+    if version != 2 or length != len(data) or chunk != JSON_CHUNK:  # noqa: PLR2004
+        raise ValueError(f"expected glTF 2 of {len(data)} bytes, JSON first; got {length} bytes")
+    text = data[start : start + size]
     if sum(map(text.count, (b",", b"[", b"{"))) > MOST_VALUES:
         message = f"the JSON part has over {MOST_VALUES} values, the limit; simplify the mesh"
         raise MeshError(MeshRefusal.TOO_MANY, message)
-    try:
-        tree: object = json.loads(text.decode("utf-8"))
-    except (ValueError, RecursionError) as error:
-        message = f"the first chunk is not JSON ({shown(error)}); export it again"
-        raise MeshError(MeshRefusal.UNREADABLE, message) from error
-    if not isinstance(tree, dict):
-        broken("the first chunk", "expected a JSON object")
-    return cast("Tree", tree)
-
-
-def _scene(tree: Tree, binary: bytes, most: int) -> tuple[Array, Indices]:
-    _check_features(tree)
-    points, triangles = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)]
-    before = placed = 0
-    for matrix, mesh in _placed(tree):
-        mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
-        for primitive in tree["meshes"][mesh]["primitives"]:
-            corners, local = decoded_primitive(tree, binary, primitive, most - placed)
-            placed += max(len(corners), 1)
-            if placed > most:
-                too_many(placed, most)
-            points.append(local @ matrix[:3, :3].T + matrix[:3, 3])
-            triangles.append(before + (corners[:, ::-1] if mirrored else corners))
-            before += len(local)
-    moved = np.vstack(points)
-    if not np.isfinite(moved).all():
-        message = "a coordinate of the scene is infinite or not a number; repair the mesh"
-        raise MeshError(MeshRefusal.NON_FINITE, message)
-    return moved, np.vstack(triangles)
+    return json.loads(text.decode("utf-8"))
 
 
 def _check_features(tree: Tree) -> None:
-    buffers = tree.get("buffers", [])
-    if len(buffers) > 1 or any("uri" in buffer for buffer in buffers):
-        unsupported("the numbers lie outside the binary chunk", "export one GLB that holds them")
-    used = [*tree.get("extensionsRequired", ()), *tree.get("extensionsUsed", ())]
-    for name in used:
-        if not str(name).startswith(PLAIN_EXTENSIONS):
-            unsupported(f"extension {shown(name)!r}", "export plain glTF, without compression")
-    if any("skin" in node or "weights" in node for node in tree.get("nodes", [])):
-        unsupported("a node has a skin or morph weights", "export the mesh in its final shape")
+    """Refuse features that would change the shape and are not read."""
+    buffers, nodes, accessors = (tree.get(name, []) for name in ("buffers", "nodes", "accessors"))
+    parts = [part for mesh in tree.get("meshes", []) for part in mesh["primitives"]]
+    names = map(str, (*tree.get("extensionsRequired", ()), *tree.get("extensionsUsed", ())))
+    wrong = {
+        "numbers outside the binary chunk": len(buffers) > 1 or any("uri" in b for b in buffers),
+        "compression": not all(name.startswith(PLAIN_EXTENSIONS) for name in names),
+        "a skin or weights of morph targets": any({"skin", "weights"} & n.keys() for n in nodes),
+        "a mesh that is a camera too": any({"mesh", "camera"} <= node.keys() for node in nodes),
+        "morph targets or extensions": any("targets" in p or p.get("extensions") for p in parts),
+        "lines, points or fans": not {part.get("mode", TRIANGLES) for part in parts} <= MODES,
+        "sparse numbers": any("sparse" in a or "bufferView" not in a for a in accessors),
+    }
+    for feature in (name for name, there in wrong.items() if there):
+        message = f"the file has a feature that is not read: {feature}; export plain triangles"
+        raise MeshError(MeshRefusal.UNSUPPORTED, message)
+    for part in parts:
+        points = _item(accessors, part["attributes"]["POSITION"])
+        if (points["componentType"], points["type"]) != (FLOAT_TYPE, "VEC3"):
+            raise ValueError("positions must be three numbers of single precision")
+        corners = _item(accessors, part["indices"]) if "indices" in part else None
+        if corners and (corners["componentType"] not in INDEX_TYPES or corners["type"] != "SCALAR"):
+            raise ValueError("indices must be whole numbers without a sign")
+
+
+def _check_sizes(tree: Tree, size: int, most: int) -> None:
+    """Refuse numbers that would make trimesh reserve more memory than the file accounts for."""
+    views, meshes, nodes = (tree.get(name, []) for name in ("bufferViews", "meshes", "nodes"))
+    used = sum(_whole(view["byteLength"]) for view in views)
+    for accessor in tree.get("accessors", []):
+        _item(views, accessor["bufferView"])
+        used += _whole(accessor["count"]) * WIDTHS[accessor["type"]]
+    if used > MOST_SHARED * size:
+        raise ValueError(f"a file of {size} bytes announces {used} bytes and numbers")
+    placed = [_item(meshes, node["mesh"]) for node in nodes if "mesh" in node]
+    parts = max(sum(len(mesh["primitives"]) for mesh in each) for each in (placed, meshes))
+    if parts > most:
+        too_many(parts, most)
+    below = [*_roots(tree), *(child for node in nodes for child in node.get("children", []))]
+    if len(set(below)) < len(below) or len(nodes) > MOST_NODES:
+        raise ValueError(f"nodes must form a tree of at most {MOST_NODES} nodes")
+
+
+def _scene(tree: Tree, data: bytes, most: int) -> tuple[Array, Indices]:
+    """Decode all parts of meshes, and place them by the nodes of the default scene."""
+    gltf: Any = importlib.import_module("trimesh.exchange.gltf")
+
+    found = gltf.load_glb(io.BytesIO(data), skip_materials=True)
+    decoded = iter(found["geometry"].values())
+    meshes = [
+        [(part, next(decoded)) for part in mesh["primitives"]] for mesh in tree.get("meshes", [])
+    ]
+    points, triangles = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)]
+    before = placed = 0
+    for pose, mesh in _placed(tree):
+        mirrored = np.linalg.det(pose[:3, :3]) < 0.0
+        for part, held in meshes[mesh]:
+            rows = np.array(held["faces"], dtype=np.int64)
+            if part.get("mode") == STRIP:  # begun as elsewhere, so that sums keep their last digits
+                rows[1::2] = np.roll(rows[1::2], -1, axis=1)
+            placed += max(len(rows), 1)
+            if placed > most:
+                too_many(placed, most)
+            check_corners(rows, len(held["vertices"]))
+            used, rows = np.unique(rows, return_inverse=True)
+            rows = before + rows.reshape(-1, 3)
+            local = np.asarray(held["vertices"])[used].astype(np.float64)
+            points.append(local @ pose[:3, :3].T + pose[:3, 3])
+            triangles.append(rows[:, ::-1] if mirrored else rows)
+            before += len(used)
+    return np.vstack(points), np.vstack(triangles)
 
 
 def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
     """Yield the 4x4 pose matrix and the index of each mesh in the default scene."""
-    scenes = tree.get("scenes", [])
-    if not scenes:
-        return
-    place = tree.get("scene", 0)
-    check_place(place, scenes)
-    waiting, seen = list[tuple[Array, int]](), set[int]()
-    _await(waiting, np.eye(4), scenes[place].get("nodes", []))
+    waiting = [(np.eye(4), root) for root in _roots(tree)]
     while waiting:
-        parent, number = waiting.pop()
-        check_place(number, tree["nodes"])
-        if number in seen or len(seen) >= MOST_NODES:
-            broken(f"node {number}", f"nodes must form a tree of at most {MOST_NODES} nodes")
-        seen.add(number)
-        node = tree["nodes"][number]
-        matrix = parent @ _matrix(node)
-        _await(waiting, matrix, node.get("children", []))
+        above, number = waiting.pop()
+        node = _item(tree["nodes"], number)
+        pose = above @ _matrix(node)
+        waiting += [(pose, child) for child in node.get("children", [])]
         if "mesh" in node:
-            check_place(node["mesh"], tree["meshes"])
-            if "camera" in node:
-                unsupported(f"node {number} holds a mesh and a camera", "export the mesh alone")
-            yield matrix, node["mesh"]
-
-
-def _await(waiting: list[tuple[Array, int]], matrix: Array, nodes: list[int]) -> None:
-    if len(waiting) + len(nodes) > MOST_NODES:
-        broken("the JSON part", f"nodes must form a tree of at most {MOST_NODES} nodes")
-    waiting += [(matrix, number) for number in nodes]
+            yield pose, node["mesh"]
 
 
 def _matrix(node: Tree) -> Array:
+    """Return the matrix of a node, (4, 4)."""
     matrix = np.eye(4)
     if "matrix" in node:
-        if {"translation", "rotation", "scale"} & node.keys():
-            broken("a node", "it has a matrix as well as a translation, rotation or scale")
-        # glTF lists matrices by columns
-        matrix = _floats(node, "matrix", 16).reshape(4, 4).T
-        if (matrix[3] != (0.0, 0.0, 0.0, 1.0)).any():
-            unsupported(
-                "the last row of a node's matrix is not 0 0 0 1", "export it without perspective"
-            )
-        return matrix
+        matrix = _numbers(node["matrix"], 16).reshape(4, 4).T  # glTF lists matrices by columns
+        if {"translation", "rotation", "scale"} & node.keys() or (matrix[3] != (0, 0, 0, 1)).any():
+            raise ValueError("a node has a matrix of perspective, or a rotation beside its matrix")
     if "rotation" in node:
-        matrix[:3, :3] = _rotation(_floats(node, "rotation", 4))
-    if "scale" in node:
-        matrix[:3, :3] *= _floats(node, "scale", 3)
-    if "translation" in node:
-        matrix[:3, 3] = _floats(node, "translation", 3)
-    return matrix
-
-
-def _floats(node: Tree, name: str, count: int) -> Array:
-    given = node[name]
-    if len(given) != count or any(type(each) not in (int, float) for each in given):
-        broken("a node", f"its {name} must be {count} numbers, got {shown(given)}")
-    values = np.array([float(each) for each in given])
-    if not np.isfinite(values).all():
-        not_finite("a node", f"its {name} must be finite", shown(given))
-    return values
-
-
-def _rotation(quaternion: Array) -> Array:
-    """Convert a quaternion (x, y, z, w) of any length to a rotation matrix, (3, 3)."""
-    size = float(np.linalg.norm(quaternion))
-    if not 0.5 < size < 2.0:  # noqa: PLR2004 - rounding does not get there
-        broken("a node", f"its rotation is a quaternion of length {size:.3g}, expected 1")
-    x, y, z, w = quaternion / size
-    return np.array(
-        [
+        quaternion = _numbers(node["rotation"], 4)
+        size = float(np.linalg.norm(quaternion))
+        if not 0.5 < size < 2.0:  # noqa: PLR2004 - rounding does not get there
+            raise ValueError(f"a rotation is a quaternion of length {size:.3g}, expected 1")
+        x, y, z, w = quaternion / size
+        matrix[:3, :3] = [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
             [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
-    )
+    if "scale" in node:
+        matrix[:3, :3] *= _numbers(node["scale"], 3)
+    if "translation" in node:
+        matrix[:3, 3] = _numbers(node["translation"], 3)
+    return matrix
+
+
+def _numbers(given: list[Any], count: int) -> Array:
+    if len(given) != count or any(type(each) not in (int, float) for each in given):
+        raise ValueError(f"a node's matrix or vector must be {count} numbers")
+    return np.array(given, dtype=np.float64)
+
+
+def _roots(tree: Tree) -> list[int]:
+    """Return the indices of the top nodes of the default scene."""
+    scenes = tree.get("scenes")
+    return _item(scenes, tree.get("scene", 0)).get("nodes", []) if scenes else []
+
+
+def _item(listed: list[Tree], place: object) -> Tree:
+    """Return an item of a list by an index that must be a whole number from 0."""
+    if type(place) is not int or not 0 <= place < len(listed):
+        raise ValueError(f"it refers to item {str(place)[:40]} of a list of {len(listed)}")
+    return listed[place]
+
+
+def _whole(size: object) -> int:
+    if type(size) is not int or size < 0:
+        raise ValueError(f"sizes must be whole numbers from 0 on, got {str(size)[:40]}")
+    return size

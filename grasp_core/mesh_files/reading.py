@@ -1,32 +1,33 @@
 """Reads a mesh file: one regular file, by the rules of the format that its ending names.
 
-Reading takes time and memory in proportion to the bytes of the file, and no more triangles than are
+Binary STL files are rows of numbers, and `glb`, `ply` and `texts` read the other formats. Reading
+takes time and memory in proportion to the bytes of the file, and no more triangles than are
 allowed are kept: `MeshLimits` bounds both.
 """
 
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.files.whole_files import bounded_bytes
-from grasp_core.mesh_files import glb, obj, off, ply, stl
+from grasp_core.files.text_files import bounded_bytes
+from grasp_core.mesh_files.glb import read_glb
 from grasp_core.mesh_files.limits import MeshLimits
-from grasp_core.mesh_files.refusals import shown
+from grasp_core.mesh_files.ply import read_ply
+from grasp_core.mesh_files.polygons import too_many
 from grasp_core.mesh_files.rounding import single_rounding, text_rounding
-from grasp_core.mesh_files.words import CONTROL, without_mark
+from grasp_core.mesh_files.texts import read_obj, read_off, read_stl_text
 
-READERS = {"obj": obj.read, "stl": stl.read, "ply": ply.read, "off": off.read, "glb": glb.read}
-FORMATS = tuple(READERS)
-OTHER_FILES = {
-    b"\x1f\x8b": "a gzip archive", b"PK\x03\x04": "a zip archive", b"BZh": "a bzip2 archive",
-    b"\xfd7zXZ": "an xz archive", b"7z\xbc\xaf": "a 7z archive", b"Rar!": "a rar archive",
-    b"\x28\xb5\x2f\xfd": "a zstd archive", b"<?xml": "an XML file", b"<!DOCTYPE": "an HTML file",
-    b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"DRACO": "a Draco file",
-}  # fmt: skip
-"""First bytes of files that are not meshes, each with a name of the format for messages."""
-MAGIC = {"ply": b"ply", "glb": b"gltf"}
+FORMATS = ("obj", "stl", "ply", "off", "glb")
+BEGINNINGS = {"ply": b"ply", "glb": b"gltf"}
 """First bytes of files of some formats, in small letters."""
+STL_HEAD = 80
+STL_ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+BYTE_ORDER_MARK, UTF_16 = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
+SHOWN = 100
+"""Largest number of characters of a fault that a message quotes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,76 +52,70 @@ class MeshFile:
 def read_triangles(path: Path, limits: MeshLimits) -> MeshFile:
     """Read a mesh file."""
     try:
-        kind = mesh_kind(path)
-        return mesh_of_bytes(kind, _bytes_of(path, limits), limits.max_triangles)
+        kind = path.suffix.lower().lstrip(".")
+        if kind not in FORMATS:
+            message = f"the file's ending must be one of {', '.join(FORMATS)}, got {kind!r}"
+            raise MeshError(MeshRefusal.FORMAT, message)
+        data = bounded_bytes(path, limits.max_bytes)
+        if len(data) > limits.max_bytes:
+            message = f"the file is over the limit of {limits.max_bytes} bytes; simplify the mesh"
+            raise MeshError(MeshRefusal.TOO_MANY, message)
+        return mesh_of_bytes(kind, data, limits.max_triangles)
     except MeshError as error:
         raise MeshError(error.reason, f"{path}: {error.message}") from error
+    except OSError as error:
+        message = f"{path}: the file cannot be read ({error.strerror}); check the path"
+        raise MeshError(MeshRefusal.UNREADABLE, message) from error
     except MemoryError as error:
         message = f"{path}: reading it needs more memory than there is; simplify the mesh"
         raise MeshError(MeshRefusal.LIMIT, message) from error
 
 
-def mesh_kind(path: Path) -> str:
-    """Name the format of a mesh file by its ending."""
-    kind = path.suffix.lower().lstrip(".")
-    if kind not in FORMATS:
-        message = f"the file's ending must be one of {', '.join(FORMATS)}, got {kind!r}"
-        raise MeshError(MeshRefusal.FORMAT, message)
-    return kind
-
-
 def mesh_of_bytes(kind: str, data: bytes, most: int) -> MeshFile:
-    """Read the bytes of a mesh file."""
-    text = data if kind == "stl" and stl.is_binary(data) else without_mark(data)
-    check_beginning(kind, text)
-    points, triangles, digits = READERS[kind](text, most)
+    """Read the bytes of a mesh file, and judge the numbers that it holds."""
+    for other, beginning in BEGINNINGS.items():
+        if other != kind and data[:4].lower().startswith(beginning):
+            message = f"the file is {other.upper()} by its first bytes; rename it to .{other}"
+            raise MeshError(MeshRefusal.FORMAT, message)
+    try:
+        points, triangles, digits = _surface(kind, data, most)
+    except (ValueError, OverflowError) as error:
+        fault = "".join(c if c.isascii() and c.isprintable() else "?" for c in str(error)[:SHOWN])
+        message = f"the file breaks the rules of {kind.upper()} ({fault}); export it again"
+        raise MeshError(MeshRefusal.UNREADABLE, message) from error
     if not len(triangles):
         raise MeshError(MeshRefusal.EMPTY, "the file holds no triangles; export a surface mesh")
+    if not np.isfinite(points).all():
+        message = "a coordinate is infinite, not a number, or too large; repair the mesh"
+        raise MeshError(MeshRefusal.NON_FINITE, message)
     rounding = single_rounding(points, digits) + text_rounding(points, digits)
     return MeshFile(points, triangles, rounding, data)
 
 
-def _bytes_of(path: Path, limits: MeshLimits) -> bytes:
-    try:
-        data = bounded_bytes(path, limits.max_bytes)
-    except OSError as error:
-        message = f"the file cannot be read ({error.strerror}); check the path and its permissions"
-        raise MeshError(MeshRefusal.UNREADABLE, message) from error
-    if len(data) > limits.max_bytes:
-        message = f"the file is over the limit of {limits.max_bytes} bytes; simplify the mesh"
-        raise MeshError(MeshRefusal.TOO_MANY, message)
-    if not data:
-        raise MeshError(MeshRefusal.EMPTY, "the file is empty; export it again")
-    return data
+def _surface(kind: str, data: bytes, most: int) -> tuple[Array, Indices, int]:
+    """Return the vertices (n, 3), triangles (t, 3) and coordinates' digits of a file."""
+    count = int.from_bytes(data[STL_HEAD : STL_HEAD + 4], "little")
+    if kind == "stl" and len(data) == STL_HEAD + 4 + STL_ROW.itemsize * count:
+        if count > most:
+            too_many(count, most)
+        rows = np.frombuffer(data, STL_ROW, offset=STL_HEAD + 4)
+        return *_unshared(rows["corners"].reshape(-1, 3).astype(np.float64)), 0
+    if data.startswith(UTF_16):
+        data = data.decode("utf-16", "replace").encode()
+    data = data.removeprefix(BYTE_ORDER_MARK)
+    if not data[:4].lower().startswith(BEGINNINGS.get(kind, b"")):
+        raise ValueError("it begins otherwise")
+    if kind == "glb":
+        return *read_glb(data, most), 0
+    if kind == "stl":
+        written = read_stl_text(data, most)
+        return *_unshared(written.array), written.digits
+    if kind == "ply":
+        points, digits, polygons = read_ply(data, most)
+        return points, polygons.fans(points), digits
+    written, polygons = (read_obj if kind == "obj" else read_off)(data, most)
+    return written.array, polygons.fans(written.array), written.digits
 
 
-def check_beginning(kind: str, data: bytes) -> None:
-    """Refuse bytes that do not begin like a file of the given format."""
-    for beginning, other in OTHER_FILES.items():
-        if data.startswith(beginning):
-            message = f"the file is {other}, expected {kind.upper()}; unpack or convert it first"
-            raise MeshError(MeshRefusal.FORMAT, message)
-    first = data[:4].lower()
-    for other, beginning in MAGIC.items():
-        if other != kind and first.startswith(beginning):
-            message = (
-                f"the file is {other.upper()} by its first bytes; rename it to end in .{other}"
-            )
-            raise MeshError(MeshRefusal.FORMAT, message)
-    if kind == "stl" and not stl.is_text(data) and not stl.is_binary(data):
-        begins = data[: stl.HEADER + 4]
-        counted = int.from_bytes(begins[stl.HEADER :], "little")
-        message = (
-            "the file is neither a text nor a binary STL file: its count of "
-            f"{counted} triangles would be {stl.HEADER + 4 + stl.TRIANGLE * counted} bytes, "
-            f"but it has {len(data)}"
-        )
-        if not CONTROL.search(begins):
-            message = (
-                f"the file does not begin with `solid` as a text STL does, got {shown(begins)!r}"
-            )
-        message += "; export it again"
-        raise MeshError(MeshRefusal.UNREADABLE, message)
-    if not first.startswith(MAGIC.get(kind, b"")):
-        message = f"does not begin as a {kind.upper()} file does; export it again"
-        raise MeshError(MeshRefusal.UNREADABLE, message)
+def _unshared(points: Array) -> tuple[Array, Indices]:
+    return points, np.arange(len(points)).reshape(-1, 3)

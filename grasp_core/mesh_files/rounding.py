@@ -33,16 +33,11 @@ SIGNS = b"+-."
 FLOATS = 3
 
 
-def no_numbers() -> "array[float]":
-    """Return an empty flat array of double precision."""
-    return array("d")
-
-
 @dataclass(slots=True)
 class TextPoints:
     """The vertices of a text file as they are read, and how many digits they are written with."""
 
-    numbers: "array[float]" = field(default_factory=no_numbers)
+    numbers: "array[float]" = field(default_factory=lambda: array("d"))
     """Coordinates, three for each vertex."""
     _digits: int = 0
     _decimals: set[int] = field(default_factory=set[int])
@@ -51,9 +46,11 @@ class TextPoints:
     def __len__(self) -> int:
         return len(self.numbers) // FLOATS
 
-    def add(self, words: Sequence[bytes], values: Sequence[float]) -> None:
-        """Add the three coordinates of a vertex, as written and as numbers."""
-        self.numbers.extend(values)
+    def add(self, words: Sequence[bytes]) -> None:
+        """Add a vertex, given by three words."""
+        if len(words) != FLOATS:
+            raise ValueError(f"a vertex needs three numbers, got {len(words)}")
+        self.numbers.extend([float(word.replace(b"_", b"?")) for word in words])
         self._waiting.append(words)
         if len(self._waiting) == BLOCK:
             self._look()
@@ -95,7 +92,7 @@ def most_digits(words: Iterable[bytes]) -> int:
 
 
 def text_rounding(points: Array, digits: int) -> float:
-    """Return the rounding of coordinates (n, 3) written with at most so many significant digits."""
+    """Return the rounding of coordinates (n, 3) written with at most so many digits."""
     largest = float(np.abs(points).max(initial=0.0))
     if not 0 < digits < ALL_DIGITS or largest == 0.0:
         return 0.0
@@ -103,10 +100,7 @@ def text_rounding(points: Array, digits: int) -> float:
 
 
 def single_rounding(points: Array, digits: int = 0) -> float:
-    """Return the rounding of coordinates (n, 3) if all are of single precision; 0 otherwise.
-
-    Takes `points` (n, 3).
-    """
+    """Return the rounding of coordinates (n, 3) if all are of single precision; 0 otherwise."""
     with np.errstate(over="ignore", under="ignore", divide="ignore"):
         sizes = np.abs(points)
         last = 10.0 ** (np.floor(np.log10(sizes)) + 1 - digits) if digits else np.zeros(())

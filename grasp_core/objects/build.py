@@ -3,6 +3,13 @@
 First come the numbers of the file, then `sound_surface` makes one surface of the triangles, and
 then faces are found on it: exact planar ones, which need a closed surface, or nearly flat patches,
 which do not. The notes say what was changed.
+
+Mass properties: by the divergence theorem volume and centre are integrals over the surface, of
+x n_x and of x_i^2 n_i / 2. On a triangle with corners a, b, c they are polynomials in the corners.
+Second moments are summed over the tetrahedra between the centre and the triangles. Trimesh computes
+the same integrals, and tests compare the two; importing it takes longer than planning.
+
+Source: Eberly, "Polyhedral mass properties (revisited)", 2002.
 """
 
 import hashlib
@@ -20,8 +27,6 @@ from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.rounding import single_rounding
 from grasp_core.objects.booleans import Solid, hull
 from grasp_core.objects.curved_patches import flat_patches
-from grasp_core.objects.face import Face, FaceKind, PatchLimits
-from grasp_core.objects.mass import MassProperties, mass_properties
 from grasp_core.objects.planar_faces import (
     MAX_FACES,
     PLANAR,
@@ -31,7 +36,7 @@ from grasp_core.objects.planar_faces import (
 )
 from grasp_core.objects.solid_checks import check_volume
 from grasp_core.objects.sound_surface import SoundSurface, sound_surface
-from grasp_core.objects.surface import Surface
+from grasp_core.objects.surface import Face, FaceKind, PatchLimits, Surface
 from grasp_core.values import FINGERS
 
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
@@ -70,6 +75,22 @@ class MeshChoices:
 
 
 DEFAULT_CHOICES = MeshChoices()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MassProperties:
+    """Mass properties of a solid at density 1 kg/m^3."""
+
+    volume: float
+    """Volume [m^3]."""
+    center: Array
+    """Centre of mass, (3,) [m]."""
+    inertia: Array
+    """Inertia about the centre, (3, 3) [kg m^2]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", frozen(self.center, (3,), "center"))
+        object.__setattr__(self, "inertia", frozen(self.inertia, (3, 3), "inertia"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -272,3 +293,25 @@ def content_hash(points: Array, corners: Indices) -> str:
     digest = hashlib.sha256(np.ascontiguousarray(points[order] + 0.0, dtype="<f8").tobytes())
     digest.update(np.ascontiguousarray(turned, dtype="<i8").tobytes())
     return digest.hexdigest()
+
+
+def mass_properties(solid: Solid, center: Array | None = None) -> MassProperties:
+    """Compute the mass properties of a solid of uniform density.
+
+    Takes `center` (3,) [m].
+    """
+    a, b, c = solid.vertices[solid.triangles].transpose(1, 0, 2)
+    areas = np.cross(b - a, c - b)  # normals, as long as twice the area
+    total = a + b + c
+    volume = float((areas[:, 0] * total[:, 0]).sum()) / 6.0
+    squares = a**2 + b**2 + a * b + c * total
+    uniform = np.ascontiguousarray((areas * squares).T).sum(axis=1) / 24.0 / volume
+    about: Array = uniform if center is None else center
+    return MassProperties(volume, about, _inertia(a - about, b - about, c - about))
+
+
+def _inertia(a: Array, b: Array, c: Array) -> Array:
+    """Sum the inertias of tetrahedra between triangles and the origin, (3, 3)."""
+    sizes = np.einsum("ti,ti->t", a, np.cross(b, c))[:, None]
+    moments = sum(part.T @ (sizes * part) for part in (a, b, c, a + b + c)) / 120.0
+    return np.trace(moments) * np.eye(3) - moments

@@ -10,16 +10,18 @@ from typing import TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, are_units, is_array, is_number
 from grasp_core.by_value import ByValue
-from grasp_core.fields import are_units, is_array, is_number
-from grasp_core.geometry.flat_polygons import (
+from grasp_core.geometry.polygons import (
     FEWEST_CORNERS,
     MOST_CORNERS,
+    clip,
+    convex_hull,
     convex_polygon,
+    edge_rows,
     has_inscribed_radius,
+    plane_frame,
 )
-from grasp_core.geometry.polygons import clip, convex_hull, edge_rows, plane_frame
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import graded

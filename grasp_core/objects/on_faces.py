@@ -7,8 +7,8 @@ import numpy as np
 from grasp_core.arrays import Array, cross
 from grasp_core.checked import instance
 from grasp_core.errors import InputError
-from grasp_core.objects.face import Face
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.surface import Face
 from grasp_core.values import Contact, Grasp
 
 ON_FACE = 1e-6

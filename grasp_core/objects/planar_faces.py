@@ -20,7 +20,7 @@ from grasp_core.geometry.polygons import (
     without_straight_corners,
 )
 from grasp_core.objects.booleans import triangulate
-from grasp_core.objects.face import Face
+from grasp_core.objects.surface import Face
 from grasp_core.solvers.ties import largest_first
 
 MAX_FACES = 200

@@ -1,6 +1,13 @@
-"""Defines the polyhedron, a solid bounded by planar faces, made from a mesh file or triangles."""
+"""Defines the polyhedron, a solid bounded by planar faces, made from a mesh file or triangles.
+
+Meshes of the library trimesh are taken and made. `is_convex` rests on this: a point of the convex
+hull is at most d from its border iff it is at most d below the plane of some facet. If that holds
+for the centroid of a triangle, each corner is at most 3 d below the same plane, as no corner is
+above it. The whole triangle is then within 3 d of the hull's border.
+"""
 
 import hashlib
+import importlib
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -10,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices, to_digits
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import (
     LARGEST,
     instance,
@@ -27,10 +34,7 @@ from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, MeshChoices, build
-from grasp_core.objects.conversion import mesh_of, triangles_of
-from grasp_core.objects.face import Face, FaceKind, PatchLimits
-from grasp_core.objects.surface import Surface
-from grasp_core.short_text import counted, summary
+from grasp_core.objects.surface import Face, FaceKind, PatchLimits, Surface
 
 UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 
@@ -280,3 +284,41 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - what is known of a mesh, a keyword 
         surface=parts.surface,
         notes=parts.notes,
     )
+
+
+def triangles_of(mesh: Any) -> tuple[Any, Any]:
+    """Return the vertices and the triangles of a `trimesh.Trimesh`, unchecked."""
+    if not (hasattr(mesh, "vertices") and hasattr(mesh, "faces")):
+        raise InputError(
+            f"mesh must be a trimesh.Trimesh, got {type(mesh).__name__}; for a trimesh.Scene, "
+            "pass scene.to_mesh()"
+        )
+    return mesh.vertices, mesh.faces
+
+
+def mesh_of(vertices: Array, triangles: Indices, name: str) -> Any:
+    """Return a `trimesh.Trimesh` with given vertices (n, 3) [m] and triangles (t, 3)."""
+    module: Any = importlib.import_module("trimesh")
+    return module.Trimesh(
+        vertices=vertices, faces=triangles, metadata={"name": name}, process=False
+    )
+
+
+FLUSH = 1e-6
+"""Largest depth of a triangle's centroid below the surface of the convex hull, in object radii: ten
+times the error of coordinates in single precision."""
+BLOCK = 256
+"""Number of triangles compared with all facets at a time, which needs a few megabytes."""
+
+
+def is_convex(body: Polyhedron) -> bool:
+    """Return whether all triangles of an object lie on the surface of their convex hull."""
+    spatial: Any = importlib.import_module("scipy.spatial")
+    points = (body.vertices - body.center_of_mass) / body.radius
+    facets: Array = spatial.ConvexHull(points).equations
+    centroids = points[body.triangles].mean(axis=1)
+    for start in range(0, len(centroids), BLOCK):
+        depths = -(centroids[start : start + BLOCK] @ facets[:, :3].T + facets[:, 3])
+        if (depths.min(axis=1) > FLUSH).any():
+            return False
+    return True

@@ -137,7 +137,8 @@ def _sorted_out(
     shells: list[_Body], slack: float, said: list[str]
 ) -> tuple[list[_Body], list[_Body], MeshError | None]:
     """Give each cavity to its body; return bodies, parts that cannot be used, and the reason."""
-    flat = [s for s in shells if abs(s.solid.volume) <= _thinnest(s)]
+    thinnest = [THINNEST * float(np.ptp(s.solid.vertices, axis=0).max()) ** 3 for s in shells]
+    flat = [s for s, least in zip(shells, thinnest, strict=True) if abs(s.solid.volume) <= least]
     bodies = [s for s in shells if s not in flat and s.solid.volume > 0.0]
     bad: list[_Body] = flat
     why: MeshError | None = None
@@ -178,10 +179,6 @@ def _sorted_out(
     return outer, [*bad, *inner], why
 
 
-def _thinnest(shell: _Body) -> float:
-    return THINNEST * float(np.ptp(shell.solid.vertices, axis=0).max()) ** 3
-
-
 def _is_inside_another(place: int, bodies: list[_Body], slack: float) -> bool:
     """Tell whether a larger body, or an equal one before it, holds a body in its material."""
     inner = bodies[place].solid
@@ -205,7 +202,7 @@ def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
     if len(bodies) == 1:
         return bodies
     solid, marks = union([(body.solid, body.marks) for body in bodies])
-    found = _with_cavities(_parts(_Body(solid, marks)), slack)
+    found = _with_cavities(_split(_Body(solid, marks), _labels(solid.triangles)), slack)
     if len(found) == len(bodies):
         return bodies
     if max(thin_share(body.solid) for body in found) > CLEAN:
@@ -240,10 +237,6 @@ def _shells(points: Array, corners: Indices, most: int) -> list[_Body]:
             f"the mesh has {label.max() + 1} parts, more than the limit of {most}; give one solid",
         )
     return _split(_Body(Solid(points, corners), np.arange(len(corners))), label)
-
-
-def _parts(body: _Body) -> list[_Body]:
-    return _split(body, _labels(body.solid.triangles))
 
 
 def _split(body: _Body, label: Indices) -> list[_Body]:

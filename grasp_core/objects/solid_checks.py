@@ -35,6 +35,8 @@ def welded(
     rank = np.argsort(np.argsort(first))
     points, corners = points[np.sort(first)], rank[order][corners]
     whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    if not whole.any():
+        raise MeshError(MeshRefusal.ZERO_VOLUME, "no triangle has an area; export a solid")
     return points, corners[whole], int((~whole).sum())
 
 

@@ -21,10 +21,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.standard_order import SHORTEST, flag_frame
 from grasp_core.values import FINGERS, Grasp
 
 SAME_BODY = 1e-4
@@ -36,8 +36,6 @@ of their normals and force cones: a picture of this object shows no smaller one.
 FAR = 4.0
 """Distance in object radii from which foci are compared by their direction, with the same share of
 their distance."""
-SHORTEST = 1e-3
-"""Least distance of a corner from its face's centre that gives a direction, in object radii."""
 MOST_FACES = 200
 """Largest number of faces of objects whose symmetries are looked for, as for exact planning."""
 CROWDED = 300
@@ -121,16 +119,6 @@ def copies_of(body: Polyhedron, grasps: Sequence[Grasp]) -> tuple[Copies, ...]:
     return tuple(classes)
 
 
-def orbit_sizes(body: Polyhedron, grasps: Sequence[Grasp]) -> tuple[int, ...]:
-    """Count the different grasps that rotations of the object make of each grasp, itself included.
-
-    That number is the number of rotations over that of those which map the grasp to itself.
-    """
-    turns = symmetries(body).rotations
-    traits = [_Traits.of(body, grasp) for grasp in grasps]
-    return tuple(len(turns) // int(each.images(each, turns).sum()) for each in traits)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Traits:
     """What must be the same in two copies, about the centre of mass and over the object's radius.
@@ -168,14 +156,10 @@ class _Traits:
 
     def is_image(self, other: "_Traits", maps: Array) -> bool:
         """Return whether one of the matrices `maps`, (n, 3, 3), makes this from another grasp."""
-        return bool(self.images(other, maps).any())
-
-    def images(self, other: "_Traits", maps: Array) -> NDArray[np.bool_]:
-        """Return which of the matrices `maps`, (n, 3, 3), make this from another grasp, (n,)."""
         images = np.einsum("nij,kvj->nkvi", maps, other.vectors)
         off = np.linalg.norm(images[:, :, None] - self.vectors[None, None], axis=4).max(axis=3)
         matched = off[:, np.arange(FINGERS), ORDERS].max(axis=2)
-        return np.asarray((matched <= SAME_GRASP).any(axis=1))
+        return bool((matched <= SAME_GRASP).any())
 
 
 def _near(points: Array) -> Array:
@@ -195,7 +179,7 @@ def _flags(body: Polyhedron) -> list[Array]:
         for corner, lengths in _corners(body, int(face))
     ]
     return [
-        _frame(body, int(face), corner)
+        flag_frame(body, int(face), corner)
         for face, corner, lengths in corners
         if math.dist(lengths, corners[0][2]) <= 2.0 * SAME_BODY
     ]
@@ -216,16 +200,6 @@ def _corners(body: Polyhedron, face: int) -> Iterator[tuple[int, tuple[float, fl
         inner = float(np.linalg.norm(at - centroid)) / body.radius
         if inner > SHORTEST:
             yield corner, (inner, float(np.linalg.norm(at - body.center_of_mass)) / body.radius)
-
-
-def _frame(body: Polyhedron, face: int, corner: int) -> Array:
-    """Return unit columns towards a corner, across, and along the face's normal, (3, 3)."""
-    normal = body.faces[face].normal
-    toward = body.faces[face].polygon[corner] - body.faces[face].centroid
-    toward = toward - normal * float(normal @ toward)
-    toward = toward / np.linalg.norm(toward)
-    columns = [toward, np.cross(normal, toward), normal]
-    return np.asarray(np.column_stack(columns), dtype=np.float64)
 
 
 def _marks(body: Polyhedron) -> tuple[Array, Array]:

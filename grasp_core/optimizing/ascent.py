@@ -1,35 +1,56 @@
-"""Moves contacts on four convex faces uphill towards larger Ferrari-Canny quality.
+"""Moves contacts on four convex faces uphill: towards larger quality, or larger resisted loads.
 
-Solved, locally: maximise over positions x_i on the faces the radius of the largest ball of wrenches
-that contact forces with normal parts of sum one resist.
+Solved, locally: maximise over positions x_i on the faces a measure of the wrenches that contact
+forces with normal parts of sum one resist.
 
-Derivation. The quality is bounded from below by the plane of an inner polytope that is nearest to
-zero (see `ferrari_canny`). A simplex of it has corners w_c, made by contact forces F_ci at contacts
-i, a unit normal (a, alpha) and the distance b; the foot of the perpendicular on its plane is
-sum_c l_c w_c. When contacts move by d_i and take their forces along, w_c moves by
-(0, sum_i d_i x F_ci), and
+*Ferrari-Canny quality*, the radius of the largest ball of wrenches. It is bounded from below by the
+plane of an inner polytope that is nearest to zero (see `ferrari_canny`). A simplex of it has
+corners w_c, made by contact forces F_ci at contacts i, a unit normal (a, alpha) and the distance b;
+the foot of the perpendicular on its plane is sum_c l_c w_c. When contacts move by d_i and take
+their forces along, w_c moves by (0, sum_i d_i x F_ci), and
 
     b changes by  sum_i d_i . (Phi_i x alpha),   Phi_i = sum_c l_c F_ci.                      (1)
 
-Each step is a linear program: raise the least of these linearised distances, with positions inside
-the faces and no coordinate moved farther than a trust region allows. A step counts when
-the proved lower bound rises by it; the region grows where the prediction was good and shrinks where
-it was not.
+*A task*, the least of the largest multiples m_j of loads w_j. The program for m_j has forces F_i
+and a twist (v, omega) as its answer, which asks for one of w_j, see `resisted_loads`. When contacts
+move by d_i and take the forces along, the wrench changes by (0, sum_i d_i x F_i), and the optimum
+by its product with the twist,
+
+    m_j changes by  sum_i d_i . (F_i x omega).                                              (2)
+
+*The weight* is a task with forces in all directions. Contacts climb for some of them, again and
+again with those directions as well that they held least.
+
+Each step is a linear program: raise the least of these linearised distances or multiples, with
+positions inside the faces and no coordinate moved farther than a trust region allows. A step counts
+when the proved lower bound rises by it; the region grows where the prediction was good and shrinks
+where it was not.
 
 The paper leaves open where on their faces the contacts of a grasp are best (section 5).
 """
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.closure.contacts import contact_frames
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.closure.wrenches import contact_frames
 from grasp_core.objects.face_pieces import FacePiece
-from grasp_core.quality.ferrari_canny import FerrariCanny, InnerPolytope, wrench_set_quality
+from grasp_core.quality.ferrari_canny import FerrariCanny, wrench_set_quality
+from grasp_core.quality.inner_polytope import InnerPolytope
+from grasp_core.quality.measures import (
+    CLOSED_GAP,
+    THIN,
+    Measure,
+    ResistedLoads,
+    resisted_loads,
+    task_limits,
+)
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
-from grasp_core.solvers.ties import graded, nearest_optimum, on_grid, surpassing
+from grasp_core.solvers.ties import graded, nearest_optimum, on_grid, smallest_first, surpassing
 
 SEARCH_GAP = 1e-3
 """Largest relative gap between the two bounds of the quality during the climb."""
@@ -57,6 +78,28 @@ POOR, SHRINKAGE = 0.2, 0.4
 shrinks."""
 WORTHWHILE = 1e-6
 """Predicted relative gain below which the climb ends."""
+TASK_WORTHWHILE = 1e-4
+"""The same for a task: the smallest gap that may be asked for, as each
+step takes a program for every load."""
+SPREAD, ROUNDS = 48, 4
+"""Directions of the weight for which contacts climb first, and how often they climb. Every
+direction is within 23 degrees of one of these, so that it is held at most 8 % less than they are;
+the directions that are added make up for that."""
+WEAK, APART, MOST_WEAK = 1.05, 0.97, 16
+"""Directions that are added are held up to this much better than the weakest: others are not the
+least after a small step. Cosines between them are below this: 14 degrees, half of what is between
+the first ones. They are so many at most, as each is a program more in every step."""
+
+
+class Height(NamedTuple):
+    """How high contacts stand."""
+
+    quality: FerrariCanny
+    lower: float
+    """Proved lower bound of what they climb for: of the quality, or of a multiple of loads."""
+    planes: Callable[[], tuple[Array, Array]] | None
+    """Gives the distances or multiples near the least, (m,), and their slopes, (m, 2k); None where
+    the contacts are not in force closure."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,26 +122,56 @@ class ContactFaces:
         return np.array([piece.point(at) for piece, at in zip(self.pieces, y, strict=True)])
 
     def quality(self, y: Array, gap: float = SEARCH_GAP) -> FerrariCanny:
-        """Compute the `l1` quality of contacts, with torques in units of the object's size.
+        """Compute the `l1` quality of contacts, with torques in units of the object's size."""
+        return wrench_set_quality(self.wrenches(y), gap)
 
-        Wrenches are rounded to a grid, because a polytope that grows where it is weakest often has
-        to choose between several equally near planes.
+    def wrenches(self, y: Array) -> WrenchSet:
+        """Return the wrenches of contacts, rounded to a grid.
+
+        A polytope that grows where it is weakest often has to choose between several equally near
+        planes.
         """
         friction = np.full(len(y), self.friction)
-        wrenches = WrenchSet.at(self.positions(y), self.normals, friction)
-        return wrench_set_quality(wrenches.on_grid(), gap)
+        return WrenchSet.at(self.positions(y), self.normals, friction).on_grid()
 
     def climbed(self, y: Array) -> tuple[Array, FerrariCanny]:
         """Move contacts uphill to a local optimum, (k, 2); return them with their quality."""
-        found, reach = self.quality(y), FIRST_REACH
+
+        def height(at: Array) -> Height:
+            found = self.quality(at)
+            polytope = found.polytope
+            if polytope is None:
+                return Height(found, found.lower, None)
+            return Height(found, found.lower, lambda: self.nearest_planes(found, polytope))
+
+        end, found = self.climb(y, height, WORTHWHILE)
+        return end, found.quality
+
+    def climbed_for_task(self, measure: Measure, y: Array) -> Array:
+        """Move contacts in force closure uphill to a local optimum of a task's loads, (k, 2)."""
+
+        def height(at: Array) -> Height:
+            wrenches = self.wrenches(at)
+            quality = wrench_set_quality(wrenches, CLOSED_GAP)
+            if quality.lower <= 0.0:
+                return Height(quality, 0.0, None)
+            planes = self.planes_of_loads(wrenches, measure)
+            return Height(quality, float(planes[0].min()), lambda: planes)
+
+        return self.climb(y, height, TASK_WORTHWHILE)[0]
+
+    def climb(
+        self, y: Array, height: Callable[[Array], Height], worthwhile: float
+    ) -> tuple[Array, Height]:
+        """Take steps uphill in a trust region as long as they are predicted to be worthwhile."""
+        found, reach = height(y), FIRST_REACH
         for _ in range(MOST_STEPS):
-            if found.polytope is None or reach < LEAST_REACH:
+            if found.planes is None or reach < LEAST_REACH:
                 break
-            planes = self.nearest_planes(found, found.polytope)
-            step, predicted = self.step(y, found.lower, planes, reach)
-            if predicted <= WORTHWHILE * found.lower:
+            step, predicted = self.step(y, found.lower, found.planes(), reach)
+            if predicted <= worthwhile * found.lower:
                 break
-            trial = self.quality(y + step)
+            trial = height(y + step)
             gained = (trial.lower - found.lower) / predicted
             if trial.lower > surpassing(found.lower):
                 y, found = y + step, trial
@@ -108,10 +181,7 @@ class ContactFaces:
     def step(
         self, y: Array, lower: float, planes: tuple[Array, Array], reach: float
     ) -> tuple[Array, float]:
-        """Find the best move within the trust region, and the gain that it predicts.
-
-        Takes `y` (k, 2); `planes` (m,) or (m, 2k).
-        """
+        """Find the best move within the trust region, and the gain that it predicts."""
         distances, slopes = planes
         n = y.size
         rows = [np.hstack([-slopes, np.ones((len(slopes), 1))])]
@@ -151,3 +221,49 @@ class ContactFaces:
         planes = np.array([piece.frame for piece in self.pieces])
         slopes = np.einsum("mki,kij->mkj", turned, planes).reshape(int(sound.sum()), -1)
         return b[sound], slopes
+
+    def planes_of_loads(self, wrenches: WrenchSet, measure: Measure) -> tuple[Array, Array]:
+        """Return the multiple of each load, (m,), and its slopes (2), (m, 2k)."""
+        limits = task_limits(wrenches, measure)
+        local = np.array([limit.forces for limit in limits]).reshape(len(limits), -1, 3)
+        forces = np.einsum("kij,nkj->nki", contact_frames(self.normals), local)
+        turned = np.cross(forces, np.array([limit.twist for limit in limits])[:, None, 3:])
+        planes = np.array([piece.frame for piece in self.pieces])
+        slopes = np.einsum("nki,kij->nkj", turned, planes).reshape(len(limits), -1)
+        return np.array([limit.multiple for limit in limits]), slopes
+
+
+def climbs_for_weight(faces: ContactFaces, y: Array) -> Iterator[Array]:
+    """Yield where contacts in force closure come to by climbing for the weight, (k, 2) each."""
+    forces = _spread()
+    for _ in range(ROUNDS):
+        loads = np.hstack([forces, np.zeros_like(forces)])
+        y = faces.climbed_for_task(Measure("task", loads), y)
+        yield y
+        found = resisted_loads(faces.wrenches(y), Measure("weight"), SEARCH_GAP)
+        forces = np.vstack([forces, _weakest(found)])
+
+
+def _spread() -> Array:
+    """Return directions along a spiral from pole to pole, all about as far apart, (n, 3)."""
+    place = np.arange(SPREAD) + 0.5
+    z, turn = 1.0 - 2.0 * place / SPREAD, np.pi * (1.0 + np.sqrt(5.0)) * place
+    across = np.sqrt(1.0 - z * z)
+    return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
+
+
+def _weakest(found: ResistedLoads) -> Array:
+    """Return directions of the weight that contacts hold least, far from each other, (n, 3)."""
+    if found.ball is None or found.ball.polytope is None:
+        return np.zeros((0, 3))
+    twists = found.ball.polytope.normals / np.repeat([1.0, THIN], 3)
+    supports, demands = found.wrenches.supports(twists), found.measure.demands(twists)
+    held = found.measure.multiples(supports, demands)
+    near = np.array(smallest_first(held))
+    near = near[held[near] <= WEAK * float(held.min())]
+    ways = -twists[near, :3] / demands[near, None]
+    kept: list[Array] = []
+    while len(ways) and len(kept) < MOST_WEAK:
+        kept.append(ways[0])
+        ways = ways[ways @ ways[0] < APART]
+    return np.array(kept)

@@ -24,7 +24,7 @@ from grasp_core.by_value import ByValue
 from grasp_core.checked import SMALLEST, coefficient, number, seed_of
 from grasp_core.errors import InputError
 from grasp_core.families.constructions import point_region, regions_of
-from grasp_core.families.free_contacts import closed_at, of_general_type
+from grasp_core.families.free import closed_at, of_general_type
 from grasp_core.geometry.polygons import SAME_CORNER
 from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_on_faces
@@ -108,11 +108,16 @@ def optimize_contacts(
             "raise the friction or give another grasp"
         )
     pieces = pieces_under(body, grasp)
-    insets = _insets(body, grasp, pieces, finger_radius)
+    at = _unit_points(body, grasp)
+    if finger_radius is None:
+        depths = [piece.inset(point) for piece, point in zip(pieces, at, strict=True)]
+        insets = [min(FINGER_RADIUS, max(-coarse(-each, START_DIGITS), 0.0)) for each in depths]
+    else:
+        insets = [finger_radius / body.radius] * FINGERS
     clearances = tuple(float(body.radius * inset) for inset in insets)
     rooms = [inset_piece(*chosen) for chosen in zip(pieces, insets, strict=True)]
     faces = ContactFaces(pieces, tuple(room.b for room in rooms), friction)
-    here = [_clear_of_edges(*on) for on in zip(rooms, _unit_points(body, grasp), strict=True)]
+    here = [_clear_of_edges(*on) for on in zip(rooms, at, strict=True)]
     rng = np.random.default_rng([seed, *grasp.faces])
     starts = [np.array(here), *_random_starts(faces, rooms, rng)]
     ends = [faces.climbed(y) for y in starts]
@@ -126,16 +131,6 @@ def optimize_contacts(
     return Improvement(grasp, before, before, clearances)
 
 
-def _insets(
-    body: Polyhedron, grasp: Grasp, pieces: Sequence[FacePiece], finger_radius: float | None
-) -> list[float]:
-    """Return the distance that contacts keep from the edges of each piece, at unit size."""
-    if finger_radius is not None:
-        return [finger_radius / body.radius] * FINGERS
-    depths = [piece.inset(at) for piece, at in zip(pieces, _unit_points(body, grasp), strict=True)]
-    return [min(FINGER_RADIUS, max(-coarse(-depth, START_DIGITS), 0.0)) for depth in depths]
-
-
 def _quality(body: Polyhedron, grasp: Grasp, friction: float) -> FerrariCanny:
     return ferrari_canny(
         grasp, friction=friction, center=body.center_of_mass, torque_scale=body.radius
@@ -143,17 +138,12 @@ def _quality(body: Polyhedron, grasp: Grasp, friction: float) -> FerrariCanny:
 
 
 def pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
-    """Return the convex piece of a face that each contact lies on."""
+    """Return the piece of a face that each contact is deepest in, the first of equal ones."""
     pieces = pieces_by_face(body)
     return tuple(
-        _deepest(pieces[face], point)
+        pieces[face][first_best([piece.inset(point) for piece in pieces[face]], SAME_CORNER)]
         for face, point in zip(grasp.faces, _unit_points(body, grasp), strict=True)
     )
-
-
-def _deepest(pieces: Sequence[FacePiece], point: Array) -> FacePiece:
-    """Return the piece that a point is deepest in, or the first if it is on a common edge."""
-    return pieces[first_best([piece.inset(point) for piece in pieces], SAME_CORNER)]
 
 
 def _unit_points(body: Polyhedron, grasp: Grasp) -> Array:

@@ -21,26 +21,17 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, frozen_each
+from grasp_core.arrays import Array, Indices, frozen_each, is_a
 from grasp_core.by_value import ByValue
 from grasp_core.checked import BOUNDS, LARGEST, coefficient, number, several, whole
 from grasp_core.errors import InputError
-from grasp_core.fields import is_a
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.grounds import Grounds, grounds_on
-from grasp_core.optimizing.best.levels import FINER
-from grasp_core.optimizing.best.same_places import first_nodes
-from grasp_core.optimizing.best.searching.search import Searching
-from grasp_core.optimizing.best.searching.stop import StopAfter
-from grasp_core.optimizing.best.single_twists import lowered_twists, refuted_by_one
-from grasp_core.optimizing.best.support_cuts import (
-    LEAST_THRESHOLD,
-    SEARCHED_BELOW,
-    CutTree,
-    Slack,
-)
+from grasp_core.optimizing.best.best_grasp import FINER, lowered_twists, refuted_by_one
+from grasp_core.optimizing.best.grounds import Grounds, first_nodes, grounds_on
+from grasp_core.optimizing.best.search import Searching, StopAfter
+from grasp_core.optimizing.best.support_cuts import LEAST_THRESHOLD, SEARCHED_BELOW, CutTree, Slack
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.solvers.ties import few_digits

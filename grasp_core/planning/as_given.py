@@ -18,7 +18,6 @@ from grasp_core.arrays import Array, frozen_copy
 from grasp_core.by_value import trusted
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.families.free import Absence
-from grasp_core.families.placements import Placement
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.objects.standard_order import FLIP, Standard
 from grasp_core.planning.certify import Certified
@@ -40,6 +39,7 @@ def as_given(found: Certified, on: Standard) -> Certified:
     """Translate a grasp to the object as given, fingers in the order of their faces."""
     places = [_place(on, face) for face in found.faces]
     order = _finger_order(found.id[0], places)
+    placement = found.placement
     swapped = found.id[0] in PAIRED and order[0] > 1
     grasp = replace(
         found,
@@ -48,7 +48,14 @@ def as_given(found: Certified, on: Standard) -> Certified:
         pieces=tuple(found.pieces[finger] for finger in order),
         cones=tuple(found.cones[finger] for finger in order),
         regions=tuple(found.regions[finger] for finger in order),
-        placement=_reordered(found.placement, order, swapped=swapped),
+        placement=replace(
+            placement,
+            positions=placement.positions[order],
+            forces=placement.forces[order],
+            foci=placement.foci[::-1] if swapped else placement.foci,
+            radii=placement.radii[order],
+            planned=None if placement.planned is None else placement.planned[order],
+        ),
         ways_out=None if found.ways_out is None else found.ways_out[order],
     )
     return _mirrored_grasp(grasp) if on.mirrored else grasp
@@ -74,17 +81,6 @@ def _finger_order(letter: str, places: Sequence[Place]) -> list[int]:
     pairs = [sorted(pair, key=places.__getitem__) for pair in ((0, 1), (2, 3))]
     first, second = sorted(pairs, key=lambda pair: places[pair[0]])
     return [*first, *second]
-
-
-def _reordered(placement: Placement, order: list[int], *, swapped: bool) -> Placement:
-    return replace(
-        placement,
-        positions=placement.positions[order],
-        forces=placement.forces[order],
-        foci=placement.foci[::-1] if swapped else placement.foci,
-        radii=placement.radii[order],
-        planned=None if placement.planned is None else placement.planned[order],
-    )
 
 
 def _mirrored_grasp(found: Certified) -> Certified:

@@ -11,17 +11,16 @@ from typing import cast
 
 import numpy as np
 
-from grasp_core.angles import kept_angle
 from grasp_core.arrays import Array, frozen_copy
 from grasp_core.by_value import trusted
-from grasp_core.closure.batches.certificates import closing_margins
+from grasp_core.closure.contacts import grasp_map, normal_and_tangential
 from grasp_core.closure.critical_friction import critical_friction, critical_frictions
-from grasp_core.closure.force_closure import force_closure
+from grasp_core.closure.force_closure import closing_margins, force_closure
 from grasp_core.closure.lines import classify_each, classify_lines
-from grasp_core.closure.wrenches import grasp_map, normal_and_tangential
-from grasp_core.cones.many_quadruples import span_angles
+from grasp_core.cones.spanning import span_angles
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.placements import Placement
+from grasp_core.frames import kept_angle
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny

@@ -15,7 +15,6 @@ import numpy as np
 
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.errors import SolverError
-from grasp_core.families.batches.settling import MOST_CHOICES, Attempt, Cones, chosen_shapes
 from grasp_core.families.constructions import (
     CONSTRUCTIONS,
     MIXED,
@@ -25,6 +24,7 @@ from grasp_core.families.constructions import (
 )
 from grasp_core.families.free import RESTARTS, Absence, Undecided, close_patches, place_free
 from grasp_core.families.placements import Placement
+from grasp_core.families.placing import MOST_CHOICES, Attempt, Cones, chosen_shapes
 from grasp_core.families.true_surface import on_true_surface
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, choices_near
 from grasp_core.objects.standard_order import Standard
@@ -129,7 +129,7 @@ def _whole(on: Standard, faces: FaceQuadruple, request: PlanRequest, gathered: G
     hulls = tuple(shape.hull for shape in chosen_shapes(on.shapes, whole))
     gathered.tally.count("solved")
     answer = _place(hulls, request, np.random.default_rng([request.seed, *faces]), restarts=0)
-    return hulls, answer if isinstance(answer, Absence) else Undecided(1, 1.0)
+    return hulls, answer if isinstance(answer, Absence) else Undecided(1.0)
 
 
 def _answers(
@@ -166,7 +166,7 @@ def _answers(
             return answers
     # more choices than were tried: the rest stays undecided
     if math.prod(len(shape.pieces) for shape in shapes) > most:
-        answers.append((hulls, Undecided(1, 1.0)))
+        answers.append((hulls, Undecided(1.0)))
     return answers
 
 
@@ -214,7 +214,7 @@ def _place(
             restarts=restarts, whole=known,
         )  # fmt: skip
     except SolverError:
-        return Undecided(1, 1.0)
+        return Undecided(1.0)
 
 
 def _cone_choices(placed: Sequence[Placed], request: PlanRequest) -> list[tuple[Cones, ...]]:

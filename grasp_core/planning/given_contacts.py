@@ -20,9 +20,9 @@ from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.cones.spanning import span_angle
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import plane_frame
-from grasp_core.objects.face import Face
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.surface import Face
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import (

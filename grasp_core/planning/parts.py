@@ -16,16 +16,15 @@ from functools import cached_property, lru_cache, partial
 from itertools import combinations, islice, tee
 from typing import TypeAlias
 
-from grasp_core.families.batches.settling import chosen_shapes
 from grasp_core.families.constructions import CONSTRUCTIONS
+from grasp_core.families.placing import chosen_shapes
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.standard_order import Standard, standard
-from grasp_core.objects.trimmed_faces import clear_of_edges, with_halves
-from grasp_core.planning.blocks import Blocks, all_blocks, kept, spanning_blocks
+from grasp_core.objects.standard_order import Standard, clear_of_edges, standard, with_halves
 from grasp_core.planning.certify import Certified
 from grasp_core.planning.family_search import Gathered, MethodSearch, found_in
 from grasp_core.planning.free_search import found_on, found_with_more_parts
 from grasp_core.planning.planned_cones import PlannedCones
+from grasp_core.planning.quadruples import Blocks, all_blocks, kept, spanning_blocks
 from grasp_core.planning.reach import Reach
 from grasp_core.planning.request import PlanRequest
 from grasp_core.processes import local_processes

@@ -10,15 +10,14 @@ and finds grasps on them or proves that there are none.
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial, wraps
-from typing import ParamSpec, TypeVar, cast
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import cast
 
-from grasp_core.angles import kept_angle
 from grasp_core.checked import function, several, text, whole
 from grasp_core.cones.spanning import count_spanning
-from grasp_core.errors import InputError
 from grasp_core.families.constructions import LEAST_RADIUS
+from grasp_core.frames import kept_angle
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard
@@ -33,25 +32,7 @@ from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.planning.selection import chosen
 from grasp_core.values import Grasp, Method
 
-Given = ParamSpec("Given")
-Result = TypeVar("Result")
 
-
-def _knows_old_name(planner: Callable[Given, Result]) -> Callable[Given, Result]:
-    """Refuse the old keyword `cells` with an error that gives its new name."""
-
-    @wraps(planner)
-    def checked(*args: Given.args, **options: Given.kwargs) -> Result:
-        if "cells" in options:
-            raise InputError(
-                "the keyword cells is called max_face_parts now; write max_face_parts instead"
-            )
-        return planner(*args, **options)
-
-    return checked
-
-
-@_knows_old_name
 def plan(  # noqa: PLR0913 - the contract's keywords
     body: Polyhedron,
     friction: float = 0.5,
@@ -125,7 +106,6 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     return _planned(body, request, on, searches)
 
 
-@_knows_old_name
 def iter_grasps(  # noqa: PLR0913 - as `plan`
     body: Polyhedron,
     friction: float = 0.5,

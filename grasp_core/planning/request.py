@@ -80,19 +80,27 @@ def check_request(body: Polyhedron, request: PlanRequest) -> None:
     """Refuse keywords out of range, and objects with too many faces for the request."""
     check_body(body)
     coefficient(request.friction)
-    _check_angle(request)
-    _check_kinds(request)
-    _check_counts(request)
-    _check_lengths(body, request)
-    _check_size(body, request)
-
-
-def _check_counts(request: PlanRequest) -> None:
+    if request.theta_deg is not None:
+        widest = math.degrees(math.atan(request.friction))
+        where = f", the angle of friction {request.friction}, or None"
+        most = widest * (1.0 + UNIT_SLACK)
+        number(request.theta_deg, "theta_deg", least=SMALLEST, most=most, where=where)
+    families: tuple[Any, ...] = request.families
+    if not families or any(family not in METHODS for family in families):
+        raise InputError(f"families must be among {', '.join(METHODS)}; got {shown(families)}")
+    if request.complete and "free" not in request.families:
+        raise InputError(
+            "complete needs the free method, which decides all faces; add free to families"
+        )
+    one_of(request.cones, get_args(ConeKind), "cones")
+    one_of(request.rank_by, get_args(RankBy), "rank_by")
     if request.limit is not None:
         whole(request.limit, "limit", least=1)
     whole(request.max_face_parts, "max_face_parts", least=1)
     seed_of(request.seed)
     switch(request.complete, "complete")
+    _check_lengths(body, request)
+    _check_size(body, request)
 
 
 def _check_lengths(body: Polyhedron, request: PlanRequest) -> None:
@@ -128,27 +136,3 @@ def _check_size(body: Polyhedron, request: PlanRequest) -> None:
             f"simpler plans: give {' and '.join(missing)}; or load the object with patches for "
             "faces (--faces patches)"
         )
-
-
-def _check_kinds(request: PlanRequest) -> None:
-    families: tuple[Any, ...] = request.families
-    unknown = [family for family in families if family not in METHODS]
-    if unknown or not families:
-        raise InputError(f"families must be among {', '.join(METHODS)}; got {shown(families)}")
-    if request.complete and "free" not in request.families:
-        raise InputError(
-            "complete needs the free method, which decides all faces; add free to families"
-        )
-    one_of(request.cones, get_args(ConeKind), "cones")
-    one_of(request.rank_by, get_args(RankBy), "rank_by")
-
-
-def _check_angle(request: PlanRequest) -> None:
-    if request.theta_deg is None:
-        return
-    widest = math.degrees(math.atan(request.friction))
-    most, where = (
-        widest * (1.0 + UNIT_SLACK),
-        f", the angle of friction {request.friction}, or None",
-    )
-    number(request.theta_deg, "theta_deg", least=SMALLEST, most=most, where=where)

@@ -6,12 +6,11 @@ from dataclasses import dataclass, field, replace
 from textwrap import shorten
 from typing import Any, Literal, Protocol, TypeAlias
 
-from grasp_core.by_value import ByValue
-from grasp_core.grasp_tables import ById, Demands, data_frame, families_of
+from grasp_core.by_value import ByValue, counted, summary
+from grasp_core.grasp_tables import ById, chosen, data_frame
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.short_text import counted, summary
 from grasp_core.values import FaceQuadruple, Grasp, Method
 
 LONGEST_REASON = 160
@@ -207,11 +206,11 @@ class Plan(ByValue, ById[Grasp], InNotebooks):
         Raises:
             InputError: A demand is not a number, or there is no such family.
         """
-        demands = Demands(
-            families_of(family), min_radius_m, min_closure_margin, max_critical_friction,
-            min_ferrari_canny_n, where,
+        kept = chosen(
+            self.grasps, where, family, min_radius_m, min_closure_margin, max_critical_friction,
+            min_ferrari_canny_n,
         )  # fmt: skip
-        return replace(self, grasps=tuple(filter(demands.are_met_by, self.grasps)))
+        return replace(self, grasps=kept)
 
     def to_dataframe(self) -> Any:
         """Return a `pandas.DataFrame` with a row for each grasp, indexed by id.

@@ -5,12 +5,12 @@ from itertools import chain, zip_longest
 
 import numpy as np
 
+from grasp_core.arrays import Array
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.errors import NoForcesError
 from grasp_core.execution.best_squeeze import GAP, best_squeeze, searched
-from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip
+from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip, springs
 from grasp_core.execution.loads import any_direction
-from grasp_core.execution.springs import springs
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.certify import Certified
 from grasp_core.planning.reach import Finger
@@ -50,11 +50,19 @@ def chosen(
 def _measure(body: Polyhedron, request: PlanRequest) -> tuple[Callable[[Certified], float], float]:
     """Return what makes grasps better the smaller it is, and the share of it that is none."""
     if request.rank_by == "friction-margin":
-        return _critical, SAME_SHARE
+        return lambda found: critical_friction(*_contacts(found)), SAME_SHARE
     if request.rank_by == "ferrari-canny":
-        return _weakness(request.friction), SAME_SHARE
+        mu = request.friction
+        return (
+            lambda found: -ferrari_canny(*_contacts(found), mu, torque_scale=1.0).lower
+        ), SAME_SHARE
     # the best squeeze is searched to a gap, so equal grasps may come out as far apart
     return _looseness(body, request, _mass(body, request.rank_by)), 2.0 * GAP
+
+
+def _contacts(found: Certified) -> tuple[Array, Array]:
+    """Return positions and normals of a grasp's contacts at unit object size, (4, 3) each."""
+    return found.placement.positions, found.normals
 
 
 def _mass(body: Polyhedron, rank_by: RankBy) -> float:
@@ -97,21 +105,6 @@ def _in_order(
 ) -> list[Certified]:
     """Order grasps by a figure, the smallest first; equal ones stay in the order given."""
     return [found[place] for place in np.argsort(ranks(figures, same), kind="stable")]
-
-
-def _critical(found: Certified) -> float:
-    """Return the least friction at which the contacts are in force closure."""
-    return critical_friction(found.placement.positions, found.normals)
-
-
-def _weakness(friction: float) -> Callable[[Certified], float]:
-    """Return a function that gives minus the Ferrari-Canny quality of a grasp."""
-
-    def measure(found: Certified) -> float:
-        contacts = found.placement.positions, found.normals
-        return -ferrari_canny(*contacts, friction, torque_scale=1.0).lower
-
-    return measure
 
 
 def _looseness(

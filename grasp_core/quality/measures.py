@@ -1,4 +1,4 @@
-"""Says which loads contacts are to resist, and how much of them each twist asks for.
+"""Measures contacts by the largest multiple of a set of loads that they resist, with proofs.
 
 A measure of contacts is the largest multiple of a convex set D of loads, which holds zero, that
 they resist with normal forces of sum one newton: the largest m with -m w in W for all w of D, where
@@ -16,20 +16,69 @@ with the support h of W. This *demand* d of a twist is
 So the measure is the least h(y) / d(y) over twists with d(y) > 0, provided that h is nowhere
 negative. Twists are taken as unit ones, with torques over the object's radius; the demand of
 ferrari-canny is then one.
+
+The multiple is bounded from both sides.
+
+*From above.* Any twist y bounds the measure by h(y) / d(y), and shows that no multiple is resisted
+if h(y) < 0, by (1).
+
+*From below, weight.* The polytope of `ferrari_canny` is grown for torques over a length that is a
+thousandth of the object's radius r. The ball that it proves,
+
+    { (f, tau) : |f|^2 + |tau / (r / 1000)|^2 <= m^2 },                                     (2)
+
+holds all forces up to m, so that m is a lower bound for the weight. The twist (v, omega) that
+limits this ball has h(y) = m' |(v, omega r / 1000)|, m' the upper bound of its radius, and so
+bounds the weight by m' (1 + 5e-7 |omega r|^2 / |v|^2) at most: the two bounds are close.
+
+*From below, task.* For each load w_j, forces with normal parts of sum one and the wrench -m_j w_j,
+m_j as large as possible, come from a cone program; its multipliers are the twist that limits m_j.
+Programs are not exact. Moved into their cones, the forces have a wrench -m_j w_j + r_j, with a
+small rest r_j across w_j. Contacts in force closure resist a ball of wrenches with a radius q > 0
+as well. The ball has the wrench -q r_j / |r_j|, which takes away the rest in a mixture:
+
+    -m w_j  is in W  for  m = m_j / (1 + |r_j| / q),                                        (3)
+
+with nothing left of the program's inaccuracy. The least of these is a lower bound, as the ball
+holds zero, see (1).
+
+Contacts that are not in force closure may have no such forces. For them
+
+    maximise m_j - `STEEP` |wrench + m_j w_j|                                               (4)
+
+always has an answer; its multipliers are a twist of length up to `STEEP` that bounds m_j.
 """
 
-from dataclasses import dataclass, field
-from typing import Literal, TypeAlias, get_args
+from dataclasses import dataclass, field, replace
+from typing import Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_core.arrays import Array, frozen, frozen_copy
+from grasp_core.arrays import (
+    Array,
+    Indices,
+    are_units,
+    frozen,
+    frozen_copy,
+    is_a,
+    is_array,
+    is_number,
+)
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, one_of
-from grasp_core.closure.wrenches import WRENCH
-from grasp_core.errors import InputError
-from grasp_core.fields import is_a, is_array
+from grasp_core.closure.contacts import WRENCH
+from grasp_core.closure.wrench_sets import WrenchSet, into_cones
+from grasp_core.errors import InputError, SolverError
+from grasp_core.quality.ferrari_canny import (
+    CHECK_SLACK,
+    GAP,
+    FerrariCanny,
+    are_allowed,
+    wrench_set_quality,
+)
+from grasp_core.solvers.conic import ConicProgram, minimize
+from grasp_core.solvers.ties import first_best
 
 MeasureName: TypeAlias = Literal["ferrari-canny", "weight", "task"]
 """Which loads count: wrenches of unit length, the weight in every orientation, or a user's loads.
@@ -40,6 +89,20 @@ measures thousands of contacts."""
 SMALL_DEMAND = 1e-2
 """Demand of a unit twist below which a twist with negative support is compared as if it had this
 one: it refutes every multiple, and none better than others do."""
+THIN = 1e-3
+"""Length of (2) over the object's radius: what (2) then gives away, 5e-7 for twists that turn and
+move alike, is less than the gap between a ball's bounds, and rounding is far from it still."""
+STEEP = 1e3
+"""Cost of wrenches that are not balanced, over the load's length: a thousandth of a load counts as
+none, and programs know twists as long as this to a few digits."""
+CLOSED_GAP = 0.5
+"""Gap that suffices to see whether contacts are in force closure, and for a ball that takes rests:
+any ball does, and half of the largest one is found with the first simplices."""
+SAME_BOUND = 1e-7
+"""Share by which bounds of twists may differ and count as one: the accuracy of the conic programs
+that they come from."""
+NONE_SHOWN = -1.0
+"""Lower bound where no multiple is shown to be resisted, not even zero."""
 
 
 def _no_loads() -> Array:
@@ -147,3 +210,199 @@ class Measure(ByValue):
 
 
 FERRARI_CANNY = Measure("ferrari-canny")
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ResistedLoads(ByValue):
+    """Bounds of the largest multiple of a set of loads that contacts resist, with their proofs."""
+
+    lower: float
+    """Multiple that is resisted; -1 where none is shown to be, not even zero, as for contacts that
+    are not in force closure. There is no ball then, and there are no forces."""
+    upper: float
+    """Multiple beyond which not all loads are resisted."""
+    measure: Measure
+    """The loads."""
+    wrenches: WrenchSet
+    """The wrenches of the contacts (`l1`), with torques over the object's radius."""
+    direction: Array
+    """Unit twist, (6,), with torques over the object's radius, that allows at most `upper`."""
+    ball: FerrariCanny | None
+    """Proof of the ball (2) for the weight, or of the one in (3) for a task."""
+    forces: Array | None
+    """Local forces, (m, 3k), for each load of a task: they resist at least `lower` times the load,
+    but for rests that the ball takes by (3)."""
+
+    def verify(self) -> bool:
+        """Check both bounds again in plain arithmetic, without any solver.
+
+        They hold to within 1e-12 of the longest wrench.
+
+        Gives whether both are proved; only the upper one where the lower one is -1.
+        """
+        with np.errstate(all="ignore"):
+            sound = (
+                is_a(self.measure, Measure)
+                and self.measure.sound()
+                and not self.measure.is_usual
+                and is_a(self.wrenches, WrenchSet)
+                and self.wrenches.sound()
+                and self.wrenches.norm == "l1"
+            )
+            ordered = is_number(self.lower) and is_number(self.upper) and self.lower <= self.upper
+            if not (sound and ordered and are_units(self.direction, WRENCH, slack=CHECK_SLACK)):
+                return False
+            demand = float(self.measure.demands(self.direction[None])[0])
+            # half of what the bound was raised by, so that two ways to round agree
+            support = self.wrenches.support(self.direction)[0] + 0.5 * _rounding(self.wrenches)
+            bounded = self.upper >= 0.0 and support <= self.upper * demand
+            return bounded and self._proves_lower()
+
+    def _proves_lower(self) -> bool:
+        if self.lower == NONE_SHOWN:
+            return self.ball is None and self.forces is None
+        if self.lower < 0.0 or not (isinstance(self.ball, FerrariCanny) and self.ball.verify()):
+            return False
+        if self.measure.name == "weight":
+            of_weight = self.ball.wrenches == thin(self.wrenches)
+            return self.forces is None and of_weight and self.ball.lower >= self.lower
+        loads, width = self.measure.loads, self.wrenches.G.shape[1]
+        if not (self.ball.wrenches == self.wrenches and is_array(self.forces, len(loads), width)):
+            return False
+        slack = _rounding(self.wrenches)
+        sizes = np.linalg.norm(loads, axis=1)
+        shown = sizes * _without_rests(self.wrenches, loads, self.forces, self.ball)
+        resisted = bool((shown >= self.lower * sizes - slack).all())
+        return resisted and are_allowed(self.forces, self.wrenches)
+
+
+def thin(wrenches: WrenchSet) -> WrenchSet:
+    """Return the same wrenches with torques over a thousandth of the length, as in (2)."""
+    return replace(wrenches, G=np.vstack([wrenches.G[:3], wrenches.G[3:] / THIN]))
+
+
+def resisted_loads(wrenches: WrenchSet, measure: Measure, gap: float = GAP) -> ResistedLoads:
+    """Bound the largest multiple of a set of loads that contacts resist.
+
+    Gives both bounds with their proofs.
+    """
+    if measure.name == "weight":
+        ball = wrench_set_quality(thin(wrenches), gap)
+        direction, upper = _least(wrenches, measure, [ball.direction / np.repeat([1.0, THIN], 3)])
+        if ball.lower <= 0.0:
+            return ResistedLoads(NONE_SHOWN, upper, measure, wrenches, direction, None, None)
+        lower = min(ball.lower, upper)
+        return ResistedLoads(lower, upper, measure, wrenches, direction, ball, None)
+    closed = wrench_set_quality(wrenches, CLOSED_GAP)
+    if closed.lower <= _rounding(wrenches):
+        limiting = [_limiting_twist(wrenches, load) for load in measure.loads]
+        direction, upper = _least(wrenches, measure, [closed.direction, *limiting])
+        return ResistedLoads(NONE_SHOWN, upper, measure, wrenches, direction, None, None)
+    each = task_limits(wrenches, measure)
+    direction, upper = _least(wrenches, measure, [limit.twist for limit in each])
+    forces = np.array([into_cones(limit.forces, wrenches.friction) for limit in each])
+    shown = _without_rests(wrenches, measure.loads, forces, closed)
+    lower = min(float(shown.min()), upper)
+    return ResistedLoads(lower, upper, measure, wrenches, direction, closed, forces)
+
+
+def measured_set(
+    wrenches: WrenchSet, measure: Measure, gap: float = GAP
+) -> FerrariCanny | ResistedLoads:
+    """Bound any measure of contacts, also the usual one (see `resisted_loads`)."""
+    usual = measure.is_usual
+    return wrench_set_quality(wrenches, gap) if usual else resisted_loads(wrenches, measure, gap)
+
+
+def _without_rests(wrenches: WrenchSet, loads: Array, forces: Array, ball: FerrariCanny) -> Array:
+    """Return the multiples of loads (m, 6) that forces (m, 3k) and a ball show by (3), (m,).
+
+    They are minus infinity where the ball is not above rounding.
+    """
+    radius = ball.lower - _rounding(wrenches)
+    if not radius > 0.0:
+        return np.full(len(loads), -np.inf)
+    sizes = np.linalg.norm(loads, axis=1)
+    units, made = loads / sizes[:, None], forces @ wrenches.G.T
+    along = -np.einsum("mi,mi->m", made, units)
+    rests = np.linalg.norm(made + along[:, None] * units, axis=1)
+    return along / (1.0 + rests / radius) / sizes
+
+
+def _least(wrenches: WrenchSet, measure: Measure, twists: list[Array]) -> tuple[Array, float]:
+    """Return the twist, at unit length, that allows the least multiple, and the multiple.
+
+    Forces along the axes are tried as well, so that it is finite. Of twists whose multiples are
+    equal but for the accuracy of programs the first counts, the same on every machine.
+    """
+    axes = np.eye(WRENCH)[:3]
+    every = _units(np.array([*twists, *axes, *-axes]))
+    # a twist that asks for next to nothing bounds nothing: rounding in its support counts in full
+    supports = wrenches.supports(every) + _rounding(wrenches)
+    allowed = measure.multiples(supports, measure.demands(every))
+    place = first_best(-allowed, SAME_BOUND * abs(float(allowed.min())))
+    # a twist with negative support shows that nothing is resisted, whatever its demand
+    return every[place], max(float(allowed[place]), 0.0)
+
+
+def _rounding(wrenches: WrenchSet) -> float:
+    """Return by how much supports of unit twists may be rounded."""
+    return CHECK_SLACK * wrenches.size
+
+
+def _units(rows: Array) -> Array:
+    return rows / np.linalg.norm(rows, axis=1)[:, None]
+
+
+class TaskLimit(NamedTuple):
+    """How large a multiple of one load contacts in force closure resist."""
+
+    multiple: float
+    forces: Array
+    """Local forces that resist the multiple, (3k,)."""
+    twist: Array
+    """Twist with demand one that limits the multiple, (6,)."""
+
+
+def task_limits(wrenches: WrenchSet, measure: Measure) -> list[TaskLimit]:
+    """Find the largest multiple of each load of a task that contacts in force closure resist."""
+    return [_limit(wrenches, load) for load in measure.loads]
+
+
+def _limit(wrenches: WrenchSet, load: Array) -> TaskLimit:
+    G, mu = wrenches.G, wrenches.friction
+    k, n, size = len(mu), G.shape[1], float(np.linalg.norm(load))
+    A = np.zeros((WRENCH + 1 + k + n, n + 1))
+    A[:WRENCH, :-1], A[:WRENCH, -1] = G, load / size
+    A[WRENCH, :n:3] = 1.0
+    A[WRENCH + 1 + np.arange(k), np.arange(0, n, 3)] = -1.0
+    cones: Indices = np.arange(WRENCH + 1 + k, len(A))
+    A[cones, np.arange(n)] = -1.0
+    A[cones[::3], np.arange(0, n, 3)] = -mu
+    q, b = np.append(np.zeros(n), -1.0), np.zeros(len(A))
+    b[WRENCH] = 1.0
+    answer = minimize(ConicProgram(q, A, b, WRENCH + 1, k, (3,) * k))
+    multiple = float(answer.x[-1]) / size
+    if not multiple > 0.0:
+        raise SolverError("a load of a task has no resisted multiple although contacts are closed")
+    # the multipliers have z.load = |load|, so that their demand is positive the other way
+    return TaskLimit(multiple, answer.x[:-1], -answer.z[:WRENCH] / size)
+
+
+def _limiting_twist(wrenches: WrenchSet, load: Array) -> Array:
+    """Return a twist that bounds the resisted multiple of a load, by the program (4), (6,)."""
+    G, mu = wrenches.G, wrenches.friction
+    k, n = len(mu), G.shape[1]
+    A = np.zeros((1 + k + 1 + WRENCH + n, n + 2))
+    A[0, :n:3] = 1.0
+    A[1 + np.arange(k), np.arange(0, n, 3)] = -1.0
+    # rows: distance >= |wrench + m load|, friction cones
+    rest = slice(2 + k, 2 + k + WRENCH)
+    A[1 + k, -1] = -1.0
+    A[rest, :n], A[rest, n] = -G, -load / np.linalg.norm(load)
+    cones: Indices = np.arange(2 + k + WRENCH, len(A))
+    A[cones, np.arange(n)] = -1.0
+    A[cones[::3], np.arange(0, n, 3)] = -mu
+    q, b = np.concatenate([np.zeros(n), [-1.0, STEEP]]), np.zeros(len(A))
+    b[0] = 1.0
+    return minimize(ConicProgram(q, A, b, 1, k, (1 + WRENCH, *(3,) * k))).z[rest]

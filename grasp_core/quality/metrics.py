@@ -2,13 +2,13 @@
 
 Each metric replaces the friction cones by inscribed pyramids, whose edges are forces of unit normal
 part n + mu t; the first t is the first tangent of the contact's frame (see
-`wrenches.contact_frames`). How the pyramids are turned changes the second digit. For a quality
+`contacts.contact_frames`). How the pyramids are turned changes the second digit. For a quality
 without pyramids see `ferrari_canny`.
 """
 
 import importlib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,22 +16,20 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.checked import MOST_EDGES, whole
-from grasp_core.closure.contact_arrays import (
+from grasp_core.closure.contacts import (
+    WRENCH,
     contact_arrays,
-    contact_frictions,
     contacts_in,
+    grasp_map,
     stacked,
     unit_size,
 )
 from grasp_core.closure.wrench_sets import WrenchSet, scaled_arms
-from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map
-from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
-from grasp_core.solvers.lp import RESIDUAL, LinearProgram, Optimum, maximize
+from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.values import Contact, Grasp
 
 FEWEST_EDGES = 3
-KERNEL = "grasp_core.quality.min_weight_kernel"
 RANK = 1e-9
 """Share of the largest singular value below which a singular value counts as zero."""
 UNREACHABLE = 1e-9
@@ -40,18 +38,13 @@ UNREACHABLE = 1e-9
 
 def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
     """Compute wrenches of pyramid edges inscribed in friction cones, (k edges, 6)."""
-    circle = _circle(edges)
+    whole(edges, "edges", least=FEWEST_EDGES, most=MOST_EDGES)
+    turns = 2.0 * np.pi * np.arange(edges) / edges
+    circle = np.column_stack([np.ones(edges), np.cos(turns), np.sin(turns)])
     slopes = wrenches.friction
     each = circle * np.array([np.ones_like(slopes), slopes, slopes]).T[:, None]
     G = wrenches.G.reshape(len(wrenches.G), -1, 3)
     return np.einsum("kej,wkj->kew", each, G).reshape(-1, len(wrenches.G))
-
-
-def _circle(edges: int) -> Array:
-    """Compute the edges (normal, tangent, tangent) of a pyramid for friction one, (edges, 3)."""
-    whole(edges, "edges", least=FEWEST_EDGES, most=MOST_EDGES)
-    turns = 2.0 * np.pi * np.arange(edges) / edges
-    return np.column_stack([np.ones(edges), np.cos(turns), np.sin(turns)])
 
 
 def min_weight(
@@ -88,77 +81,7 @@ def min_weight(
     points, units = contact_arrays(positions, normals)
     _, center, size = unit_size(points)
     wrenches = WrenchSet.of(points, units, friction, center=center, torque_scale=float(size))
-    return _min_weight(pyramid_wrenches(wrenches, edges))
-
-
-def min_weights(
-    positions: ArrayLike | Iterable[Grasp],
-    normals: ArrayLike | None = None,
-    friction: ArrayLike = 0.5,
-    *,
-    edges: int = 8,
-) -> Array:
-    """Find the min-weight metric of each of many sets of contacts (see `min_weight`).
-
-    A compiled search names the vertex of each program; answers that fail the check of `lp` are
-    solved again one by one.
-
-    Args:
-        positions: Contact points, (g, k, 3) [m]; or grasps.
-        normals: Unit vectors into the object, (g, k, 3).
-        friction: Coulomb coefficient, one for all contacts, or one each, (k,) or (g, k).
-        edges: How many edges each pyramid has.
-
-    Returns:
-        The metric of each set, (g,).
-
-    Raises:
-        InputError: Shapes, lengths or signs are wrong.
-        SolverError: A program's answer failed its check.
-    """
-    points, units = contact_arrays(positions, normals, many=True)
-    W = _many_pyramid_wrenches(points, units, contact_frictions(friction, points.shape[:2]), edges)
-    found = _at_once(W)
-    for i in np.flatnonzero(np.isnan(found)):
-        found[i] = _min_weight(W[i])
-    return found
-
-
-def _many_pyramid_wrenches(points: Array, normals: Array, friction: Array, edges: int) -> Array:
-    """Return wrenches of pyramid edges, (g, k edges, 6), about the centres and at unit size."""
-    circle, (arms, _, _) = _circle(edges), unit_size(points)
-    frames = contact_frames(normals)
-    forces = np.matmul(circle[:, 1:], frames[..., 1:].swapaxes(-1, -2)) * friction[..., None, None]
-    forces += normals[..., None, :]
-    W = np.empty((*forces.shape[:-1], WRENCH))
-    W[..., :3], W[..., 3:] = forces, np.cross(arms[..., None, :], forces)
-    return W.reshape(len(points), edges * points.shape[1], WRENCH)
-
-
-def _at_once(W: Array) -> Array:
-    """Find metrics of wrenches (g, N, 6) by the kernel, (g,); NaN where an answer fails."""
-    found = np.full(len(W), math.nan)
-    (count, N), y = W.shape[:2], np.empty((len(W), WRENCH))
-    multipliers, rows = np.empty((count, WRENCH)), np.empty((count, WRENCH), dtype=np.int64)
-    compiled(KERNEL).vertices(W, y, multipliers, rows)
-    c = W.sum(axis=1)
-    values = np.einsum("gw,gw->g", c, y)
-    reached = values[:, None] - N * np.einsum("gnw,gw->gn", W, y)
-    met = c[:, None] - N * np.take_along_axis(W, rows[..., None], axis=1)
-    failures = [
-        (reached - 1.0).max(axis=1),
-        -multipliers.min(axis=1),
-        np.abs(c - np.einsum("gr,grw->gw", multipliers, met)).max(axis=1),
-        np.abs(multipliers.sum(axis=1) - values),
-    ]
-    scale = 1.0 + np.abs(y).max(axis=1)
-    good = (np.array(failures) <= RESIDUAL * scale).all(axis=0)  # not if one is not a number
-    found[good] = (1.0 - values[good]) / N
-    return found
-
-
-def _min_weight(W: Array) -> float:
-    """Compute the min-weight metric of wrenches (N, 6)."""
+    W = pyramid_wrenches(wrenches, edges)
     N, mean = len(W), W.mean(axis=0)
     if not _balanced_by_any_weights(W):
         return -math.inf

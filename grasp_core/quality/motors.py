@@ -21,11 +21,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, real_array
+from grasp_core.arrays import Array, frozen, is_array, real_array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, instance
 from grasp_core.errors import InputError
-from grasp_core.fields import is_array
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -1,30 +1,386 @@
-"""The largest multiples of wrenches that contacts resist, one by one and hundreds at once.
+"""How large a multiple of a wrench contacts resist, proved on both sides.
 
-The program and its dual are in `wrench_body`, and what proves their answers in `wrench_limit`.
+With each normal force at most f_max, the wrenches that the contacts can apply form a convex
+body W around the origin. An external wrench w is resisted up to
+
+    the largest lambda  with  -lambda w in W,                                           (1)
+
+a conic program. Its dual is a facet of W: a twist y with
+
+    y.w = -1  and  lambda = h(y) = f_max sum_i max(0, s_i(y)),                          (2)
+
+the support of W (s_i as in `force_closure`).
+
+Where motors hold the fingertips, the torques of their joints are limited too: rows of (1) that are
+linear in the forces. With a multiplier m for each joint, (2) of `motors` bounds
+
+    h(y) <= f_max sum_i max(0, s_i(G'y - L'm)) + sum_j |m_j| c_j - m_j g_j              (3)
+
+for every m, with equality for the multipliers of the program; s_i is the support of cone i in the
+direction that contact i has in its argument.
+
+Soft contacts also transmit a torque m about their normal. It enters as a fourth component of the
+local force, u = m mu / mu_t [N] with the torsional coefficient mu_t, so that the cone is
+|(f_t, u)| <= mu f_n and all of the above stays as it is.
+
+Forces that balance the multiple prove that it is resisted, and a facet, (2) and (3), that no larger
+one is. No wrench of unit size has a limit below f_max times the `linf` quality of the contacts (see
+`ferrari_canny`), which is the bound over all directions.
+
+The weakest wrench. The wrench -y / |y| meets a limiting facet squarely, so
+
+    limit of -y / |y|  <=  h(y) / |y|:                                                  (4)
+
+stepping from a wrench to the one its limiting facet points at never raises the limit, and stops
+at a wrench that is locally the weakest. Torques are compared with forces through a stated length.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen
-from grasp_core.checked import LARGEST, SMALLEST
-from grasp_core.closure.contact_arrays import contact_arrays
-from grasp_core.compiled import compiled
-from grasp_core.errors import InputError
-from grasp_core.quality.motors import Motors
-from grasp_core.quality.wrench_body import WrenchBody
-from grasp_core.quality.wrench_limit import WrenchLimit, body_of, limit_of
+from grasp_core.arrays import Array, frozen, frozen_copy, is_array, is_number
+from grasp_core.by_value import ByValue
+from grasp_core.checked import LARGEST, SMALLEST, positive
+from grasp_core.closure.contacts import (
+    WRENCH,
+    contact_arrays,
+    contact_frames,
+    contact_frictions,
+    grasp_map,
+    in_frames,
+)
+from grasp_core.closure.soft_contacts import LOCAL, contact_torsions, torsion_lengths
+from grasp_core.closure.wrench_sets import WrenchSet, with_torques
+from grasp_core.errors import InputError, SolverError
+from grasp_core.quality.motors import Motors, motors_for
+from grasp_core.solvers.conic import ConicProgram, minimize
+from grasp_core.solvers.ties import first_best, smallest_first
 from grasp_core.values import Contact, Grasp
 
-KERNEL = "grasp_core.quality.wrench_limits_kernel"
-CLOSE = 1e-7
-"""Distance up to which two bounds of a limit count as one, relative to it: the accuracy of the
-conic programs that the compiled code stands for."""
-HALF = 0.5
-"""Largest normal force from which the compiled code starts, in units of f_max: as far from the
-largest as from zero, so that it starts inside both bounds."""
+HELD = 1e-7
+"""How far forces at a limit may leave cones and balance, relative to the largest wrench of a unit
+normal force: the accuracy of conic programs."""
+FACET_SLACK = 1e-9
+"""Slack of the upper bound, relative to it."""
+LAST_DIGITS = 1e-12
+"""Slack of an upper bound near zero, relative to the largest that the facet's length allows, and
+`HELD` of the largest force at most, however long the facet is."""
+MOST_OFF = 1e-6
+"""Largest error of the facet's power."""
+LONGEST = 1e8
+"""Most that the lengths of facet and load, or of multipliers, levers and load, may be together:
+rounding takes about `HELD` from factors that are longer."""
+SETTLED = 1e-3
+"""The search for the weakest wrench ends when a step lowers the limit by less than this share."""
+MAX_STEPS = 30
+STARTS = 3
+"""How many of the weakest axis wrenches the search starts from."""
+
+
+class Farthest(NamedTuple):
+    """How large a multiple of a wrench is resisted, by the program (1), and what limits it."""
+
+    multiple: float
+    """Largest multiple that is resisted; it may be negative by rounding."""
+    local: Array
+    """Local forces over the largest normal force that resist it, (k, 3) or (k, 4)."""
+    twist: Array
+    """Twist y of the limiting facet, scaled and about the contacts' mean, (6,)."""
+    multipliers: Array
+    """Multipliers m of the joints that go with it, (joints,) [1/(N m)]."""
+
+
+class WrenchBody:
+    """The body of wrenches that contacts can apply, and the program for its farthest points."""
+
+    def __init__(
+        self, arms: Array, normals: Array, friction: Array, max_normal_force: float,
+        motors: Motors | None = None, torsions: Array | None = None,
+    ) -> None:  # fmt: skip
+        """Set up the conic program; its last column will hold the wrench in question.
+
+        Takes `arms` (k, 3) [m]; `normals` (k, 3); `friction` (k,); `max_normal_force` [N];
+        `torsions` (k,) [m].
+        """
+        self.max_normal_force = positive(max_normal_force, "max_normal_force")
+        self.count = k = len(arms)
+        self.motors = motors_for(motors, k)
+        # at the contacts' own middle and at unit size all numbers are of order one
+        self.middle = arms.mean(axis=0)  # a far centre would swamp the levers
+        arms = arms - self.middle
+        self.size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
+        self.scale = np.array([1.0] * 3 + [self.size] * 3)
+        self.frames = contact_frames(normals)
+        hard = in_frames(grasp_map(arms / self.size), self.frames)
+        self.lengths = lengths = None if torsions is None else torsion_lengths(torsions, friction)
+        self.G = hard if lengths is None else with_torques(hard, normals, lengths / self.size)
+        self.bounded = WrenchSet(self.G, friction, "linf")
+        self.width = LOCAL if torsions is not None else 3
+        levers = in_frames(self.motors.levers, self.frames)
+        self.levers = levers if torsions is None else np.zeros((0, LOCAL * k))
+        self.A, self.b = self._rows(friction)
+
+    def _rows(self, friction: Array) -> tuple[Array, Array]:
+        """Build the rows of (1) in units of f_max.
+
+        They are G f + lambda w = 0, then 0 <= normal parts <= 1, then the torques of each joint
+        over its limit, both ways, then the cones.
+        """
+        k, joints, width = self.count, len(self.levers), self.width
+        n = width * k
+        A = np.zeros((WRENCH + 2 * k + 2 * joints + n, n + 1))
+        A[:WRENCH, :-1] = self.G
+        caps, torques = WRENCH + np.arange(2 * k), WRENCH + 2 * k + np.arange(2 * joints)
+        cones = WRENCH + 2 * k + 2 * joints + np.arange(n)
+        A[caps, np.tile(np.arange(0, n, width), 2)] = np.repeat([1.0, -1.0], k)
+        shares = self.max_normal_force * self.levers / self.motors.limits[:, None]
+        A[torques, :-1] = np.vstack([shares, -shares])
+        A[cones, np.arange(n)] = -1.0
+        A[cones[::width], np.arange(0, n, width)] = -friction
+        carried = self.motors.gravity / self.motors.limits
+        b = [np.zeros(6), np.ones(k), np.zeros(k), 1.0 - carried, 1.0 + carried, np.zeros(n)]
+        return A, np.concatenate(b)
+
+    def largest(self, wrench: Array, carried: Array) -> Farthest:
+        """Find the largest multiple of a wrench that is resisted while joints carry as many times.
+
+        Takes `wrench` (6,); `carried` (joints,) [N m]. Gives the multiple, and a facet with m.q -
+        y.w = 1, so that none above (3) is resisted.
+        """
+        unit = self.about_middle(wrench)
+        length = float(np.linalg.norm(unit))
+        A = self.A.copy()
+        k, joints = self.count, len(self.levers)
+        # a wrench of unit length keeps lambda of order one; it is scaled back below
+        A[:6, -1] = unit / length
+        share = self.max_normal_force / length
+        torques = 6 + 2 * k + np.arange(2 * joints)
+        asked = carried / self.motors.limits
+        A[torques, -1] = share * np.concatenate([asked, -asked])
+        q = np.zeros(A.shape[1])
+        q[-1] = -1.0
+        answer = minimize(ConicProgram(q, A, self.b, 6, 2 * (k + joints), (self.width,) * k))
+        # the equations' multipliers, scaled to (2), and those of the torques alike
+        more, less = answer.z[torques].reshape(2, joints)
+        power = -float(answer.z[:6] @ unit) - self.max_normal_force * float((more - less) @ asked)
+        # exact multipliers have the power -|w|: the last column of A times them is one
+        if not power < 0.0:
+            raise SolverError(
+                "the program for the largest multiple of a wrench has multipliers without power "
+                f"against it ({power:.3g}), so that they bound nothing"
+            )
+        multipliers = self.max_normal_force * (more - less) / (power * -self.motors.limits)
+        local = answer.x[:-1].reshape(k, self.width)
+        return Farthest(share * float(answer.x[-1]), local, answer.z[:6] / power, multipliers)
+
+    def in_object_frame(self, local: Array) -> Array:
+        """Turn local forces over the largest normal force, (k, 3) or (k, 4), to forces (k, 3)."""
+        return self.max_normal_force * np.einsum("kij,kj->ki", self.frames, local[:, :3])
+
+    def support(self, facet: Array, multipliers: Array) -> float:
+        """Bound the support of the body by (3), for a twist about the centre, (6,)."""
+        return self.scaled_support(self.scaled(facet), multipliers)
+
+    def scaled_support(self, twist: Array, multipliers: Array) -> float:
+        """Bound the support of the body by (3), for a scaled twist about the contacts' mean."""
+        slopes = twist @ self.G - multipliers @ self.levers
+        pushed = self.max_normal_force * self.bounded.reach(slopes)[0]
+        return pushed + self.motors.relaxed(multipliers)
+
+    def holds(self, shares: Array, loads: Array, slack: float | Array) -> bool:
+        """Return whether forces are in their cones, no larger than allowed, and balance loads.
+
+        Takes `shares` (n, 3k) or (n, 4k); `loads` (n, 6); `slack` (n,).
+        """
+        left = np.linalg.norm(shares @ self.G.T + loads, axis=1)
+        return bool((left <= slack).all()) and self.bounded.holds(shares, slack)
+
+    def is_strong_enough(self, torques: Array, slack: float | Array) -> bool:
+        """Return whether motors have torques, (n, joints) [N m], to a slack over their limits."""
+        return bool((np.abs(torques) / self.motors.limits <= 1.0 + slack).all())
+
+    @property
+    def strongest(self) -> Array:
+        """Return how many times its limit each joint's torque is at most under one push, (j,)."""
+        each = self.levers.reshape(len(self.levers), self.count, 3)
+        longest = np.linalg.norm(each, axis=2).max(axis=1)
+        return self.max_normal_force * longest / self.motors.limits
+
+    def about_middle(self, wrench: Array) -> Array:
+        """Move a wrench's reference point to the contacts' mean, and scale it to unit size."""
+        moved = np.append(wrench[:3], wrench[3:] - _across(self.middle, wrench[:3]))
+        return moved / self.scale
+
+    def scaled(self, facet: Array) -> Array:
+        """Move a facet about the centre to a scaled twist about the contacts' mean."""
+        twist = facet * self.scale
+        twist[:3] += _across(facet[3:], self.middle)
+        return twist
+
+    def about_center(self, facet: Array) -> Array:
+        """Move a facet about the contacts' mean to the centre, (6,)."""
+        slides = _across(facet[3:], self.middle)
+        return np.concatenate([facet[:3] - slides, facet[3:]])
+
+
+def _across(one: Array, two: Array) -> Array:
+    """Return the cross product of two vectors, (3,): NumPy's takes ten times as long for one."""
+    a, b, c = one.tolist()
+    x, y, z = two.tolist()
+    return np.array([b * z - c * y, c * x - a * z, a * y - b * x])
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class WrenchLimit(ByValue):
+    """The largest multiple of an external wrench that contacts resist, proved from both sides."""
+
+    wrench: Array
+    """External wrench (force, torque), (6,) [N, N m], torque about the stated centre."""
+    limit: float
+    """Largest multiple of `wrench` that is resisted; `forces` prove it by balancing that multiple.
+    """
+    upper: float
+    """Multiple above which the wrench is not resisted: the support of `facet`, in plain arithmetic.
+    """
+    forces: Array
+    """Contact forces that resist the wrench at the limit, (k, 3) [N]: in their cones, with normal
+    parts up to the largest, and balanced, all to within `HELD`."""
+    facet: Array
+    """Twist y of the facet that limits the wrench, (6,), with y.wrench = -1, about the stated
+    centre."""
+    motor_multipliers: Array = field(default_factory=lambda: frozen_copy(np.zeros(0)))
+    """Multipliers m of the joints in (3), (joints,) [1/(N m)]; none where no motors are given."""
+    torques: Array | None = field(default=None, repr=False)
+    """Torques about the inward normals that act with `forces`, (k,) [N m]; None without torsion."""
+
+    def verify(
+        self,
+        positions: ArrayLike | Grasp | Sequence[Contact],
+        normals: ArrayLike | None,
+        friction: ArrayLike,
+        *,
+        max_normal_force: float,
+        center: ArrayLike = (0.0, 0.0, 0.0),
+        motors: Motors | None = None,
+        torsion_m: ArrayLike = 0.0,
+    ) -> bool:
+        """Check both bounds again in plain arithmetic, for the contacts they refer to.
+
+        Args:
+            positions: Contact points or Grasp, as given to `wrench_limits`, (k, 3) [m].
+            normals: Unit vectors into the object, (k, 3), or None with a Grasp or Contacts.
+            friction: Coulomb coefficient, one for all contacts or one each.
+            max_normal_force: Largest normal force of each contact [N].
+            center: Point about which torques are taken, (3,) [m].
+            motors: The motors that were given to `wrench_limits`.
+            torsion_m: The torsional coefficients that were given to `wrench_limits`.
+
+        Returns:
+            Whether both bounds are proved; False if the fields are no certificate.
+
+        Raises:
+            InputError: The arguments do not describe contacts.
+        """
+        points, units = contact_arrays(positions, normals)
+        about = frozen(center, (3,), "center")
+        body = body_of(points - about, units, friction, max_normal_force, motors, torsion_m)
+        with np.errstate(all="ignore"):
+            soft = body.lengths is not None
+            known = self.has_numbers(len(points), len(body.levers), soft=soft)
+            return known and attains(body, self) and bounds(body, self)
+
+    def has_numbers(self, count: int, joints: int = 0, *, soft: bool = False) -> bool:
+        """Return whether fields are numbers of the right shapes, for `count` contacts."""
+        return (
+            is_array(self.wrench, WRENCH)
+            and bool(self.wrench.any())
+            and is_array(self.facet, WRENCH)
+            and is_array(self.forces, count, 3)
+            and is_array(self.motor_multipliers, joints)
+            and (is_array(self.torques, count) if soft else self.torques is None)
+            and is_number(self.limit, least=0.0)
+            and is_number(self.upper)
+            and self.limit <= self.upper
+        )
+
+
+def body_of(
+    arms: Array, normals: Array, friction: ArrayLike, max_normal_force: float,
+    motors: Motors | None, torsion_m: ArrayLike,
+) -> WrenchBody:  # fmt: skip
+    """Make the body of contacts; arms (k, 3) [m] start at the centre of torques."""
+    mu = contact_frictions(friction, len(arms))
+    torsions = contact_torsions(torsion_m, mu)
+    if torsions is not None and motors is not None:
+        raise InputError(
+            "torsion_m must be zero with motors: their levers have no column for the torque of a "
+            "contact; leave one of the two out"
+        )
+    return WrenchBody(arms, normals, mu, max_normal_force, motors, torsions)
+
+
+def limit_of(body: WrenchBody, wrench: Array) -> WrenchLimit:
+    """Find the largest multiple of an external wrench, (6,), that a body holds, with its proof."""
+    found = body.largest(wrench, np.zeros(len(body.levers)))
+    limit = max(found.multiple, 0.0)
+    return WrenchLimit(
+        wrench=wrench,
+        limit=limit,
+        upper=max(limit, body.scaled_support(found.twist, found.multipliers)),
+        forces=body.in_object_frame(found.local),
+        facet=body.about_center(found.twist / body.scale),
+        motor_multipliers=found.multipliers,
+        torques=None
+        if body.lengths is None
+        else body.max_normal_force * body.lengths * found.local[:, 3],
+    )
+
+
+def attains(body: WrenchBody, found: WrenchLimit) -> bool:
+    """Return whether the forces are allowed and balance the limit's multiple of the wrench."""
+    shares = _shares(body, found).reshape(1, -1)
+    load = found.limit / body.max_normal_force * body.about_middle(found.wrench)
+    torques = body.motors.torques(found.forces)
+    # rows of torques are met as all rows of the program are, by shares of the motors' limits
+    balanced = body.holds(shares, load[None], HELD * body.bounded.size)
+    return balanced and body.is_strong_enough(torques[None], HELD * np.maximum(1.0, body.strongest))
+
+
+def _shares(body: WrenchBody, found: WrenchLimit) -> Array:
+    """Return the local forces of a limit over the largest normal force, (k, 3) or (k, 4)."""
+    shares = np.einsum("kij,ki->kj", body.frames, found.forces) / body.max_normal_force
+    if body.lengths is None or found.torques is None:
+        return shares
+    arms, torques = body.lengths, found.torques / body.max_normal_force
+    # a torque that a contact cannot transmit is in no cone
+    lacking = np.where(torques == 0.0, 0.0, np.inf)
+    turns = np.divide(torques, arms, out=lacking, where=arms > 0.0)
+    return np.column_stack([shares, turns])
+
+
+def bounds(body: WrenchBody, found: WrenchLimit) -> bool:
+    """Return whether the facet proves that no multiple above the upper one is resisted."""
+    load, twist = body.about_middle(found.wrench), body.scaled(found.facet)
+    power, length = float(twist @ load), float(np.linalg.norm(load))
+    if not (_are_short(body, found, length) and abs(power + 1.0) <= MOST_OFF):
+        return False
+    # (3): h(y) is at most the upper limit times -y.w, but for rounding
+    bound = body.scaled_support(twist, found.motor_multipliers)
+    largest = body.max_normal_force * body.bounded.size
+    slack = largest * min(LAST_DIGITS * float(np.linalg.norm(twist)), HELD / length)
+    return bound <= found.upper * min(1.0, -power) * (1.0 + FACET_SLACK) + slack
+
+
+def _are_short(body: WrenchBody, found: WrenchLimit, load: float) -> bool:
+    """Return whether facet and multipliers are short enough for rounding, given a load's length."""
+    twist, middle = np.abs(found.facet * body.scale), float(np.linalg.norm(body.middle))
+    moved = float(np.linalg.norm(twist) + np.linalg.norm(found.facet[3:]) * middle)
+    pulled = float((np.abs(found.motor_multipliers) @ np.abs(body.levers)).max(initial=0.0))
+    return (moved + pulled) * load <= LONGEST
 
 
 def max_resisted_wrench(
@@ -102,53 +458,6 @@ def wrench_limits(
     return tuple(limit_of(body, load) for load in loads)
 
 
-def many_limits(
-    positions: Array, normals: Array, friction: float, wrenches: Array, inside: Array, *,
-    max_normal_force: float, center: Array,
-) -> Array:  # fmt: skip
-    """Find the largest multiple of each of hundreds of wrenches that contacts resist, (n,).
-
-    Compiled code finds them, and a wrench whose two bounds are farther apart than `CLOSE` is
-    solved for by itself.
-
-    Takes `positions` (k, 3) [m]; `normals`, `inside` (k, 3); `wrenches` (force, torque) or (n, 6)
-    [N, N m]; `max_normal_force` [N]; `center` (3,) [m].
-    """
-    _check_sizes(wrenches, "wrenches")
-    mu = np.full(len(positions), friction)
-    body = WrenchBody(positions - center, normals, mu, max_normal_force)
-    units = np.array([body.about_middle(wrench) for wrench in wrenches])
-    lengths = np.linalg.norm(units, axis=1)
-    found, close = _compiled_limits(body, units / lengths[:, None], inside)
-    limits = body.max_normal_force / lengths * found
-    for place in np.flatnonzero(~close):
-        limits[place] = limit_of(body, wrenches[place]).limit
-    return limits
-
-
-def _compiled_limits(
-    body: WrenchBody, loads: Array, inside: Array
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Find limits of unit loads (n, 6) on hard contacts without motors, by the compiled code.
-
-    Gives the limits over the largest normal force, (n,), and whether both bounds of each are close
-    to each other, (n,).
-    """
-    local = np.einsum("kij,ki->kj", body.frames, inside)
-    start = (HALF / local[:, 0].max() * local).ravel()
-    found, facets = np.empty(len(loads)), np.empty(loads.shape)
-    forces = np.empty((len(loads), len(start)))
-    mu = body.bounded.friction
-    kernel = compiled(KERNEL)
-    kernel.limits(kernel.Contacts(body.G, mu, start), loads, found, forces, facets)
-    upper = body.bounded.supports(facets) / -np.einsum("ij,ij->i", facets, loads)
-    close: NDArray[np.bool_] = np.abs(upper - found) <= CLOSE * np.abs(upper)
-    close &= np.abs(forces @ body.G.T + found[:, None] * loads).max(axis=1) <= CLOSE * upper
-    normal, *across = forces.reshape(len(loads), -1, 3).transpose(2, 0, 1)
-    close &= (np.hypot(*across) <= mu * normal).all(axis=1) & (normal <= 1.0).all(axis=1)
-    return found, close
-
-
 def _check_sizes(loads: Array, name: str) -> None:
     """Refuse wrenches (n, 6) that are zero, because every multiple of zero is resisted."""
     sizes = np.abs(loads).max(axis=1)
@@ -167,3 +476,30 @@ def axis_wrenches(torque_scale: float) -> Array:
     """
     scale = np.array([1.0] * 3 + [torque_scale] * 3)
     return np.vstack([np.eye(6), -np.eye(6)]) * scale
+
+
+def weakest_from(
+    body: WrenchBody, limits: Iterable[WrenchLimit], torque_scale: float
+) -> WrenchLimit:
+    """Search for a wrench of unit size that is locally the hardest to resist.
+
+    Takes `torque_scale` [m]. Gives the weakest limit found: its wrench has |(force, torque /
+    torque_scale)| = 1.
+    """
+    scale = np.array([1.0] * 3 + [torque_scale] * 3)
+    every = list(limits)
+    weak = [every[place] for place in smallest_first([found.limit for found in every])]
+    ends = [_descend(body, start, scale) for start in weak[:STARTS]]
+    return ends[first_best([-found.limit for found in ends])]
+
+
+def _descend(body: WrenchBody, start: WrenchLimit, scale: Array) -> WrenchLimit:
+    best = start
+    for _ in range(MAX_STEPS):
+        # (4): the wrench that the limiting facet points at, by the scaled product of wrenches
+        facing = -best.facet * scale**2
+        found = limit_of(body, facing / float(np.linalg.norm(facing / scale)))
+        if found.limit > best.limit * (1.0 - SETTLED):
+            break
+        best = found
+    return best

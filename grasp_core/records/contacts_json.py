@@ -13,10 +13,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from grasp_core.arrays import Array, frozen, frozen_units
 from grasp_core.checked import LARGEST, LARGEST_FRICTION, SMALLEST, positive
-from grasp_core.closure.contact_arrays import contact_frictions
+from grasp_core.closure.contacts import contact_frictions
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
-from grasp_core.files.strict_json import value_of
+from grasp_core.files.json_text import record_of, value_of
 from grasp_core.records.grasps_json import grasps_from_json
 
 FEWEST_CONTACTS = 2

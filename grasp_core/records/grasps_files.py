@@ -12,7 +12,8 @@ from grasp_core.records.grasps_json import plan_from_json, plan_to_json
 def save_grasps(path: str | Path, plan: Plan) -> Path:
     """Write a plan as a `grasps.json`, which `graspproof validate` and all other commands read.
 
-    A slice of a plan, such as `plan[:5]`, and what `plan.filter` gives can be written as well.
+    A slice of a plan, such as `plan[:5]`, what `plan.filter` gives, and grasps of one's own choice,
+    `dataclasses.replace(plan, grasps=...)`, can be written as well.
 
     Args:
         path: Path of the file; missing folders are made.

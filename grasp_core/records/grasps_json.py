@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from grasp_core.angles import radians_of
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import text_of
+from grasp_core.frames import radians_of
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.objects.build import MeshChoices
-from grasp_core.objects.face import PatchLimits
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
-from grasp_core.objects.surface import Surface
+from grasp_core.objects.surface import PatchLimits, Surface
 from grasp_core.planning.certify import check_witness, find_critical_frictions
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import MethodCounts, Moved, Outcomes, Plan, PlanCounts
@@ -195,7 +194,7 @@ def plan_from_json(text: str) -> Plan:
 
 
 def _record_of(text: str) -> "GraspsRecord":
-    from grasp_core.files.complaints import record_of
+    from grasp_core.files.json_text import record_of
     from grasp_core.records.grasps_schema import GraspsRecord
 
     return record_of(GraspsRecord, text, "grasps.json", schema=SCHEMA)

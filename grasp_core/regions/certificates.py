@@ -6,22 +6,30 @@ from functools import partial
 
 import numpy as np
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import (
+    Array,
+    are_frictions,
+    are_units,
+    frozen,
+    is_a,
+    is_array,
+    is_number,
+    is_tuple_of,
+)
 from grasp_core.by_value import ByValue
 from grasp_core.checked import SMALLEST, instance, number, positive, several
-from grasp_core.closure.contact_arrays import contact_frictions
+from grasp_core.closure.contacts import contact_frictions
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.errors import InputError
-from grasp_core.fields import are_frictions, are_units, is_a, is_array, is_number, is_tuple_of
-from grasp_core.geometry.flat_polygons import (
+from grasp_core.geometry.polygons import (
     FEWEST_CORNERS,
     MOST_CORNERS,
     FlatPolygon,
     flat_polygon,
     has_inscribed_radius,
     holds_disc,
+    plane_frame,
 )
-from grasp_core.geometry.polygons import plane_frame
 from grasp_core.regions.proof import TwistCover
 from grasp_core.values import FINGERS, ContactRegion
 

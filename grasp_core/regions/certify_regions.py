@@ -3,8 +3,8 @@
 Contacts may be anywhere in their own regions, wherever the others are, and the grasp stays in force
 closure. The search begins with the largest equal discs for which this is proved (`largest_discs`),
 around the contacts or around better centres (`centers`). Then polygons grow around the discs, as
-far as the same proof allows, or as long as larger proofs are found (`growth`). Every proof is
-checked by `CertifiedRegions.verify` before it is returned.
+far as the same proof allows (`growth`). Every proof is checked by `CertifiedRegions.verify` before
+it is returned.
 
 On patches of curved surfaces a contact may be as far off the plane as the surface is. The plane's
 normals are used there, and the friction angle is reduced by the angle between surface and plane.
@@ -12,7 +12,6 @@ normals are used there, and the friction angle is reduced by the angle between s
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
@@ -21,19 +20,18 @@ from grasp_core.checked import (
     BOUNDS,
     coefficient,
     number,
-    one_of,
-    shown,
     switch,
     whole,
 )
-from grasp_core.closure.contact_arrays import stacked
+from grasp_core.closure.contacts import stacked
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.errors import InputError, SolverError, UndecidedError
-from grasp_core.geometry.flat_polygons import convex_polygon, holds_disc
 from grasp_core.geometry.polygons import (
     SAME_CORNER,
     clip,
+    convex_polygon,
     edge_rows,
+    holds_disc,
     nearest_point,
     tidy,
     with_fewer_corners,
@@ -41,16 +39,12 @@ from grasp_core.geometry.polygons import (
 from grasp_core.objects.face_pieces import FacePiece, inscribed_radius, piece_of
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.regions.centers import better_centers, larger_inside
 from grasp_core.regions.certificates import PLACED, CertifiedRegions
-from grasp_core.regions.growth import BEGINNINGS, disc_polygons, most_area, shared_out
+from grasp_core.regions.growth import better_centers, larger_inside, shared_out
 from grasp_core.regions.largest_discs import Grounds, Proved, largest_discs
-from grasp_core.regions.proof import TwistCover
 from grasp_core.solvers.ties import coarse, first_best, on_grid
 from grasp_core.values import ContactRegion, Grasp, four
 
-Balance: TypeAlias = Literal["radius", "area"]
-"""What regions are made large for: the smallest inscribed disc, or the total area."""
 CONES = 10_000
 """Default for the largest number of cones in one proof, which takes half a second."""
 UNIT_DIGITS, PLACE_DIGITS = 6, 8
@@ -59,17 +53,15 @@ NARROWED = 1e-3
 """Precision of the largest discs in grown polygons, relative to the proved radius."""
 
 
-def certify_regions(  # noqa: PLR0913 - what a user may choose
+def certify_regions(
     body: Polyhedron,
     grasp: Grasp,
     friction: float,
     *,
     reserve: float = 0.0,
-    balance: Balance = "radius",
     recenter: bool = False,
     clearance: float = 0.0,
     max_cones: int = CONES,
-    cones: object = None,
 ) -> CertifiedRegions | None:
     """Find independent regions around the contacts of a grasp, as large as can be proved.
 
@@ -78,32 +70,26 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
         grasp: A grasp on faces of the object.
         friction: Coulomb coefficient at every contact.
         reserve: Share of the friction that is not counted on.
-        balance: `radius` seeks large discs for all fingers; `area` seeks much area in total, with
-            smaller discs perhaps, and takes several times longer.
         recenter: Move the regions' centres to where the discs can be largest; the contacts may
             then be outside of their regions.
         clearance: Distance of regions from the edges of their faces [m]. The region of a contact
             nearer to an edge is centred at the nearest place that keeps it.
         max_cones: Most cones of one attempt at a proof, at least 64. With more, radii grow by
             some hundredths, or not at all where they are as large as can be.
-        cones: The former name of `max_cones`, which is refused.
 
     Returns:
         The regions; None if no radius could be proved.
 
     Raises:
         InputError: The contacts are not on the faces or not force-closed with the friction that is
-            left, or a number or a choice is out of its range.
+            left, or a number is out of its range.
         UndecidedError: Force closure of the contacts is too close to call.
         SolverError: A proof failed its check.
     """
     check_on_faces(body, grasp)
     number(reserve, "reserve", **BOUNDS["reserve"])
-    one_of(balance, get_args(Balance), "balance")
     switch(recenter, "recenter")
     number(clearance, "clearance", least=0.0, below=body.radius, where=", the object's radius in m")
-    if cones is not None:
-        raise InputError(f"cones is now called max_cones: pass max_cones={shown(cones)}")
     whole(max_cones, "max_cones", **BOUNDS["max_cones"])
     left = coefficient(friction) * (1.0 - reserve)
     positions, normals = stacked(grasp.contacts)
@@ -129,10 +115,11 @@ def certify_regions(  # noqa: PLR0913 - what a user may choose
         proved = larger_inside(grounds, moved, proved)
     if proved is None:
         return None
-    polygons, cover = _polygons(grounds, proved, balance, grasp, unit)
+    discs = grounds.discs(proved.ys, proved.radius)
+    polygons = shared_out(grounds, proved.ys, discs, proved.cover)
     if min(map(len, polygons)) < 3:  # noqa: PLR2004 - not polygons
         return None
-    found = _placed(grounds, proved, polygons, cover, unit)
+    found = _placed(grounds, proved, polygons, unit)
     if not found.verify():
         raise SolverError(f"grasp {grasp.id}: its regions failed their own check; please report it")
     return found
@@ -189,25 +176,8 @@ def _pieces(
     return tuple(found)
 
 
-def _polygons(
-    grounds: Grounds, proved: Proved, balance: Balance, grasp: Grasp, unit: _Unit
-) -> tuple[list[Array], TwistCover]:
-    """Grow polygons in plane coordinates, (c, 2) each, and return them with their proof."""
-    if balance == "radius":
-        discs = grounds.discs(proved.ys, proved.radius)
-        return shared_out(grounds, proved.ys, discs, proved.cover), proved.cover
-    beginnings = [disc_polygons(grounds, proved.ys, b * proved.radius) for b in BEGINNINGS]
-    planned = [
-        tidy(clip((unit.at(region.polygon) - piece.origin) @ piece.frame, piece.E, piece.b))
-        for region, piece in zip(grasp.regions, grounds.pieces, strict=True)
-    ]
-    if min(map(len, planned)) > 2:  # noqa: PLR2004 - polygons, not points
-        beginnings.append(planned)
-    return most_area(grounds, proved, beginnings)
-
-
 def _placed(
-    grounds: Grounds, proved: Proved, polygons: list[Array], cover: TwistCover, unit: _Unit
+    grounds: Grounds, proved: Proved, polygons: list[Array], unit: _Unit
 ) -> CertifiedRegions:
     """Return polygons as regions in the object's frame, with their proof."""
     trimmed = [_trimmed(polygon, y) for polygon, y in zip(polygons, proved.ys, strict=True)]
@@ -226,20 +196,16 @@ def _placed(
         borders=four(unit.back(grounds.places(i)) for i in range(len(grounds.pieces))),
         radius=unit.scale * _radius_held(grounds, proved, trimmed),
         centers=centers,
-        limit=math.inf if choice is None else _farthest(choice, centers),
+        limit=math.inf if choice is None else float(np.linalg.norm(choice - centers, axis=1).max()),
         open_choice=choice,
         open_wrench=None if opened is None else opened.separating_wrench,
         friction=grounds.friction,
         origin=unit.origin,
         normals=np.array([piece.normal for piece in grounds.pieces]),
         depths=unit.scale * np.array([piece.depth for piece in grounds.pieces]),
-        cover=cover,
+        cover=proved.cover,
         scale=unit.scale,
     )
-
-
-def _farthest(points: Array, centers: Array) -> float:
-    return float(np.linalg.norm(points - centers, axis=1).max())
 
 
 def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> float:

@@ -1,4 +1,4 @@
-"""Grows polygons as far as a proof allows, and then further with new proofs.
+"""Makes proved regions larger: polygons grow as far as a proof allows, and centres move.
 
 A cover proves more than the discs it was sought for. On a ray of one of its cones the least powers
 of the forces sum to s > 0. Each of the m contacts with a force may lose s / m there and no more, so
@@ -10,32 +10,47 @@ a half-plane. The part of a face in all half-planes of its finger is a convex po
 region. The cover proves these polygons too, as the losses on each ray sum to s at most. The power
 that the polygons leave over is shared out again.
 
-For larger areas, polygons are moved outwards one finger at a time, and kept if a cover is found.
+Centres. A cover has fixed contact forces for each cone. The power of a fixed force is linear in the
+position of its contact. So the largest radius r that these forces allow, over all centres c_i with
+the discs on their faces, is one linear program:
+
+    maximise r  over c_i, r
+    sum over i of F_i.(a + b x c_i) - r |T_i'(F_i x b)| >= 0   for each ray of each cone,   (2)
+    E_i c_i + r <= b_i                                          for each face.              (3)
+
+New centres allow other forces, so new covers are sought around them, again and again while the
+radius grows. The paper's own program for concurrent grasps is of this kind, with one focus for all
+twists.
 """
 
-from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.geometry.polygons import ON_LINE, SAME_CORNER, clip, edge_rows, signed_area, tidy
-from grasp_core.regions.cover_search import search_cover
-from grasp_core.regions.largest_discs import Grounds, Proved, part_of_disc
+from grasp_core.errors import SolverError
+from grasp_core.geometry.polygons import ON_LINE, clip, nearest_point, tidy
+from grasp_core.regions.largest_discs import Grounds, Proved, largest_discs
 from grasp_core.regions.proof import TwistCover, power_of, slack_of, summed
 from grasp_core.regions.sites import Sites
-from grasp_core.solvers.ties import first_best, surpassing
+from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
+from grasp_core.solvers.ties import first_best, nearest_optimum, on_grid
 
 SHARINGS = 2
 """Number of times that spare power is shared out among the contacts."""
 MARGIN = 4.0
 """Power that polygons leave over, as a multiple of the slack with which the proof is checked."""
-FIRST_STEP, LAST_STEP = 0.4, 0.03
-"""First and last step by which edges of polygons are moved outwards, relative to the radius of the
-discs."""
-BEGINNINGS = (1.0, 0.6)
-"""Radii of the discs from which large areas grow, relative to the largest proved ones."""
-GROWING = 4
-"""Factor by which the covers of attempts to grow have fewer cones than are allowed."""
+MOVES = 12  # of all centres, at most
+MOVING = 8
+"""Factor by which covers have fewer cones while centres move than are allowed in the end."""
+WORTH = 1.005
+"""Least growth of the radius, as a factor, at which centres are moved once more."""
+FARTHEST = 1.0
+"""Largest distance that a centre moves at once, in radii."""
+MOVED_DIGITS = 6
+"""Digits after the point that moved centres keep."""
+STOPPING = 3.0
+"""Rays count in the program if they would stop a radius up to this factor of the present one."""
 
 
 def shared_out(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> list[Array]:
@@ -96,63 +111,78 @@ def _inside(polygon: Array, rows: Array, limits: Array) -> Array:
     return polygon
 
 
-def disc_polygons(grounds: Grounds, ys: Array, radius: float) -> list[Array]:
-    """Replace discs by polygons, cut to their pieces, in plane coordinates, (c, 2) each."""
-    return [
-        tidy(part_of_disc(piece, y, radius)) for piece, y in zip(grounds.pieces, ys, strict=True)
-    ]
+def better_centers(grounds: Grounds, ys: Array) -> Array:
+    """Find centres with larger discs than around `ys`, in plane coordinates, (k, 2).
+
+    The result is `ys` itself if no radius is proved around it.
+    """
+    coarse = replace(grounds, cones=grounds.cones // MOVING)
+    best = largest_discs(coarse, ys)
+    if best is None:
+        return ys
+    for _ in range(MOVES):
+        moved = _best_for_forces(coarse, best)
+        found = None if moved is None else largest_discs(coarse, moved, best.radius)
+        if found is None or inside_faces(coarse, found) < WORTH * inside_faces(coarse, best):
+            break
+        best = found
+    return best.ys
 
 
-def most_area(
-    grounds: Grounds, proved: Proved, beginnings: Sequence[list[Array]]
-) -> tuple[list[Array], TwistCover]:
-    """Grow polygons of large total area: the best result from discs and other beginnings."""
-    axes, discs = grounds.axes(proved.ys), grounds.discs(proved.ys, proved.radius)
-    best = shared_out(grounds, proved.ys, discs, proved.cover), proved.cover
-    for polygons in beginnings:
-        cover = _cover(grounds, proved.ys, polygons, axes)
-        if cover is None:
-            continue
-        polygons, cover = _grown(grounds, proved, polygons, cover, axes)
-        sites = grounds.around(proved.ys, polygons, np.zeros(len(polygons)))
-        polygons = shared_out(grounds, proved.ys, sites, cover)
-        if total_area(polygons) > surpassing(total_area(best[0])):
-            best = polygons, cover
-    return best
+def larger_inside(grounds: Grounds, one: Proved | None, other: Proved | None) -> Proved | None:
+    """Return whichever of two sets of discs has the larger discs inside the faces."""
+    if one is None or other is None:
+        return other if one is None else one
+    return (one, other)[first_best([inside_faces(grounds, each) for each in (one, other)])]
 
 
-def total_area(polygons: Sequence[Array]) -> float:
-    """Add up the areas of counter-clockwise polygons, (c, 2) each."""
-    return sum(map(signed_area, polygons))
+def inside_faces(grounds: Grounds, proved: Proved) -> float:
+    """Return the largest radius of discs that are proved and lie inside the faces."""
+    depths = [(p.b - p.E @ y).min() for p, y in zip(grounds.pieces, proved.ys, strict=True)]
+    return min(proved.radius, *map(float, depths))
 
 
-def _grown(
-    grounds: Grounds, proved: Proved, polygons: list[Array], cover: TwistCover, axes: Array
-) -> tuple[list[Array], TwistCover]:
-    """Move polygons outwards in turn; steps are halved where no proof is found."""
-    steps = np.full(len(polygons), FIRST_STEP * proved.radius)
-    # each turn halves a step, or moves edges outwards by `LAST_STEP` at least until a piece is full
-    while (steps > LAST_STEP * proved.radius).any():
-        for i, piece in enumerate(grounds.pieces):
-            if steps[i] <= LAST_STEP * proved.radius:
-                continue
-            tried = list(polygons)
-            tried[i] = _offset(piece.corners, polygons[i], steps[i])
-            full = signed_area(tried[i]) <= signed_area(polygons[i]) * (1.0 + SAME_CORNER)
-            found = None if full else _cover(grounds, proved.ys, tried, axes)
-            if found is None:
-                steps[i] = 0.0 if full else 0.5 * steps[i]
-            else:
-                polygons, cover = tried, found
-    return polygons, cover
-
-
-def _cover(grounds: Grounds, ys: Array, polygons: list[Array], axes: Array) -> TwistCover | None:
-    sites = grounds.around(ys, polygons, np.zeros(len(ys)))
-    return search_cover(sites, axes, grounds.cones // GROWING).cover
-
-
-def _offset(piece: Array, polygon: Array, distance: float) -> Array:
-    """Move the edges of a convex polygon outwards and cut the result to a piece, (c, 2)."""
-    E, b = edge_rows(polygon)
-    return tidy(clip(piece, E, b + distance))
+def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
+    """Find the best centres near the present ones for a cover's forces, (k, 2), or None."""
+    k = len(proved.ys)
+    rows, limits = list[Array](), list[Array]()
+    points = grounds.points(proved.ys)
+    for where, rays in proved.cover.leaves():
+        twists = rays @ proved.cover.axes
+        twists = (twists / np.linalg.norm(twists, axis=2, keepdims=True)).reshape(-1, 6)
+        powers, falls, moves = np.zeros(len(twists)), np.zeros(len(twists)), list[Array]()
+        forces = proved.cover.forces[where]
+        sizes = np.sqrt(np.einsum("mki,mki->m", forces, forces))[:, None]
+        for piece, point, F in zip(grounds.pieces, points, forces.swapaxes(0, 1), strict=True):
+            each = np.repeat(F / sizes, rays.shape[1], axis=0)
+            slope, at_origin = power_of(each, twists[:, None])
+            slope, across = slope[:, 0], slope[:, 0] @ piece.frame
+            powers += at_origin[:, 0] + slope @ point - piece.depth * np.abs(slope @ piece.normal)
+            falls += np.linalg.norm(across, axis=1)
+            moves.append(across)
+        # (2), for moves from the present centres
+        near = powers < STOPPING * proved.radius * falls
+        rows.append(np.column_stack([-np.hstack(moves), falls])[near])
+        limits.append(powers[near])
+    # (3), for the same moves
+    for i, (piece, y) in enumerate(zip(grounds.pieces, proved.ys, strict=True)):
+        edges = np.zeros((len(piece.E), 2 * k + 1))
+        edges[:, 2 * i : 2 * i + 2], edges[:, -1] = piece.E, 1.0
+        rows.append(edges)
+        limits.append(piece.b - piece.E @ y)
+    box = np.eye(2 * k, 2 * k + 1)
+    rows += [box, -box]
+    limits += [np.full(2 * k, FARTHEST * proved.radius)] * 2
+    c = np.zeros(2 * k + 1)
+    c[-1] = 1.0
+    program = LinearProgram(c, np.vstack(rows), np.concatenate(limits))
+    try:
+        best = maximize(program)
+    except SolverError:
+        return None
+    if not isinstance(best, Optimum):
+        return None
+    moved = on_grid(proved.ys + nearest_optimum(program, best)[:-1].reshape(k, 2), MOVED_DIGITS)
+    return np.array([
+        nearest_point(piece.corners, y) for piece, y in zip(grounds.pieces, moved, strict=True)
+    ])  # fmt: skip

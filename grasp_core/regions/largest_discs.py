@@ -1,9 +1,14 @@
 """Finds the largest equal discs around contacts that are proved to keep force closure.
 
-Solved: for contacts on faces, a radius at which a cover of all twists is found (`cover_search`),
+Solved: for contacts on faces, a radius at which a cover of all twists is found,
 and a larger radius at which some contacts in the discs are not force-closed. Parts of a disc
 outside its face are left out. The radius is doubled from a small one and then bisected, first with
 few cones for each attempt, then in smaller steps with as many cones as are allowed.
+
+A cover is a list of cones that fill the space of twists, each with contact forces that together
+have power on all its rays. Compiled code divides cones until such forces are found for each, or
+stops when it finds a twist that contacts at some places do not resist; `proof` derives why a cover
+is enough, and checks the answer, and `sites` describes how forces are found.
 """
 
 import math
@@ -12,14 +17,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, to_digits
+from grasp_core.arrays import Array, Indices, to_digits
+from grasp_core.compiled import compiled
 from grasp_core.geometry.polygons import SAME_CORNER, clip
 from grasp_core.objects.face_pieces import FacePiece
-from grasp_core.regions.cover_search import search_cover
-from grasp_core.regions.proof import TwistCover
+from grasp_core.regions.proof import LEAF, TWIST, TwistCover
 from grasp_core.regions.sites import Sites, stacked_corners
 from grasp_core.solvers.ties import coarse
 
+KERNEL = "grasp_core.regions.cover_kernel"
 DIAGONAL = 1e-12
 """Number added to the diagonal of a product of motions, so that it has a triangular factor."""
 FINENESS = 0.02
@@ -39,6 +45,38 @@ REACH_DIGITS = 10
 """Digits after the point to which the largest radius to try is rounded."""
 SIDES = 16
 """Number of sides of the polygon around a disc that extends beyond its face."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Searched:
+    """How a search ended: with a proof, with contacts not in force closure, or with neither."""
+
+    cover: TwistCover | None = None
+    choice: Array | None = None
+    """Contacts that leave a twist unresisted, except for rounding, (k, 3)."""
+
+
+def search_cover(sites: Sites, axes: Array, cones: int) -> Searched:
+    """Search for a cover that proves force closure for all contacts in given sites.
+
+    Takes `axes` (6, 6).
+    """
+    # the search sees sites on a grid, so that it ends alike on all machines
+    kernel, told = compiled(KERNEL), sites.on_grid()
+    k, most = len(sites.points), max(cones, 1 << TWIST)
+    tree = kernel.Tree(np.zeros(most, np.int64), np.zeros((most, k, 3)), np.zeros((k, 3)))
+    ended, count = kernel.search(told, axes, (most, told.clear()), tree)
+    # (5), translated from shifts along the frames to places
+    if ended == kernel.REFUTED:
+        return Searched(choice=sites.points + np.einsum("kij,kj->ki", sites.frames, tree.shifts))
+    if ended != kernel.COVERED:
+        return Searched()
+    codes = tree.codes[:count]
+    return Searched(_cover(sites, axes, codes, tree.forces[:count][codes == LEAF]))
+
+
+def _cover(sites: Sites, axes: Array, codes: Indices, forces: Array) -> TwistCover:
+    return TwistCover(axes, codes, np.einsum("kij,mkj->mki", sites.frames, forces))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -47,10 +47,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices
+from grasp_core.arrays import (
+    Array,
+    Indices,
+    are_frictions,
+    are_units,
+    frozen,
+    frozen_indices,
+    is_a,
+    is_array,
+)
 from grasp_core.by_value import ByValue
 from grasp_core.errors import InputError
-from grasp_core.fields import are_frictions, are_units, is_a, is_array
 
 TWIST = 6
 LEAF = 15

@@ -21,19 +21,21 @@ positive outwards, because normals point into the part.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.objects.face import Face
+from grasp_core.by_value import counted
 from grasp_core.objects.on_faces import ON_FACE
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.surface import Face
 from grasp_core.planning.given_contacts import nearest_in
-from grasp_core.transferring.face_places import Triple, place_in_words, triple
 from grasp_core.transferring.like_faces import SAME, WIDEST_DEG, Likeness
 
+Triple: TypeAlias = tuple[float, float, float]
 MOVED = ON_FACE
 """Least distance that counts as moved, relative to the old part's radius: files that keep six
 digits stay within it."""
@@ -42,7 +44,9 @@ TURNED = 1e-4
 than a hundredth of the part."""
 RESHAPED = 1e-5
 """Least change of a face's area that counts, relative to its area."""
-MM, MM2 = 1e3, 1e6
+MOST_NAMED = 12
+"""Largest number of faces that one line names."""
+MM = 1e3
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,10 +67,10 @@ class FaceChange:
     """Area of the successor [m^2]; 0.0 without one."""
     moved: bool
     """Whether the face is gone, or its plane is another one by more than rounding."""
-    normal: Triple | None = None
-    """Inward unit normal on the old part; None where a file does not say it."""
-    center: Triple | None = None
-    """Centroid on the old part [m]; None where a file does not say it."""
+    normal: Triple
+    """Inward unit normal on the old part."""
+    center: Triple
+    """Centroid on the old part [m]."""
     likely: int | None = None
     """Number of the face that it probably became although it turned too far to succeed it; None if
     it has a successor, or no face is plausible."""
@@ -79,45 +83,48 @@ class FaceChange:
         return abs(self.new_area - self.old_area) > RESHAPED * self.old_area
 
     def __str__(self) -> str:
-        """Say what became of the face: `face 3 (facing +z at z = 25 mm) moved 1.00 mm outward`."""
-        return self.in_words(f"face {self.old}", self.old)
+        """Say what became of the face: `face 3 moved 1.00 mm outward`."""
+        return self.in_words(f"face {self.old}")
 
-    def in_words(self, named: str, number: int | None) -> str:
-        """Say what became of the face under a name that another numbering gives it.
-
-        Args:
-            named: Name of the face, such as `face 3`.
-            number: Its number in that numbering; the number on the changed part is said if it is
-                another one. None if it has none.
-        """
-        named = self.called(named)
+    def in_words(self, name: str) -> str:
+        """Say what became of the face, under the name that another numbering gives it."""
         if self.likely is not None:
-            turn = f"turned {math.degrees(self.likely_turn):.2f} deg"
-            return f"{named} {turn}, too far to be the same face"
+            turn = math.degrees(self.likely_turn)
+            return f"{name} turned {turn:.2f} deg, too far to be the same face"
         if self.new is None:
-            return f"{named} is gone"
-        if number is not None and self.new != number:
-            named += f", face {self.new} of the changed part,"
-        said = list(_motions(self)) if self.moved else []
-        if not said and self.reshaped:
-            said = [f"has {MM2 * (self.new_area - self.old_area):+.4g} mm2 of area"]
-        return f"{named} {' and '.join(said) or 'is as it was'}"
-
-    def called(self, named: str) -> str:
-        """Return a name of the face with its place, such as `face 3 (facing +z at z = 25 mm)`."""
-        if self.normal is None or self.center is None:
-            return named
-        return f"{named} ({place_in_words(self.normal, self.center)})"
+            return f"{name} is gone"
+        if not self.moved:
+            return f"{name} is as it was"
+        way = "outward" if self.distance > 0.0 else "inward"
+        turned = f" and turned {math.degrees(self.turn):.2f} deg" if self.turn > TURNED else ""
+        return f"{name} moved {abs(MM * self.distance):.2f} mm {way}{turned}"
 
 
-def _motions(change: FaceChange) -> Iterable[str]:
-    far = f"{abs(MM * change.distance):.2f}"
-    if float(far):
-        yield f"moved {far} mm {'outward' if change.distance > 0.0 else 'inward'}"
-    if change.turn > TURNED:
-        yield f"turned {math.degrees(change.turn):.2f} deg"
-    elif not float(far):  # less than the digits show
-        yield f"moved {MM * change.distance:+.2g} mm"
+def changes_in_words(
+    changes: Sequence[FaceChange],
+    added: Sequence[int] = (),
+    numbers: Mapping[int, int] | None = None,
+) -> str:
+    """Say in one line which faces moved, the farthest first, and count the other changes.
+
+    Faces are called by `numbers`, which are theirs on another part; None for their own.
+    """
+    moved = sorted(
+        (change for change in changes if change.moved),
+        key=lambda change: (change.new is not None, -abs(change.distance), change.old),
+    )
+    said: list[str] = []
+    for change in moved[:MOST_NAMED]:
+        number = change.old if numbers is None else numbers.get(change.old)
+        said.append(change.in_words("a newer face" if number is None else f"face {number}"))
+    if len(moved) > MOST_NAMED:
+        said.append(f"{len(moved) - MOST_NAMED} more faces moved")
+    if kept := sum(change.reshaped and not change.moved for change in changes):
+        said.append(f"{counted(kept, 'face')} of another area")
+    likely = {change.likely for change in changes}
+    if new := sum(index not in likely for index in added):
+        said.append(counted(new, "new face"))
+    return "; ".join(said) or "no face moved"
 
 
 def face_changes(old: Polyhedron, new: Polyhedron, rule: Likeness) -> tuple[FaceChange, ...]:
@@ -155,7 +162,11 @@ def _successor(
 ) -> int | None:
     """Find the nearest like face among some of the changed part; None if none is within reach."""
     like = new.normals @ face.normal >= math.cos(rule.angle + SAME)
-    centers, weights = _representatives(face)
+    centers = np.array([piece.mean(axis=0) for piece in face.pieces])
+    weights = np.array([  # twice the areas of the pieces
+        float(np.linalg.norm(cross(piece[1:-1] - piece[0], piece[2:] - piece[0]).sum(axis=0)))
+        for piece in face.pieces
+    ])  # fmt: skip
     best, least = None, math.inf
     for index in (each for each in candidates if like[each]):
         # planes are nowhere nearer than this, so most faces are left out at once
@@ -169,16 +180,6 @@ def _successor(
     return best
 
 
-def _representatives(face: Face) -> tuple[Array, Array]:
-    """Return the centre of each convex piece of a face, (k, 3) [m], and twice its area, (k,)."""
-    centers = np.array([piece.mean(axis=0) for piece in face.pieces])
-    areas = [
-        float(np.linalg.norm(cross(piece[1:-1] - piece[0], piece[2:] - piece[0]).sum(axis=0)))
-        for piece in face.pieces
-    ]
-    return centers, np.array(areas)
-
-
 def _distance(face: Face, point: Array) -> float:
     """Return the distance of a point from a planar face [m]."""
     feet = (nearest_in(piece, face.normal, point) for piece in face.pieces)
@@ -188,7 +189,7 @@ def _distance(face: Face, point: Array) -> float:
 def _change(
     index: int, face: Face, successor: int | None, new: Polyhedron, size: float
 ) -> FaceChange:
-    normal, center = triple(face.normal), triple(face.centroid)
+    normal, center = _triple(face.normal), _triple(face.centroid)
     if successor is None:
         return FaceChange(index, None, 0.0, 0.0, face.area, 0.0, True, normal, center)
     now = new.faces[successor]
@@ -198,6 +199,11 @@ def _change(
     turn = _turn(face, now)
     moved = abs(distance) > MOVED * size or turn > TURNED
     return FaceChange(index, successor, distance, turn, face.area, now.area, moved, normal, center)
+
+
+def _triple(numbers: Array) -> Triple:
+    x, y, z = numbers.tolist()
+    return x, y, z
 
 
 def _turn(face: Face, now: Face) -> float:

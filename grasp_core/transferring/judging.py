@@ -17,7 +17,7 @@ import numpy as np
 
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.families.free_contacts import of_general_type
+from grasp_core.families.free import of_general_type
 from grasp_core.families.placements import Placement
 from grasp_core.objects.face_pieces import piece_of
 from grasp_core.objects.polyhedron import Polyhedron

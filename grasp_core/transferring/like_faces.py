@@ -54,10 +54,7 @@ class Likeness:
 
 
 def likeness(old: Polyhedron, distance: float | None, angle_deg: float) -> Likeness:
-    """Build the rule for an old part.
-
-    Takes `distance` [m]; `angle_deg` [deg].
-    """
+    """Build the rule for an old part."""
     where = f", the part's radius in m, or None for {SHARE_OF_SIZE:g} of it"
     usual = SHARE_OF_SIZE * old.radius
     most = usual if distance is None else distance
@@ -79,10 +76,7 @@ def check_planar(body: Polyhedron, name: str) -> None:
 
 
 def place_of(new: Polyhedron, point: Array, normal: Array, rule: Likeness) -> Nearest | None:
-    """Find the point of a changed part that takes the place of an old one; None if there is none.
-
-    Takes `point` (3,) [m]; `normal` (3,).
-    """
+    """Find the point of a changed part that takes an old one's place; None if there is none."""
     return _nearest(_parts(new), point, normal, rule, rule.distance + rule.same)
 
 

@@ -18,17 +18,20 @@ from functools import partial
 
 import numpy as np
 
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import cross
+from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import coefficient, instance, several
 from grasp_core.errors import UndecidedError
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated
 from grasp_core.planning.reach import Finger
-from grasp_core.short_text import counted, summary
-from grasp_core.transferring.change_words import in_words
-from grasp_core.transferring.contacts import CarriedContact, carried_contacts
-from grasp_core.transferring.face_changes import FaceChange, added_faces, face_changes
+from grasp_core.transferring.face_changes import (
+    FaceChange,
+    added_faces,
+    changes_in_words,
+    face_changes,
+)
 from grasp_core.transferring.judging import (
     CHANGES,
     Change,
@@ -38,11 +41,44 @@ from grasp_core.transferring.judging import (
     judged,
     reached,
 )
-from grasp_core.transferring.like_faces import ANGLE_DEG, Likeness, check_planar, likeness
+from grasp_core.transferring.like_faces import (
+    ANGLE_DEG,
+    Likeness,
+    check_planar,
+    likeness,
+    nearest_at_any_distance,
+    place_of,
+)
 from grasp_core.values import Contact, Grasp, four
 
 BY_FACES = re.compile(r"([a-z](?:-[a-z])*)((?:-\d+[ab]?){4})")
 """Ids that plans make: letters of methods, then the faces by finger, perhaps halves of faces."""
+MM = 1e3
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class CarriedContact(ByValue):
+    """What became of one contact of a grasp on the changed part."""
+
+    finger: int
+    old_face: int
+    """Number of the face of the old part on which the contact was."""
+    new_face: int | None
+    """Number of the face of the changed part that it is on now; None if it has no place there."""
+    contact: Contact | None
+    """The contact on the changed part, with the normal of its face; None if it has no place."""
+    distance: float
+    """How far it moved [m]; without a place, the distance of the nearest like face, which is
+    infinite if there is none."""
+    turn: float
+    """Angle between its old normal and that of the nearest like face [rad]; 0.0 if there is none.
+    """
+
+    def __repr__(self) -> str:
+        return summary(
+            "CarriedContact", finger=self.finger, old_face=self.old_face, new_face=self.new_face,
+            distance=self.distance,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -99,8 +135,8 @@ class Transfer(ByValue):
 
     @property
     def faces_in_words(self) -> str:
-        """Say in one line where faces are that moved, and by how much."""
-        return in_words(self.faces, self.added)
+        """Say in one line which faces moved, and by how much."""
+        return changes_in_words(self.faces, self.added)
 
     def __repr__(self) -> str:
         counts = [f"{self.count(status)} {status}" for status in CHANGES]
@@ -170,13 +206,21 @@ class _Judge:
     def carried(self, grasp: Grasp, taken: set[str]) -> CarriedGrasp:
         """Carry a grasp over; its new id joins those that are taken."""
         before = self._before(grasp)
-        contacts = carried_contacts(self.old, self.new, grasp, self.rule)
-        lost = [each.reason for each in contacts if each.contact is None]
+        contacts = tuple(
+            self._contact(finger, face, contact)
+            for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True))
+        )
+        lost = [self._loss(each) for each in contacts if each.contact is None]
         if lost:
             return CarriedGrasp(grasp, "gone", "; ".join(lost), contacts, before, None, None)
         name = _free_id(_id_on(grasp, contacts), taken)
         try:
-            now = judged(self.new, _seated(self.new, contacts), self.friction, name)
+            seated = Seated(
+                self.new, four(each.new_face for each in contacts if each.new_face is not None),
+                four(each.contact for each in contacts if each.contact is not None),
+                float(np.max([each.distance for each in contacts])),
+            )  # fmt: skip
+            now = judged(self.new, seated, self.friction, name)
         except UndecidedError as error:
             why = f"whether its contacts are still in force closure is too close to call: {error}"
             return CarriedGrasp(grasp, "gone", why, contacts, before, None, None)
@@ -186,6 +230,27 @@ class _Judge:
         taken.add(name)
         status, reason = compared(before, now.figures, self.friction)
         return CarriedGrasp(grasp, status, reason, contacts, before, now.figures, held)
+
+    def _contact(self, finger: int, face: int, contact: Contact) -> CarriedContact:
+        """Carry one contact over to the changed part."""
+        at, normal = contact.position, contact.normal
+        place = place_of(self.new, at, normal, self.rule)
+        near = place or nearest_at_any_distance(self.new, at, normal, self.rule)
+        if near is None:
+            return CarriedContact(finger, face, None, None, math.inf, 0.0)
+        sine = float(np.linalg.norm(cross(normal, near.contact.normal)))
+        turn = math.atan2(sine, float(normal @ near.contact.normal))
+        if place is None:
+            return CarriedContact(finger, face, None, None, near.distance, turn)
+        return CarriedContact(finger, face, place.part.face, place.contact, place.distance, turn)
+
+    def _loss(self, found: CarriedContact) -> str:
+        """Say which finger has lost which face, and how far the nearest like face is."""
+        if math.isfinite(found.distance):
+            near = f"the nearest face like it is {MM * found.distance:.2f} mm away"
+        else:
+            near = f"no face is within {math.degrees(self.rule.angle):.4g} deg of it"
+        return f"finger {found.finger} has lost face {found.old_face}: {near}"
 
     def _before(self, grasp: Grasp) -> GraspFigures:
         """Judge a grasp on the old part, as it will be judged on the changed one."""
@@ -207,13 +272,6 @@ class _Judge:
             return now.grasp
         found = reached(self.new, now.grasp, self.finger)
         return f"out of reach: {found}" if isinstance(found, str) else found
-
-
-def _seated(new: Polyhedron, contacts: Iterable[CarriedContact]) -> Seated:
-    placed = [(c.new_face, c.contact, c.distance) for c in contacts]
-    faces = four(face for face, *_ in placed if face is not None)
-    return Seated(new, faces, four(at for _, at, _ in placed if isinstance(at, Contact)),
-                  float(np.max([far for *_, far in placed])))  # fmt: skip
 
 
 def _id_on(grasp: Grasp, contacts: Iterable[CarriedContact]) -> str:

@@ -12,7 +12,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
 from grasp_core.errors import GraspError, InputError
-from grasp_core.files.whole_files import write_parts
-from scenes.drawing.flat.colours import FINGERS, rgb
+from grasp_core.files.text_files import write_parts
+from scenes.drawing.colours import FINGERS, rgb
 from scenes.execution.held_mjcf import HeldScene
 from scenes.mjcf import Scene
 
@@ -103,17 +103,12 @@ def _written(path: Path, **job_parts: Any) -> Path:
         job, out = Path(folder) / "job.npz", Path(folder) / f"clip{path.suffix.lower()}"
         colours = [rgb(colour) for colour in FINGERS]
         np.savez(job, size=SIZE, rate=RATE, colours=colours, **job_parts)
-        drawn_by_first([(job, out)])
-        return write_parts(path, [out.read_bytes()])
-
-
-def drawn_by_first(pairs: Sequence[tuple[Path, Path]]) -> None:
-    """Draw pictures in another process, with the first graphics library that works."""
-    said = ""
-    for graphics in _graphics():
-        said = _drawn(pairs, graphics)
-        if not said:
-            return
+        said = ""
+        for graphics in _graphics():
+            said = _run_frames(graphics, [str(job), str(out)])
+            if not said and out.is_file():
+                return write_parts(path, [out.read_bytes()])
+            said = said or f"{graphics}: nothing was drawn"
     raise GraphicsError(f"MuJoCo cannot draw on this machine: {said}; {remedy()}")
 
 
@@ -168,13 +163,6 @@ def _graphics() -> Iterator[str]:
         yield from ("egl", "osmesa", *(["glfw"] if os.environ.get("DISPLAY") else []))
     else:
         yield ""
-
-
-def _drawn(pairs: Sequence[tuple[Path, Path]], graphics: str) -> str:
-    """Draw pictures in another process; return what went wrong, or an empty text."""
-    trouble = _run_frames(graphics, [str(path) for pair in pairs for path in pair])
-    whole = all(out.is_file() for _, out in pairs)
-    return trouble or ("" if whole else f"{graphics}: nothing was drawn")
 
 
 def _run_frames(graphics: str, arguments: list[str]) -> str:

@@ -4,10 +4,17 @@ The object is drawn as glass. Outside of it, each finger is a long bar. Inside o
 has its friction cone and, within that, the force cone that the construction used. Lines of force
 run through the focus points. For a pencil the plane of each pair of fingers is shown too, for a
 regulus the ruled surface on which the lines lie. Pictures and web pages draw these shapes.
+
+That ruled surface is swept by the transversals of three pairwise skew lines: through each point of
+the first, exactly one line meets the other two, the intersection of the planes that the point spans
+with them. They sweep a hyperboloid of one sheet. Every line that depends linearly on the three,
+such as the fourth line of force, meets all of them, and so lies on it too (Sudsang & Ponce 1995,
+section 2.2).
 """
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,13 +24,16 @@ from grasp_core.cones.spanning import angles_between
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.drawing.flat.sheets import closed
-from scenes.drawing.hands.posed_hands import PosedHand, hand_shapes
-from scenes.drawing.outlines import feature_edges
-from scenes.drawing.ruled_surfaces import between, rulings
+from scenes.drawing.hands import PosedHand, hand_shapes
+from scenes.drawing.painting import feature_edges
 from scenes.drawing.shapes import Shape, cone_rim, cone_sides, tube
+from scenes.drawing.sheets import closed
 from scenes.drawing.views import Extent
 
+RULINGS = 40
+PARALLEL = 1e-9
+"""Least length of the cross product that gives the direction of a transversal, relative to the
+squared reach."""
 BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
 """Length and radius of a finger's bar, in finger sizes."""
 CONE_LENGTH = 0.42
@@ -45,6 +55,42 @@ POLYGON = 3
 """Least number of corners of a region that can be filled with colour."""
 MOST_TRIANGLES = 2500
 """Largest number of triangles drawn for the object; finer surfaces are simplified first."""
+
+
+def rulings(points: Array, directions: Array, center: Array, reach: float) -> tuple[Array, ...]:
+    """Cut the transversals of three lines to segments inside a ball.
+
+    Takes `points` (k, 3) [m]; `directions` (k, 3); `center` (3,) [m]; `reach` [m]. Gives ends of
+    each segment, (2, 3) [m], with neighbouring segments next to each other.
+    """
+    segments = list[Array]()
+    for along in np.linspace(-reach, reach, RULINGS):
+        start = points[0] + along * directions[0]
+        planes = np.cross(points[1:3] - start, directions[1:3])
+        way = np.cross(planes[0], planes[1])
+        length = float(np.linalg.norm(way))
+        if length > PARALLEL * reach**2:
+            segments += _inside(start, way / length, center, reach)
+    return tuple(segments)
+
+
+def _inside(start: Array, way: Array, center: Array, reach: float) -> list[Array]:
+    """Return the part of a line inside a ball, as a list with one segment or none."""
+    middle = float((center - start) @ way)
+    room = reach**2 - float(np.linalg.norm(center - start - middle * way)) ** 2
+    if room <= 0.0:
+        return []
+    half = math.sqrt(room)
+    return [np.array([start + (middle - half) * way, start + (middle + half) * way])]
+
+
+def between(segments: Sequence[Array]) -> tuple[Array, ...]:
+    """Make the quadrilaterals between neighbouring segments, each (4, 3)."""
+    quads = list[Array]()
+    for one, two in pairwise(segments):
+        turned = two if (one[1] - one[0]) @ (two[1] - two[0]) > 0.0 else two[::-1]
+        quads.append(np.array([one[0], one[1], turned[1], turned[0]]))
+    return tuple(quads)
 
 
 def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, ...]:
@@ -92,28 +138,12 @@ def finger_size(body: Extent) -> float:
 
 def glass(body: Polyhedron) -> tuple[Shape, ...]:
     """Return the shapes of the object: its surface, and the edges at which it is bent."""
-    panes = _panes(body)
-    return (
-        Shape("object", polygons=panes),
-        Shape("edge", lines=tuple(feature_edges(_edged(body, panes)))),
-    )
-
-
-def _edged(body: Polyhedron, panes: tuple[Array, ...]) -> Sequence[Array]:
-    """Return the polygons whose edges are the object's; fine surfaces keep their own triangles."""
     if body.patches is None:
-        return panes
-    return tuple(body.vertices[body.triangles])
-
-
-def _panes(body: Polyhedron) -> tuple[Array, ...]:
-    """Return the polygons of the surface, counter-clockwise as seen from outside.
-
-    They are face pieces, or the triangles of a curved surface.
-    """
-    if body.patches is None:
-        return tuple(piece[::-1] for face in body.faces for piece in face.pieces)
-    return tuple(coarse(body.vertices, body.triangles))
+        panes = edged = tuple(piece[::-1] for face in body.faces for piece in face.pieces)
+    else:  # a fine surface keeps the edges of its own triangles
+        panes = tuple(coarse(body.vertices, body.triangles))
+        edged = tuple(body.vertices[body.triangles])
+    return Shape("object", polygons=panes), Shape("edge", lines=tuple(feature_edges(edged)))
 
 
 def coarse(vertices: Array, triangles: Indices) -> Array:

@@ -1,6 +1,6 @@
-"""Draws scenes in motion as animated pictures, or depths of scenes; it runs as a separate program.
+"""Draws scenes in motion as animated pictures; it runs as a separate program.
 
-Only `scenes.drawing.clips` starts it, as `python -P frames.py JOB.npz OUT ...`. It is a separate
+Only `scenes.drawing.clips` starts it, as `python -P frames.py JOB.npz OUT`. It is a separate
 process because MuJoCo chooses its graphics library when it is first imported, and because a broken
 graphics driver may end the whole process. Without arguments it draws an empty scene, to find out
 whether drawing works.
@@ -23,38 +23,6 @@ SKY, AMBIENT, DIFFUSE = (0.93, 0.95, 0.97), 0.45, 0.45
 """Colour of the background, and strengths of the ambient light and of the light from the camera."""
 INK, LETTERS = (30, 30, 40), 18
 """Colour and height of the caption's letters [pixels]."""
-
-
-def main(*paths: str) -> None:
-    """Do one job after the other: each is a file that says what to draw, and the file to write."""
-    for job, out in zip(paths[::2], paths[1::2], strict=True):
-        with np.load(job, allow_pickle=False) as given:
-            (draw_depths if "views" in given else draw_clip)(given, out)
-
-
-def draw_depths(given: Mapping[str, np.ndarray], out: str) -> None:
-    """Write what each camera of a scene sees: distances, and where they are the object's."""
-    model = mujoco.MjModel.from_xml_string(str(given["xml"]))
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_camlight(model, data)
-    width, height = (int(size) for size in given["size"])
-    tables = [place for place in range(model.ngeom) if model.geom(place).name != "object"]
-    depths, seen = [], []
-    with mujoco.Renderer(model, height, width) as renderer:
-        for view in range(int(given["views"])):
-            for number, place in enumerate(tables):
-                model.geom_rgba[place, 3] = float(number == view)  # others are not drawn
-            renderer.update_scene(data, f"view{view}")
-            renderer.enable_depth_rendering()
-            depths.append(renderer.render().copy())
-            renderer.disable_depth_rendering()
-            renderer.enable_segmentation_rendering()
-            seen.append(renderer.render()[:, :, 0].copy())
-            renderer.disable_segmentation_rendering()
-    drawn = np.array(seen)
-    distances = np.where(drawn < 0, 0.0, np.array(depths)).astype(np.float32)
-    np.savez(out, depth_m=distances, on_object=drawn == model.geom("object").id)
 
 
 def draw_clip(given: Mapping[str, np.ndarray], out: str) -> None:
@@ -130,4 +98,8 @@ if __name__ == "__main__":
     quiet = mujoco.MjLogConfig.get()
     quiet.logto_file = False  # MUJOCO_LOG.TXT in the working folder
     mujoco.MjLogConfig.set(quiet)
-    main(*sys.argv[1:]) if sys.argv[1:] else try_out()
+    if sys.argv[1:]:
+        with np.load(sys.argv[1], allow_pickle=False) as job:
+            draw_clip(job, sys.argv[2])
+    else:
+        try_out()

@@ -13,16 +13,10 @@ from grasp_core.arrays import Array
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
-from scenes.drawing.drawings import (
-    bar,
-    coarse,
-    drawing_alone,
-    drawing_of,
-    glass,
-)
-from scenes.drawing.flat.svg import svg_of
+from scenes.drawing.drawings import bar, coarse, drawing_alone, drawing_of, glass
 from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG, number_places, sheet_of
 from scenes.drawing.shapes import Shape
+from scenes.drawing.sheets import svg_of
 from scenes.drawing.views import Alone, Extent, View, best_view, view_alone
 from scenes.layout import Layout
 from scenes.mjcf import Scene

@@ -3,8 +3,14 @@
 Lines are cut into pieces, so that one order by depth holds for everything: a finger in front of a
 line of force hides it, and glass in front of the line lets it show through. Solid bodies are
 covered by their outline first, so that nothing shines through between their sides.
+
+Edges between parts that are nearly in one plane belong to how a curved surface is cut into parts,
+not to its shape, so they are not drawn. Where such an edge lies between a part that faces the
+viewer and one that does not, it is the outline of the surface from there, and is drawn.
 """
 
+import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -12,12 +18,16 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.polygons import convex_hull
-from scenes.drawing.flat.colours import hexed, rgb
-from scenes.drawing.outlines import Surface, joined, outline
-from scenes.drawing.palette import LOOKS, Look, colour_of
-from scenes.drawing.shapes import Role, Shape
+from scenes.drawing.colours import hexed, rgb
+from scenes.drawing.shapes import LOOKS, Look, Role, Shape, colour_of
 from scenes.drawing.views import View
 
+SMOOTH_DEG = 20.0
+"""Angle between the normals of two parts up to which their common edge is not drawn [deg]."""
+MOST_EDGES = 1500
+"""Largest number of edges drawn; of more, as scans have them, only the sharpest are drawn."""
+SAME_POINT = 1e-6
+"""Distance up to which two corners count as one, relative to the size of the surface."""
 LIGHT = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
 """Direction towards the light, as (right, up, towards the viewer): from the left, above and in
 front."""
@@ -35,6 +45,126 @@ SHADES = 7
 clear glass."""
 WHOLE: tuple[Role, ...] = ("friction cone",)
 """Roles whose lines are short, so that each is drawn whole."""
+SOLIDS: tuple[Role, ...] = ("finger", "hand", "fingertip")
+"""Roles whose shapes are convex bodies that nothing shines through."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """Polygons of a closed surface, corners counter-clockwise as seen from outside."""
+
+    corners: Array
+    """Corners of all polygons, one polygon after the other, (n, 3) [m]."""
+    names: Indices
+    """Number of the point at each corner, (n,); polygons that meet share numbers."""
+    owners: Indices
+    """Polygon of each corner, (n,)."""
+    normals: Array
+    """Unit normals, outwards, (polygons, 3); zero for polygons without area."""
+
+    @classmethod
+    def of(cls, polygons: Sequence[Array]) -> "Surface":
+        """Number the corners of polygons, and measure their normals."""
+        corners = np.vstack(polygons)
+        counts = np.array([len(polygon) for polygon in polygons])
+        size = float(np.ptp(corners, axis=0).max())
+        places = np.rint(corners / (SAME_POINT * size)).astype(np.int64)
+        names = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
+        owners = np.repeat(np.arange(len(polygons)), counts)
+        turned = np.cross(corners, corners[_followers(owners, counts)])
+        normals = np.add.reduceat(turned, np.cumsum(counts) - counts)
+        lengths = np.linalg.norm(normals, axis=1)
+        normals = normals / np.where(lengths > 0.0, lengths, np.inf)[:, None]
+        return cls(corners, names, owners, normals)
+
+    def following(self) -> Indices:
+        """Return the place of the next corner of the same polygon for each corner, (n,)."""
+        return _followers(self.owners, np.bincount(self.owners))
+
+    def edges(self) -> tuple[Indices, Indices]:
+        """Pair the edges of polygons that meet.
+
+        Returns:
+            Places of the first corners of edges in one polygon, and of the same edges, which run
+            the other way, in another.
+        """
+        first, second = self.names, self.names[self.following()]
+        count = int(self.names.max()) + 1
+        ahead, back = first * count + second, second * count + first
+        order = np.argsort(ahead)
+        found = np.minimum(np.searchsorted(ahead, back, sorter=order), len(ahead) - 1)
+        other = order[found]
+        paired = (ahead[other] == back) & (first < second)
+        return np.flatnonzero(paired), other[paired]
+
+    def facing(self, camera: Array) -> Array:
+        """Tell which polygons face a point, (polygons,)."""
+        firsts = np.flatnonzero(np.diff(self.owners, prepend=-1))
+        return np.einsum("ij,ij->i", self.normals, camera - self.corners[firsts]) > 0.0
+
+    def segments(self, places: Indices) -> Array:
+        """Return the edges that begin at corners, (k, 2, 3) [m]."""
+        return np.stack([self.corners[places], self.corners[self.following()[places]]], axis=1)
+
+
+def _followers(owners: Indices, counts: Indices) -> Indices:
+    """Return the place of the next corner of the same polygon, (n,)."""
+    places = np.arange(len(owners)) + 1
+    ends = np.cumsum(counts)
+    places[ends - 1] = ends - counts
+    return places
+
+
+def _angles(surface: Surface, one: Indices, two: Indices) -> Array:
+    """Measure the angles between the normals on both sides of edges, (k,) [rad]."""
+    sides = surface.normals[surface.owners[one]], surface.normals[surface.owners[two]]
+    return np.arccos(np.clip(np.einsum("ij,ij->i", *sides), -1.0, 1.0))
+
+
+def feature_edges(polygons: Sequence[Array]) -> Array:
+    """Find the edges at which a surface is bent, the sharpest first, (k, 2, 3) [m]."""
+    surface = Surface.of(polygons)
+    one, two = surface.edges()
+    angles = _angles(surface, one, two)
+    order = np.argsort(-angles, kind="stable")[:MOST_EDGES]
+    return surface.segments(one[order[angles[order] > math.radians(SMOOTH_DEG)]])
+
+
+def outline(surface: Surface, camera: Array) -> Array:
+    """Find the smooth edges between polygons that face the camera and others, (k, 2, 3) [m]."""
+    one, two = surface.edges()
+    front = surface.facing(camera)
+    between = front[surface.owners[one]] != front[surface.owners[two]]
+    one, two = one[between], two[between]
+    return surface.segments(one[_angles(surface, one, two) <= math.radians(SMOOTH_DEG)])
+
+
+def joined(surface: Surface, chosen: Array) -> tuple[Array, ...]:
+    """Join polygons of a surface that meet, and return the loops around them, each (k, 3) [m]."""
+    following = surface.following()
+    places = np.flatnonzero(chosen[surface.owners])
+    first, second = surface.names[places], surface.names[following[places]]
+    count = int(surface.names.max()) + 1
+    alone = ~np.isin(second * count + first, first * count + second)
+    ways = defaultdict[int, list[tuple[int, int]]](list)
+    for start, end, place in zip(
+        first[alone].tolist(), second[alone].tolist(), places[alone].tolist(), strict=True
+    ):
+        ways[start].append((end, place))
+    return tuple(surface.corners[loop] for loop in _loops(ways))
+
+
+def _loops(ways: dict[int, list[tuple[int, int]]]) -> list[list[int]]:
+    """Follow edges from corner to corner until they close."""
+    loops = list[list[int]]()
+    for start in list(ways):
+        while ways[start]:
+            at, loop = start, list[int]()
+            while ways.get(at):
+                at, place = ways[at].pop()
+                loop.append(place)
+            loops.append(loop)
+    return loops
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,29 +193,23 @@ def _patches(shape: Shape, view: View, width: float) -> Iterator[Patch]:
     look = LOOKS[shape.role]
     if look.fill and shape.polygons:
         yield from FILLED.get(shape.role, _each)(shape, look, view)
-    lines = [*shape.lines, *_outline(shape, view)] if look.line or shape.role == "object" else []
-    for line in lines if shape.role not in WHOLE else ():
-        drawn = LOOKS["edge"] if shape.role == "object" else look
-        yield from _line(line, drawn, _line_colour(shape), view, width)
-    for line in lines if shape.role in WHOLE else ():
-        flat, near = view.seen(line)
-        yield Patch((flat,), float(near.mean()), colour_of(shape), look.opacity,
-                    width=0.01 * look.line * width)  # fmt: skip
+    if shape.role == "object" and shape.polygons:
+        edge = Shape("edge")
+        for line in (*shape.lines, *outline(Surface.of(shape.polygons), view.camera)):
+            yield from _line(line, LOOKS["edge"], colour_of(edge), view, width)
+    elif shape.role in WHOLE:
+        for line in shape.lines:
+            flat, near = view.seen(line)
+            yield Patch((flat,), float(near.mean()), colour_of(shape), look.opacity,
+                        width=0.01 * look.line * width)  # fmt: skip
+    elif look.line:
+        for line in shape.lines:
+            yield from _line(line, look, colour_of(shape), view, width)
     for point in () if shape.points is None else shape.points:
         place, (near,) = view.seen(point[None])
         # A dot is drawn in front of what it marks.
         yield Patch((place,), float(near) + 0.02 * width, colour_of(shape), look.opacity,
                     radius=0.005 * look.dot * width)  # fmt: skip
-
-
-def _line_colour(shape: Shape) -> str:
-    return colour_of(Shape("edge") if shape.role == "object" else shape)
-
-
-def _outline(shape: Shape, view: View) -> Sequence[Array]:
-    if shape.role != "object" or not shape.polygons:
-        return ()
-    return tuple(outline(Surface.of(shape.polygons), view.camera))
 
 
 def _each(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
@@ -143,8 +267,6 @@ def _cone(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
         yield Patch((part,), float(near.mean()), colour_of(shape), look.fill)
 
 
-SOLIDS: tuple[Role, ...] = ("finger", "hand", "fingertip")
-"""Roles whose shapes are convex bodies that nothing shines through."""
 FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Patch]]] = {
     "object": _glass,
     "force cone": _cone,

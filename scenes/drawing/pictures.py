@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,26 +11,17 @@ from grasp_core.arrays import Array, cross
 from grasp_core.checked import coefficient, instance, path_of, switch
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
-from grasp_core.objects.face import Face
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.surface import Face
 from grasp_core.values import Grasp
-from scenes.drawing.canvas import figure_of, format_of, write_sheet
-from scenes.drawing.drawings import (
-    BAR_LENGTH,
-    drawing_of,
-    drawing_with_hand,
-    finger_size,
-    glass,
-)
-from scenes.drawing.flat.colours import FINGERS, NEUTRAL
-from scenes.drawing.flat.panels import ROW, Entry, keyed, thinned
-from scenes.drawing.flat.sheets import Area, Dots, Line, Mark, Sheet, closed, numbered
-from scenes.drawing.hands.hand_views import view_of_hand
-from scenes.drawing.hands.posed_hands import PosedHand, numbers_behind, posed_hand
+from scenes.drawing.colours import FINGERS, NEUTRAL
+from scenes.drawing.drawings import BAR_LENGTH, drawing_of, drawing_with_hand, finger_size, glass
+from scenes.drawing.hands import PosedHand, numbers_behind, posed_hand, view_of_hand
 from scenes.drawing.painting import Patch, painted
-from scenes.drawing.palette import LOOKS, colour_of
-from scenes.drawing.shapes import Role, Shape, extent_of
+from scenes.drawing.panels import ROW, Entry, keyed, thinned
+from scenes.drawing.shapes import LOOKS, Role, Shape, colour_of, extent_of
+from scenes.drawing.sheets import Area, Dots, Line, Mark, Sheet, closed, format_of, numbered
 from scenes.drawing.views import Extent, View, best_view
 
 if TYPE_CHECKING:
@@ -81,7 +72,7 @@ def write_picture(
     Args:
         body: The object.
         grasp: A grasp on the faces of `body`.
-        path: Path of the picture; its ending (png, svg, pdf, webp, jpg) says the format.
+        path: Path of the picture; its ending (svg or png) says the format.
         friction: Coulomb coefficient of the friction cones.
         view: The view to draw from; None chooses the best one.
         hand: A hand to draw in place of straight fingers, with `reach`.
@@ -95,7 +86,7 @@ def write_picture(
     format_of(path)
     held = held_by(hand, reach, grasp)
     sheet = grasp_sheet(body, grasp, friction, view=view, legend=True, held=held)
-    return write_sheet(sheet, path)
+    return sheet.write(path)
 
 
 def write_object_picture(body: Polyhedron, path: Path) -> Path:
@@ -105,24 +96,18 @@ def write_object_picture(body: Polyhedron, path: Path) -> Path:
     """
     format_of(path)
     view = View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, body)
-    towards = _faces_towards(view, body)
+    has_numbers = body.patches is None and len(body.faces) <= MOST_NUMBERED
+    towards = [
+        index
+        for index, face in enumerate(body.faces if has_numbers else ())
+        if float(face.normal @ (view.camera - face.centroid)) < 0.0
+    ]
     places = np.array([_middle(body.faces[face]) for face in towards]).reshape(-1, 3)
     labels = [(str(face), NEUTRAL) for face in towards]
     sheet = sheet_of(
         glass(body), body, view, body.name, numbers=places, side=SIDE, labels=labels
     )  # fmt: skip
-    return write_sheet(sheet, path)
-
-
-def _faces_towards(view: View, body: Polyhedron) -> list[int]:
-    """List the faces that have numbers and face the viewer."""
-    if body.patches is not None or len(body.faces) > MOST_NUMBERED:
-        return []
-    return [
-        index
-        for index, face in enumerate(body.faces)
-        if float(face.normal @ (view.camera - face.centroid)) < 0.0
-    ]
+    return sheet.write(path)
 
 
 def _middle(face: Face) -> Array:
@@ -137,19 +122,19 @@ def _middle(face: Face) -> Array:
 def grasp_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
     legend: bool = True, hand: Hand | None = None, reach: "HandReach | None" = None,
-) -> Any:  # fmt: skip
-    """Draw a grasp as `write_picture` does, as a matplotlib figure.
+) -> Sheet:  # fmt: skip
+    """Draw a grasp as `write_picture` does, as a sheet that a notebook shows.
 
     Raises:
         InputError: As for `write_picture`.
     """
     held = held_by(hand, reach, grasp)
-    return figure_of(grasp_sheet(body, grasp, friction, view=view, legend=legend, held=held))
+    return grasp_sheet(body, grasp, friction, view=view, legend=legend, held=held)
 
 
 def grasp_sheet(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
-    legend: bool = False, steady: bool = False, held: PosedHand | None = None,
+    legend: bool = False, held: PosedHand | None = None,
 ) -> Sheet:  # fmt: skip
     """Draw a grasp in the style of the paper, or with the hand in it."""
     check_drawn(body, grasp, friction, view)
@@ -161,7 +146,7 @@ def grasp_sheet(
     else:
         shapes, numbers = drawing_with_hand(body, grasp, friction, held), numbers_behind(held)
         view, name = view or view_of_hand(body, held), f"{name} with the hand {held.hand.name}"
-    sheet = sheet_of(shapes, body, view, name, numbers=numbers, side=SIDE, steady=steady)
+    sheet = sheet_of(shapes, body, view, name, numbers=numbers, side=SIDE)
     if not legend:
         return sheet
     marks, rows = keyed(_entries(shapes), 20.0, SIDE, SIDE - 30.0)
@@ -170,7 +155,7 @@ def grasp_sheet(
 
 def sheet_of(
     shapes: Sequence[Shape], extent: Extent, view: View, name: str, *,
-    numbers: Array | None = None, side: int, steady: bool = False,
+    numbers: Array | None = None, side: int,
     labels: Sequence[tuple[str, str]] = FINGER_LABELS,
 ) -> Sheet:  # fmt: skip
     """Draw shapes on a square sheet.
@@ -178,7 +163,7 @@ def sheet_of(
     Takes `numbers` (k, 3) [m]; `side` [pixels].
     """
     places = np.empty((0, 3)) if numbers is None else numbers
-    low, high = frame_around(shapes, places, extent, None if steady else view)
+    low, high = frame_around(shapes, places, extent, view)
     scale = side / float(high[0] - low[0])
     patches = painted(shapes, view, float(high[0] - low[0]))
 
@@ -247,20 +232,14 @@ def number_places(body: Extent, grasp: Grasp) -> Array:
 
 
 def frame_around(
-    shapes: Sequence[Shape], numbers: Array, body: Extent, view: View | None
+    shapes: Sequence[Shape], numbers: Array, body: Extent, view: View
 ) -> tuple[Array, Array]:
-    """Return two opposite corners of a square around the drawing, (2,) each [m].
-
-    The square suits the given view or, if that is None, every view.
-    """
+    """Return two opposite corners of a square around the drawing in a view, (2,) each [m]."""
     points = np.vstack([extent_of(shapes), numbers])
     distances = np.linalg.norm(points - body.center_of_mass, axis=1)
     whole = [np.full(len(shape.vertices()), shape.role in WHOLE) for shape in shapes]
     hand = np.concatenate([*whole, np.full(len(numbers), any(each.any() for each in whole))])
     near = (distances <= FARTHEST * body.radius) | hand
-    if view is None:
-        half = (1.0 + 2.0 * MARGIN) * float(distances[near].max())
-        return np.full(2, -half), np.full(2, half)
     flat, _ = view.seen(points[near])
     low, high = flat.min(axis=0), flat.max(axis=0)
     half = 0.5 * (1.0 + 2.0 * MARGIN) * float((high - low).max())

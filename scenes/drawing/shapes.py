@@ -1,4 +1,4 @@
-"""Describes shapes to draw: flat polygons, lines and points in space, each with a role."""
+"""Describes shapes to draw: polygons, lines and points in space, and the look of each role."""
 
 import math
 from collections.abc import Iterable
@@ -9,6 +9,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, frozen
 from grasp_core.solvers.ties import SAME_SHARE, first_best
+from scenes.drawing.colours import FINGERS, FOCUS, GLASS, HAND, INK, SURFACE
 
 Role: TypeAlias = Literal[
     "object", "edge", "finger", "friction cone", "force cone", "region", "line of force", "focus",
@@ -16,6 +17,10 @@ Role: TypeAlias = Literal[
 ]  # fmt: skip
 SIDES = 20
 """Number of corners of the polygons that replace circles."""
+OF_ROLES: dict[Role, str] = {
+    "object": GLASS, "edge": INK, "focus": FOCUS, "plane": SURFACE, "ruled surface": SURFACE,
+    "contact": INK, "hand": HAND, "fingertip": HAND,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,3 +83,42 @@ def cone_sides(tip: Array, axis: Array, half_angle: float, length: float) -> tup
     """Make the triangles between the tip of a cone and its rim."""
     rim = cone_rim(tip, axis, half_angle, length)
     return tuple(np.array([tip, rim[i - 1], rim[i]]) for i in range(SIDES))
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How shapes of one role, such as force cones, are drawn."""
+
+    fill: float = 0.0
+    """Opacity of polygons, from 0 to 1."""
+    line: float = 0.0
+    """Width of lines, in hundredths of the picture's width."""
+    dot: float = 0.0
+    """Diameter of points, in hundredths of the picture's width."""
+    opacity: float = 1.0
+    """Opacity of lines and points."""
+    shaded: bool = False
+    """Whether polygons are darker where they face away from the light."""
+    dashed: bool = False
+
+
+LOOKS: dict[Role, Look] = {
+    "object": Look(fill=0.13, shaded=True),
+    "edge": Look(line=0.18, opacity=0.75),
+    "finger": Look(fill=1.0, shaded=True),
+    "friction cone": Look(line=0.16, opacity=0.9),
+    "force cone": Look(fill=0.28),
+    "region": Look(fill=0.6),
+    "line of force": Look(line=0.3, dashed=True),
+    "focus": Look(dot=1.9),
+    "plane": Look(fill=0.16, line=0.3),
+    "ruled surface": Look(fill=0.1, line=0.1, opacity=0.5),
+    "contact": Look(dot=1.2),
+    "hand": Look(fill=1.0, shaded=True),
+    "fingertip": Look(fill=1.0, shaded=True),
+}
+
+
+def colour_of(shape: Shape) -> str:
+    """Return the colour of a shape, written as #rrggbb."""
+    return OF_ROLES.get(shape.role, INK) if shape.finger is None else FINGERS[shape.finger]

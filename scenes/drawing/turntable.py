@@ -16,18 +16,16 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import path_of
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from scenes.drawing.drawings import drawing_of, drawing_with_hand, glass
-from scenes.drawing.hands.hand_views import view_of_hand
-from scenes.drawing.hands.posed_hands import PosedHand, numbers_behind
+from scenes.drawing.hands import PosedHand, numbers_behind, view_of_hand
 from scenes.drawing.pages import filled, number, text_of
 from scenes.drawing.painting import SOLIDS
-from scenes.drawing.palette import LOOKS, colour_of
 from scenes.drawing.pictures import check_drawn, held_by, number_places
-from scenes.drawing.shapes import Role, Shape
+from scenes.drawing.shapes import LOOKS, Role, Shape, colour_of
 from scenes.drawing.views import best_view
 
 if TYPE_CHECKING:

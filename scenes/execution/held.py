@@ -18,13 +18,39 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, frozen, to_digits
 from grasp_core.checked import BOUNDS, LARGEST, SMALLEST, instance, number, positive
-from grasp_core.closure.wrenches import WRENCH, contact_frames, grasp_map
+from grasp_core.closure.contacts import WRENCH, contact_frames, grasp_map
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip, check_grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.execution.surface import touched_solids
+
+
+def rotations(quaternions: Array) -> Array:
+    """Return the rotation matrices of unit quaternions (w, x, y, z), (n, 4), as (n, 3, 3)."""
+    w, x, y, z = quaternions.T
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=1),
+            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=1),
+            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1),
+        ],
+        axis=1,
+    )
+
+
+def hinged(angles: Array) -> Array:
+    """Return the palm's rotation, (n, 3, 3): about x, then the turned y, then the turned z."""
+    half = 0.5 * angles
+    zero = np.zeros(len(angles))
+    turn = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
+    for axis in range(3):
+        parts = [np.cos(half[:, axis]), zero, zero, zero]
+        parts[axis + 1] = np.sin(half[:, axis])
+        turn = turn @ rotations(np.stack(parts, axis=1))
+    return turn
+
 
 TIP_MASS_KG = 0.05
 """Mass of a fingertip with the part of its finger that moves with it, unless stated."""
@@ -208,10 +234,7 @@ def held_layout(
     body: Polyhedron, grip: Grip, mass_kg: float, settings: HeldSettings | None = None,
     reach_m: float | None = None,
 ) -> HeldLayout:  # fmt: skip
-    """Place an object of a given mass between the springs of a grip.
-
-    Takes `mass_kg` [kg]; `reach_m` [m].
-    """
+    """Place an object of a given mass between the springs of a grip."""
     check_body(body)
     check_grip(grip)
     mass = positive(mass_kg, "mass_kg")

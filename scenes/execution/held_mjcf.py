@@ -22,20 +22,16 @@ from grasp_core.by_value import ByValue
 from grasp_core.checked import instance, path_of
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.text_files import write_parts
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.execution.held import HeldLayout, HeldSettings, held_layout
 from scenes.mjcf_text import (
-    COMPILER,
     Element,
-    add_comment,
     add_element,
     document,
-    element,
-    printable,
     quaternion,
 )
-from scenes.physics import PhysicsSettings
+from scenes.physics import PhysicsSettings, add_free_body, add_light, begin_scene
 
 PALM_ARMATURE = 1e7
 """Armature of the palm's joints, relative to what the palm carries."""
@@ -183,22 +179,11 @@ def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
 
 def opened(layout: HeldLayout, physics: PhysicsSettings) -> tuple[Element, Element]:
     """Open a model with options, the object and the table; return it and its world."""
-    root = element("mujoco", {"model": printable(layout.name)})
-    add_comment(root, TRUE_MASS)
-    add_element(root, "compiler", COMPILER)
-    option = add_element(root, "option", physics.options())
-    add_element(option, "flag", {**physics.flags(), **FLAGS})
-    extent = {"extent": 3.0 * layout.radius_m, "center": (0.0, 0.0, 0.0)}
-    add_element(root, "statistic", extent)
-    assets = add_element(root, "asset", {})
-    seen = {"vertex": layout.vertices.ravel(), "face": layout.triangles.ravel()}
-    add_element(assets, "mesh", {"name": "object", "inertia": "shell"} | seen)
-    for place, corners in enumerate(layout.solids):
-        solid = {"name": f"surface{place}", "inertia": "shell", "vertex": corners.ravel()}
-        add_element(assets, "mesh", solid)
-    world = add_element(root, "worldbody", {})
-    light = {"pos": (0.0, 0.0, 8.0 * layout.radius_m), "dir": (0.0, 0.0, -1.0)}
-    add_element(world, "light", light | {"type": "directional"})
+    mesh = (layout.vertices, layout.triangles)
+    root, world = begin_scene(
+        layout.name, TRUE_MASS, physics, layout.radius_m, mesh, flags=FLAGS, solids=layout.solids
+    )
+    add_light(world, layout.radius_m)
     _object(world, layout, physics)
     _table(world, layout, physics)
     return root, world
@@ -214,11 +199,7 @@ def add_start(root: Element, layout: HeldLayout) -> None:
 
 
 def _object(world: Element, layout: HeldLayout, physics: PhysicsSettings) -> None:
-    body = add_element(world, "body", {"name": "object", "pos": (0.0, 0.0, 0.0)})
-    add_element(body, "freejoint", {"name": "object"})
-    inertia = layout.inertia_kg_m2[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    origin = {"pos": (0.0, 0.0, 0.0), "mass": layout.mass_kg, "fullinertia": inertia}
-    add_element(body, "inertial", origin)
+    body = add_free_body(world, layout.mass_kg, layout.inertia_kg_m2)
     hull = {"name": "object", "type": "mesh", "mesh": "object", "contype": TABLE, "group": 1,
             "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip
     add_element(body, "geom", {**hull, **_smooth(physics)})

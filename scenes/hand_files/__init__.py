@@ -1,5 +1,5 @@
 """Answers what hand an MJCF or URDF file describes.
 
 `model_text.py` reads the file and what it names, within bounds; `model.py` compiles it with MuJoCo;
-`chains.py` finds fingers in the compiled model; `loading.py` puts a hand together.
+`fingers.py` finds fingers in the compiled model; `building.py` puts a hand together.
 """

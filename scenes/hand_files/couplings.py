@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.errors import InputError
-from scenes.hand_files.chains import Chains, path_of_body
+from scenes.hand_files.fingers import Chains, path_of_body
 from scenes.hand_files.model import HandModel
 from scenes.hand_files.model_text import listed
 
@@ -121,7 +121,7 @@ def _refuse_loops(model: HandModel, used: set[int], name: str) -> None:
 def _moving(model: HandModel, body: int) -> set[int]:
     """Return the joints that move a body."""
     path = path_of_body(model, body)
-    return {j for j, own in enumerate(model.joint_bodies.tolist()) if own in path}
+    return {j for j, own in enumerate(model.raw.jnt_bodyid.tolist()) if own in path}
 
 
 def _refuse(model: HandModel, joints: set[int], name: str, why: str) -> None:

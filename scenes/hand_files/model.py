@@ -9,7 +9,7 @@ can have are balanced: of a link only its mass and centre of mass are used.
 
 import math
 import warnings
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -54,53 +54,31 @@ class Tendon(NamedTuple):
 
 
 class HandModel(NamedTuple):
-    """What a compiled model says: n bodies, j joints, g geoms, s sites."""
+    """What a compiled model says: n bodies, j joints, g geoms."""
 
+    raw: Any
+    """MuJoCo's own model, whose arrays are read where they are used."""
     body_names: tuple[str, ...]
     geom_names: tuple[str, ...]
     site_names: tuple[str, ...]
     joint_names: tuple[str, ...]
-    parents: Indices
-    """Body that each body hangs on, (n,); the world is its own."""
     positions: Array
     """Origins of the bodies' frames in the world at the reference joint angles, (n, 3) [m]."""
     rotations: Array
     """Their axes, (n, 3, 3)."""
-    masses: Array
-    """Masses of the bodies, (n,) [kg]."""
-    mass_centers: Array
-    """Their centres of mass in the bodies' frames, (n, 3) [m]."""
-    joint_bodies: Indices
     joint_kinds: tuple[str, ...]
     """`hinge`, `slide`, `ball` or `free`."""
-    joint_positions: Array
-    """Points on the joints' axes in the bodies' frames, (j, 3) [m]."""
-    joint_axes: Array
-    """Unit vectors in the bodies' frames, (j, 3)."""
     joint_ranges: Array
     """Lowest and highest angles; NaN without limits, (j, 2) [rad]."""
     references: Array
     """Angles at which the model is drawn, (j,) [rad]; NaN for joints that are no hinges."""
     torques: Array
     """Largest torques, NaN where none is stated, (j,) [N m]."""
-    geom_bodies: Indices
     geom_kinds: tuple[str, ...]
-    geom_sizes: Array
-    geom_boxes: Array
-    """Middle and half-sizes of each geom's box in the geom's frame, (g, 6) [m]."""
-    geom_positions: Array
-    """Origins of the geoms' frames in the bodies', (g, 3) [m]."""
     geom_rotations: Array
     """Their axes, (g, 3, 3)."""
-    geom_points: tuple[Array, ...]
-    """Corners of each geom that is a mesh in the geom's frame, (v, 3) [m]; none of others."""
     geom_bits: Indices
     """Bits that say with what a geom collides: its type and its affinity, (g, 2)."""
-    site_bodies: Indices
-    site_positions: Array
-    site_radii: Array
-    excluded: Indices
-    """Pairs of bodies that the model lets overlap, (e, 2)."""
     joint_rules: tuple[JointRule, ...]
     """What holds joints at functions of others."""
     loops: tuple[Loop, ...]
@@ -133,36 +111,20 @@ def compiled_hand(text: ModelText, name: str) -> HandModel:
     slides = np.array([kind == "slide" for kind in kinds], bool)
     limited = (hinges | slides) & model.jnt_limited.astype(bool)
     return HandModel(
+        raw=model,
         body_names=_names(model, mujoco.mjtObj.mjOBJ_BODY, model.nbody),
         geom_names=_names(model, mujoco.mjtObj.mjOBJ_GEOM, model.ngeom),
         site_names=_names(model, mujoco.mjtObj.mjOBJ_SITE, model.nsite),
         joint_names=_names(model, mujoco.mjtObj.mjOBJ_JOINT, model.njnt),
-        parents=model.body_parentid.astype(np.int64),
         positions=np.array(data.xpos),
         rotations=np.array(data.xmat).reshape(-1, 3, 3),
-        masses=np.array(model.body_mass),
-        mass_centers=np.array(model.body_ipos),
-        joint_bodies=model.jnt_bodyid.astype(np.int64),
         joint_kinds=kinds,
-        joint_positions=np.array(model.jnt_pos),
-        joint_axes=np.array(model.jnt_axis),
         joint_ranges=np.where(limited[:, None], model.jnt_range, np.nan),
         references=np.where(hinges, model.qpos0[model.jnt_qposadr], np.nan),
         torques=_torques(model),
-        geom_bodies=model.geom_bodyid.astype(np.int64),
         geom_kinds=tuple(mujoco.mjtGeom(int(kind)).name[7:].lower() for kind in model.geom_type),
-        geom_sizes=np.array(model.geom_size),
-        geom_boxes=np.array(model.geom_aabb),
-        geom_positions=np.array(model.geom_pos),
         geom_rotations=_turns(model.geom_quat),
-        geom_points=tuple(_points(model, int(mesh)) for mesh in _meshes(model)),
         geom_bits=bits,
-        site_bodies=model.site_bodyid.astype(np.int64),
-        site_positions=np.array(model.site_pos),
-        site_radii=np.array(model.site_size)[:, 0] if model.nsite else np.empty(0),
-        excluded=np.array(
-            [(int(each) >> 16, int(each) & 0xFFFF) for each in model.exclude_signature], np.int64
-        ).reshape(-1, 2),
         joint_rules=_joint_rules(model),
         loops=_loops(model),
         tendons=_tendons(model),
@@ -249,16 +211,14 @@ def _names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> tuple[str,
     return tuple(mujoco.mj_id2name(model, kind, i) or "" for i in range(count))
 
 
-def _meshes(model: mujoco.MjModel) -> Array:
-    """Return the number of each geom's mesh, -1 for other geoms, (g,)."""
-    return np.where(model.geom_type == int(mujoco.mjtGeom.mjGEOM_MESH), model.geom_dataid, -1)
-
-
-def _points(model: mujoco.MjModel, mesh: int) -> Array:
-    if mesh < 0:
+def mesh_points(model: HandModel, geom: int) -> Array:
+    """Return the corners of a geom that is a mesh, in its frame, (v, 3) [m]; none of others."""
+    raw = model.raw
+    if raw.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
         return np.empty((0, 3))
-    first = int(model.mesh_vertadr[mesh])
-    return np.array(model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])], float)
+    mesh = raw.geom_dataid[geom]
+    first = int(raw.mesh_vertadr[mesh])
+    return np.array(raw.mesh_vert[first : first + int(raw.mesh_vertnum[mesh])], float)
 
 
 def _turns(quaternions: Array) -> Array:

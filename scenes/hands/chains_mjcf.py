@@ -3,10 +3,14 @@
 Each link is a body on a hinge, turned as in the pose, so that all hinges stand at zero. Fingertips
 are the balls that the analysis knows. Shapes of links may touch those of other fingers and of the
 palm, except pairs that the hand lets overlap.
+
+Masses and inertias of links, where no source states them, are estimated from their shapes. Shapes
+are taken as solid and of one density, and as apart where they overlap. A shape with rounded edges
+has its true volume, and the inertia of the box around it.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -15,8 +19,15 @@ import numpy as np
 
 from grasp_core.arrays import Array, to_digits
 from grasp_core.hands.hand import PALM, Hand, HandFinger, Link, LinkShape
+from grasp_core.hands.kinematics import rotation_about
 from scenes.mjcf_text import Element, add_element, quaternion
 
+DENSITY_KG_M3 = 1000.0
+"""Density of links: the one that MuJoCo takes itself."""
+BALL = LinkShape(np.zeros(3), np.eye(3), np.zeros(3), 0.01)
+"""What a link without shapes is taken for."""
+LEAST_KG, LEAST_M = 1e-6, 1e-6
+"""Least mass of a link [kg], and least length of a shape [m]: the simulator refuses none at all."""
 NOMINAL_KG = 1e-3
 """Mass of a link whose own is not known, or does not count [kg]."""
 NOMINAL_M = 0.01
@@ -25,6 +36,40 @@ THIN_M = 1e-6
 """Least half-size of a box, for shapes that are flat [m]."""
 SHAPES = 1 << 20
 """Bit of what the shapes of links may touch."""
+
+
+def hand_inertials(hand: Hand) -> dict[str, dict[str, object]]:
+    """Return the MJCF inertial of the palm and of each link, by name."""
+    own = {link.name: _inertial(link.shapes, link) for link in hand.links}
+    return {PALM: _inertial(hand.palm, None), **own}
+
+
+def _inertial(shapes: Sequence[LinkShape], link: Link | None) -> dict[str, object]:
+    """Return the inertial of shapes, with the mass and centre that are known of their link."""
+    shapes = shapes or (BALL,)
+    known = None if link is None else link.mass_kg
+    center = None if link is None else link.center_of_mass
+    volumes = np.array([_volume(shape) for shape in shapes])
+    middles = np.array([shape.position for shape in shapes])
+    mass = DENSITY_KG_M3 * float(volumes.sum()) if known is None else max(known, LEAST_KG)
+    masses = mass * volumes / volumes.sum()
+    middle = masses @ middles / mass
+    second = np.zeros((3, 3))
+    for shape, part, place in zip(shapes, masses, middles - middle, strict=True):
+        sides = shape.rotation * (shape.half_sizes + shape.radius)
+        second += part * (sides @ sides.T / 3.0 + np.outer(place, place))
+    inertia = np.trace(second) * np.eye(3) - second
+    return {
+        "pos": middle if center is None else center, "mass": mass,
+        "fullinertia": inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]],
+    }  # fmt: skip
+
+
+def _volume(shape: LinkShape) -> float:
+    """Return the volume of a box with rounded edges [m^3], by Steiner's formula."""
+    (a, b, c), r = np.maximum(2.0 * shape.half_sizes, LEAST_M).tolist(), shape.radius
+    area, edges = 2.0 * (a * b + b * c + c * a), a + b + c
+    return a * b * c + area * r + math.pi * r**2 * edges + 4.0 / 3.0 * math.pi * r**3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,6 +96,22 @@ class Chains:
     """Mass and inertia of links by name, in place of those above."""
     stops: bool = False
     """Whether joints stop at the ends of their ranges."""
+
+
+def add_hand(
+    root: Element, parent: Element, pose: Array, chains: Chains, limits: Iterable[float],
+    stiffness: float, damping: float,
+) -> None:  # fmt: skip
+    """Add a hand to a body at a pose of the palm, with a servo for each joint.
+
+    Takes `limits` [N m]; `stiffness` [N m/rad]; `damping` [N m s/rad].
+    """
+    palm = add_element(parent, "body", {"name": PALM, **placed(pose[:3, 3], pose[:3, :3])})
+    add_fingers(palm, chains)
+    add_exclusions(add_element(root, "contact", {}), chains.hand)
+    actuators = add_element(root, "actuator", {})
+    for joint, limit in zip(chains.hand.joints, limits, strict=True):
+        add_servo(actuators, joint.name, stiffness, damping, limit)
 
 
 def add_fingers(palm: Element, chains: Chains) -> None:
@@ -101,13 +162,6 @@ def _link(parent: Element, chains: Chains, numbered: tuple[Link, bool], angle: f
 def placed(position: Array, rotation: Array) -> dict[str, object]:
     """Return the attributes of a body or shape at a position (3,) [m] with axes (3, 3)."""
     return {"pos": to_digits(position), "quat": quaternion(rotation)}
-
-
-def rotation_about(axis: Array, angle: float) -> Array:
-    """Return the rotation by an angle about a unit axis, (3, 3)."""
-    x, y, z = axis.tolist()
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
 
 
 def _shape(

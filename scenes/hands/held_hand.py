@@ -1,4 +1,9 @@
-"""What a scene consists of in which a hand with its real chains holds an object of true mass.
+"""A scene in which a hand on a moving wrist holds an object of true mass, as MJCF text.
+
+Object, table and the moving body are those of other scenes of execution (see
+`scenes.execution.held_mjcf`). On that body stands the hand's palm, with its fingers as chains of
+hinges; a servo on each has the motor's torque as its `forcerange`. Palm and links touch the object
+where it comes to them, but for the last links, whose fingertips do.
 
 A servo of stiffness k_q turns each joint. With the levers L_i of contact i, (joints, 3), a change
 df of the contact force turns the joints of its finger by -L_i df / k_q, and so moves the finger's
@@ -31,17 +36,31 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_grips import HandGrip
 from grasp_core.hands.hand_motors import hand_motors
 from grasp_core.hands.kinematics import HandPlaces, places
-from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import Stance, stance_of, uncoupled
+from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from scenes.execution.held import FingersSeen, HeldLayout, HeldSettings, held_layout
-from scenes.hands.hand_layout import mean_lever, touching
+from scenes.execution.held_mjcf import (
+    FINGERTIPS,
+    HeldScene,
+    add_palm,
+    add_start,
+    held_physics,
+    opened,
+)
+from scenes.hands.chains_mjcf import Chains, add_hand
+from scenes.hands.hand_scene import mean_lever, touching
+from scenes.mjcf_text import document
+from scenes.physics import PhysicsSettings
 
 EXECUTION = "an execution with the hand"
 STRETCHED = 0.02
 """Least singular value of a finger's levers, over the root mean square of all, with which it
 counts as free to move in all directions."""
+WRIST = "wrist"
+LIGHT_KG = 1e-5
+"""Mass of links: ten thousand times less than objects', so that no joint feels the wrist's motion
+through them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -221,10 +240,7 @@ def held_hand_layout(
     hand: Hand, body: Polyhedron, reach: HandReach, grip: Grip, mass_kg: float,
     settings: HeldSettings, reach_m: float | None = None,
 ) -> HeldHandLayout:  # fmt: skip
-    """Place an object of a given mass in a hand.
-
-    Takes `mass_kg` [kg].
-    """
+    """Place an object of a given mass in a hand."""
     base = held_layout(body, grip, mass_kg, settings, reach_m)
     stance, motors = stance_of(hand, reach), strong_motors(hand, reach)
     size = mean_lever(motors) ** 2
@@ -249,3 +265,34 @@ def held_hand_layout(
 
 def _rounded(value: float) -> float:
     return float(to_digits(np.array(value)))
+
+
+def held_hand_scene(
+    hand: Hand, body: Polyhedron, reach: HandReach, grip: Grip, mass_kg: float,
+    settings: HeldSettings, reach_m: float | None = None,
+) -> HeldScene:  # fmt: skip
+    """Make a MuJoCo scene of an object with its true mass in a hand (see `held_hand_layout`)."""
+    layout = held_hand_layout(hand, body, reach, grip, mass_kg, settings, reach_m)
+    physics = held_physics(layout)
+    return HeldScene(held_hand_text(layout, physics), layout, physics)
+
+
+def held_hand_text(layout: HeldHandLayout, physics: PhysicsSettings) -> str:
+    """Write the MJCF text of an object held by a hand; equal layouts give equal texts."""
+    root, world = opened(layout, physics)
+    wrist = add_palm(world, layout, WRIST)
+    tips = [dict[str, object]() for _ in layout.hand.fingers]
+    for contact, finger in enumerate(layout.used_fingers):
+        rubbing = float(layout.friction[contact]), 0.0, 0.0
+        tips[finger] = {"conaffinity": FINGERTIPS, "friction": rubbing, **physics.contact()}
+    touching = {**physics.contact(), "friction": (float(layout.friction.max()), 0.0, 0.0)}
+    chains = Chains(
+        layout.hand, layout.angles, layout.armature_kg_m2, tuple(tips), light_kg=LIGHT_KG,
+        touches=FINGERTIPS, contact=touching,
+    )  # fmt: skip
+    add_hand(
+        root, wrist, layout.palm_pose, chains, layout.motors.limits.tolist(),
+        layout.servo_n_m_per_rad, layout.damping_n_m_s_per_rad,
+    )  # fmt: skip
+    add_start(root, layout)
+    return document(root)

@@ -4,14 +4,13 @@ import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
-from grasp_core.short_text import counted
+from grasp_core.by_value import counted
+from sim_validate.baselines.baseline import Baseline, Entry
 from sim_validate.baselines.check import Checked
 from sim_validate.baselines.compare import WORDS, Status
-from sim_validate.baselines.entries import Baseline, Entry
-from sim_validate.baselines.executions import not_survived
-from sim_validate.baselines.parts.changed_part import Present
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.baselines.part import Present
+from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, losses_in_words
+from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 
 def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
@@ -62,18 +61,25 @@ def _next_steps(name: str, at: str | None, files: tuple[Path, Path], now: Presen
     chosen = f" --wrench={shlex.quote(at)}" if at else ""
     check = f"  all of them: graspproof baseline check {baseline} --grasps {grasps}"
     if now.carried is None:
-        which = f"--grasp {shlex.quote(name)}{chosen} --grasps {grasps}"
         if at is not None:
-            yield f"  to see it: graspproof replay {baseline} {which} --out replay"
+            yield _to_see(name, chosen, grasps)
         yield check
         return
     part = shlex.quote(str(now.source.file))
     lengths = f"--unit {now.unit}" + (f" --scale {now.scale!r}" if now.scale != 1.0 else "")
     yield f"  its contacts: graspproof transfer {grasps} {part} {lengths} --out carried"
     if at is not None:
-        which = f"--grasp {shlex.quote(now.id_on_part(name) or name)}{chosen}"
-        yield f"  to see it: graspproof replay carried/grasps.json {which} --out replay"
+        yield _to_see(now.id_on_part(name) or name, chosen, "carried/grasps.json")
     yield f"{check} --object {part}"
+
+
+def _to_see(name: str, chosen: str, grasps: str) -> str:
+    """Return the commands that simulate a grasp, and then one of its trials with a clip."""
+    which = f"--grasp {shlex.quote(name)}{chosen} --grasps {grasps}"
+    return (
+        f"  to see it: graspproof validate {grasps} --out seen; "
+        f"graspproof replay seen {which} --out replay"
+    )
 
 
 def unstable(verdict: Verdict) -> str:
@@ -119,3 +125,22 @@ def _both(predicted: float, simulated: float | None, unit: str) -> str:
     """Write a number as predicted and as simulated."""
     said = "not measured in simulation" if simulated is None else f"{simulated:.4g}{unit} simulated"
     return f"{predicted:.4g}{unit} predicted, {said}"
+
+
+def not_survived(grasp: ExecutedGrasp) -> str:
+    """Say why a grasp does not survive its execution: trials, numbers, predictions.
+
+    Gives lines about the grasp; empty if it survived every trial and every control slipped.
+    """
+    found = grasp.execution
+    if found is None:
+        return f"{grasp.id} was not executed: {grasp.reason}"
+    lines = [*losses_in_words(found), *held_controls_in_words(found)]
+    if not lines:
+        return ""
+    lost = sum(not trial.survived for trial in found.trials)
+    head = (
+        f"{grasp.id} with {found.mass_kg:g} kg: {lost} of {len(found.trials)} trials lost; its "
+        f"squeeze is certified for {found.load_multiple:.4g} times the weight in any direction"
+    )
+    return "\n  ".join([head, *lines])

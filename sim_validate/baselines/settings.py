@@ -1,32 +1,31 @@
 """Reads and writes the simulation settings and the choice of trials in a baseline's file."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import to_jsonable_python
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
-from grasp_core.errors import InputError
-from grasp_core.files.complaints import complaint
-from grasp_core.files.strict_json import shown
+from grasp_core.errors import InputError, about
+from grasp_core.files.json_text import complaint, shown
 from grasp_core.records.grasps_json import SavedGrasps
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface
-from sim_validate.execution.asked import (
+from sim_validate.execution.settings import (
     TABLE,
     AskedExecution,
     asked_execution,
     execution_table,
 )
 from sim_validate.records.setup_toml import setup_from_file, setup_from_tables, tables_of
-from sim_validate.simulation.noise import Noise
 from sim_validate.simulation.setup import (
     Agenda,
     LimitSearch,
     NamedWrench,
+    Noise,
     Setup,
     with_planned_radius,
 )
@@ -42,7 +41,7 @@ class _Settings(BaseModel):
     setup: dict[str, Any]
     surface: Surface
     random_wrenches: Annotated[int, Field(ge=0, le=MOST_RANDOM_WRENCHES)]
-    wrenches: dict[str, tuple[float, float, float, float, float, float]]
+    wrenches: dict[str, Annotated[list[float], Field(min_length=6, max_length=6)]]
     limits: LimitSearch
     trials: Count
     noise: dict[str, float]
@@ -75,16 +74,16 @@ def settings_of(how: How) -> dict[str, Any]:
     }
     if how.execution is not None:
         settings[TABLE] = execution_table(how.execution)
-    return json.loads(json.dumps(settings))
+    return to_jsonable_python(settings)
 
 
 def of_settings(settings: Mapping[str, Any], path: str) -> How:
     """Read how the grasps of a baseline are simulated."""
     try:
-        given = _Settings.model_validate_json(json.dumps(settings))
+        given = _Settings.model_validate(settings)
     except ValidationError as error:
         raise InputError(f"{path}: {complaint(error, _Settings, ['settings'])}") from error
-    try:
+    with about(f"{path}: settings"):
         setup = setup_from_tables(given.setup, Setup(surface=given.surface), "setup")
         agenda = Agenda(
             random_wrenches=given.random_wrenches,
@@ -95,8 +94,6 @@ def of_settings(settings: Mapping[str, Any], path: str) -> How:
             seed=given.seed,
         )
         execution = None if given.execution is None else asked_execution(given.execution)
-    except InputError as error:
-        raise InputError(f"{path}: settings: {error}") from error
     return How(setup, agenda, execution)
 
 

@@ -72,8 +72,6 @@ class Check:
     """Fail also if a grasp has become better."""
     bless: bool = False
     """Write the new results over the baseline, even if grasps have become worse."""
-    junit: Path | None = None
-    """Also write a JUnit file, which build servers show, with a case for each grasp."""
     changed: OmitArgPrefixes[ChangedPart] = field(default_factory=ChangedPart)
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes; results do not depend on it."""

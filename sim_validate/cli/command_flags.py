@@ -147,11 +147,11 @@ class Export:
 
     grasps: Positional[Path]
     """The grasps.json with the grasps to write."""
-    to: Literal["moveit", "gltf", "usd"]
-    """Format to write: YAML with the fields of ROS messages (moveit), a binary glTF scene (gltf) or
-    a USD stage (usd), see docs/exports.md."""
+    to: Literal["moveit", "gltf"]
+    """Format to write: YAML with the fields of ROS messages (moveit) or a binary glTF scene (gltf),
+    see docs/exports.md."""
     out: Annotated[Path, arg(aliases=("-o",))]
-    """File to write, which ends in .yaml for moveit, .glb for gltf, and .usda or .usdc for usd."""
+    """File to write, which ends in .yaml for moveit and .glb for gltf."""
     grasp: str | None = None
     """Id of the grasp to write; if not given, all grasps are written."""
     limit: Count | None = None
@@ -176,9 +176,6 @@ class Regions:
     """Coulomb coefficient of the proof; if not given, the one planned for."""
     reserve: Annotated[float, within("reserve")] = 0.0
     """Share of the friction that the proof does not count on."""
-    balance: Literal["radius", "area"] = "radius"
-    """Prefer large discs for all fingers (radius), or large regions in total (area), whose discs
-    may be smaller and which take several times longer."""
     recenter: bool = False
     """Move the regions to where discs inside the faces can be largest; contacts may then lie
     outside their regions."""
@@ -199,8 +196,7 @@ class Replay:
     """Simulate one recorded trial again, and write its motion, sample by sample, and a clip."""
 
     source: Positional[Path]
-    """Where the trial is recorded: a baseline, verdicts.json or grasps.json, the folder of a run,
-    or a dataset."""
+    """Where the trial is recorded: a verdicts.json, the folder of a run, or a dataset."""
     grasp: str | None = None
     """Id of the grasp; may be left out if there is only one."""
     wrench: str | None = None
@@ -212,7 +208,7 @@ class Replay:
     trial: Annotated[int, at_least(0, up_to=MOST_COUNT)] | None = None
     """Number of a repeat with noise to replay instead of the trial without noise."""
     grasps: Path | None = None
-    """The grasps.json that the verdicts or the baseline are about, if it is not where they say."""
+    """The grasps.json that the verdicts are about, if it is not beside them."""
     out: Path | None = None
     """Folder for scene.xml, trace.csv and, where graphics are available, clip.gif."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
@@ -252,7 +248,7 @@ class Inspect:
     object: Positional[str]
     """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
     picture: Annotated[Path, ends_in(*PICTURES)] | None = None
-    """Write the object as a picture (png, svg, pdf, webp, jpg)."""
+    """Write the object as a picture (svg, png)."""
     mesh: OmitArgPrefixes[Mesh] = field(default_factory=Mesh)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 

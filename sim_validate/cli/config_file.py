@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, cast, get_args, get_type_hints
 
 from grasp_core.errors import InputError
-from grasp_core.files.strict_json import place
+from grasp_core.files.json_text import place
 from sim_validate.cli.flag_bounds import FlagsError
 
 COMMAND_WORDS = {"dataset": 2, "baseline": 2}

@@ -1,17 +1,42 @@
 """The flags of the commands about datasets; this module imports nothing that is slow to load."""
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, subcommand
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
-from sim_validate.cli.flag_bounds import FINITE, at_least, more_than
+from sim_validate.cli.flag_bounds import FINITE, at_least
 from sim_validate.cli.flag_groups import Count, Friction, Lengths, Positive, Seed, Speech
-from sim_validate.cli.learning_flags import Learned
-from sim_validate.datasets.columns import ExportFormat, SplitName
+from sim_validate.datasets.tables import SplitName
 from sim_validate.parallel.processes import available_cores
+
+Varied = Annotated[int, at_least(0, up_to=100)]
+
+
+@dataclass(frozen=True, slots=True)
+class Learned:
+    """What a dataset holds besides for learners; a TOML file can ask for more."""
+
+    friction_below: Varied = 0
+    """Rows per grasp with its contacts clearly below their critical friction."""
+    friction_near: Varied = 0
+    """Rows per grasp within some percent of the critical friction, on either side."""
+    friction_above: Varied = 0
+    """Rows per grasp clearly above the critical friction."""
+    moved_out: Varied = 0
+    """Rows per grasp with contacts moved on their faces, each out of its region."""
+    figures: UseAppendAction[tuple[Literal["closure", "least_squeeze"], ...]] = ()
+    """Figures that each grasp has; may be repeated (see docs/datasets.md for what each costs)."""
+    synthetic: Annotated[int, at_least(0, up_to=5)] = 5
+    """Largest number of synthetic negative controls of each grasp."""
+    hand: Literal["", "allegro", "allegro-urdf", "leap"] = ""
+    """Hand whose pose is looked for in each grasp in force closure."""
+
+    def asked(self) -> dict[str, Any] | None:
+        """Return the settings that were given; None if all are the usual ones."""
+        return None if self == Learned() else asdict(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +108,6 @@ class Build:
     settings but --out (see docs/datasets.md)."""
     out: Path
     """Folder of the dataset."""
-    stats: Path | None = None
-    """Folder for a page that shows what the dataset holds, with charts, as `dataset stats` writes
-    it; if not given, none is written."""
     planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
     learned: OmitArgPrefixes[Learned] = field(default_factory=Learned)
     settings: OmitArgPrefixes[Settings] = field(default_factory=Settings)
@@ -125,88 +147,28 @@ class Verify:
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """Write a dataset in a format that other tools read."""
+    """Write the grasps of a dataset that are in force closure for another program."""
 
     dataset: Positional[Path]
     """Folder of the dataset."""
-    to: ExportFormat
-    """csv, jsonl: a text file per table. npz: an archive of arrays without pickle per table. hdf5:
-    one file. isaac: an Isaac grasp file per object and friction. mjcf: a MuJoCo scene per grasp."""
     out: Path
     """Folder to write to; it must be empty or not exist."""
+    to: Literal["isaac"] = "isaac"
+    """Format: Isaac grasp files, one for each object at each friction."""
     split: SplitName | None = None
     """Export only the objects of this split; if not given, all objects."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
-class Stats:
-    """Count a dataset's rows by kind and outcome, and show how its numbers spread."""
-
-    dataset: Positional[Path]
-    """Folder of the dataset."""
-    out: Path | None = None
-    """Folder for a page with charts and for the numbers as JSON; if not given, only counts are
-    printed."""
-    split: SplitName | None = None
-    """Count only the objects of this split; if not given, all objects."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
-
-
-@dataclass(frozen=True, slots=True)
-class SampleRows:
-    """Show some rows of a dataset on a page, with pictures of their contacts."""
-
-    dataset: Positional[Path]
-    """Folder of the dataset."""
-    out: Path
-    """Folder for the page."""
-    count: Annotated[int, at_least(1, up_to=1000)] = 50
-    """Number of rows."""
-    seed: Seed = 0
-    """Seed of the random choice of the rows."""
-    split: SplitName | None = None
-    """Show only objects of this split; if not given, all objects."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
-
-
-@dataclass(frozen=True, slots=True)
-class Depth:
-    """Draw depth images of the objects, with the poses of the cameras; this needs graphics."""
-
-    dataset: Positional[Path]
-    """Folder of the dataset."""
-    out: Path
-    """Folder to write to; it must be empty or not exist."""
-    views: Annotated[int, at_least(1, up_to=1000)] = 8
-    """Number of images of each object."""
-    on_table: bool = False
-    """Have the object lie on a table and look from above it; if not given, look from all around."""
-    width: Annotated[int, at_least(1, up_to=4096)] = 128
-    """Columns of an image [pixels]."""
-    height: Annotated[int, at_least(1, up_to=4096)] = 128
-    """Rows of an image [pixels]."""
-    field_deg: Annotated[float, FINITE, more_than(0.0, up_to=120.0)] = 40.0
-    """Angle between the upper and the lower border of an image [deg]."""
-    seed: Seed = 0
-    """Seed of the places of cameras, and of the poses on the table."""
-    split: SplitName | None = None
-    """Draw only objects of this split; if not given, all objects."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
-
-
-@dataclass(frozen=True, slots=True)
 class Dataset:
-    """Build a dataset of grasps of many objects; check, show or export datasets."""
+    """Build a dataset of grasps of many objects; check or export datasets."""
 
     action: OmitArgPrefixes[
         Annotated[Build, subcommand("build", prefix_name=False)]
         | Annotated[Import, subcommand("import", prefix_name=False)]
         | Annotated[Verify, subcommand("verify", prefix_name=False)]
         | Annotated[Export, subcommand("export", prefix_name=False)]
-        | Annotated[Stats, subcommand("stats", prefix_name=False)]
-        | Annotated[SampleRows, subcommand("sample", prefix_name=False)]
-        | Annotated[Depth, subcommand("depth", prefix_name=False)]
     ]
 
     @property

@@ -14,7 +14,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "validate": (
         "validate plan/grasps.json --out plan",
-        "validate plan/grasps.json --protocol dexgraspbench --protocol graspqp --out plan",
+        "validate plan/grasps.json --protocol dexgraspbench --protocol dexonomy --out plan",
         "validate plan/grasps.json --weight-n 3 --down 0 0 -1 --limits ramp --trials 20",
     ),
     "execute": (
@@ -32,11 +32,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "regions": (
         "regions plan/grasps.json --out plan",
-        "regions plan/grasps.json --reserve 0.1 --balance area --limit 5 --out smaller",
+        "regions plan/grasps.json --reserve 0.1 --recenter --limit 5 --out smaller",
     ),
     "replay": (
         "replay graspproof-out/wedge --grasp c-0-1-2-7 --out replay",
-        "replay wedge.baseline.json --grasp c-0-1-2-7 --wrench weakest --out replay",
+        "replay graspproof-out/wedge --grasp c-0-1-2-7 --wrench weakest --out replay",
     ),
     "analyze": (
         "analyze contacts.json --friction 0.5 --wrench 0 0 -3 0 0 0",
@@ -76,15 +76,9 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "dataset import": ("dataset import contacts.npz mug.obj --out judged",),
     "dataset verify": ("dataset verify ds",),
-    "dataset stats": ("dataset stats ds --out ds-stats",),
-    "dataset sample": ("dataset sample ds --count 50 --out ds-rows",),
-    "dataset depth": (
-        "dataset depth ds --out ds-depth",
-        "dataset depth ds --out ds-depth --on-table --width 320 --height 240",
-    ),
-    "dataset export": ("dataset export ds --to csv --out tables",),
+    "dataset export": ("dataset export ds --to isaac --out isaac",),
     "baseline record": ("baseline record grasps.json -o wedge.baseline.json",),
-    "baseline check": ("baseline check wedge.baseline.json --junit results.xml",),
+    "baseline check": ("baseline check wedge.baseline.json --strict",),
 }
 """Examples of each command, without the program's name."""
 HELP = {"-h", "--help"}

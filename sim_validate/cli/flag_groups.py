@@ -39,21 +39,12 @@ Direction = Annotated[Point, not_zero(SMALLEST, LARGEST)]
 Wrench = Annotated[
     tuple[Finite, Finite, Finite, Finite, Finite, Finite], not_zero(SMALLEST, LARGEST)
 ]
-RuleName = Literal["5cm-15deg", "contact-remains", "2cm", "3cm", "six-forces"]
 ProtocolName = Literal[
     "dexgraspbench",
     "dexgraspbench-paper",
     "dexonomy",
     "mj-grasp-sim",
     "molmospaces",
-    "graspqp",
-    "graspdatagen",
-    "dexgraspnet",
-    "gendexgrasp",
-    "multigrippergrasp",
-    "multigrippergrasp-axes",
-    "multigrippergrasp-ramp",
-    "get-a-grip",
 ]
 """Names of the published tests, which `sim_validate/protocols` holds."""
 
@@ -238,11 +229,6 @@ class Testing:
     """With --weight-n: a direction in which the weight acts; may be repeated."""
     limits: Literal["none", "ramp", "bisection"] = "none"
     """Also find the largest multiple of each wrench in simulation."""
-    independent: bool = False
-    """Also run trials that do not use the planned finger forces: rigid fingertips, a fixed squeeze,
-    and the first instant of motion."""
-    also_judge_by: UseAppendAction[tuple[RuleName, ...]] = ()
-    """Also show which grasps the acceptance rule of another tool would accept; may be repeated."""
     repeats: OmitArgPrefixes[Repeats] = Repeats()
     traces: bool = False
     """With --out: also write how the object and each contact moved over time."""

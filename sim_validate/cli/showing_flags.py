@@ -14,7 +14,7 @@ from sim_validate.cli.flag_bounds import at_least, ends_in
 from sim_validate.cli.flag_groups import Count, Friction, Speech
 from sim_validate.parallel.processes import available_cores
 
-PICTURES, CLIPS = (".png", ".svg", ".pdf", ".webp", ".jpg", ".jpeg"), (".gif", ".webp")
+PICTURES, CLIPS = (".svg", ".png"), (".gif", ".webp")
 PAGES = (".html", ".htm")
 
 
@@ -29,12 +29,12 @@ class View:
     friction: Friction | None = None
     """Coulomb coefficient; if not given, the one planned for."""
     picture: Annotated[Path, ends_in(*PICTURES)] | None = None
-    """Write the grasp as a picture like the paper's (png, svg, pdf, webp, jpg)."""
+    """Write the grasp as a picture like the paper's (svg, png)."""
     page: Annotated[Path, ends_in(*PAGES)] | None = None
     """Write a page (html) on which the grasp can be turned."""
     clip: Annotated[Path, ends_in(*CLIPS)] | None = None
-    """Write a clip (webp, gif) of the fingers closing, rendered by MuJoCo; without graphics the
-    clip shows the picture turning."""
+    """Write a clip (webp, gif) of the fingers closing, which MuJoCo renders where there are
+    graphics."""
     hand: bool = True
     """Show the hand of the reaches.json beside the grasps, where it reaches the grasp, in the
     picture and on the page."""

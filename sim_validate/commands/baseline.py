@@ -5,17 +5,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
-from sim_validate.baselines.baseline_json import check_writable, read_baseline, write_baseline
-from sim_validate.baselines.check import Checked, check
+from sim_validate.baselines.baseline import check_writable, fields_of, read_baseline, write_baseline
+from sim_validate.baselines.check import Checked, check, complete, measured, seen_from
 from sim_validate.baselines.compare import Finding, Status, failing
-from sim_validate.baselines.entries import fields_of
-from sim_validate.baselines.junit import junit_text
-from sim_validate.baselines.measure import complete, measured, seen_from
-from sim_validate.baselines.parts.changed_part import Present, present, testable
-from sim_validate.baselines.parts.if_changed import IfChanged
-from sim_validate.baselines.parts.source_file import source_of
+from sim_validate.baselines.part import IfChanged, Present, present, source_of, testable
 from sim_validate.baselines.settings import How, of_settings, setup_for
 from sim_validate.cli import baseline_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
@@ -60,16 +54,13 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     path = command.grasps or command.baseline.parent / before.grasps_file
     saved = read_grasps(path)
     now = _present(saved, path, command.baseline, command.changed, before.scale)
-    now = now.against(before.shape)
+    now = now.against(before)
     how = of_settings(before.settings, str(command.baseline))
     if command.setup is not None:
         how = replace(how, setup=setup_from_file(command.setup, how.setup))
     where = seen_from(command.baseline, path)
     with reporter.progress("simulating") as steps:
         done = check(before, now, where, how, command.jobs, steps.update)
-    if command.junit is not None:
-        text = junit_text(str(command.baseline), done.findings, strict=command.strict)
-        write_text(command.junit, text)
     _show(done, reporter)
     _say_mesh(now, reporter)
     if command.bless:

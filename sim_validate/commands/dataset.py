@@ -12,18 +12,14 @@ from grasp_core.processes import local_processes
 from sim_validate.cli import dataset_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.datasets.looks import refuse_own, write_page
-from sim_validate.datasets.building.build import build
-from sim_validate.datasets.building.driver import Engine
-from sim_validate.datasets.building.worker import Limits
-from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
-from sim_validate.datasets.describing.card import CARD
-from sim_validate.datasets.exports.formats import export
-from sim_validate.datasets.learning.settings import Learning
+from sim_validate.datasets.build import build
+from sim_validate.datasets.card import CARD
+from sim_validate.datasets.config import CREDITS, DatasetConfig, Learning, config_from_toml
+from sim_validate.datasets.isaac import export
 from sim_validate.datasets.manifest import read_manifest
-from sim_validate.datasets.open_dataset import select, splits_in_words
-from sim_validate.datasets.verifying.redo import Sample
-from sim_validate.datasets.verifying.verify import verify
+from sim_validate.datasets.open_dataset import splits_in_words
+from sim_validate.datasets.verify import Sample, verify
+from sim_validate.datasets.workers import Engine, Limits
 from sim_validate.parallel.clusters import dask_workers, ray_workers
 
 FRICTION = 0.5
@@ -33,12 +29,7 @@ MEGABYTE = 2**20
 
 def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
     """Make a dataset, or resume a build that was interrupted."""
-    if command.stats is not None:
-        refuse_own(command.stats, command.out)
-    ended = _build(_asked(command), command.out, command.work, reporter)
-    if command.stats is not None:
-        write_page(command.stats, select(command.out), reporter)
-    return ended
+    return _build(_asked(command), command.out, command.work, reporter)
 
 
 def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
@@ -99,9 +90,9 @@ def verify_dataset(command: dataset_flags.Verify, reporter: Reporter) -> int:
 
 
 def export_dataset(command: dataset_flags.Export, reporter: Reporter) -> int:
-    """Write a dataset in another format."""
+    """Write the grasps of a dataset in force closure for another program."""
     with reporter.progress("exporting") as steps:
-        done = export(command.dataset, command.to, command.out, command.split, steps.update)
+        done = export(command.dataset, command.out, command.split, steps.update)
     counts = ", ".join(f"{count} {name}" for name, count in done.rows.items())
     reporter.say(f"{command.out}: {done.files} files, {counts}")
     if not done.rows["grasps"]:

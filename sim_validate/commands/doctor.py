@@ -9,7 +9,7 @@ from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import compiled, state_of
 from grasp_core.cones.pyramids import inscribed_share
-from grasp_core.families.discs import KEPT
+from grasp_core.families.placements import KEPT
 from grasp_core.planning.planner import plan
 from grasp_core.provenance import versions
 from scenes.drawing.clips import GraphicsError, available_graphics, has_display, remedy
@@ -19,8 +19,9 @@ from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.parallel.compiling import EVERYTHING, compile_loops
 from sim_validate.parallel.processes import available_cores
-from sim_validate.records.verdicts_json import finite, gate_record
-from sim_validate.simulation.gate.gate import measured_gate
+from sim_validate.records.fields import finite
+from sim_validate.records.verdicts import gate_record
+from sim_validate.simulation.gate import measured_gate
 from sim_validate.simulation.setup import Setup
 from sim_validate.validation.validation import validate
 

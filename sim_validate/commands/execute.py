@@ -13,21 +13,17 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.executions import check_mass, execution_settings
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
-from sim_validate.execution.jobs import (
-    ExecutedGrasp,
-    ExecutionJob,
-    best_executed,
-    executed,
-)
+from sim_validate.execution.jobs import ExecutionJob, executed
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (
+    ExecutedGrasp,
     Execution,
+    best_executed,
     held_controls_in_words,
     losses_in_words,
 )
-from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.stale_results import remove_executions
-from sim_validate.records.executions_json import (
+from sim_validate.files.result_folders import alone_in, remove_executions
+from sim_validate.records.executions import (
     EXECUTIONS,
     executions_summary,
     executions_to_json,

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from grasp_core.by_value import vector
 from grasp_core.cones.spanning import count_spanning
-from grasp_core.objects.face import Face
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.surface import Face
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
 from grasp_core.records.grasps_json import surface_record
-from grasp_core.short_text import vector
-from grasp_core.transferring.face_places import face_in_words
 from scenes.drawing.pictures import MOST_NUMBERED, write_object_picture
 from scenes.example_objects import example_names
 from sim_validate.cli import command_flags
@@ -25,6 +24,10 @@ from sim_validate.commands.asked.objects import load_object
 MM, CM3 = 1e3, 1e6
 MM2 = 1e6
 COLUMNS = ("face", "where it is", "area mm^2")
+ALONG = 1e-4
+"""Largest angle from an axis at which a face counts as facing along it [rad]."""
+NOTHING_MM = 1e-6
+"""Coordinate that is written as zero [mm]."""
 
 
 def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
@@ -48,7 +51,16 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
         "radius_m": body.radius,
         "center_of_mass_m": body.center_of_mass.tolist(),
         "spanning_quadruples": spanning,
-        "face_list": _face_list(body),
+        "face_list": [
+            {
+                "number": number,
+                "normal": face.normal.tolist(),  # into the object
+                "area_m2": face.area,
+                "center_m": face.centroid.tolist(),
+                "place": _place(face),
+            }
+            for number, face in enumerate(body.faces)
+        ],
         "content_sha256": body.content_sha256,
         "notes": list(body.notes),
     }
@@ -59,31 +71,16 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
     for sentence in _sentences(body, spanning):
         reporter.say(f"  {sentence}")
     if body.patches is None and len(body.faces) <= MOST_NUMBERED:
-        rows = [_row(number, face) for number, face in enumerate(body.faces)]
+        rows = [
+            (str(number), _place(face), f"{MM2 * face.area:.5g}")
+            for number, face in enumerate(body.faces)
+        ]
         reporter.table("faces, by the numbers in ids of grasps", COLUMNS, rows)
     if command.picture is not None:
         reporter.say(f"wrote {command.picture}")
     else:
         reporter.say("  `--picture FILE.png` draws it.")
     return Exit.GOOD
-
-
-def _face_list(body: Polyhedron) -> list[dict[str, Any]]:
-    """List the faces of a mesh, in order of their numbers; normals point into the object."""
-    return [
-        {
-            "number": number,
-            "normal": face.normal.tolist(),
-            "area_m2": face.area,
-            "center_m": face.centroid.tolist(),
-            "place": face_in_words(face),
-        }
-        for number, face in enumerate(body.faces)
-    ]
-
-
-def _row(number: int, face: Face) -> tuple[str, ...]:
-    return str(number), face_in_words(face), f"{MM2 * face.area:.5g}"
 
 
 def _sentences(body: Polyhedron, spanning: int | None) -> Iterator[str]:
@@ -135,3 +132,17 @@ def list_objects(_: command_flags.Objects, reporter: Reporter) -> int:
         for name in names:
             reporter.say(name)
     return Exit.GOOD
+
+
+def _place(face: Face) -> str:
+    """Say where a face is and what it faces, outwards, such as `facing +x at x = 60 mm`."""
+    outward = (-face.normal).tolist()
+    axis = max(range(3), key=lambda index: abs(outward[index]))
+    across = math.hypot(*(each for index, each in enumerate(outward) if index != axis))
+    center = [f"{0.0 if abs(MM * each) < NOTHING_MM else MM * each:.5g}"
+              for each in face.centroid.tolist()]  # fmt: skip
+    if across <= ALONG:
+        name, sign = "xyz"[axis], "+" if outward[axis] > 0.0 else "-"
+        return f"facing {sign}{name} at {name} = {center[axis]} mm"
+    side = ", ".join(f"{round(each, 2) + 0.0:g}" for each in outward)
+    return f"facing ({side}) around ({', '.join(center)}) mm"

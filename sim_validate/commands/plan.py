@@ -27,14 +27,13 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.flag_bounds import FlagsError
 from sim_validate.commands.asked.objects import asked_finger, object_to_plan
-from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.stale_results import remove_results
+from sim_validate.files.result_folders import alone_in, remove_results
 from sim_validate.parallel.compiling import PLANNING, compile_loops, must_compile
 
 if TYPE_CHECKING:
     from grasp_core.optimizing.best.result import BestGrasp
-    from sim_validate.commands.best.best_json import Rated
     from sim_validate.parallel.certifying import Found
+    from sim_validate.records.best import Rated
 
 CARRIED = {"payload": "payload kg", "first-slip": "first slip"}
 """Column of what grasps carry, by the rank that orders them."""

@@ -8,8 +8,7 @@ from grasp_core.errors import InputError
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.stale_results import remove_regions
+from sim_validate.files.result_folders import alone_in, remove_regions
 from sim_validate.parallel.certifying import Asked, certified
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.regions import REGIONS, write_regions
@@ -26,7 +25,7 @@ def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
         raise InputError(f"{command.grasps}: expected {wanted} to certify, found none")
     asked = Asked(
         saved.friction if command.friction is None else command.friction,
-        command.reserve, command.balance, command.recenter, command.edge_clearance_m,
+        command.reserve, command.recenter, command.edge_clearance_m,
         command.max_cones,
     )  # fmt: skip
     with alone_in(command.out):

@@ -11,11 +11,8 @@ from scenes.mjcf import write_scene
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.records.verdicts_json import finite
-from sim_validate.replaying.recorded import Recorded, Wanted
-from sim_validate.replaying.replay import Replayed, replayed
-from sim_validate.replaying.sources import recorded_in
-from sim_validate.simulation.hold_verdict import LET_GO, Outcome
+from sim_validate.records.fields import finite
+from sim_validate.replaying import Recorded, Replayed, Wanted, recorded_in, replayed
 
 SHOWN = 12
 """Number of rows of the motion that are shown; the trace file has all of them."""
@@ -34,15 +31,7 @@ def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
     files = [] if command.out is None else list(_written(found, command, reporter))
     record = _record(recorded, found, said) | {"files": [str(path) for path in files]}
     reporter.document(finite(record))
-    return Exit.GOOD if _as_it_must(found, said) else Exit.NEGATIVE
-
-
-def _as_it_must(found: Replayed, said: str | None) -> bool:
-    """Tell whether a trial ended as recorded or, if nothing is recorded, as predicted."""
-    outcome, limit = found.hold.outcome, found.predicted_limit
-    if said is not None:
-        return outcome.value == said
-    return outcome is Outcome.HELD if limit is not None and limit >= 1.0 else outcome in LET_GO
+    return Exit.GOOD if found.hold.outcome.value == said else Exit.NEGATIVE
 
 
 def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Reporter) -> None:

@@ -18,11 +18,15 @@ from sim_validate.commands.asked.objects import asked_finger, object_to_plan
 from sim_validate.commands.asked.trials import prepared
 from sim_validate.commands.execute import execute_grasps
 from sim_validate.commands.plan import plan_object, say_counts, show_gains, with_regions
-from sim_validate.commands.report import shown_report
 from sim_validate.commands.validate import simulate_grasps
-from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.stale_results import REPORT, remove_results, require_report_folder
-from sim_validate.simulation.gate.gate import require_faithful
+from sim_validate.commands.view import shown_report
+from sim_validate.files.result_folders import (
+    REPORT,
+    alone_in,
+    remove_results,
+    require_report_folder,
+)
+from sim_validate.simulation.gate import require_faithful
 from sim_validate.simulation.setup import Agenda, Setup
 
 RESULTS = Path("graspproof-out")

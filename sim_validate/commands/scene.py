@@ -7,13 +7,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from grasp_core.by_value import counted
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_files import load_grasps
 from grasp_core.records.grasps_json import SavedGrasps
-from grasp_core.short_text import counted
 from grasp_core.values import Grasp
-from scenes.exports import formats
+from scenes import exports
 from scenes.mjcf import build_scene
 from scenes.physics import PhysicsSettings
 from sim_validate.cli import command_flags, flag_groups
@@ -24,7 +24,7 @@ from sim_validate.cli.flag_bounds import FlagsError
 from sim_validate.commands.asked.executions import check_mass, holding
 from sim_validate.commands.asked.trials import finger_settings
 from sim_validate.execution.execute import chosen_squeeze, held_scene
-from sim_validate.files.folder_lock import alone_in
+from sim_validate.files.result_folders import alone_in
 from sim_validate.records.grasps import grasp_with_id, read_grasps
 from sim_validate.simulation.setup import with_planned_radius
 
@@ -127,7 +127,7 @@ def _held(
 
 def export_grasps(command: command_flags.Export, reporter: Reporter) -> int:
     """Write the grasps of a file as one file of another program's format."""
-    endings = formats.ENDINGS[command.to]
+    endings = exports.ENDINGS[command.to]
     if command.out.suffix.lower() not in endings:
         raise FlagsError(
             f"--out must end in {' or '.join(endings)} with --to {command.to}, got {command.out}"
@@ -141,7 +141,7 @@ def export_grasps(command: command_flags.Export, reporter: Reporter) -> int:
         return Exit.NONE
     chosen = plan[: command.limit]
     radius = command.fingertip_radius_m
-    formats.export_grasps(chosen, command.out, command.to, fingertip_radius_m=radius)
+    exports.export_grasps(chosen, command.out, command.to, fingertip_radius_m=radius)
     reporter.say(f"wrote {command.out} with {counted(len(chosen), 'grasp')}")
     ids = [grasp.id for grasp in chosen]
     reporter.document({"to": command.to, "out": str(command.out), "grasps": ids})

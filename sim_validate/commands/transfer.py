@@ -1,13 +1,14 @@
 """Runs the command `transfer`, which carries grasps over to a part that has changed."""
 
+import math
 from pathlib import Path
 
+from grasp_core.by_value import counted
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.shells import SMALL
 from grasp_core.records.grasps_json import SavedGrasps
-from grasp_core.short_text import counted
 from grasp_core.transferring.changed_part import SURE_GROWTH, given_center, growth
 from grasp_core.transferring.judging import CHANGES, Change, GraspFigures
 from grasp_core.transferring.like_faces import check_planar
@@ -17,13 +18,14 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import saved_grasps
 from sim_validate.commands.asked.objects import load_object
-from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.stale_results import remove_results
-from sim_validate.records.transfers.transfer_json import TRANSFER, carried_to_json, transfer_to_json
+from sim_validate.files.result_folders import alone_in, remove_results
+from sim_validate.records.transfers import TRANSFER, carried_to_json, transfer_to_json
 
 MM = 1e3
 GRASPS = "grasps.json"
 ABSENT = "-"
+COLUMNS = ("grasp", "status", "mm", "deg", "mu*", "now", "quality N", "now", "faces")
+"""How far contacts moved and turned, what they reach, and faces under them that changed."""
 BAD: tuple[Change, ...] = ("worse", "gone")
 """What becomes of a grasp if its part should not have changed like that."""
 
@@ -57,7 +59,9 @@ def transfer_file(command: transfer_flags.Transfer, reporter: Reporter) -> int:
             _write(command.out, found, saved, text, reporter)
     reporter.text(text)
     _show(found, reporter)
-    return _code(found)
+    if not found.carried:
+        return Exit.NONE
+    return Exit.NEGATIVE if any(map(found.count, BAD)) else Exit.GOOD
 
 
 def _check_elsewhere(grasps: Path, out: Path | None) -> None:
@@ -96,19 +100,13 @@ def _write(
     reporter.say(f"wrote {grasps} and {path}")
 
 
-def _code(found: Transfer) -> Exit:
-    if not found.carried:
-        return Exit.NONE
-    return Exit.NEGATIVE if any(map(found.count, BAD)) else Exit.GOOD
-
-
 def _show(found: Transfer, reporter: Reporter) -> None:
-    """Show a table of the grasps, what happened to faces, and why grasps are worse or gone."""
-    columns = ("grasp", "now", "status", "mm moved", "mu*", "mu* now", "quality N", "now N")
+    """Show a table of the grasps, which faces moved, and why grasps are worse or gone."""
     order = sorted(found.grasps, key=lambda each: -CHANGES.index(each.status))
     shown = order[:TABLE_ROWS]
     title = f"{counted(len(order), 'grasp')} of {found.old.name} on {found.new.name}"
-    reporter.table(title, columns, [_row(each) for each in shown])
+    changed = {each.old for each in found.faces if each.moved or each.reshaped}
+    reporter.table(title, COLUMNS, [_row(each, changed) for each in shown])
     say_cut(len(order), reporter)
     reporter.say(f"{found.new.name}: {found.faces_in_words}")
     counts = ", ".join(f"{found.count(status)} {status}" for status in CHANGES)
@@ -123,12 +121,15 @@ def _show(found: Transfer, reporter: Reporter) -> None:
         reporter.warn("no grasp is left; plan on the changed part anew")
 
 
-def _row(each: CarriedGrasp) -> tuple[str, ...]:
-    now = ABSENT if each.grasp is None else each.grasp.id
-    lost = any(contact.contact is None for contact in each.contacts)
-    moved = ABSENT if lost else f"{MM * max(contact.distance for contact in each.contacts):.2f}"
+def _row(each: CarriedGrasp, changed: set[int]) -> tuple[str, ...]:
+    """Write how far contacts moved and turned, figures before and after, and changed faces."""
+    moved = turned = ABSENT
+    if all(contact.contact is not None for contact in each.contacts):
+        moved = f"{MM * max(contact.distance for contact in each.contacts):.2f}"
+        turned = f"{math.degrees(max(contact.turn for contact in each.contacts)):.2f}"
     old, new = _figures(each.before), _figures(each.after)
-    return (each.old.id, now, each.status, moved, old[0], new[0], old[1], new[1])
+    faces = ", ".join(map(str, sorted(changed & {*each.old.faces}))) or ABSENT
+    return (each.old.id, each.status, moved, turned, old[0], new[0], old[1], new[1], faces)
 
 
 def _figures(figures: GraspFigures | None) -> tuple[str, str]:

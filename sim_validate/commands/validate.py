@@ -13,18 +13,15 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
 from sim_validate.commands.asked.trials import prepared
-from sim_validate.commands.judging.by_protocols import judge_grasps
-from sim_validate.files.folder_lock import alone_in
-from sim_validate.files.stale_results import remove_verdicts
+from sim_validate.commands.judging import judge_grasps
+from sim_validate.files.result_folders import alone_in, remove_verdicts
 from sim_validate.files.writing import write_arrays
-from sim_validate.records.verdicts_json import summary, trace_arrays, verdicts_to_json
-from sim_validate.simulation.gate.gate import require_faithful
-from sim_validate.simulation.hold_verdict import Outcome
-from sim_validate.simulation.other_rules import RULES
+from sim_validate.records.verdicts import summary, trace_arrays, verdicts_to_json
+from sim_validate.simulation.gate import require_faithful
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.jobs import Job, validated
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.simulation.traces import Outcome
+from sim_validate.validation.validation import Job, validated
+from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 
 def validate_file(command: command_flags.Validate, reporter: Reporter) -> int:
@@ -110,9 +107,7 @@ def _show(
     )
     reporter.table("verdicts", columns, rows)
     say_cut(len(verdicts), reporter)
-    _show_bounds(verdicts, reporter)
     _show_robustness(verdicts, reporter)
-    _show_rules(verdicts, reporter)
     totals = summary(verdicts)
     reporter.say(
         f"{totals['grasps_held']} of {totals['grasps']} grasps held all wrenches, at "
@@ -132,23 +127,6 @@ def _limit_range(verdict: Verdict) -> str:
     return f"{min(shares):.3f}-{max(shares):.3f}" if shares else "-"
 
 
-def _show_bounds(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
-    """Show the bounds that trials without planned forces gave, if asked for."""
-    rows: list[tuple[str, ...]] = []
-    for verdict in verdicts[:TABLE_ROWS]:
-        if (found := verdict.bounds) is None:
-            return
-        held = found.friction_at_most
-        rows.append(
-            (verdict.id, f"{verdict.critical_friction.predicted:.4f}",
-             "-" if held is None else f"{held:.4f}",
-             f"{min(found.limit_shares):.1f}-{max(found.limit_shares):.1f}",
-             f"{found.residual:.3f}")
-        )  # fmt: skip
-    columns = ("grasp", "mu*", "mu, rigid tips", "limits, fixed squeeze", "residual")
-    reporter.table("without planned forces (bounds)", columns, rows)
-
-
 def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
     """Show how often grasps held in repeats with noise, if asked for."""
     rows: list[tuple[str, ...]] = []
@@ -165,22 +143,6 @@ def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
         )  # fmt: skip
     columns = ("grasp", "held", "predicted", "95 % interval", "first not held")
     reporter.table("repeats with noise", columns, rows)
-
-
-def _show_rules(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
-    """Show how many grasps and negative controls other tools would accept, if asked for."""
-    names = verdicts[0].agenda.rules if verdicts else ()
-    controls = [control for verdict in verdicts for control in verdict.controls]
-    rows = [
-        (name,
-         f"{sum(verdict.accepted_by[name] for verdict in verdicts)} of {len(verdicts)}",
-         f"{sum(control.accepted_by[name] for control in controls)} of {len(controls)}",
-         RULES[name].source)
-        for name in names
-    ]  # fmt: skip
-    if rows:
-        columns = ("rule", "grasps accepted", "controls accepted", "used by")
-        reporter.table("rules of other tools", columns, rows)
 
 
 def _expected(trial: WrenchVerdict) -> str:

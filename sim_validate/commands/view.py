@@ -1,10 +1,8 @@
-"""Runs the command `view`, which shows one grasp in MuJoCo's viewer or writes it to files."""
+"""Runs the commands that show results: one grasp (`view`), or a run as pages (`report`)."""
 
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,20 +12,19 @@ from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
-from scenes.drawing.canvas import write_sheet
 from scenes.drawing.clips import GraphicsError, has_display, write_clip
-from scenes.drawing.hands.posed_hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
-from scenes.drawing.turning_clips import write_turning_clip
 from scenes.drawing.turntable import turntable_page
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, build_scene
 from sim_validate.cli import showing_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.files.result_folders import alone_in
 from sim_validate.records.grasps import grasp_with_id, read_grasps
 from sim_validate.reports.reached_grasps import held_in, why_not_held
-from sim_validate.reports.run_folder import GRASPS, reaches_beside
+from sim_validate.reports.report import Report, write_report
+from sim_validate.reports.run_folder import GRASPS, folder_of, reaches_beside
 from sim_validate.simulation.setup import with_planned_radius
 
 COMING, RESTING = 60, 20
@@ -57,8 +54,19 @@ def view_grasp(command: showing_flags.View, reporter: Reporter) -> int:
     held = held_in(reaches, grasp)
     if reaches is not None and held is None:
         reporter.warn(f"the hand is not shown: {why_not_held(reaches, grasp)}")
-    shown = _Shown(saved, grasp, friction, held)
-    files = [str(path) for path in _written(command, shown, reporter)]
+    files = list[str]()
+
+    def keep(path: Path) -> None:
+        reporter.say(f"wrote {path}")
+        files.append(str(path))
+
+    if command.picture is not None:
+        sheet = grasp_sheet(saved.body, grasp, friction, legend=True, held=held)
+        keep(sheet.write(command.picture))
+    if command.page is not None:
+        keep(write_text(command.page, turntable_page(saved.body, grasp, friction, held)))
+    if command.clip is not None:
+        keep(write_closing_clip(_scene(saved, grasp, friction), grasp, command.clip))
     reporter.document({"id": grasp.id, "files": files})
     return Exit.GOOD
 
@@ -89,38 +97,6 @@ def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Shown:
-    """What is written to files."""
-
-    saved: SavedGrasps
-    grasp: Grasp
-    friction: float
-    held: PosedHand | None
-    """The hand in the grasp, for pictures and pages."""
-
-
-def _written(
-    command: showing_flags.View, shown: _Shown, reporter: Reporter
-) -> Iterator[Path]:  # fmt: skip
-    saved, grasp, friction = shown.saved, shown.grasp, shown.friction
-    body = saved.body
-    if command.picture is not None:
-        sheet = grasp_sheet(body, grasp, friction, legend=True, held=shown.held)
-        yield write_sheet(sheet, command.picture)
-        reporter.say(f"wrote {command.picture}")
-    if command.page is not None:
-        yield write_text(command.page, turntable_page(body, grasp, friction, shown.held))
-        reporter.say(f"wrote {command.page}")
-    if command.clip is not None:
-        try:
-            yield write_closing_clip(_scene(saved, grasp, friction), grasp, command.clip)
-        except GraphicsError as error:
-            reporter.warn(f"the clip shows the picture turning, not the fingers closing: {error}")
-            yield write_turning_clip(body, grasp, command.clip, friction)
-        reporter.say(f"wrote {command.clip}")
-
-
 def write_closing_clip(scene: Scene, grasp: Grasp, path: Path) -> Path:
     """Write a clip in which fingers come in to their contacts while the camera moves around."""
     joints = closing(scene)
@@ -137,3 +113,38 @@ def closing(scene: Scene) -> Array:
     slides = np.vstack([left[:, None] * away, np.zeros((RESTING, len(away)))])
     home = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     return np.column_stack([np.tile(home, (len(slides), 1)), slides])
+
+
+def report_folder(command: showing_flags.Report, reporter: Reporter) -> int:
+    """Write the results of a run as pages, and print where they are."""
+    at = command.out or folder_of(command.folder)
+    with alone_in(at if command.out or at.is_dir() else None):
+        report = shown_report(command, reporter)
+    reporter.document({"report": str(report.index), "grasps": report.grasps})
+    return Exit.GOOD
+
+
+def shown_report(asked: showing_flags.Report, reporter: Reporter) -> Report:
+    """Write the pages of a run, and say where they are."""
+
+    def say_ready(index: Path, drawn: int, total: int) -> None:
+        reporter.say(
+            f"report: {index} can be opened now; {drawn} of {total} cards are drawn, "
+            "the others follow"
+        )
+
+    with reporter.progress("drawing") as steps:
+        report = write_report(
+            asked.folder,
+            asked.out,
+            jobs=asked.jobs,
+            limit=asked.limit,
+            clips=asked.clips,
+            every_copy=asked.every_copy,
+            progress=steps.update,
+            ready=say_ready,
+        )
+    if report.no_clip:
+        reporter.warn(f"no clips: {report.no_clip}")
+    reporter.say(f"report: open {report.index} in a browser")
+    return report

@@ -1,6 +1,7 @@
-"""What does a dataset of grasps consist of?
+"""How are tables of grasps made, checked and read?
 
 A configuration names many objects and several frictions; the tables of a dataset hold objects,
-grasps and trials. The package `building` makes a dataset, `verifying` checks it, `describing`
-documents it, and `exports` writes it for other programs.
+grasps and trials. The work is split into units: one object at one friction each. Every finished
+unit is kept in a staging folder; in the end the rows of all units become the tables. `build` makes
+a dataset, `verify` checks it, `card` documents it, and `isaac` writes its grasps for Isaac.
 """

@@ -12,19 +12,16 @@ from datetime import date
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, cast, get_args
 
-from grasp_core.checked import LARGEST_FRICTION, MOST_RANDOM_WRENCHES, positive
-from grasp_core.errors import InputError
-from grasp_core.files.strict_json import place, shown
-from grasp_core.mesh_files.reading import FORMATS
-from grasp_core.objects.face import FaceKind
+from grasp_core.checked import LARGEST_FRICTION, MOST_RANDOM_WRENCHES, one_of, positive, whole
+from grasp_core.errors import InputError, about
+from grasp_core.files.json_text import place, settings_of, shown
+from grasp_core.hands.named_hands import hand_names, load_hand
 from grasp_core.objects.polyhedron import UNITS_M
+from grasp_core.objects.surface import FaceKind
 from grasp_core.planning.request import METHODS, ConeKind
 from grasp_core.values import Method
-from sim_validate.datasets.columns import Tables
-from sim_validate.datasets.learning.columns import dataset_tables
-from sim_validate.datasets.learning.settings import TABLE as LEARNING
-from sim_validate.datasets.learning.settings import Learning, asked_learning, learning_table
-from sim_validate.execution.asked import (
+from sim_validate.datasets.tables import Tables, dataset_tables
+from sim_validate.execution.settings import (
     TABLE,
     AskedExecution,
     asked_execution,
@@ -32,6 +29,18 @@ from sim_validate.execution.asked import (
 )
 from sim_validate.files.toml_tables import read_tables
 
+LEARNING = "learning"
+"""Name of the table in a settings file."""
+Figure: TypeAlias = Literal["closure", "least_squeeze"]
+"""A group of figures that each grasp has on request."""
+FIGURES: tuple[Figure, ...] = get_args(Figure)
+LEAST_SQUEEZE: Figure = "least_squeeze"
+MOST_VARIED = 100
+"""Largest number of rows of one kind that are made from a grasp."""
+CONTROLS = 5
+"""Number of kinds of synthetic negative controls that a grasp has at most."""
+OF_GRASPS = ("friction_below", "friction_near", "friction_above", "moved_out", "mass_near")
+"""Settings that say how many rows of a kind are made from each grasp; also the kinds' names."""
 LimitsKind: TypeAlias = Literal["none", "ramp", "bisection"]
 KINDS: dict[str, tuple[str, ...]] = {
     "unit": tuple(UNITS_M),
@@ -53,6 +62,81 @@ LISTS: dict[str, type[str] | type[float]] = {"objects": str, "frictions": float,
 WORDS: dict[type, str] = {
     str: "text", float: "numbers", int: "a whole number", bool: "true or false",
 }  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Learning:
+    """What is added to the tables, and how many rows of each kind are made from a grasp.
+
+    Raises:
+        InputError: A number is out of range.
+    """
+
+    friction_below: int = 0
+    """Rows per grasp with its contacts at a friction clearly below its critical one."""
+    friction_near: int = 0
+    """Rows per grasp at a friction within some percent of its critical one, on either side."""
+    friction_above: int = 0
+    """Rows per grasp at a friction clearly above its critical one."""
+    moved_out: int = 0
+    """Rows per grasp with contacts moved on their faces, each out of its region."""
+    mass_near: int = 0
+    """Rows per grasp that is executed with a mass near the one at which it is predicted to fail."""
+    figures: tuple[Figure, ...] = ()
+    """Groups of figures of each grasp; what each takes is in docs/datasets.md."""
+    seeds: tuple[int, ...] = ()
+    """Seeds by which objects are misplaced once more in executions, besides the execution's own."""
+    synthetic: int = CONTROLS
+    """Largest number of synthetic negative controls of each grasp, drawn from all that exist."""
+    hand: str = ""
+    """Built-in hand whose pose is looked for in each grasp in force closure; empty for none."""
+
+    def __post_init__(self) -> None:
+        for name in OF_GRASPS:
+            whole(getattr(self, name), name, most=MOST_VARIED)
+        whole(self.synthetic, "synthetic", most=CONTROLS)
+        one_of(self.hand, ("", *hand_names()), "hand")
+        for name in self.figures:
+            one_of(name, FIGURES, "figures")
+        for seed in self.seeds:
+            whole(seed, "seeds")
+        for name in ("figures", "seeds"):
+            if len(set(getattr(self, name))) < len(getattr(self, name)):
+                raise InputError(f"{name}: expected different items, got one of them twice")
+
+    def groups(self, *, executed: bool) -> dict[str, int]:
+        """Return the groups of columns that the tables have on request, with their sizes."""
+        chosen = ["kinds", *self.figures]
+        chosen += ["margins"] if executed else []
+        sized = {"hand": len(load_hand(self.hand).joints)} if self.hand else {}
+        return {**dict.fromkeys(chosen, 1), **sized}
+
+    @property
+    def executes(self) -> str:
+        """Name of a setting that only executions have a use for; empty if there is none."""
+        used = {
+            "mass_near": self.mass_near, "seeds": self.seeds,
+            "figures": LEAST_SQUEEZE in self.figures,
+        }  # fmt: skip
+        return next((name for name, value in used.items() if value), "")
+
+
+def asked_learning(table: object) -> Learning:
+    """Read the table `[learning]` of a settings file."""
+    if not isinstance(table, Mapping):
+        raise InputError(f"{LEARNING}: expected a table of settings, got {shown(table)}")
+    given = cast("Mapping[str, Any]", table)
+    known = [each.name for each in fields(Learning)]
+    if unknown := [name for name in given if name not in known]:
+        raise InputError(
+            f"{LEARNING}: no setting is named {shown(unknown[0])}; choose from {', '.join(known)}"
+        )
+    return settings_of(Learning, given, [LEARNING])
+
+
+def learning_table(asked: Learning) -> dict[str, Any]:
+    """Return every setting as the table that gives the same settings when it is read."""
+    return {each.name: getattr(asked, each.name) for each in fields(asked)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,8 +216,6 @@ class DatasetConfig:
                 "objects: expected only one object beside `contacts`, the one that the contacts "
                 "are on"
             )
-        if self.learning is not None:
-            self.learning.check_names([Path(name).name for name in self.objects])
         if self.learning is not None and self.learning.executes and self.execution is None:
             raise InputError(
                 f"{LEARNING}.{self.learning.executes}: only executed grasps have a mass and a "
@@ -162,25 +244,11 @@ class DatasetConfig:
         return dataset_tables(executed=self.execution is not None, groups=self.groups)
 
     @property
-    def counts_splits(self) -> bool:
-        """Whether splits depend on all objects, not on the hash of each alone."""
-        return self.learning is not None and self.learning.split_by != "hash"
-
-    @property
     def groups(self) -> dict[str, int]:
         """Groups of columns that the tables have on request, with their sizes."""
-        units = {} if self.scale == 1.0 else {"units": 1}
         if self.learning is None:
-            return units
-        return units | self.learning.groups(executed=self.execution is not None)
-
-    def lengths_of(self, name: str) -> tuple[str, float]:
-        """Return unit and scale of an object: its own, or the usual ones, which are for files."""
-        of_file = Path(name).suffix.lower().lstrip(".") in FORMATS
-        scale = self.scale if of_file else 1.0
-        if self.learning is None:
-            return self.unit, scale
-        return self.learning.unit_of(name, self.unit), self.learning.scale_of(name, scale)
+            return {}
+        return self.learning.groups(executed=self.execution is not None)
 
     @property
     def sha256(self) -> str:
@@ -191,10 +259,8 @@ class DatasetConfig:
 def config_from_toml(path: Path) -> DatasetConfig:
     """Read a configuration from a file."""
     given = read_tables(path)
-    try:
+    with about(path):
         return config_from_settings(given)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
@@ -269,9 +335,6 @@ def _lines(values: Mapping[str, object]) -> str:
 def _as_toml(value: object) -> str:
     if isinstance(value, tuple):
         return f"[{', '.join(map(_as_toml, cast('tuple[object, ...]', value)))}]"
-    if isinstance(value, dict):
-        items = cast("dict[str, object]", value).items()
-        return f"{{{', '.join(f'{quoted(name)} = {_as_toml(each)}' for name, each in items)}}}"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):

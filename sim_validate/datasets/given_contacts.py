@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
-from grasp_core.files.strict_json import value_of
+from grasp_core.files.json_text import value_of
 from grasp_core.files.text_files import read_bytes, text_of
 from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
 from grasp_core.values import FINGERS

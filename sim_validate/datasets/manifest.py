@@ -1,28 +1,27 @@
-"""Reads and writes the manifest of a dataset: its files, and the versions that made them.
+"""Reads and writes the manifest of a dataset, and the list of what was left out of it.
 
-A folder without a manifest is no finished dataset, as the manifest is written last. The manifest
-does not say when or with how many processes the dataset was made: equal configuration, meshes and
-versions give equal bytes.
+The manifest names all files, and the versions that made them. A folder without one is no finished
+dataset, as it is written last. It does not say when or with how many processes the dataset was
+made: equal configuration, meshes and versions give equal bytes.
 """
 
 import hashlib
 import json
+from collections.abc import Iterable
 from dataclasses import asdict, field
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from grasp_core.errors import InputError
-from grasp_core.files.complaints import complaint
-from grasp_core.files.strict_json import object_of, place, shown
+from grasp_core.errors import InputError, about
+from grasp_core.files.json_text import complaint, object_of, place, record_of, shown
 from grasp_core.files.text_files import read_text, write_text
-from sim_validate.datasets.columns import Name, Tables
-from sim_validate.datasets.learning.columns import GROUPS, dataset_tables
+from sim_validate.datasets.tables import GROUPS, Name, Tables, dataset_tables
 from sim_validate.files.paths import require_inside
 
-SCHEMA = 1
+SCHEMA = 2
 MANIFEST = "manifest.json"
 STRICT = ConfigDict(strict=True, extra="forbid")
 Count = Annotated[int, Field(ge=0)]
@@ -125,10 +124,8 @@ def read_manifest(folder: Path) -> Manifest:
             "dataset build` to the end"
         )
     text = read_text(path)
-    try:
+    with about(path):
         return manifest_from_json(text)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def manifest_from_json(text: str) -> Manifest:
@@ -142,4 +139,39 @@ def manifest_from_json(text: str) -> Manifest:
         require_inside(each.path, place(["files", i, "path"]))
     if len({each.path for each in found.files}) < len(found.files):
         raise InputError("files: expected every path only once, got one path twice")
+    return found
+
+
+class LeftOut(BaseModel):
+    """A unit of work without rows, with the reason."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    object: str
+    source_sha256: str
+    friction: float
+    given: list[str]
+    """Ids of the given grasps that have no rows, if the unit is about given grasps."""
+    reason: str
+
+
+def left_out_text(units: Iterable[LeftOut]) -> str:
+    """Write the text of `quarantine.jsonl`, one line per unit of work without rows."""
+    return "".join(json.dumps(each.model_dump(), sort_keys=True) + "\n" for each in units)
+
+
+def read_left_out(path: Path) -> list[LeftOut]:
+    """Read `quarantine.jsonl`: the units of work that have no rows."""
+    text = read_text(path)
+    with about(path):
+        return left_out_from(text)
+
+
+def left_out_from(text: str) -> list[LeftOut]:
+    """Parse the text of `quarantine.jsonl`."""
+    found = list[LeftOut]()
+    lines = text.removesuffix("\n").split("\n") if text else []
+    for number, line in enumerate(lines, start=1):
+        with about(f"line {number}"):
+            found.append(record_of(LeftOut, line, "line of quarantine.jsonl"))
     return found

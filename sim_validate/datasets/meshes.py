@@ -5,11 +5,11 @@ import json
 from pathlib import Path
 
 from grasp_core.errors import InputError, MeshError
-from grasp_core.files.complaints import record_of
+from grasp_core.files.json_text import record_of
 from grasp_core.mesh_files.reading import MeshFile, read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, MeshChoices, content_hash
-from grasp_core.objects.face import FaceKind
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
+from grasp_core.objects.surface import FaceKind
 from grasp_core.records.grasps_json import surface_of_record, surface_record
 from grasp_core.records.grasps_schema import SurfaceRecord
 from sim_validate.files.paths import path_inside

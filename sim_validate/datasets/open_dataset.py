@@ -1,19 +1,34 @@
-"""Reads a finished dataset, or one split of it: its tables as arrays, and how they were made."""
+"""Reads a finished dataset, or one split of it: its tables as arrays, or row by row.
+
+All tables are sorted by the beginning of their rows' names, which are the first letters of the
+object's hash, so that rows can be read grouped by object, with only one object in memory.
+"""
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from grasp_core.checked import one_of, path_of
 from grasp_core.errors import InputError
-from sim_validate.datasets.columns import Name, Tables
 from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
 from sim_validate.datasets.manifest import Listed, Manifest, listed, read_manifest
-from sim_validate.datasets.object_rows import SPLITS
 from sim_validate.datasets.parquet import Columns, each_batch, read_columns
+from sim_validate.datasets.tables import SHORT, SPLITS, Name, Tables
 from sim_validate.files.paths import path_inside
+
+Row: TypeAlias = Mapping[str, Any]
+ObjectRows: TypeAlias = Mapping[Name, Sequence[Row]]
+Group: TypeAlias = tuple[str, list[Row]]
+BEGINNINGS: Mapping[Name, Callable[[Row], str]] = {
+    "objects": lambda row: str(row["object_id"])[:SHORT],
+    "grasps": lambda row: str(row["object_id"])[:SHORT],
+    "trials": lambda row: str(row["grasp_id"])[:SHORT],
+    "executions": lambda row: str(row["grasp_id"])[:SHORT],
+}
+"""Functions that return the part of a row's name that all rows of its object share."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,3 +150,22 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
             stacklevel=2,
         )
     return {name: read_columns(chosen.paths(name), name, chosen.tables) for name in chosen.tables}
+
+
+def by_object(chosen: Selection) -> Iterator[ObjectRows]:
+    """Yield the rows of each object in turn."""
+    streams = {name: _groups(chosen, name) for name in chosen.tables}
+    heads: dict[Name, Group | None] = {name: next(streams[name], None) for name in chosen.tables}
+    while waiting := [head[0] for head in heads.values() if head is not None]:
+        first = min(waiting)
+        rows: dict[Name, list[Row]] = {name: [] for name in chosen.tables}
+        for name, head in heads.items():
+            if head is not None and head[0] == first:
+                rows[name] = head[1]
+                heads[name] = next(streams[name], None)
+        yield rows
+
+
+def _groups(chosen: Selection, name: Name) -> Iterator[Group]:
+    for beginning, rows in groupby(chosen.rows(name), key=BEGINNINGS[name]):
+        yield beginning, list(rows)

@@ -1,25 +1,25 @@
-"""Writes the rows of a table as the bytes of a Parquet file, and reads them back.
+"""Reads and writes the Parquet files of a dataset.
 
 Equal rows give equal bytes. Every page carries a checksum, and reading checks it: without that, a
-flipped bit goes unnoticed. Units and meanings are in the metadata of the columns.
+flipped bit goes unnoticed. Units and meanings are in the metadata of the columns. A whole dataset
+is written one group of rows after another, so that memory does not grow.
 """
 
 import importlib
 import io
-import itertools
 import math
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, BinaryIO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
-from grasp_core.files.strict_json import shown
-from sim_validate.datasets.columns import KEYS, TABLES, Column, Name, Tables, base_tables
+from grasp_core.files.json_text import shown
+from sim_validate.datasets.tables import KEYS, TABLES, Column, Name, Tables
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
 TYPES = {"text": "string", "bool": "bool_", "int": "int64", "float": "float64"}
@@ -35,6 +35,8 @@ PAGES: Mapping[str, Any] = {
     "write_page_checksum": True,
     "write_page_index": True,
 }
+FILE_ROWS = 500_000
+"""Number of rows at which a file is closed and the next one begun, about 100 MB of grasps."""
 
 
 def pyarrow() -> Any:
@@ -57,33 +59,24 @@ def parquet_bytes(
     name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[str, str],
     tables: Tables = TABLES,
 ) -> bytes:  # fmt: skip
-    """Encode one table as the bytes of a file (see `arrow_table`)."""
-    held = io.BytesIO()
-    pyarrow_parquet().write_table(arrow_table(name, rows, about, tables), held, **PAGES)
-    return held.getvalue()
-
-
-def arrow_table(
-    name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[str, str],
-    tables: Tables = TABLES,
-) -> Any:  # fmt: skip
-    """Make an Arrow table of rows."""
-    arrow = pyarrow()
-    listed = sorted(rows, key=lambda row: _key(name, row))
-    for one, other in itertools.pairwise(listed):
-        if _key(name, one) == _key(name, other):
-            raise InputError(
-                f"table {name}: expected rows with different keys, got two rows with the key "
-                f"{_key(name, one)}"
-            )
+    """Encode the rows of one table as the bytes of a file, sorted by their keys."""
+    arrow, keys = pyarrow(), KEYS[name]
+    listed = list(rows)
+    by_key = {tuple(row[key] for key in keys): row for row in listed}
+    if len(by_key) < len(listed):
+        raise InputError(f"table {name}: two rows have the same {' and '.join(keys)}")
+    ordered = [row for _, row in sorted(by_key.items(), key=lambda pair: pair[0])]
     schema = schema_of(tables[name]).with_metadata(dict(sorted(about.items())))
-    columns = [[_cell(row.get(column.name)) for row in listed] for column in tables[name]]
     try:
-        arrays = [arrow.array(values, type=each.type)
-                  for values, each in zip(columns, schema, strict=True)]  # fmt: skip
-        return arrow.Table.from_arrays(arrays, schema=schema)
+        arrays = [
+            arrow.array([_cell(row.get(each.name)) for row in ordered], type=each.type)
+            for each in schema
+        ]
     except (arrow.ArrowInvalid, arrow.ArrowTypeError) as error:
         raise InputError(f"table {name}: a cell does not fit its column: {error}") from error
+    held = io.BytesIO()
+    pyarrow_parquet().write_table(arrow.Table.from_arrays(arrays, schema=schema), held, **PAGES)
+    return held.getvalue()
 
 
 def as_read(
@@ -94,27 +87,25 @@ def as_read(
     return pyarrow_parquet().ParquetFile(held).read().to_pylist()
 
 
-def read_rows(
-    path: Path, name: Name | None = None, tables: Tables | None = None
-) -> list[dict[str, Any]]:
+def read_rows(path: Path, name: Name, tables: Tables = TABLES) -> list[dict[str, Any]]:
     """Read the rows of a file and check all of its checksums."""
     return read_table(path, name, tables).to_pylist()
 
 
-def each_batch(path: Path, name: Name, tables: Tables | None = None) -> Iterator[Any]:
+def each_batch(path: Path, name: Name, tables: Tables = TABLES) -> Iterator[Any]:
     """Yield the rows of a file as Arrow's record batches, without holding all of them in memory."""
     with _opened(path, name, tables) as file:
         yield from file.iter_batches(GROUP_ROWS)
 
 
-def read_table(path: Path, name: Name | None = None, tables: Tables | None = None) -> Any:
+def read_table(path: Path, name: Name, tables: Tables) -> Any:
     """Read a file as an Arrow table and check all of its checksums."""
     with _opened(path, name, tables) as file:
         return file.read()
 
 
 @contextmanager
-def _opened(path: Path, name: Name | None, tables: Tables | None) -> Generator[Any]:
+def _opened(path: Path, name: Name, tables: Tables) -> Generator[Any]:
     """Open a file of one of the tables; any damage is raised as an `InputError`."""
     arrow, parquet = pyarrow(), pyarrow_parquet()
     try:
@@ -130,23 +121,14 @@ def _opened(path: Path, name: Name | None, tables: Tables | None) -> Generator[A
         ) from error
 
 
-def _check_columns(path: Path, came: Any, name: Name | None, tables: Tables | None) -> None:
-    both = [base_tables(executed=executed) for executed in (False, True)]
-    kinds = both if tables is None else [tables]
-    known = [
-        (each, schema_of(columns))
-        for kind in kinds
-        for each, columns in kind.items()
-        if name in (None, each)
-    ]
-    if any(came.names == one.names and came.types == one.types for _, one in known):
-        return
-    what = "column types" if any(came.names == one.names for _, one in known) else "columns"
-    named = " or ".join(dict.fromkeys(each for each, _ in known))
-    raise InputError(
-        f"{path}: expected the {what} of the table {named} in this version of graspproof, got "
-        "others; build the dataset again"
-    )
+def _check_columns(path: Path, came: Any, name: Name, tables: Tables) -> None:
+    wanted = schema_of(tables[name])
+    if came.names != wanted.names or came.types != wanted.types:
+        what = "column types" if came.names == wanted.names else "columns"
+        raise InputError(
+            f"{path}: expected the {what} of the table {name} in this version of graspproof, got "
+            "others; build the dataset again"
+        )
 
 
 def _check_size(path: Path, claimed: Any) -> None:
@@ -187,10 +169,6 @@ def _as_array(column: Column, rows: Sequence[Mapping[str, Any]]) -> NDArray[Any]
     return found.astype(np.int64 if column.kind == "int" else np.float64)
 
 
-def _key(name: Name, row: Mapping[str, Any]) -> tuple[Any, ...]:
-    return tuple(row[column] for column in KEYS[name])
-
-
 def _cell(value: Any) -> Any:
     """Replace every number that is not finite by None."""
     if isinstance(value, Sequence) and not isinstance(value, str):
@@ -212,3 +190,102 @@ def _field(column: Column) -> Any:
         kind = arrow.list_(kind, size)
     about = {"meaning": column.meaning} | ({"unit": column.unit} if column.unit else {})
     return arrow.field(column.name, kind, metadata=about)
+
+
+class TableFiles:
+    """Writes the files of all tables, one after another for each table and split.
+
+    Rows are kept back until there are enough for a group of rows, so memory does not grow. Use it
+    in a `with` block; at its end no file is open, whatever happens.
+    """
+
+    def __init__(self, folder: Path, about: Mapping[str, str], tables: Tables = TABLES) -> None:
+        self._folder, self._tables = folder, tables
+        self._about = dict(sorted(about.items()))
+        self._parts: dict[tuple[Name, str], _Part] = {}
+
+    def __enter__(self) -> "TableFiles":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for part in self._parts.values():
+            part.abandon()
+
+    def add(self, name: Name, split: str, paths: Iterable[Path]) -> None:
+        """Add the rows of some files; their keys must come after all that were added before."""
+        arrow, keys = pyarrow(), list(KEYS[name])
+        table = arrow.concat_tables([read_table(path, name, self._tables) for path in paths])
+        table = table.sort_by([(key, "ascending") for key in keys])
+        if table.group_by(keys).aggregate([]).num_rows < table.num_rows:
+            raise InputError(
+                f"table {name}: two rows have the same {' and '.join(keys)}; build the dataset "
+                "again into an empty folder"
+            )
+        if not table.num_rows:
+            return
+        part = self._parts.setdefault((name, split), _Part(self._folder / name, split))
+        part.add(table.replace_schema_metadata(self._about))
+
+    def close(self) -> list[tuple[Name, str, Path, int]]:
+        """Write the rows that still wait; list the files with table, split and number of rows."""
+        return [
+            (name, split, path, rows)
+            for (name, split), part in sorted(self._parts.items())
+            for path, rows in part.close()
+        ]
+
+
+class _Part:
+    """Writes the files of one table and split."""
+
+    def __init__(self, folder: Path, split: str) -> None:
+        self._folder, self._split = folder, split
+        self._waiting: list[Any] = []
+        self._writer: Any = None
+        self._stream: BinaryIO | None = None
+        self._rows: list[int] = []
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def add(self, table: Any) -> None:
+        self._waiting.append(table)
+        if sum(each.num_rows for each in self._waiting) >= GROUP_ROWS:
+            self._flush()
+
+    def close(self) -> list[tuple[Path, int]]:
+        if self._waiting:
+            self._flush()
+        self._end_file()
+        files = len(self._rows)
+        named = [self._folder / f"{self._split}-{i:05}-of-{files:05}.parquet" for i in range(files)]
+        return [
+            (self._path(i).rename(path), rows)
+            for i, (path, rows) in enumerate(zip(named, self._rows, strict=True))
+        ]
+
+    def _path(self, number: int) -> Path:
+        return self._folder / f".{self._split}-{number:05}"
+
+    def _flush(self) -> None:
+        table = pyarrow().concat_tables(self._waiting)
+        self._waiting.clear()
+        if self._writer is None:
+            path = self._path(len(self._rows))
+            self._stream = path.open("wb")
+            self._writer = pyarrow_parquet().ParquetWriter(self._stream, table.schema, **PAGES)
+            self._rows.append(0)
+        self._writer.write_table(table, row_group_size=table.num_rows)
+        self._rows[-1] += table.num_rows
+        if self._rows[-1] >= FILE_ROWS:
+            self._end_file()
+
+    def _end_file(self) -> None:
+        if self._writer is not None and self._stream is not None:
+            self._writer.close()
+            self._stream.close()
+            self._writer = self._stream = None
+
+    def abandon(self) -> None:
+        """Close the open file after a failure such as a full disk."""
+        if self._stream is not None:
+            with suppress(OSError):
+                self._stream.close()

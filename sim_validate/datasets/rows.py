@@ -1,7 +1,9 @@
-"""Turns verdicts into rows of a dataset: objects, grasps with negative controls, and trials."""
+"""Makes the row of an object, and chooses its split by the hash of its mesh."""
 
+import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -9,23 +11,20 @@ import numpy as np
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated
 from grasp_core.values import Contact, Grasp
-from sim_validate.datasets.columns import Name
-from sim_validate.datasets.execution_rows import (
+from sim_validate.datasets.figures import (
     Executed,
+    Figures,
     execution_cells,
     execution_rows,
     for_fingers,
 )
 from sim_validate.datasets.given_contacts import GivenGrasp
-from sim_validate.datasets.learning.figures import Figures, symmetry_cells
-from sim_validate.datasets.learning.variants import ratio_of
-from sim_validate.datasets.learning.varied import VARIED, Tried
-from sim_validate.datasets.object_rows import split_of
+from sim_validate.datasets.tables import SPLITS, Name, id_beginning
 from sim_validate.datasets.units import WorkUnit
-from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
-from sim_validate.validation.control_trials import ControlVerdict
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.datasets.varied import VARIED, Tried, ratio_of
+from sim_validate.simulation.traces import HoldVerdict, Outcome
+from sim_validate.validation.controls import ControlVerdict
+from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 Row: TypeAlias = Mapping[str, Any]
 Rows: TypeAlias = Mapping[Name, tuple[Row, ...]]
@@ -36,13 +35,31 @@ GIVEN = "given"
 NOT_TRIED = "not_tried"
 """Outcome of given grasps that cannot be simulated: their `note` says why, and no cell claims
 anything else about them."""
-SHORT = 16
-"""Number of digits of an object's hash in the names of its grasps."""
 
 
-def id_beginning(object_id: str, friction: float) -> str:
-    """Return the first part of the names of all grasps of one object at one friction."""
-    return f"{object_id[:SHORT]}-{friction}-"
+def split_of(object_id: str, seed: int) -> str:
+    """Choose the split of an object by its hash, so that adding objects moves no other object."""
+    digest = hashlib.sha256(f"{seed} {object_id}".encode()).digest()
+    share = int.from_bytes(digest[:8], "big") / 2.0**64
+    return next(name for name, upto in SPLITS if share < upto)
+
+
+def object_row(body: Polyhedron, unit: WorkUnit) -> Mapping[str, Any]:
+    """Make the row of a unit's object."""
+    return {
+        "object_id": body.content_sha256,
+        "source_name": Path(unit.object).name,
+        "source_sha256": unit.source_sha256,
+        "split": split_of(body.content_sha256, unit.config.seed),
+        "vertices": len(body.vertices),
+        "triangles": len(body.triangles),
+        "faces": len(body.faces),
+        "curved": body.patches is not None,
+        "volume_m3": body.volume,
+        "volume_source": body.surface.volume_source,
+        "radius_m": body.radius,
+        "center_of_mass_m": body.center_of_mass.tolist(),
+    }
 
 
 @dataclass(slots=True)
@@ -218,12 +235,6 @@ class GraspRows:
             return None
         return Figures(config.learning, config.execution, config.seed)
 
-    def add_symmetries(self, grasps: Sequence[Grasp]) -> None:
-        """Add to the rows of planned grasps which are the same by symmetry of the object."""
-        names = [self.name(grasp.id) for grasp in grasps]
-        cells = dict(zip(names, symmetry_cells(self.body, grasps, names), strict=True))
-        self.grasps = [{**row, **cells.get(row["grasp_id"], {})} for row in self.grasps]
-
     def name(self, grasp: str) -> str:
         """Return the name of a grasp, which no other grasp of the dataset has."""
         return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
@@ -244,7 +255,7 @@ class GraspRows:
             "contacts": len(listed),
             "contact_points_m": for_fingers([c.position.tolist() for c in listed], [None] * 3),
             "contact_normals": for_fingers([c.normal.tolist() for c in listed], [None] * 3),
-            **({} if figures is None else figures.of_contacts(self.body, listed, friction)),
+            **({} if figures is None else figures.of_contacts(self.body, listed)),
         }
 
     def _add_trials(

@@ -17,16 +17,12 @@ from types import MappingProxyType
 
 from grasp_core.errors import GraspError, InputError
 from grasp_core.mesh_files.reading import FORMATS
-from grasp_core.objects.build import MeshChoices
-from grasp_core.objects.face import FaceKind
-from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron, polyhedron_from_mesh
+from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.provenance import versions
 from scenes.example_objects import example_object
-from sim_validate.datasets.config import CREDITS, DatasetConfig
+from sim_validate.datasets.config import CREDITS, LEARNING, DatasetConfig, learning_table
 from sim_validate.datasets.given_contacts import GivenGrasp, given_sha256, read_given
-from sim_validate.datasets.learning.settings import TABLE as LEARNING
-from sim_validate.datasets.learning.settings import learning_table
-from sim_validate.execution.asked import TABLE, execution_table
+from sim_validate.execution.settings import TABLE, execution_table
 
 CHUNK = 2**20
 PART = 25
@@ -114,10 +110,7 @@ def units_of(config: DatasetConfig) -> list[WorkUnit]:
 
 def of_unit(config: DatasetConfig, name: str, friction: float) -> DatasetConfig:
     """Return the settings of one unit, whose size does not grow with the number of objects."""
-    learning = config.learning
-    if learning is not None:
-        learning = learning.of_object(name, config.lengths_of(name)[1])
-    return replace(config, objects=(name,), frictions=(friction,), learning=learning)
+    return replace(config, objects=(name,), frictions=(friction,))
 
 
 def _parts(config: DatasetConfig) -> list[tuple[GivenGrasp, ...]]:
@@ -130,9 +123,9 @@ def _parts(config: DatasetConfig) -> list[tuple[GivenGrasp, ...]]:
 
 def body_of(unit: WorkUnit) -> Polyhedron:
     """Load the object of a unit."""
-    length, scale = unit.config.lengths_of(unit.object)
+    config = unit.config
     if unit.path is None:
-        return _scaled(example_object(unit.object), scale, unit.config.faces)
+        return example_object(unit.object)
     if not unit.path.is_file():
         raise WorkerError(
             f"{unit.path}: a worker process cannot find this mesh; all processes must share a "
@@ -142,20 +135,7 @@ def body_of(unit: WorkUnit) -> Polyhedron:
         raise WorkerError(
             f"{unit.path}: this mesh has changed since the build began; start the build again"
         )
-    return load_polyhedron(unit.path, unit=length, scale=scale, faces=unit.config.faces)
-
-
-def _scaled(body: Polyhedron, scale: float, faces: FaceKind) -> Polyhedron:
-    """Return a built-in object at the scale that is asked for."""
-    if scale == 1.0:
-        return body
-    return polyhedron_from_mesh(
-        body.vertices * scale,
-        body.triangles,
-        MeshChoices(faces),
-        name=body.name,
-        source_sha256=body.source_sha256,
-    )
+    return load_polyhedron(unit.path, unit=config.unit, scale=config.scale, faces=config.faces)
 
 
 def is_mesh_file(name: str) -> bool:

@@ -16,12 +16,12 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
+from scenes.execution.held import hinged, rotations
 from scenes.execution.held_mjcf import SAMPLE_S, HeldScene, palm_armature
-from scenes.execution.turns import hinged, rotations
 from scenes.mjcf_text import quaternion
-from sim_validate.execution.drives import Drive, Table
-from sim_validate.execution.paths import WHOLE
-from sim_validate.simulation.engine import batch, compiled, mujoco, step, touched, unlogged
+from scenes.silent_mujoco import unlogged
+from sim_validate.execution.paths import WHOLE, Drive, Table
+from sim_validate.simulation.bench import batch, compiled, faults, mujoco, step, touched
 
 FREE, PALM = 6, 12
 """Joint velocities up to the end of the object's, and up to the end of the palm's."""
@@ -104,10 +104,7 @@ class HeldBench:
         self, scene: HeldScene, *, threads: int = 1, sample_s: float = SAMPLE_S,
         lost_m: float = math.inf, step_s: float | None = None,
     ) -> None:  # fmt: skip
-        """Compile a scene.
-
-        Takes `sample_s`, `step_s` [s]; `lost_m` [m].
-        """
+        """Compile a scene."""
         self.scene, self.threads, self.lost_m = scene, threads, lost_m
         self.model = compiled(scene.xml)
         if step_s is None:
@@ -228,7 +225,7 @@ class HeldBench:
         return tuple(
             self._motion(
                 moved[trial, :length], speeds[trial, :length], forces[trial, :length],
-                states[trial, :length], _faults(trials, trial, errors.get(trial, "")),
+                states[trial, :length], faults(trials, trial, errors.get(trial, "")),
             )
             for trial, length in enumerate(lengths)
         )  # fmt: skip
@@ -294,13 +291,3 @@ def facing(table: Table) -> Array:
     first = np.cross(aside, normal)
     first /= np.linalg.norm(first)
     return np.column_stack([first, np.cross(normal, first), normal])
-
-
-def _faults(trials: batch.Batch, trial: int, error: str) -> tuple[str, ...]:
-    found = [error] if error else []
-    if not np.isfinite(trials.state[trial]).all():
-        found.append("a number of the simulator's state is not finite")
-    warnings = int(trials.warning[trial, :, 1].sum())
-    if warnings:
-        found.append(f"the simulator raised {warnings} warnings")
-    return tuple(found)

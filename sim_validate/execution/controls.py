@@ -20,17 +20,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.wrenches import grasp_map
+from grasp_core.closure.contacts import grasp_map
 from grasp_core.errors import InputError, SolverError
-from grasp_core.execution.best_squeeze import BestSqueeze
 from grasp_core.execution.first_slip import first_slip
 from grasp_core.execution.grips import Grip
+from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.execution.worst_loads import Reactions
 from grasp_core.solvers.ties import first_best
 from scenes.execution.held import HeldLayout
 from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench, HeldMotion
-from sim_validate.execution.drives import Drive, joined
+from sim_validate.execution.paths import Drive, joined
 from sim_validate.execution.slips import SLID, outcome, seen, slides
 from sim_validate.execution.verdict import ExecutionControl
 

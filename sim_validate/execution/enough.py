@@ -17,8 +17,8 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError, NoForcesError, SolverError
-from grasp_core.execution.best_squeeze import BestSqueeze
 from grasp_core.execution.loads import GRAVITY_M_PER_S2, LoadSet, any_direction
+from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from scenes.execution.held import HeldLayout

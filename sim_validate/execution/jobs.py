@@ -1,19 +1,27 @@
-"""Executes several grasps of one object, in one process or in several, with results in order."""
+"""Executes several grasps of one object, in one process or in several, and films their trials."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
-from grasp_core.by_value import ByValue
-from grasp_core.closure.contact_arrays import contacts_sha256
+import numpy as np
+
+from grasp_core.checked import one_of
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import NoForcesError
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.solvers.ties import first_best
 from grasp_core.values import Grasp
+from scenes.drawing.clips import RATE, write_held_clip
+from scenes.execution.held_mjcf import SAMPLE_S
+from scenes.mjcf_text import quaternion
 from scenes.physics import PhysicsSettings
-from sim_validate.execution.enough import Enough, NoSqueezeError
-from sim_validate.execution.execute import chosen_squeeze, execute, held_scene
+from sim_validate.execution.bench import HeldBench, facing
+from sim_validate.execution.enough import NoSqueezeError
+from sim_validate.execution.execute import chosen_squeeze, execute, held_scene, run_trials
+from sim_validate.execution.predictions import held_dynamics
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.execution.verdict import Execution, ExecutionTrial
+from sim_validate.execution.trials import trials_of
+from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
 from sim_validate.parallel.processes import each, processes
 
 
@@ -30,56 +38,6 @@ class ExecutionJob:
     threads: int = 1
     enough: bool = True
     """Whether to find the push that would be enough where the object is lost."""
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ExecutedGrasp(ByValue):
-    """A grasp with what its execution found, or with the reason why no squeeze holds the object."""
-
-    id: str
-    family: str
-    contacts_sha256: str
-    """Hash of the contacts, which tells grasps of one id apart."""
-    execution: Execution | None
-    """Trials and negative controls; None where no squeeze carries the weight."""
-    reason: str | None = None
-    """Why there is no execution: no squeeze carries the weight, or the best one is unstable."""
-    enough: Enough | None = None
-    """The push, and stiffness, that would be enough for the trials, as in `Execution.enough`."""
-
-    @property
-    def survived(self) -> bool:
-        """Whether the object survived every trial, of at least one."""
-        return self.execution is not None and self.execution.survived
-
-    @property
-    def trials(self) -> tuple[ExecutionTrial, ...]:
-        """The trials of the execution; empty where no squeeze holds the object."""
-        return () if self.execution is None else self.execution.trials
-
-    @property
-    def least_predicted_loss(self) -> float:
-        """Least multiple of a trial's load at which the object is lost, predicted.
-
-        It is 0 where no squeeze holds the object, or no trial is possible.
-        """
-        return 0.0 if self.execution is None else self.execution.least_predicted_loss
-
-    @property
-    def controls_let_go(self) -> bool:
-        """Whether every negative control slipped, as it must; True where there is none."""
-        return self.execution is None or self.execution.controls_let_go
-
-
-def best_executed(grasps: Iterable[ExecutedGrasp]) -> ExecutedGrasp | None:
-    """Return the grasp with the largest of the least predicted losses among those that survived.
-
-    A grasp whose negative control held does not count. Of equal ones the first is taken; None if
-    no grasp survived.
-    """
-    kept = [grasp for grasp in grasps if grasp.survived and grasp.controls_let_go]
-    losses = [grasp.least_predicted_loss for grasp in kept]
-    return kept[first_best(losses)] if kept else None
 
 
 def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[ExecutedGrasp]:
@@ -122,3 +80,48 @@ def physics_of(job: ExecutionJob) -> PhysicsSettings | None:
     except NoForcesError:
         return None
     return replace(held_scene(job.body, best.grip, job.settings).physics, **job.physics)
+
+
+FRAMES = 60
+"""Least number of frames of a clip, 2.4 s: shorter motions are slowed down by a whole number."""
+VISIBLE_M = 1e-4
+"""Least slip that is worth a clip, about a pixel of its picture [m]."""
+
+
+def worth_seeing(found: Execution) -> tuple[ExecutionTrial, ...]:
+    """Choose the trials to film: the lift, the worst shake, and the worst slip that can be seen.
+
+    Shakes that slip before they differ are ordered by their predictions.
+    """
+    shakes = sorted(
+        found.of_kind("shake"),
+        key=lambda each: (each.survived, each.simulated_first_slip, each.predicted_first_slip),
+    )
+    slips = [
+        each for each in found.trials
+        if each.dropped or (each.fate == "slipped" and each.slip_m >= VISIBLE_M)
+    ]  # fmt: skip
+    slips.sort(key=lambda each: (not each.dropped, -each.slip_m))
+    chosen = [*found.of_kind("lift")[:1], *shakes[:1], *slips[:1]]
+    return tuple({trial.name: trial for trial in chosen}.values())
+
+
+def film(job: ExecutionJob, name: str, path: Path) -> Path:
+    """Simulate one trial of an execution again and draw it."""
+    body, settings = job.body, job.settings
+    best = chosen_squeeze(body, job.grasp, job.friction, settings)
+    scene = held_scene(body, best.grip, settings, physics_of(job))
+    dynamics = held_dynamics(best.grip, scene.layout)
+    trials, _ = trials_of(body, scene.layout, settings, dynamics.lowest_frequency)
+    named = {trial.name: trial for trial in trials}
+    one_of(name, tuple(named), "name")
+    (motion,) = run_trials(HeldBench(scene), [named[name]])
+    stride = max(1, min(round(1.0 / (RATE * SAMPLE_S)), len(motion.moved) // FRAMES))
+    slowed = 1.0 / (RATE * SAMPLE_S * stride)
+    caption = name if slowed <= 1.0 else f"{name}, {slowed:.1f} times slower"
+    table, gravity = named[name].drive.table, scene.layout.gravity
+    up = -gravity / np.linalg.norm(gravity) if table is None else table.normal
+    return write_held_clip(
+        scene, motion.joints[::stride], path, caption, up=up,
+        table=None if table is None else (table.point, quaternion(facing(table))),
+    )  # fmt: skip

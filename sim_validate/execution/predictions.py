@@ -39,14 +39,14 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.closure.wrenches import cross_matrix, grasp_map
+from grasp_core.closure.contacts import cross_matrix, grasp_map
 from grasp_core.execution.beyond_slip import loss_multiples
 from grasp_core.execution.first_slip import slip_steps
 from grasp_core.execution.grips import Grip
 from grasp_core.solvers.ties import first_best
 from scenes.execution.held import HeldLayout
 from scenes.execution.held_mjcf import SAMPLE_S
-from sim_validate.execution.drives import Drive
+from sim_validate.execution.paths import Drive
 
 POSE = 6
 

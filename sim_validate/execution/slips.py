@@ -27,10 +27,9 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, cross
 from grasp_core.execution.first_slip import slip_steps
-from scenes.execution.held import HeldLayout
-from scenes.execution.turns import hinged, rotations
+from scenes.execution.held import HeldLayout, hinged, rotations
 from sim_validate.execution.bench import HeldMotion
-from sim_validate.execution.drives import Drive
+from sim_validate.execution.paths import Drive
 
 ON_CONE = 0.9995
 """Tangential force, relative to friction times normal force, at which a contact counts as on its

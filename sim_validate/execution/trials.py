@@ -1,19 +1,178 @@
-"""Which trials an execution consists of, and what each applies."""
+"""Which trials an execution consists of, what each applies, and where object and fingertips are.
 
+In `misplaced` the object is moved by a stated distance and turned by a stated angle, both in
+directions drawn by a seed. Each fingertip comes along its normal until it touches, as far behind
+its planned place as the object can have moved; one that meets nothing stops as far beyond it. From
+there the squeeze is commanded as planned. A fingertip advances by its distance from the surface
+less its radius, so it never passes the first point that it meets (sphere tracing, Hart 1996).
+
+In `lift` the object rests on a table, on a face of its convex hull that carries its centre of mass:
+the centre, dropped onto the face, lies inside. An object that is thrown and settles without sliding
+comes to rest on a face about as often as the solid angle says under which the centre of mass sees
+the face, so faces are tried in this order.
+"""
+
+import importlib
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from grasp_core.arrays import Array, Indices, to_digits
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from grasp_core.geometry.nearest_points import nearest_on_surface
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.execution.held import HeldLayout
+from grasp_core.solvers.ties import largest_first
+from scenes.execution.held import TOUCH, HeldLayout, rotations
+from scenes.mjcf_text import quaternion
 from sim_validate.execution import paths
-from sim_validate.execution.drives import Drive, Table, joined
-from sim_validate.execution.misplaced import met, misplacements
-from sim_validate.execution.resting import resting
+from sim_validate.execution.paths import Drive, Pose, Table, joined
 from sim_validate.execution.settings import ExecutionSettings, TrialKind
+
+MET = 1e-7
+"""Distance from the surface at which a fingertip has met it, in object radii."""
+MOST_STEPS = 100
+"""Advances after which a fingertip stops: beside a surface that it nearly grazes they are tiny."""
+ROOM = 1.5
+"""Distance from which fingertips come, relative to how far points of the object can have moved."""
+
+
+def misplacements(layout: HeldLayout, off_m: float, off_rad: float, count: int, seed: int) -> tuple[
+    Pose, ...
+]:  # fmt: skip
+    """Draw poses of the object that are off by a distance and an angle, in random directions."""
+    rng = np.random.default_rng(seed)
+    ways = rng.normal(size=(count, 2, 3))
+    ways /= np.linalg.norm(ways, axis=2, keepdims=True)
+    poses = list[Pose]()
+    for way, axis in ways:
+        turn = np.concatenate([[math.cos(0.5 * off_rad)], math.sin(0.5 * off_rad) * axis])
+        turned = rotations(to_digits(turn / np.linalg.norm(turn))[None])[0]
+        poses.append(Pose(to_digits(off_m * way, layout.radius_m), quaternion(turned)))
+    return tuple(poses)
+
+
+def met(layout: HeldLayout, poses: tuple[Pose, ...], off_m: float, off_rad: float) -> Array:
+    """Return how far each fingertip is from its planned place when it stops, (poses, k, 3) [m].
+
+    The displacements are along the axes of the springs.
+    """
+    ways = layout.frames[:, :, 0]
+    room = ROOM * (off_m + off_rad * layout.radius_m)
+    starts = layout.tip_centers - room * ways
+    turned = np.array([rotations(pose.quaternion[None])[0] for pose in poses])
+    moved = np.array([pose.moved for pose in poses])
+    starts = np.einsum("pji,pkj->pki", turned, starts[None] - moved[:, None])
+    ways = np.einsum("pji,kj->pki", turned, ways)
+    radii = layout.tip_radius_m - TOUCH * layout.radius_m
+    gone = np.zeros(starts.shape[:2])
+    middles = starts + room * ways
+    near = [_near(layout, middles[:, finger], room) for finger in range(len(radii))]
+    for _ in range(MOST_STEPS):
+        centers = starts + gone[..., None] * ways
+        nearest = np.stack(
+            [
+                nearest_on_surface(layout.vertices, triangles, centers[:, finger])
+                for finger, triangles in enumerate(near)
+            ],
+            axis=1,
+        )
+        gaps = np.linalg.norm(nearest - centers, axis=2) - radii
+        open_ = (gaps > MET * layout.radius_m) & (gone < 2.0 * room)
+        if not open_.any():
+            break
+        gone = np.where(open_, np.minimum(gone + gaps, 2.0 * room), gone)
+    back = (to_digits(gone, layout.radius_m) - room)[..., None] * layout.frames[:, :, 0]
+    return np.einsum("kij,pki->pkj", layout.axes, back)
+
+
+def _near(layout: HeldLayout, middles: Array, room: float) -> Indices:
+    """Return the triangles, (t, 3), that can be the nearest to a point within `room` of others.
+
+    If the surface is at a distance d from a middle, it is at most d + room from such a point, so
+    that a triangle farther than d + 2 room from the middle is not the nearest.
+    """
+    corners = layout.vertices[layout.triangles]
+    nearest = nearest_on_surface(layout.vertices, layout.triangles, middles)
+    reach = np.linalg.norm(nearest - middles, axis=1) + 2.0 * room + MET * layout.radius_m
+    centers = corners.mean(axis=1)
+    extents = np.linalg.norm(corners - centers[:, None], axis=2).max(axis=1)
+    distances = np.linalg.norm(centers - middles[:, None], axis=2) - extents
+    return layout.triangles[(distances <= reach[:, None]).any(axis=0)]
+
+
+FLAT = 1e-6
+"""Difference of normals, and of offsets in object radii, up to which facets are one face."""
+CLEAR = 0.01
+"""Least gap between fingertips and the table, in object radii."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rest:
+    """A face of the convex hull on which the object can rest."""
+
+    down: Array
+    """Unit normal out of the object, (3,)."""
+    height: float
+    """Distance of the centre of mass from the table [m]."""
+    likelihood: float
+    """Share of the sphere that the face takes, as the centre of mass sees it."""
+
+
+def rests(body: Polyhedron) -> tuple[Rest, ...]:
+    """Return the faces on which an object can rest, the likeliest first."""
+    spatial: Any = importlib.import_module("scipy.spatial")
+    points = (body.vertices - body.center_of_mass) / body.radius
+    hull = spatial.ConvexHull(points)
+    normals, offsets = hull.equations[:, :3], -hull.equations[:, 3]
+    left = set(range(len(normals)))
+    found = list[Rest]()
+    for first in range(len(normals)):
+        if first not in left:
+            continue
+        alike = (np.abs(normals - normals[first]).max(axis=1) <= FLAT) & (
+            np.abs(offsets - offsets[first]) <= FLAT
+        )
+        own = [facet for facet in np.flatnonzero(alike) if facet in left]
+        left -= set(own)
+        triangles = points[hull.simplices[own]]
+        if _carries(triangles, normals[first]):
+            share = float(sum(_solid_angle(corners) for corners in triangles) / (4.0 * np.pi))
+            found.append(Rest(normals[first], float(offsets[first]) * body.radius, share))
+    order = largest_first([rest.likelihood for rest in found])
+    return tuple(found[place] for place in order)
+
+
+def resting(body: Polyhedron, tips: Array, radii: Array) -> Rest | None:
+    """Return the likeliest rest in which no fingertip meets the table; None if there is none.
+
+    Takes `tips` (k, 3) [m]; `radii` (k,) [m].
+    """
+    for rest in rests(body):
+        if (tips @ rest.down + radii).max() <= rest.height - CLEAR * body.radius:
+            return rest
+    return None
+
+
+def _carries(triangles: Array, normal: Array) -> bool:
+    """Return whether the origin, dropped along a normal, falls into one of the triangles."""
+    return any(_is_inside(corners, normal) for corners in triangles)
+
+
+def _is_inside(corners: Array, normal: Array) -> bool:
+    sides = np.cross(np.roll(corners, -1, axis=0) - corners, -corners) @ normal
+    return bool((sides >= 0.0).all() or (sides <= 0.0).all())
+
+
+def _solid_angle(corners: Array) -> float:
+    """Return the solid angle of a triangle seen from the origin (Van Oosterom & Strackee 1983)."""
+    a, b, c = corners
+    x, y, z = np.linalg.norm(corners, axis=1)
+    along = x * y * z + (a @ b) * z + (b @ c) * x + (c @ a) * y
+    return float(abs(2.0 * np.arctan2(a @ np.cross(b, c), along)))
+
 
 AXES = ("x", "y", "z")
 SIDES = tuple((sign, axis) for axis in range(3) for sign in (1.0, -1.0))

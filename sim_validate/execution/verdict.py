@@ -1,12 +1,14 @@
 """What an execution found: each trial with its outcome and prediction, and whether all survived."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from grasp_core.errors import InputError
+from grasp_core.solvers.ties import first_best
 from scenes.physics import PhysicsSettings
 from sim_validate.execution.enough import Enough
 from sim_validate.execution.settings import ExecutionSettings, TrialKind
@@ -135,6 +137,56 @@ class Execution(ByValue):
         """Return how many trials of a kind the object survived, and of how many."""
         own = self.of_kind(kind)
         return sum(trial.survived for trial in own), len(own)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ExecutedGrasp(ByValue):
+    """A grasp with what its execution found, or with the reason why no squeeze holds the object."""
+
+    id: str
+    family: str
+    contacts_sha256: str
+    """Hash of the contacts, which tells grasps of one id apart."""
+    execution: Execution | None
+    """Trials and negative controls; None where no squeeze carries the weight."""
+    reason: str | None = None
+    """Why there is no execution: no squeeze carries the weight, or the best one is unstable."""
+    enough: Enough | None = None
+    """The push, and stiffness, that would be enough for the trials, as in `Execution.enough`."""
+
+    @property
+    def survived(self) -> bool:
+        """Whether the object survived every trial, of at least one."""
+        return self.execution is not None and self.execution.survived
+
+    @property
+    def trials(self) -> tuple[ExecutionTrial, ...]:
+        """The trials of the execution; empty where no squeeze holds the object."""
+        return () if self.execution is None else self.execution.trials
+
+    @property
+    def least_predicted_loss(self) -> float:
+        """Least multiple of a trial's load at which the object is lost, predicted.
+
+        It is 0 where no squeeze holds the object, or no trial is possible.
+        """
+        return 0.0 if self.execution is None else self.execution.least_predicted_loss
+
+    @property
+    def controls_let_go(self) -> bool:
+        """Whether every negative control slipped, as it must; True where there is none."""
+        return self.execution is None or self.execution.controls_let_go
+
+
+def best_executed(grasps: Iterable[ExecutedGrasp]) -> ExecutedGrasp | None:
+    """Return the grasp with the largest of the least predicted losses among those that survived.
+
+    A grasp whose negative control held does not count. Of equal ones the first is taken; None if
+    no grasp survived.
+    """
+    kept = [grasp for grasp in grasps if grasp.survived and grasp.controls_let_go]
+    losses = [grasp.least_predicted_loss for grasp in kept]
+    return kept[first_best(losses)] if kept else None
 
 
 def ended(trial: ExecutionTrial, settings: ExecutionSettings | None = None) -> str:

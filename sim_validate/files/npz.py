@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
-from grasp_core.files.strict_json import shown
+from grasp_core.files.json_text import shown
 from grasp_core.files.text_files import read_bytes
 
 MOST_BYTES = 256 * 2**20

@@ -3,7 +3,7 @@
 from pathlib import Path, PurePosixPath
 
 from grasp_core.errors import InputError
-from grasp_core.files.strict_json import shown
+from grasp_core.files.json_text import shown
 
 LONGEST = 500
 """Largest number of characters of a path in a file."""

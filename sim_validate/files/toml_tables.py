@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError
-from grasp_core.files.strict_json import DEEPEST, check_values
+from grasp_core.files.json_text import DEEPEST, check_values
 from grasp_core.files.text_files import read_text
 
 MOST_LETTERS = 2**20

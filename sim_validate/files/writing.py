@@ -15,12 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
-from grasp_core.files.whole_files import SHOWN, UNFINISHED, write_parts
-
-
-def write_bytes(path: Path, data: bytes) -> Path:
-    """Write bytes by renaming a complete file into place; folders are made as needed."""
-    return write_parts(path, [data])
+from grasp_core.files.text_files import SHOWN, UNFINISHED, write_parts
 
 
 def write_lines(path: Path, lines: Iterable[str]) -> Path:

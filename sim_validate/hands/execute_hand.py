@@ -1,32 +1,35 @@
-"""Executes a grasp with a hand: the trials of `execute` on real chains of joints with servos.
+"""Executes grasps with a hand: the trials of `execute` on real chains of joints with servos.
 
 The squeeze is the best one for fingertips on the springs that the servos amount to, within the
 torques of the motors (see `scenes.hands.held_hand`). Servos are told its torques once, and nothing
-is replanned. Palm and links touch the object where it comes to them.
+is replanned. Palm and links touch the object where it comes to them. Many grasps are executed, or
+tested by `validate_hand`, in one process or in several.
 """
 
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from grasp_core.checked import instance, switch, whole
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, NoForcesError
-from grasp_core.execution.best_squeeze import BestSqueeze, searched
+from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.grips import unsqueezed
 from grasp_core.execution.loads import LoadSet, any_direction
+from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_grips import hand_grip
-from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import stance_of
+from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.execution.held_mjcf import HeldScene
-from scenes.hands.held_hand import finger_springs, servo_stiffness, strong_motors
-from scenes.hands.held_hand_mjcf import held_hand_scene
+from scenes.hands.held_hand import finger_springs, held_hand_scene, servo_stiffness, strong_motors
+from sim_validate.execution.enough import Enough, NoSqueezeError
 from sim_validate.execution.execute import executed, surface_reach
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import Execution
-from sim_validate.hands.validate_hand import MOST_PUSH_N
-from sim_validate.simulation.setup import MOST_THREADS
+from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict, validate_hand
+from sim_validate.parallel.processes import each
+from sim_validate.simulation.setup import MOST_THREADS, Agenda
 
 
 def execute_hand(
@@ -87,10 +90,7 @@ def execute_hand(
 
 
 def hand_execution_settings(mass_kg: float) -> ExecutionSettings:
-    """Return the usual settings for hands, in which motors alone limit how hard fingers push.
-
-    Takes `mass_kg` [kg].
-    """
+    """Return the usual settings for hands, in which motors alone limit how hard fingers push."""
     return ExecutionSettings(mass_kg=mass_kg, push_n=MOST_PUSH_N)
 
 
@@ -122,3 +122,72 @@ def hand_squeeze(
             "direction; use stronger motors, another pose, or more friction"
         )
     return best
+
+
+@dataclass(frozen=True, slots=True)
+class HandJob:
+    """One pose to test, as it is sent to a worker process."""
+
+    hand: Hand
+    body: Polyhedron
+    reach: HandReach
+    friction: float
+    settings: ExecutionSettings | None = None
+    """How to execute the grasp; None where it is only to hold test wrenches."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExecutedHand:
+    """What came of executing one grasp with a hand."""
+
+    grasp: str
+    execution: Execution | None
+    """The trials; None where the grasp cannot be executed."""
+    refused: str = ""
+    """Why the grasp cannot be executed; empty if it was."""
+    enough: Enough | None = None
+    """The push, and stiffness, that would be enough for the trials, as in `Execution.enough`."""
+
+    @property
+    def survived(self) -> bool:
+        """Return whether the object survived every trial."""
+        return self.execution is not None and self.execution.survived
+
+    @property
+    def least_predicted_loss(self) -> float:
+        """Return the least multiple of a trial's load at which the object is predicted to be lost.
+
+        It is zero where the grasp cannot be executed.
+        """
+        return 0.0 if self.execution is None else self.execution.least_predicted_loss
+
+    @property
+    def good(self) -> bool:
+        """Return whether the object survived every trial, and every control slipped."""
+        return self.survived and self.execution is not None and self.execution.controls_let_go
+
+
+def held_by_hands(jobs: Sequence[HandJob], processes: int) -> Iterator[HandVerdict]:
+    """Yield one verdict per job, in order; the number of processes does not change the results."""
+    yield from each(held_by_hand, jobs, jobs=processes)
+
+
+def held_by_hand(job: HandJob) -> HandVerdict:
+    """Test one pose with the usual wrenches and controls."""
+    agenda = Agenda(critical_friction=False)
+    return validate_hand(job.hand, job.body, job.reach, job.friction, agenda=agenda)
+
+
+def executed_by_hands(jobs: Sequence[HandJob], processes: int) -> Iterator[ExecutedHand]:
+    """Yield one result per job, in order; the number of processes does not change the results."""
+    yield from each(executed_by_hand, jobs, jobs=processes)
+
+
+def executed_by_hand(job: HandJob) -> ExecutedHand:
+    """Execute one grasp with the settings of its job."""
+    try:
+        found = execute_hand(job.hand, job.body, job.reach, job.friction, job.settings)
+    except (InputError, NoForcesError) as error:
+        answer = error.enough if isinstance(error, NoSqueezeError) else None
+        return ExecutedHand(job.reach.grasp, None, str(error), answer)
+    return ExecutedHand(job.reach.grasp, found, enough=found.enough)

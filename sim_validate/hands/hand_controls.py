@@ -16,7 +16,7 @@ from grasp_core.by_value import ByValue
 from grasp_core.checked import SMALLEST
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
-from grasp_core.quality.wrench_limit import WrenchLimit, limit_of
+from grasp_core.quality.wrench_limits import WrenchLimit, limit_of
 from grasp_core.values import Contact
 from sim_validate.simulation.loads import PlannedLoad, resisted_by
 from sim_validate.simulation.setup import Setup

@@ -27,17 +27,17 @@ from grasp_core.errors import UnfaithfulError
 from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.quality.wrench_limit import limit_of
+from grasp_core.quality.wrench_limits import limit_of
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
-from scenes.hands.hand_mjcf import HandScene, build_hand_scene, limited
-from sim_validate.simulation.gate.case import Check
+from scenes.hands.hand_scene import HandScene, build_hand_scene, limited
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.known_cases import Check
+from sim_validate.simulation.limits import ramped_limits
 from sim_validate.simulation.loads import resisted_by
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.simulate import Bench
-from sim_validate.simulation.wrench_limits import ramped_limits
 
 HALF, HEIGHT, TIP, TORQUE = 0.03, 0.08, 0.01, 0.35
 """Half-width of the cube, height of the hinges over the contacts, radius of the fingertips [m], and

@@ -7,37 +7,110 @@ limits are found in simulation too. Controls are the same hand with one thing ch
 makes it let go.
 """
 
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import instance
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import stance_of
+from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
 from scenes.fingertips import FingerSettings
-from scenes.hands.hand_mjcf import HandScene, build_hand_scene, hand_physics, limited
+from scenes.hands.hand_scene import HandScene, build_hand_scene, hand_physics, limited
 from sim_validate.hands.hand_controls import HandCase, HandControl, hand_controls
 from sim_validate.hands.hand_gate import require_faithful_hands
-from sim_validate.hands.hand_verdict import HandControlVerdict, HandVerdict
-from sim_validate.simulation.gate.gate import require_faithful
-from sim_validate.simulation.hold_verdict import judge
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.gate import require_faithful
+from sim_validate.simulation.known_cases import Check
+from sim_validate.simulation.limits import SimulatedLimit, bisected_limits, part, ramped_limits
 from sim_validate.simulation.loads import planned_loads
 from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import WEAKEST, Agenda, Setup
-from sim_validate.simulation.simulate import Bench
-from sim_validate.simulation.wrench_limits import (
-    SimulatedLimit,
-    bisected_limits,
-    part,
-    ramped_limits,
-)
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.simulation.traces import LET_GO, HoldVerdict, Outcome, judge
+from sim_validate.validation.verdict import WrenchVerdict
 
 MOST_PUSH_N = 100.0
 """Largest normal force of a fingertip in predictions, unless stated [N]: more than hands' motors
 give, so that they are what limits."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class HandControlVerdict(ByValue):
+    """How a negative control of a hand ended in simulation."""
+
+    control: HandControl
+    hold: HoldVerdict
+
+    @property
+    def let_go(self) -> bool:
+        """Return whether the object moved, as it must."""
+        return self.hold.outcome in LET_GO
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class HandVerdict(ByValue):
+    """The result of simulating a hand in a grasp: what it held, and whether that was predicted."""
+
+    hand: str
+    """Name of the hand."""
+    grasp: str
+    """Id of the grasp."""
+    friction: float
+    wrenches: tuple[WrenchVerdict, ...]
+    controls: tuple[HandControlVerdict, ...]
+    checks: tuple[Check, ...]
+    """Cases with known answers on which the simulator was checked first."""
+    scene: HandScene
+    setup: Setup
+    agenda: Agenda
+
+    @property
+    def failures(self) -> tuple[WrenchVerdict, ...]:
+        """Return the wrenches that were not held, in order."""
+        return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
+
+    @property
+    def held(self) -> bool:
+        """Return whether every wrench held."""
+        return not self.failures
+
+    @property
+    def weakest_n(self) -> float:
+        """Return the size of the weakest wrench that was found, at its predicted limit [N].
+
+        Torques count over the object's radius.
+        """
+        trial = next(each for each in self.wrenches if each.name == WEAKEST)
+        scale = np.array([1.0] * 3 + [self.scene.layout.radius_m] * 3)
+        return trial.predicted_limit * float(np.linalg.norm(trial.wrench / scale))
+
+    @property
+    def controls_let_go(self) -> bool:
+        """Return whether every negative control let go of the object, as it must."""
+        return all(control.let_go for control in self.controls)
+
+    @property
+    def mismatches(self) -> tuple[str, ...]:
+        """Return where simulation contradicts the analysis, one sentence each."""
+        found = [trial.contradiction for trial in self.wrenches if trial.contradiction]
+        if self.agenda.limits != "none":
+            found += [f"{trial.name}: the limit was not found near the predicted one"
+                      for trial in self.wrenches if trial.simulated_limit is None]  # fmt: skip
+        return tuple(found)
+
+    @property
+    def good(self) -> bool:
+        """Return whether wrenches held, controls let go, and nothing was contradicted."""
+        return self.held and self.controls_let_go and not self.mismatches
+
+    def __repr__(self) -> str:
+        told = "held" if self.held else f"{len(self.failures)} of {len(self.wrenches)} not held"
+        return summary("HandVerdict", self.hand, self.grasp, told)
 
 
 def hand_setup() -> Setup:

@@ -11,7 +11,7 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.regions.certificates import CertifiedRegions
-from grasp_core.regions.certify_regions import CONES, Balance, certify_regions
+from grasp_core.regions.certify_regions import CONES, certify_regions
 from grasp_core.values import Grasp
 from sim_validate.parallel.processes import each
 
@@ -25,7 +25,6 @@ class Asked:
 
     friction: float
     reserve: float = 0.0
-    balance: Balance = "radius"
     recenter: bool = False
     clearance: float = 0.0
     max_cones: int = CONES
@@ -61,8 +60,8 @@ def _certify(task: _Task) -> CertifiedRegions | str:
         if not force_closure(grasp.positions, grasp.normals, left).closed:
             return f"not in force closure at friction {left:.6g}"
         proved = certify_regions(
-            task.body, grasp, asked.friction, reserve=asked.reserve, balance=asked.balance,
-            recenter=asked.recenter, clearance=asked.clearance, max_cones=asked.max_cones,
+            task.body, grasp, asked.friction, reserve=asked.reserve, recenter=asked.recenter,
+            clearance=asked.clearance, max_cones=asked.max_cones,
         )  # fmt: skip
     except (UndecidedError, SolverError) as error:
         return str(error)

@@ -72,7 +72,7 @@ def _best() -> None:
 
 
 def _clearance() -> None:
-    from scenes.execution.clearance import Surface
+    from scenes.execution.surface import Surface
 
     body = example_object("tetrahedron")
     corners = body.vertices[body.triangles]
@@ -80,15 +80,15 @@ def _clearance() -> None:
 
 
 def _hand_checks() -> None:
+    from grasp_core.hands.first_use import compile_checks
     from grasp_core.hands.named_hands import load_hand
-    from grasp_core.hands.posing.first_use import compile_checks
 
     compile_checks(load_hand("allegro"), example_object("tetrahedron"), 0)
 
 
 def _hand_posing() -> None:
+    from grasp_core.hands.first_use import compile_posing
     from grasp_core.hands.named_hands import load_hand
-    from grasp_core.hands.posing.first_use import compile_posing
 
     compile_posing(load_hand("allegro"), example_object("tetrahedron"))
 
@@ -103,7 +103,7 @@ def _hand_reach() -> None:
 
 
 PLANNING = Loops(
-    ("families.batches.discs", "families.regulus", "closure.critical_friction",
+    ("families.discs", "families.regulus", "closure.critical_friction",
      "quality.ferrari_canny"),
     (partial(_planned, "concurrent", "pencil"),),
     # first what the other half needs late
@@ -111,11 +111,11 @@ PLANNING = Loops(
 )  # fmt: skip
 """What compiles the loops that plans need."""
 REACHING = Loops(
-    ("hands.posing.postures", "hands.posing.pose"), (_hand_checks,), (_hand_posing,)
+    ("hands.collisions", "hands.pose"), (_hand_checks,), (_hand_posing,)
 )  # fmt: skip
 """What compiles the loops that put hands to contacts."""
 EVERYTHING = Loops(
-    (*PLANNING.kernels, *REACHING.kernels, "regions.cover", "optimizing.best.searching.search"),
+    (*PLANNING.kernels, *REACHING.kernels, "regions.cover", "optimizing.best.search"),
     (*PLANNING.here, _hand_checks, _hand_posing, _hand_reach, _regions, _clearance),
     (*PLANNING.beside, _best),
 )

@@ -1,27 +1,93 @@
 """Writes `judgements.json`: what published tests, our trials and the analysis say of each grasp.
 
-Each test stands in the file once, with all its numbers and sources; a test that imitates another
-simulator says so there and in each record. Numbers that JSON lacks are null: the margin of a test
-without loads is infinite.
+Each test stands in the file once, with all its numbers and sources. Numbers that JSON lacks are
+null: the margin of a test without loads is infinite.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
-from typing import Any, cast
+from typing import Any, Literal, NotRequired, cast
+
+from pydantic import ConfigDict, with_config
+from typing_extensions import TypedDict
 
 from grasp_core.files.json_text import text_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
-from sim_validate.protocols.judgement import Judgement
-from sim_validate.protocols.judgements_schema import (
-    JudgementRecord,
-    JudgementsFile,
-    ProtocolRecord,
-    RunRecord,
-    TotalsRecord,
-)
-from sim_validate.protocols.published import PublishedProtocol
-from sim_validate.records.verdicts_json import finite, object_record
+from sim_validate.protocols.judging import Judgement
+from sim_validate.records.fields import Count, ObjectRecord, Positive, finite, object_record
+from sim_validate.records.reaches import NotNegative
+
+
+class RunRecord(TypedDict):
+    """Fields about one run of a test."""
+
+    number: Count
+    passed: bool
+    reason: str
+    displacement_m: NotNegative | None
+    turn_deg: NotNegative | None
+    fingers: Count
+
+
+class TheirsRecord(TypedDict):
+    """Fields about the verdict of a published test."""
+
+    passed: bool
+    runs: list[RunRecord]
+
+
+class OursRecord(TypedDict):
+    """Fields about our verdict on the loads of a test."""
+
+    held: bool
+    force_closure: bool
+    reason: str
+
+
+class PredictedRecord(TypedDict):
+    """Fields about what is predicted of the loads of a test."""
+
+    resisted: bool
+    margin: NotNegative | None
+    """Least multiple of the loads that is resisted; null where nothing loads the object."""
+
+
+class JudgementRecord(TypedDict):
+    """Fields about one grasp and one test."""
+
+    id: str
+    hand: NotRequired[str]
+    protocol: str
+    mass_kg: Positive
+    push_n: float
+    theirs: TheirsRecord
+    ours: OursRecord
+    predicted: PredictedRecord
+
+
+class TotalsRecord(TypedDict):
+    """Numbers of grasps that were judged by one test."""
+
+    grasps: Count
+    theirs_passed: Count
+    ours_held: Count
+    predicted: Count
+    agree: Count
+
+
+@with_config(ConfigDict(strict=True, extra="forbid"))
+class JudgementsFile(TypedDict):
+    """The content of `judgements.json`."""
+
+    schema: Literal[1]
+    object: ObjectRecord
+    friction: Positive
+    complete: bool
+    protocols: dict[str, dict[str, Any]]
+    summary: dict[str, TotalsRecord]
+    judgements: list[JudgementRecord]
+    versions: dict[str, str]
 
 
 def judgements_to_json(
@@ -35,7 +101,9 @@ def judgements_to_json(
         "object": object_record(body),
         "friction": friction,
         "complete": complete,
-        "protocols": {name: protocol_record(test) for name, test in tests.items()},
+        "protocols": {
+            name: {**asdict(test), "physics": test.physics.record()} for name, test in tests.items()
+        },
         "summary": judgements_summary(listed),
         "judgements": [_record(each) for each in listed],
         "versions": {**versions()},
@@ -60,22 +128,14 @@ def judgements_summary(judgements: Sequence[Judgement]) -> dict[str, TotalsRecor
     }
 
 
-def protocol_record(protocol: PublishedProtocol) -> ProtocolRecord:
-    """Return all numbers of a published test, with units in their names, and its sources."""
-    own: Mapping[str, Any] = {**asdict(protocol), "physics": protocol.physics.record()}
-    return cast("ProtocolRecord", {"imitation": protocol.imitation, **own})
-
-
 def _record(each: Judgement) -> JudgementRecord:
     record: JudgementRecord = {
         "id": each.grasp,
         "protocol": each.protocol.name,
-        "imitation": each.protocol.imitation,
         "mass_kg": each.mass_kg,
         "push_n": each.push_n,
         "theirs": {
             "passed": each.theirs,
-            "copies_passed": each.copies_passed,
             "runs": [cast("RunRecord", asdict(run)) for run in each.runs],
         },
         "ours": {

@@ -3,36 +3,100 @@
 Their verdict is that of the test as it is published, with its own friction, mass and contacts. The
 prediction and our verdict are about the grasp at its own friction: the loads of the test are
 applied in our closure trials, where forces are planned, contacts obey Coulomb's law to a per mille,
-and thresholds are micrometres.
+and thresholds are micrometres. Contacts that are not in force closure need no trial: it is proved
+that they let go of some load.
 """
 
-from collections.abc import Iterable
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 
+import numpy as np
+
 from grasp_core.arrays import Array
-from grasp_core.checked import coefficient, instance, one_of, seed_of, several
-from grasp_core.closure.contact_arrays import FEWEST
+from grasp_core.by_value import ByValue, summary
+from grasp_core.checked import coefficient, instance, one_of, several
+from grasp_core.closure.contacts import FEWEST
+from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.reach import HandReach
-from grasp_core.hands.stance import stance_of
+from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.motors import Motors
 from grasp_core.values import Contact, Grasp
-from scenes.hands.hand_mjcf import build_hand_scene
-from scenes.tested.fingertip_scene import fingertip_scene
-from scenes.tested.hand_scene import HandServos, hand_scene, planned_postures
+from scenes.hands.hand_scene import build_hand_scene
+from scenes.mjcf import Scene
+from scenes.tested import HandServos, fingertip_scene, hand_scene, planned_postures
+from sim_validate.dexgraspbench import RecordedReach, hand_file, recorded_postures
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.hands.validate_hand import hand_setup
-from sim_validate.peer_files.hand_files import hand_file
-from sim_validate.peer_files.hand_records import RecordedReach, recorded_postures
-from sim_validate.protocols.judgement import Judgement
-from sim_validate.protocols.named_protocols import PROTOCOLS
-from sim_validate.protocols.our_verdict import OurVerdict, our_verdict
-from sim_validate.protocols.published import PublishedProtocol
-from sim_validate.protocols.their_verdict import their_verdict
-from sim_validate.simulation.gate.gate import require_faithful
+from sim_validate.parallel.processes import each
+from sim_validate.protocols.published import PROTOCOLS, PublishedProtocol
+from sim_validate.protocols.runs import RunVerdict, their_verdict
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.gate import require_faithful
+from sim_validate.simulation.loads import PlannedLoad, loads_as_they_are
+from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.setup import Setup
+from sim_validate.simulation.traces import Outcome, judge
+
+
+@dataclass(frozen=True, slots=True)
+class OurVerdict:
+    """Our verdict on the loads of a published test, with the prediction."""
+
+    closed: bool
+    """Whether the contacts are in force closure, which is proved either way."""
+    held: bool
+    """Whether the object stayed within our thresholds under every load; False without closure."""
+    margin: float
+    """Least multiple of the loads that is resisted according to the analysis; 0 without closure,
+    and infinite without a load."""
+    reason: str
+    """Why it was not held; empty if it was."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Judgement(ByValue):
+    """A grasp judged by a published test, by our trials of the same loads, and by the analysis."""
+
+    grasp: str
+    """Id of the grasp; empty for contacts without one."""
+    hand: str
+    """Name of the hand that held the object; empty for fingertips."""
+    protocol: PublishedProtocol
+    friction: float
+    """Coulomb coefficient of our verdict and of the prediction; the test has its own."""
+    mass_kg: float
+    """Mass of the object in the test [kg]."""
+    push_n: float
+    """Largest normal force with which a finger squeezes in the test [N]."""
+    runs: tuple[RunVerdict, ...]
+    ours: OurVerdict
+    """Our verdict on the loads of the test, with the predicted margin."""
+
+    @property
+    def theirs(self) -> bool:
+        """Return whether the grasp passes the published test: all of its runs."""
+        return all(each.passed for each in self.runs)
+
+    @property
+    def predicted(self) -> bool:
+        """Return whether the analysis says that the grasp resists all loads of the test."""
+        return self.ours.closed and self.ours.margin >= 1.0
+
+    @property
+    def good(self) -> bool:
+        """Return whether the test and our trials both accept the grasp."""
+        return self.theirs and self.ours.held
+
+    def __repr__(self) -> str:
+        theirs = f"theirs {'passed' if self.theirs else 'failed'}"
+        ours = f"ours {'held' if self.ours.held else 'not held'}"
+        told = (self.grasp or "contacts", self.protocol.name, theirs, ours)
+        return summary("Judgement", *told, margin=self.ours.margin)
 
 
 def judge_by(
@@ -42,7 +106,6 @@ def judge_by(
     friction: float = 0.5,
     *,
     setup: Setup | None = None,
-    seed: int = 0,
 ) -> Judgement:
     """Judge a grasp by four fingertips, or contacts of any origin, by a published test.
 
@@ -53,7 +116,6 @@ def judge_by(
         friction: Coulomb coefficient of our verdict and of the prediction.
         setup: How our trials are simulated, and the largest normal force of fingertips, which the
             test squeezes with too; None for the usual ones.
-        seed: Seed of the noise of tests that have some.
 
     Returns:
         Their verdict, ours, and the predicted margin.
@@ -66,7 +128,6 @@ def judge_by(
     check_body(body)
     coefficient(friction)
     setup = Setup() if setup is None else instance(setup, Setup, "setup")
-    seed_of(seed)
     given = _given(body, grasp)
     contacts = given.contacts if isinstance(given, Grasp) else given
     require_faithful(setup, friction, body.radius)
@@ -80,7 +141,7 @@ def judge_by(
         friction=friction,
         mass_kg=scene.mass_kg,
         push_n=float(scene.pushes_n.max()),
-        runs=their_verdict(found, scene, seed, setup.threads),
+        runs=their_verdict(found, scene, setup.threads),
         ours=our_verdict(
             body, contacts, friction, found.forces(scene.mass_kg), setup,
             partial(setup.scene, body, given, friction),
@@ -96,7 +157,6 @@ def judge_hand_by(
     friction: float = 0.5,
     *,
     setup: Setup | None = None,
-    seed: int = 0,
 ) -> Judgement:
     """Judge a hand that stands in a grasp by a published test.
 
@@ -111,7 +171,6 @@ def judge_hand_by(
         reach: The pose in which the hand stands (see `gc.reach_with` and `reach_of_record`).
         friction: Coulomb coefficient of our verdict and of the prediction.
         setup: How our trials are simulated; None for that of `hand_setup`.
-        seed: Seed of the noise of tests that have some.
 
     Returns:
         Their verdict, ours, and the predicted margin.
@@ -124,7 +183,6 @@ def judge_hand_by(
     instance(hand, Hand, "hand", "load_hand makes one")
     check_body(body)
     coefficient(friction)
-    seed_of(seed)
     setup = hand_setup() if setup is None else instance(setup, Setup, "setup")
     file = hand_file(hand)
     stiffness = file.servo_n_m_per_rad if found.own_servos else None
@@ -146,7 +204,7 @@ def judge_hand_by(
         friction=friction,
         mass_kg=scene.mass_kg,
         push_n=float(scene.pushes_n.max(initial=0.0)),
-        runs=their_verdict(found, scene, seed, setup.threads),
+        runs=their_verdict(found, scene, setup.threads),
         ours=_ours(hand, body, reach, friction, found.forces(scene.mass_kg), setup),
     )
 
@@ -183,3 +241,78 @@ def _given(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> Grasp | tuple[
     if len(contacts) < FEWEST:
         raise InputError(f"grasp: at least two contacts are needed, got {len(contacts)}")
     return contacts
+
+
+def our_verdict(
+    body: Polyhedron,
+    contacts: Sequence[Contact],
+    friction: float,
+    forces: Sequence[Array],
+    setup: Setup,
+    scene: Callable[[], Scene],
+    motors: Motors | None = None,
+) -> OurVerdict:
+    """Predict the least multiple of forces that contacts resist, and hold the forces in simulation.
+
+    Takes `forces` (3,) [N].
+    """
+    if not force_closure(contacts, friction=friction, torsion_m=setup.torsion_m).closed:
+        told = f"the contacts are proved not to be in force closure at friction {friction:g}"
+        return OurVerdict(False, False, 0.0, told)
+    bench = Bench(scene(), threads=setup.threads, timeout_s=setup.timeout_s)
+    layout = bench.scene.layout
+    rig = squeezed(bench, setup, layout.squeeze_forces, friction)
+    named = [(_name(force), np.concatenate([force, np.zeros(3)])) for force in forces]
+    loads = loads_as_they_are(body, contacts, friction, rig.idle, named, setup, motors=motors)
+    margin = min((load.predicted_limit for load in loads), default=math.inf)
+    reason = _not_held(rig, loads, setup)
+    return OurVerdict(True, not reason, margin, reason)
+
+
+def _name(force: Array) -> str:
+    x, y, z = force.tolist()
+    return f"{x:.3g} {y:.3g} {z:.3g} N"
+
+
+def _not_held(rig: Rig, loads: Sequence[PlannedLoad], setup: Setup) -> str:
+    """Hold all loads, or none at all where there are none; say what was not held."""
+    held = [each.load for each in loads] or [rig.idle]
+    names = [each.name for each in loads] or ["no load"]
+    for name, trace in zip(names, rig.hold(held), strict=True):
+        found = judge(trace, rig.bench.scene.layout, setup.hold)
+        if found.outcome is not Outcome.HELD:
+            return f"{name}: {found.outcome.value}: {found.reason}"
+    return ""
+
+
+@dataclass(frozen=True, slots=True)
+class GraspCase:
+    """A grasp to judge by a test, as it is sent to a worker process."""
+
+    protocol: str
+    body: Polyhedron
+    grasp: Grasp
+    friction: float
+    setup: Setup
+
+
+@dataclass(frozen=True, slots=True)
+class HandCase:
+    """A hand in a grasp to judge by a test, as it is sent to a worker process."""
+
+    protocol: str
+    hand: Hand
+    body: Polyhedron
+    reach: HandReach
+    friction: float
+
+
+def judged(cases: Sequence[GraspCase | HandCase], processes: int) -> Iterator[Judgement]:
+    """Yield one judgement per case, in order; the number of processes does not change them."""
+    yield from each(_judged, cases, jobs=processes)
+
+
+def _judged(case: GraspCase | HandCase) -> Judgement:
+    if isinstance(case, HandCase):
+        return judge_hand_by(case.protocol, case.hand, case.body, case.reach, case.friction)
+    return judge_by(case.protocol, case.body, case.grasp, case.friction, setup=case.setup)

@@ -8,7 +8,7 @@ from typing import Any
 from grasp_core.arrays import Array
 from grasp_core.closure.friction_interval import FrictionInterval
 from grasp_core.provenance import versions
-from grasp_core.quality.wrench_limit import WrenchLimit
+from grasp_core.quality.wrench_limits import WrenchLimit
 from sim_validate.contact_analysis import Analysis, Bounds, Outcome, Question, Resisted
 
 
@@ -44,7 +44,7 @@ def _analysis_record(analysis: Analysis) -> dict[str, object]:
         "forces": None if certificate is None else _rows(certificate.forces),
         "separating_wrench": _rows(analysis.separating_wrench),
         "critical_friction": _number(analysis.critical_friction),
-        "critical_friction_interval": _interval(analysis.friction_interval),
+        "critical_friction_interval": _pair(analysis.friction_interval),
         "ferrari_canny_l1_n": _pair(l1),
         "ferrari_canny_linf_n": _pair(linf),
         "verified": {
@@ -94,11 +94,7 @@ def _number(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else value + 0.0
 
 
-def _interval(found: FrictionInterval | None) -> list[float | None] | None:
-    return None if found is None else [_number(found.lower), _number(found.upper)]
-
-
-def _pair(bounds: Bounds | None) -> list[float | None] | None:
+def _pair(bounds: Bounds | FrictionInterval | None) -> list[float | None] | None:
     return None if bounds is None else [_number(bounds.lower), _number(bounds.upper)]
 
 

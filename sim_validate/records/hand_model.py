@@ -23,7 +23,7 @@ from grasp_core.hands.hand import (
     Link,
     LinkShape,
 )
-from sim_validate.records.verdicts_schema import Finite
+from sim_validate.records.fields import Finite
 
 Triple = tuple[Finite, Finite, Finite]
 Rotation = tuple[Triple, Triple, Triple]
@@ -86,9 +86,8 @@ class ModelRecord(TypedDict):
     palm: Annotated[list[ShapeRecord], Field(max_length=MOST_SHAPES)]
     fingers: Annotated[list[FingerRecord], Field(max_length=MOST_FINGERS)]
     ignored_pairs: list[tuple[str, str]]
-    couplings: NotRequired[list[CouplingRecord]]
-    """Absent in files of versions that took all joints as free, as is the next."""
-    notes: NotRequired[list[str]]
+    couplings: list[CouplingRecord]
+    notes: list[str]
 
 
 def model_record(hand: Hand) -> ModelRecord:
@@ -131,9 +130,9 @@ def hand_of_model(
     pairs = tuple(record["ignored_pairs"])
     couplings = tuple(
         Coupling(each["joint"], each["driver"], each["ratio"], each["offset_rad"])
-        for each in record.get("couplings", [])
+        for each in record["couplings"]
     )
-    notes = tuple(record.get("notes", []))
+    notes = tuple(record["notes"])
     return Hand(name, palm, fingers, tuple(sources), torque_source, pairs, couplings, notes)
 
 

@@ -1,20 +1,25 @@
-"""Writes and reads certified regions: one proof file per grasp, and one `regions.json`."""
+"""Writes and reads certified regions: one proof file per grasp, and one `regions.json`.
+
+Type checking holds the writer to the fields of `regions.json`, which reports read.
+"""
 
 import hashlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, Any, Literal, NotRequired
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict, Field, with_config
+from typing_extensions import TypedDict
 
 from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
 from grasp_core.checked import path_of
-from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError, SolverError
-from grasp_core.files.json_text import text_of
+from grasp_core.files.json_text import record_of, text_of
 from grasp_core.files.text_files import write_text
-from grasp_core.geometry.flat_polygons import FEWEST_CORNERS
+from grasp_core.geometry.polygons import FEWEST_CORNERS
 from grasp_core.objects.face_pieces import inscribed_disc_radius_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
@@ -24,16 +29,9 @@ from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.files.npz import read_arrays
 from sim_validate.files.writing import write_arrays
 from sim_validate.parallel.certifying import Asked, Found
+from sim_validate.records.fields import Finite, ObjectRecord, Positive
 
-if TYPE_CHECKING:  # planning needs no schema
-    from sim_validate.records.regions_schema import (
-        GraspRecord,
-        NamedGrasp,
-        ProofRecord,
-        RegionsFile,
-    )
-
-SCHEMA = 3
+SCHEMA = 1
 REGIONS, PROOFS = "regions.json", "proofs"
 POLYGONS = tuple(f"region{i}_m" for i in range(FINGERS))
 BORDERS = tuple(f"border{i}_m" for i in range(FINGERS))
@@ -51,12 +49,64 @@ SMALLEST_SCALE, LARGEST = 1e-6, 1e6
 """Smallest and largest unit of length of a proof, and largest coordinate in it [m]."""
 
 
+class RegionRecord(TypedDict):
+    """Fields about the region of one finger."""
+
+    kind: NotRequired[str]
+    polygon_m: Annotated[list[tuple[Finite, Finite, Finite]], Field(min_length=FEWEST_CORNERS)]
+    inscribed_radius_m: Finite
+    area_m2: NotRequired[Finite]
+
+
+class ProofRecord(TypedDict):
+    """Fields about the file that proves a grasp's regions."""
+
+    file: Annotated[str, Field(pattern=r"^proofs/[A-Za-z0-9][A-Za-z0-9_-]{0,99}\.npz$")]
+    """Path of the proof, relative to the folder of `regions.json`."""
+    sha256: NotRequired[str]
+
+
+class NamedGrasp(TypedDict):
+    """Fields about the grasp that regions belong to."""
+
+    id: str
+    contacts_sha256: str
+    family: NotRequired[str]
+    planned_radius_m: NotRequired[Finite]
+
+
+class GraspRecord(NamedGrasp):
+    """Fields about the regions of one grasp, or the reason why it has none."""
+
+    disc_radius_m: Finite | None
+    centers_m: NotRequired[list[list[Finite]]]
+    friction: NotRequired[list[Finite]]
+    open_radius_m: NotRequired[Finite | None]
+    open_choice_m: NotRequired[list[list[Finite]] | None]
+    cones: NotRequired[int]
+    proof: NotRequired[ProofRecord | None]
+    regions: Annotated[list[RegionRecord], Field(min_length=FINGERS, max_length=FINGERS)] | None
+    reason: NotRequired[str]
+
+
+@with_config(ConfigDict(strict=True, extra="allow"))
+class RegionsFile(TypedDict):
+    """The content of `regions.json`; type checking holds its writer to it."""
+
+    schema: Literal[1]
+    object: ObjectRecord
+    friction: Positive
+    reserve: NotRequired[Finite]
+    recenter: NotRequired[bool]
+    edge_clearance_m: NotRequired[Finite]
+    cones: NotRequired[int]
+    versions: NotRequired[dict[str, str]]
+    grasps: list[GraspRecord]
+
+
 def write_regions(
-    folder: Path | None,
-    body: Polyhedron,
-    asked: Asked,
-    found: Iterable[Found],
-) -> "RegionsFile":
+    folder: Path | None, body: Polyhedron, asked: Asked, found: Iterable[Found]
+) -> RegionsFile:
     """Write each proof when it is ready, then `regions.json`; write nothing if `folder` is None.
 
     Gives the content of regions.json.
@@ -67,7 +117,6 @@ def write_regions(
         "object": {"name": body.name, "content_sha256": body.content_sha256},
         "friction": asked.friction,
         "reserve": asked.reserve,
-        "balance": asked.balance,
         "recenter": asked.recenter,
         "edge_clearance_m": asked.clearance,
         "cones": asked.max_cones,
@@ -81,7 +130,7 @@ def write_regions(
 
 def _record(
     grasp: Grasp, proved: CertifiedRegions | str, body: Polyhedron, folder: Path | None
-) -> "GraspRecord":
+) -> GraspRecord:
     """Build the record of one grasp, and write its proof or remove an earlier one."""
     named: NamedGrasp = {
         "id": grasp.id,
@@ -153,6 +202,11 @@ def proof_arrays(
     }
 
 
+def regions_file_of(text: str) -> RegionsFile:
+    """Read the text of a `regions.json`."""
+    return record_of(RegionsFile, text, REGIONS, schema=SCHEMA)
+
+
 def load_regions(path: str | Path) -> CertifiedRegions:
     """Read regions and their proof, as `graspproof regions` writes them; nothing is verified yet.
 
@@ -218,12 +272,9 @@ def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRe
         )
     try:
         with np.errstate(invalid="ignore", divide="ignore"):  # edges without length divide by zero
-            return ContactRegion("certified", polygon, _inscribed(polygon, normal, scale))
+            radius = scale * inscribed_disc_radius_of(polygon / scale, normal)
+            return ContactRegion("certified", polygon, radius)
     except SolverError as error:
         raise InputError(
             f"{name}: expected the corners of a convex polygon in order; certify the regions again"
         ) from error
-
-
-def _inscribed(polygon: Array, normal: Array, scale: float) -> float:
-    return scale * inscribed_disc_radius_of(polygon / scale, normal)

@@ -12,12 +12,11 @@ from typing import Any, cast
 from pydantic import TypeAdapter, ValidationError
 
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import complaint
-from grasp_core.files.strict_json import shown
+from grasp_core.files.json_text import complaint, shown
 from scenes.fingertips import FingerSettings
 from scenes.physics import PhysicsSettings
 from sim_validate.files.toml_tables import read_tables
-from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.simulation.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.simulation.setup import Setup
 
 OURS = ("drive", "indentation")
@@ -89,14 +88,11 @@ def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:
             )
     kind = cast("type[Any]", type(values))
     try:
-        text = json.dumps({**_as_dict(values), **given})
+        known = {field.name: getattr(values, field.name) for field in fields(values)}
+        text = json.dumps({**known, **given})
         checked: Any = TypeAdapter(kind).validate_json(text, strict=True)
     except ValidationError as error:
         raise InputError(f"{path}: [{table}] {complaint(error, kind)}") from error
     except InputError as error:  # raised by the value's own checks
         raise InputError(f"{path}: [{table}] {error}") from error
     return checked
-
-
-def _as_dict(values: Any) -> dict[str, Any]:
-    return {field.name: getattr(values, field.name) for field in fields(values)}

@@ -13,8 +13,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
-from grasp_core.files.strict_json import place, shown
+from grasp_core.files.json_text import place, record_of, shown
 from grasp_core.files.text_files import read_text
 from sim_validate.simulation.setup import NamedWrench
 
@@ -77,8 +76,7 @@ def weights(
     ways = [np.array(down) for down in downs] or [*np.eye(3), *-np.eye(3)]
     return tuple(
         NamedWrench(
-            f"weight_{place}",
-            np.concatenate([weight_n * way / np.linalg.norm(way), np.zeros(3)]),
+            f"weight_{place}", np.concatenate([weight_n * way / np.linalg.norm(way), np.zeros(3)])
         )
         for place, way in enumerate(ways)
     )

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from sim_validate.simulation.hold_verdict import LET_GO, Outcome
-from sim_validate.validation.wrench_verdict import AGREEMENT
+from sim_validate.simulation.traces import LET_GO, Outcome
+from sim_validate.validation.verdict import AGREEMENT
 
 Record = Mapping[str, Any]
 """An object of a JSON file."""

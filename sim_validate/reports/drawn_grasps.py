@@ -17,18 +17,15 @@ from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import ContactRegion, Grasp, four
 from scenes.drawing.clips import GraphicsError, magnified, write_clip
-from scenes.drawing.flat.svg import svg_of
-from scenes.drawing.hands.posed_hands import PosedHand
+from scenes.drawing.hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
+from scenes.drawing.sheets import svg_of
 from scenes.drawing.views import best_view
 from scenes.fingertips import FingerSettings
-from sim_validate.execution.filming import film, worth_seeing
-from sim_validate.execution.jobs import ExecutionJob
-from sim_validate.files.stale_results import CLIPS, PICTURES
-from sim_validate.records.executions_json import EXECUTIONS, Executions
-from sim_validate.replaying.from_verdicts import of_verdict
-from sim_validate.replaying.recorded import Wanted
-from sim_validate.replaying.replay import Replayed, replayed
+from sim_validate.execution.jobs import ExecutionJob, film, worth_seeing
+from sim_validate.files.result_folders import CLIPS, PICTURES
+from sim_validate.records.executions import EXECUTIONS, Executions
+from sim_validate.replaying import Replayed, Wanted, of_verdict, replayed
 from sim_validate.reports.agreement import Record
 from sim_validate.reports.charts.margin_charts import margin_panels
 from sim_validate.reports.charts.motion_charts import motion_panels
@@ -110,7 +107,9 @@ def tasks_of(
             friction=run.friction,
             verdict=run.verdicts.get(grasp.id),
             regions=run.shaded.get(grasp.id),
-            executions=_own(run, grasp),
+            executions=None
+            if run.executions is None or (found := run.executed(grasp.id)) is None
+            else replace(run.executions, grasps=(found,)),
             held=held_in(run.reaches, grasp),
             source=run.verdicts_path,
             folder=folder,
@@ -119,13 +118,6 @@ def tasks_of(
         )
         for grasp in grasps
     ]
-
-
-def _own(run: RunFolder, grasp: Grasp) -> Executions | None:
-    found = run.executed(grasp.id)
-    if run.executions is None or found is None:
-        return None
-    return replace(run.executions, grasps=(found,))
 
 
 def certified(grasp: Grasp, record: Record | None) -> Grasp:
@@ -145,7 +137,12 @@ def draw(task: Task) -> Drawn:
     view = best_view(body, grasp)
     path = task.folder / PICTURES / f"{task.name}.svg"
     write_text(path, svg_of(grasp_sheet(body, grasp, task.friction, view=view), alone=True))
-    drawn = _with_hand(task, Drawn(f"{PICTURES}/{path.name}"))
+    drawn = Drawn(f"{PICTURES}/{path.name}")
+    if task.held is not None:
+        path = task.folder / PICTURES / f"{task.name}-hand.svg"
+        sheet = grasp_sheet(body, grasp, task.friction, held=task.held)
+        write_text(path, svg_of(sheet, alone=True))
+        drawn = replace(drawn, hand=f"{PICTURES}/{path.name}")
     if force_closure(grasp, friction=task.friction).closed:
         largest = largest_push(task.verdict)
         wrenches = wrench_panels(body, grasp, task.friction, view=view)
@@ -158,26 +155,13 @@ def draw(task: Task) -> Drawn:
     return _with_executed(task, task.executions, drawn) if task.clip and task.executions else drawn
 
 
-def _with_hand(task: Task, drawn: Drawn) -> Drawn:
-    """Draw the hand in the grasp, if there is one."""
-    if task.held is None:
-        return drawn
-    path = task.folder / PICTURES / f"{task.name}-hand.svg"
-    sheet = grasp_sheet(task.saved.body, task.grasp, task.friction, held=task.held)
-    write_text(path, svg_of(sheet, alone=True))
-    return replace(drawn, hand=f"{PICTURES}/{path.name}")
-
-
 def _with_motion(task: Task, verdict: Record, drawn: Drawn) -> Drawn:
     recorded = of_verdict(task.source, task.saved, verdict, Wanted(task.saved.grasps[0].id))
     found = replayed(recorded)
     size = found.scene.layout.grasp_size_m
     panels = motion_panels(found, recorded.setup.hold.hold_threshold * size)
     drawn = replace(
-        drawn,
-        motion=tuple(map(svg_of, panels)),
-        trial=found.name,
-        outcome=found.hold.outcome.value,
+        drawn, motion=tuple(map(svg_of, panels)), trial=found.name, outcome=found.hold.outcome.value
     )
     return _with_clip(task, found, drawn) if task.clip else drawn
 

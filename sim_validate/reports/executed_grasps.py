@@ -10,10 +10,15 @@ from typing import cast
 import numpy as np
 
 from scenes.drawing.pages import NOTHING, number
-from sim_validate.execution.jobs import ExecutedGrasp, best_executed
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.execution.verdict import Execution, ExecutionTrial, ended
-from sim_validate.records.executions_json import Executions, executions_summary
+from sim_validate.execution.verdict import (
+    ExecutedGrasp,
+    Execution,
+    ExecutionTrial,
+    best_executed,
+    ended,
+)
+from sim_validate.records.executions import Executions, executions_summary
 from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record, said_of
 
 MILLI = 1e3

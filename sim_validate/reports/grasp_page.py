@@ -13,26 +13,15 @@ from grasp_core.cones.spanning import angles_between
 from grasp_core.values import Grasp
 from scenes.drawing.pages import NOTHING, number
 from scenes.drawing.turntable import as_text, grasp_data
-from sim_validate.reports.agreement import (
-    BAD,
-    GOOD,
-    Record,
-    as_predicted,
-    let_go,
-    wrench_size,
-)
-from sim_validate.reports.best_possible import possible_facts
+from sim_validate.records.best import BestFile, shares_of_bound
+from sim_validate.reports.agreement import BAD, GOOD, Record, as_predicted, let_go, wrench_size
 from sim_validate.reports.drawn_grasps import Drawn, certified, largest_push
-from sim_validate.reports.executed_grasps import (
-    execute_command,
-    execution_section,
-    said_of_both,
-)
+from sim_validate.reports.executed_grasps import execute_command, execution_section, said_of_both
 from sim_validate.reports.pages import page
 from sim_validate.reports.reached_grasps import held_in, reach_commands, reach_section
 from sim_validate.reports.run_folder import GRASPS, RunFolder
 
-MILLI, MICRO = 1e3, 1e6
+MILLI, MICRO, PERCENT = 1e3, 1e6, 100.0
 ROTATED, MIRRORED = "rotated", "mirrored"
 """Kinds of copies of a grasp, as the pages call them."""
 DRAW_ALL = "graspproof report . --every-copy"
@@ -67,6 +56,12 @@ MOTIONS = (
     ),
 )  # fmt: skip
 """Names, fields and meanings of the two motions that a page tells."""
+MEASURES = {
+    "ferrari-canny": ("Ferrari-Canny quality", " N"),
+    "weight": ("weight held in every orientation, for normal forces of sum 1 N", " N"),
+    "task": ("multiple of the task's loads, for normal forces of sum 1 N", ""),
+}
+"""What each measure of the best grasp says of a grasp, and its unit."""
 FOCUS = "where lines of force meet, in the object's frame"
 
 
@@ -165,6 +160,20 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[Fac
         yield f"{name} {place}", f"({millimetres(focus)}) mm", FOCUS if place == 0 else ""
     if verdict is not None:
         yield from _measured(verdict)
+
+
+def possible_facts(best: BestFile | None, grasp: str) -> Iterable[Fact]:
+    """Yield the share that a grasp reaches of what a search has bounded."""
+    share = None if best is None else shares_of_bound(best).get(grasp)
+    if best is None or share is None:
+        return
+    what, unit = MEASURES[best["measure"]]
+    yield (
+        "Share of the possible", f"{PERCENT * share:.1f} %",
+        f"{what}, over the bound {number(best['bound'])}{unit} for all contacts "
+        f"at least {number(MILLI * best['clearance_m'])} mm from edges; grasps nearer to edges "
+        "may exceed it",
+    )  # fmt: skip
 
 
 def _measured(verdict: Record) -> Iterable[Fact]:

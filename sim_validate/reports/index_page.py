@@ -7,8 +7,10 @@ from typing import Any, cast
 from grasp_core.objects.symmetries import Copies, copies_of
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
-from scenes.drawing.flat.svg import svg_of
-from sim_validate.records.executions_json import Executions
+from scenes.drawing.pages import number
+from scenes.drawing.sheets import svg_of
+from sim_validate.records.best import BestFile, shares_of_bound
+from sim_validate.records.executions import Executions
 from sim_validate.reports.agreement import (
     Agreement,
     Record,
@@ -18,16 +20,18 @@ from sim_validate.reports.agreement import (
     quadrants_in,
     wrench_size,
 )
-from sim_validate.reports.best_possible import described_possible
-from sim_validate.reports.charts.fidelity_charts import fidelity_panels
-from sim_validate.reports.charts.survival_charts import survival_sentence, survival_sheet
+from sim_validate.reports.charts.run_charts import (
+    fidelity_panels,
+    survival_sentence,
+    survival_sheet,
+)
 from sim_validate.reports.executed_grasps import (
     described_executions,
     execution_row,
     execution_settings,
     said_of_both,
 )
-from sim_validate.reports.grasp_page import MILLI, MIRRORED, Copy
+from sim_validate.reports.grasp_page import MEASURES, MILLI, MIRRORED, PERCENT, Copy
 from sim_validate.reports.pages import page
 from sim_validate.reports.reached_grasps import (
     described_reaches,
@@ -36,6 +40,9 @@ from sim_validate.reports.reached_grasps import (
     said_of_reach,
 )
 from sim_validate.reports.run_folder import RunFolder
+
+ROWS = 20
+"""Largest number of grasps in the table of the possible."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,9 +113,32 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         possible=[
             {"object": run.saved.body.name, **found}
             for run in runs
-            if (found := described_possible(run.possible)) is not None
+            if (found := _described_possible(run.possible)) is not None
         ],
     )
+
+
+def _described_possible(best: BestFile | None) -> Record | None:
+    """Build the section about the best grasp and the bound; None where nothing was bounded."""
+    if best is None:
+        return None
+    (what, unit), bound, name = MEASURES[best["measure"]], best["bound"], best["grasp"]["id"]
+    proved = f"by the proof in {best['proof']}" if best["proof"] else "whose proof was not kept"
+    reached = {each["id"]: each["quality"][0] for each in best["planned"]}
+    ranked = sorted({**reached, name: best["quality"][0]}.items(), key=lambda e: (-e[1], e[0]))
+    return {
+        "said": (
+            f"Best is {name}: {number(best['quality'][0])}{unit} of {what}. No four contacts at "
+            f"least {number(MILLI * best['clearance_m'])} mm from edges exceed "
+            f"{number(bound)}{unit} at friction {number(best['friction'])}, {proved}; "
+            f"{PERCENT * best['gap']:.1f} % are between the two."
+        ),
+        "what": f"{what}{f' [{unit.strip()}]' if unit else ''}",
+        "rows": [
+            (each, number(value), f"{PERCENT * value / bound:.1f}") for each, value in ranked[:ROWS]
+        ],
+        "more": max(0, len(ranked) - ROWS),
+    }
 
 
 def _judged(run: RunFolder) -> Iterable[Record]:
@@ -117,9 +147,7 @@ def _judged(run: RunFolder) -> Iterable[Record]:
         return
     summary: Record = run.judgements["summary"]
     for name, counts in summary.items():
-        test: Record = run.judgements["protocols"][name]
-        label = f"{name} (imitation)" if test["imitation"] else name
-        yield {"name": label, "object": run.saved.body.name, "imitates": test["imitates"], **counts}
+        yield {"name": name, "object": run.saved.body.name, **counts}
 
 
 def all_verdicts(runs: Iterable[RunFolder]) -> list[Record]:
@@ -165,7 +193,7 @@ def _card(shown: Shown) -> dict[str, Any]:
         "tone": tone,
         "radius_mm": round(MILLI * grasp.radius, 6),
         "quality": grasp.ferrari_canny[0],
-        "share": None if shown.run.possible is None else shown.run.possible.share(grasp.id),
+        "share": shares_of_bound(shown.run.possible).get(grasp.id) if shown.run.possible else None,
         "critical_friction": grasp.critical_friction,
         "executed": execution_row(executed) if shown.run.executions else None,
         "reached": said_of_reach(shown.run.reaches, grasp) if shown.run.reaches else None,

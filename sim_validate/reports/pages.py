@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from scenes.drawing import pages
-from scenes.drawing.flat.svg import night_style
+from scenes.drawing.sheets import night_style
 
 ASSETS = Path(__file__).parent / "assets"
 """Folder of the templates and scripts of reports."""

@@ -4,18 +4,17 @@ import shlex
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from grasp_core.by_value import counted
 from grasp_core.hands.named_hands import HANDS
-from grasp_core.short_text import counted
 from grasp_core.values import Grasp
-from scenes.drawing.hands.posed_hands import PosedHand, posed_hand
+from scenes.drawing.hands import PosedHand, posed_hand
 from scenes.drawing.pages import number
-from sim_validate.records.executions_json import enough_of
+from sim_validate.records.executions import enough_of
 from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record
 
 if TYPE_CHECKING:
     from grasp_core.hands.reach import HandReach
-    from sim_validate.records.reaches_schema import ExecutedHandRecord
-    from sim_validate.records.saved_reaches import SavedReaches
+    from sim_validate.records.reaches import ExecutedHandRecord, SavedReaches
 
 MILLI = 1e3
 STARTS, SEED, CLEARANCE_M = 100, 0, 5e-4

@@ -9,7 +9,7 @@ from typing import TypeAlias
 from grasp_core.checked import function, path_of, switch, whole
 from grasp_core.files.text_files import write_text
 from scenes.drawing.turntable import as_text, object_data
-from sim_validate.files.stale_results import (
+from sim_validate.files.result_folders import (
     GRASPS,
     INDEX,
     REPORT,
@@ -20,19 +20,8 @@ from sim_validate.files.stale_results import (
 )  # fmt: skip
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.reports.drawn_grasps import Drawn, Task, draw, tasks_of
-from sim_validate.reports.grasp_page import (
-    MIRRORED,
-    ROTATED,
-    Copy,
-    Kin,
-    Neighbours,
-    grasp_page,
-)
-from sim_validate.reports.index_page import (
-    Shown,
-    cards_of,
-    index_page,
-)
+from sim_validate.reports.grasp_page import MIRRORED, ROTATED, Copy, Kin, Neighbours, grasp_page
+from sim_validate.reports.index_page import Shown, cards_of, index_page
 from sim_validate.reports.pages import asset, style
 from sim_validate.reports.run_folder import RunFolder, folder_of, runs_in
 
@@ -45,17 +34,6 @@ Runs: TypeAlias = tuple[RunFolder, ...]
 
 def _nothing(*_: object) -> None:
     """Take note of nothing."""
-
-
-@dataclass(frozen=True, slots=True)
-class Steps:
-    """What is called while a report is drawn."""
-
-    progress: Callable[[int, int], object] = _nothing
-    """Called with (drawn, total) after each card."""
-    ready: Callable[[Path, int, int], object] = _nothing
-    """Called with (first page, drawn, total) once the first page can be opened, if more cards are
-    to be drawn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,9 +97,9 @@ def write_report(
     runs = tuple(run.first(limit) for run in runs_in(folder))
     require_report_folder(out)
     with new_pages(out) as place:
-        steps = Steps(progress, ready if place == out else _nothing)
         cards = list(_cards(runs, place, clips, every_copy=every_copy))
-        report = _written(cards, runs, place, jobs or available_cores(), steps)
+        ready = ready if place == out else _nothing
+        report = _written(cards, runs, place, jobs or available_cores(), progress, ready)
     return replace(report, index=out / INDEX)
 
 
@@ -141,9 +119,16 @@ class _Card:
         return f"{GRASPS}/{self.task.name}.html"
 
 
-def _written(cards: Sequence[_Card], runs: Runs, out: Path, jobs: int, steps: Steps) -> Report:
+def _written(
+    cards: Sequence[_Card], runs: Runs, out: Path, jobs: int,
+    progress: Callable[[int, int], object], ready: Callable[[Path, int, int], object],
+) -> Report:  # fmt: skip
     """Draw all cards, and write the first page as soon as `FIRST` of them are drawn."""
-    _shared_files(runs, out)
+    for name in STATIC:
+        write_text(out / name, style() if name == STYLE else asset(name))
+    for number, run in enumerate(runs):
+        data = as_text(object_data(run.saved.body))
+        write_text(out / f"object-{number}.js", f"window.graspproofObject = {data};\n")
     tasks = [card.task for card in cards]
     shown = list[Shown]()
     no_clip, next_index = "", min(FIRST, len(cards))
@@ -156,9 +141,9 @@ def _written(cards: Sequence[_Card], runs: Runs, out: Path, jobs: int, steps: St
             waiting = len(cards) - len(shown)
             index = write_text(out / INDEX, index_page(runs, shown, waiting))
             if next_index == FIRST and waiting:
-                steps.ready(index, len(shown), len(cards))
+                ready(index, len(shown), len(cards))
             next_index = min(2 * next_index, len(cards))
-        steps.progress(len(shown), len(cards))
+        progress(len(shown), len(cards))
     grasps = sum(1 + len(card.copies) for card in cards)
     return Report(out / INDEX, grasps, no_clip, len(cards))
 
@@ -179,15 +164,6 @@ def _cards(
                 for place in found.places if place != found.first
             )  # fmt: skip
             yield _Card(run, f"object-{number}.js", task, copies)
-
-
-def _shared_files(runs: Runs, out: Path) -> None:
-    """Write what pages share: styles, scripts, and drawings of the objects."""
-    for name in STATIC:
-        write_text(out / name, style() if name == STYLE else asset(name))
-    for number, run in enumerate(runs):
-        data = as_text(object_data(run.saved.body))
-        write_text(out / f"object-{number}.js", f"window.graspproofObject = {data};\n")
 
 
 def _neighbours(cards: Sequence[_Card], place: int) -> Neighbours:

@@ -5,29 +5,26 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
-from grasp_core.files.complaints import record_of
+from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.records.grasps_json import SavedGrasps
-from sim_validate.execution.jobs import ExecutedGrasp
-from sim_validate.files.stale_results import BEST, JUDGEMENTS, REACHES
-from sim_validate.protocols.judgements_schema import JudgementsFile
-from sim_validate.records.executions_json import EXECUTIONS, Executions, load_executions
+from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.files.result_folders import BEST, JUDGEMENTS, REACHES
+from sim_validate.protocols.judgements_json import JudgementsFile
+from sim_validate.records.best import BestFile, best_of
+from sim_validate.records.executions import EXECUTIONS, Executions, load_executions
 from sim_validate.records.grasps import read_grasps
-from sim_validate.records.regions import REGIONS
-from sim_validate.records.regions import SCHEMA as REGIONS_SCHEMA
-from sim_validate.records.regions_schema import RegionsFile
-from sim_validate.records.saved_verdicts import verdicts_of
-from sim_validate.records.verdicts_schema import VerdictsFile
+from sim_validate.records.regions import REGIONS, RegionsFile, regions_file_of
+from sim_validate.records.verdicts import VerdictsFile, verdicts_of
 from sim_validate.reports.agreement import BAD, Record, said_of
-from sim_validate.reports.best_possible import Possible, read_possible
 
 if TYPE_CHECKING:
-    from sim_validate.records.saved_reaches import SavedReaches
+    from sim_validate.records.reaches import SavedReaches
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"
-Read = TypeVar("Read", VerdictsFile, RegionsFile, JudgementsFile)
+Read = TypeVar("Read", VerdictsFile, RegionsFile, JudgementsFile, BestFile)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +49,7 @@ class RunFolder:
     """Where a hand stands in the grasps; None if the file does not exist."""
     judgements: Record | None = None
     """What published tests say of the grasps; None if the file does not exist."""
-    possible: Possible | None = None
+    possible: BestFile | None = None
     """The best grasp and the bound on all others; None if the file does not exist."""
     left_out: int = 0
     """Number of grasps in the files that `saved` leaves out."""
@@ -117,7 +114,7 @@ def runs_in(folder: Path) -> tuple[RunFolder, ...]:
 def _run(path: Path) -> RunFolder:
     saved = read_grasps(path / GRASPS)
     tried = _read(path / VERDICTS, verdicts_of, saved)
-    certified = _read(path / REGIONS, _regions, saved)
+    certified = _read(path / REGIONS, regions_file_of, saved)
     verdicts: Sequence[Record] = [] if tried is None else tried["verdicts"]
     regions: Sequence[Record] = [] if certified is None else certified["grasps"]
     return RunFolder(
@@ -131,20 +128,8 @@ def _run(path: Path) -> RunFolder:
         executions=_executions(path / EXECUTIONS, saved),
         reaches=reaches_beside(path / GRASPS, saved),
         judgements=_read(path / JUDGEMENTS, _judgements, saved),
-        possible=_possible(path / BEST[0], saved),
+        possible=_read(path / BEST[0], best_of, saved),
     )
-
-
-def _possible(path: Path, saved: SavedGrasps) -> Possible | None:
-    """Read the best grasp and the bound on all others; return None if the file does not exist."""
-    if not path.is_file():
-        return None
-    try:
-        found = read_possible(path)
-    except InputError as error:
-        raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
-    _check_object(path, found.object_sha256, saved)
-    return found
 
 
 def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
@@ -155,16 +140,13 @@ def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
     path = grasps.with_name(REACHES)
     if not path.is_file():
         return None
-    from sim_validate.records.saved_reaches import read_reaches  # runs without a hand need none
+    from sim_validate.records.reaches import read_reaches  # runs without a hand need none
 
     found, record = read_reaches(path)
     _check_object(path, record["object"]["content_sha256"], saved)
-    own = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
-    listed = [
-        (each["id"], each.get("contacts_sha256", own.get(each["id"], "")))
-        for each in record["reaches"]
-    ]  # fmt: skip
-    _check_contacts(path, listed, saved)
+    _check_contacts(
+        path, [(each["id"], each["contacts_sha256"]) for each in record["reaches"]], saved
+    )
     return found
 
 
@@ -210,10 +192,6 @@ def _read(path: Path, read: Callable[[str], Read], saved: SavedGrasps) -> Read |
         raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
     _check_object(path, found["object"]["content_sha256"], saved)
     return found
-
-
-def _regions(text: str) -> RegionsFile:
-    return record_of(RegionsFile, text, REGIONS, schema=REGIONS_SCHEMA)
 
 
 def _judgements(text: str) -> JudgementsFile:

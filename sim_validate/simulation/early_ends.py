@@ -53,10 +53,10 @@ from functools import lru_cache
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.closure.wrenches import cross_matrix
+from grasp_core.closure.contacts import cross_matrix
 from scenes.layout import Layout, grasp_size
+from sim_validate.simulation.bench import Mask
 from sim_validate.simulation.schedules import Schedule
-from sim_validate.simulation.simulate import Mask
 from sim_validate.simulation.traces import displaced, strayed
 
 SAFETY = 2.0
@@ -93,10 +93,7 @@ class EarlyEnds:
         self, layout: Layout, trials: Sequence[Schedule], sample_s: float, thresholds: Thresholds,
         start: Array | None = None,
     ) -> None:  # fmt: skip
-        """Begin to look at trials.
-
-        Takes `sample_s` [s].
-        """
+        """Begin to look at trials."""
         self.layout, self.thresholds, self.sample_s = layout, thresholds, sample_s
         self.resting = np.array([trial.resting for trial in trials])
         self.watched = np.array([trial.watched for trial in trials])

@@ -6,19 +6,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, cross, to_digits
-from grasp_core.closure.contact_arrays import contact_frictions, stacked
-from grasp_core.closure.soft.contacts import contact_torsions
-from grasp_core.closure.wrenches import normal_and_tangential
+from grasp_core.closure.contacts import contact_frictions, normal_and_tangential, stacked
+from grasp_core.closure.soft_contacts import contact_torsions
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
-from grasp_core.quality.weakest_wrench import weakest_from
-from grasp_core.quality.wrench_body import WrenchBody
-from grasp_core.quality.wrench_limit import WrenchLimit, limit_of
-from grasp_core.quality.wrench_limits import axis_wrenches
+from grasp_core.quality.wrench_limits import (
+    WrenchBody,
+    WrenchLimit,
+    axis_wrenches,
+    limit_of,
+    weakest_from,
+)
 from grasp_core.values import Contact
+from sim_validate.simulation.limits import part
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup
-from sim_validate.simulation.wrench_limits import part
 
 NO_PUSH = 1e-9
 """Normal forces below this share of the largest one count as zero."""

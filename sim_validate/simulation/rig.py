@@ -8,10 +8,10 @@ import numpy as np
 from grasp_core.arrays import Array
 from scenes.layout import Layout
 from sim_validate.simulation import schedules
+from sim_validate.simulation.bench import Bench, Motion
 from sim_validate.simulation.early_ends import EarlyEnds, Thresholds
 from sim_validate.simulation.schedules import Load, Schedule
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.simulate import Bench, Motion
 from sim_validate.simulation.traces import Trace, traces
 
 
@@ -51,13 +51,12 @@ class Rig:
     known (see `early_ends`)."""
 
     def hold(
-        self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None, *,
-        whole: bool = False,
-    ) -> tuple[Trace, ...]:  # fmt: skip
+        self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None
+    ) -> tuple[Trace, ...]:
         """Simulate a hold under each load, and trace it from the moment friction is lowered."""
         protocol, size = self.setup.hold, self.bench.scene.layout.grasp_size_m
         limits = Thresholds(protocol.hold_threshold * size, protocol.total_threshold * size)
-        return self._traces(self._holds(loads, settling_frictions), None if whole else limits)
+        return self._traces(self._holds(loads, settling_frictions), limits)
 
     def watch(self, load: Load, settling_friction: float | None = None) -> Watched:
         """Simulate one whole hold, and keep all motion since the fingers closed."""
@@ -110,10 +109,7 @@ class Rig:
     def release(
         self, settling_friction: float, frictions: Sequence[float], threshold_m: float | None = None
     ) -> tuple[Trace, ...]:
-        """Lower the friction of the unloaded object to several values, and trace its motion.
-
-        Takes `threshold_m` [m].
-        """
+        """Lower the friction of the unloaded object to several values, and trace its motion."""
         limits = None if threshold_m is None else Thresholds(threshold_m)
         return self._traces(self._releases(settling_friction, frictions), limits)
 

@@ -1,15 +1,162 @@
-"""Schedules say what is applied to an object in each sample of a trial; they need no simulator.
+"""What is applied to an object in each sample of a trial, and the durations, loads and thresholds.
 
 Every trial is a schedule: the forces planned for the fingers, the external wrench and the friction
 in each sample. Loads change smoothly, because long objects spring loose under a sudden start.
+
+Wrench hold. The fingers squeeze with planned forces while friction is raised, so that the
+transients of loading cannot slip a contact that would hold at rest. Then the wrench and the forces
+planned for it are applied together, the object settles, friction is lowered to the value under
+test, and the object must stay where it is.
+
+Largest wrench. The object is either held at several shares of the predicted limit (bisection), or
+loaded in one slow rise through it (ramp). It lets go where it has moved by a threshold. The mass
+must first be accelerated, so a ramp finds the limit late, never early.
+
+Critical friction. Fingers squeeze the unloaded object with the forces that balance at the predicted
+critical friction, friction is lowered to a trial value, and the object must stay; the trial value
+is bisected.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+from grasp_core.checked import LARGEST, SMALLEST, number, several, whole
+from grasp_core.errors import InputError
+
+MOST_ROUNDS = 40
+SECONDS, POSITIVE = (0.05, 60.0), (SMALLEST, LARGEST)
+RANGES = {
+    "hold_s": (0.2, 60.0),  # a shorter hold does not see a small imbalance move anything
+    "load_share": (0.1, 0.999),  # a smaller share would say next to nothing about a grasp
+    # under a smaller load the servos, which hide up to 0.01, might hold
+    "control_load": (0.05, 2.0),
+    "least_normal_share": (1e-4, 0.1),
+    # with less the servos might hold; with more no control would need a load
+    "least_excess": (1e-4, 0.01),
+    "least_friction": (1e-6, 0.01),
+    "settling_friction": (1.0, 100.0),
+}
+"""Least and largest value of each number that needs more than being positive."""
+
+
+@dataclass(frozen=True, slots=True)
+class HoldProtocol:
+    """Durations, loads and thresholds of a trial in which the object must hold a wrench.
+
+    Thresholds are relative to the size of the grasp, which is the lever of its contacts about the
+    axis they are closest to: 2e-4 is 10 um for contacts that span a decimetre. A servo hides an
+    unbalanced force of stiffness times displacement, here a thousandth of the largest normal force,
+    so looser thresholds would certify the wrong thing.
+
+    Raises:
+        InputError: A number is not positive and finite, or out of its range.
+    """
+
+    squeeze_s: float = 0.16
+    load_s: float = 0.16
+    settle_s: float = 0.10
+    hold_s: float = 0.40
+    settling_friction: float = 3.0
+    """Friction while loading, relative to the friction under test. In trials of negative controls
+    (contacts that must fail) it is relative to the larger of that friction and the one that the
+    planned forces need."""
+    load_share: float = 0.8
+    """Applied wrench, relative to the largest one that is resisted according to the analysis."""
+    control_load: float = 0.2
+    """Wrench applied to a negative control (contacts that must fail), relative to the largest
+    normal force."""
+    least_normal_share: float = 0.005
+    """Least planned normal force, relative to the largest; it keeps fingers without load in
+    contact."""
+    hold_threshold: float = 2e-4
+    """Largest displacement while the object must be held, in grasp sizes."""
+    total_threshold: float = 2e-4
+    """Largest displacement from the planned pose, in grasp sizes; a tilt of the object acts like
+    that much additional friction."""
+    least_excess: float = 5e-4
+    """Share of the sum of forces by which the forces must leave their friction cones even without a
+    load; it equals minus the closure margin. Contacts that need at least this share have to slip
+    without a load. With less, the servos, which hide a few thousandths of the largest normal force,
+    might hold them."""
+    gap_threshold: float = 2e-4
+    """A fingertip farther than this from its face has lost contact, in grasp sizes."""
+
+    def __post_init__(self) -> None:
+        _check(asdict(self))
+
+
+@dataclass(frozen=True, slots=True)
+class LimitProtocol:
+    """How the largest wrench that a grasp resists is found in simulation.
+
+    Raises:
+        InputError: A number is not positive and finite, or out of its range.
+    """
+
+    spans: tuple[float, ...] = (0.02, 0.1, 0.5)
+    """Half widths of the intervals around the predicted limit, relative to it. They are searched in
+    turn until the limit is found."""
+    ramp_s: float = 0.5
+    """Duration of the slow rise of the load through one interval [s]."""
+    ramp_threshold: float = 2e-5
+    """Displacement that ends a ramp, in grasp sizes. It is smaller than in a hold, because nothing
+    but the load moves the object during a ramp."""
+    rounds: int = 4
+    """How often bisection halves an interval."""
+
+    def __post_init__(self) -> None:
+        _check(asdict(self))
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionProtocol:
+    """How the critical friction of a grasp is found in simulation.
+
+    Raises:
+        InputError: A number is not positive and finite, or out of its range.
+    """
+
+    spans: tuple[float, ...] = (0.01, 0.1, 0.5)
+    """Half widths of the intervals around the predicted critical friction, relative to it. They are
+    searched in turn until the critical friction is found."""
+    rounds: int = 4
+    """How often bisection halves an interval."""
+    settling_friction: float = 5.0
+    """Friction while the fingers squeeze, relative to the predicted critical friction."""
+    least_friction: float = 1e-3
+    """Least friction that is simulated; the only one tried where the prediction is smaller."""
+    settle_s: float = 0.10
+    hold_s: float = 0.40
+    threshold: float = 2e-5
+    """Largest displacement while the object must be held, in grasp sizes. Within it the servos hide
+    an imbalance of a ten-thousandth of the largest normal force. Fingers that hardly push let the
+    object creep by up to 1e-5 above the critical friction."""
+
+    def __post_init__(self) -> None:
+        _check(asdict(self))
+
+
+def _check(numbers: Mapping[str, Any]) -> None:
+    for name, value in numbers.items():
+        if name == "spans":
+            shares = several(
+                value, partial(number, name=name, above=0.0, below=1.0), name, "shares"
+            )
+            if not shares or any(one >= two for one, two in pairwise(shares)):
+                raise InputError(
+                    f"{name} must be one or more numbers from 0 to 1 in rising order, got {value}"
+                )
+        elif name == "rounds":
+            whole(value, name, least=1, most=MOST_ROUNDS)
+        else:
+            least, largest = RANGES.get(name, SECONDS if name.endswith("_s") else POSITIVE)
+            number(value, name, least=least, most=largest)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,15 +3,16 @@
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
 from grasp_core.arrays import Array, frozen, to_digits
-from grasp_core.by_value import ByValue
+from grasp_core.by_value import ByValue, changed
 from grasp_core.checked import (
+    BOUNDS,
     LARGEST,
     MOST_RANDOM_WRENCHES,
     MOST_TRIALS,
@@ -26,17 +27,14 @@ from grasp_core.checked import (
     whole,
 )
 from grasp_core.errors import InputError
-from grasp_core.files.strict_json import shown
+from grasp_core.files.json_text import shown
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.short_text import changed
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, Surface, build_scene
 from scenes.physics import PhysicsSettings
-from sim_validate.simulation.noise import Noise
-from sim_validate.simulation.other_rules import rules_named
-from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.simulation.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
 
 AXIS_NAMES = tuple(
     f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
@@ -148,6 +146,30 @@ class NamedWrench(ByValue):
 
 
 @dataclass(frozen=True, slots=True)
+class Noise:
+    """How uncertain the pose, surface, friction and mass are, as standard deviations.
+
+    Raises:
+        InputError: A number is negative or out of its range.
+    """
+
+    shift: float = 0.01
+    """Deviation of the object's position along each axis, in object radii."""
+    turn_deg: float = 1.0
+    """Deviation of the object's orientation about each axis through its centre of mass [deg]."""
+    normal_deg: float = 1.0
+    """Deviation of the surface normal at each contact, about two axes in the surface [deg]."""
+    friction: float = 0.05
+    """Deviation of the friction coefficient, relative to the coefficient."""
+    mass: float = 0.05
+    """Deviation of the mass and of every load, relative to the planned values."""
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            number(value, name, **BOUNDS[f"noise_{name}"])
+
+
+@dataclass(frozen=True, slots=True)
 class Agenda:
     """Which trials a grasp goes through.
 
@@ -162,11 +184,7 @@ class Agenda:
     """Whether to find the critical friction in simulation."""
     limits: LimitSearch = "none"
     """How the largest multiple of each wrench is found in simulation, if at all."""
-    independent: bool = False
-    """Whether to run the trials of `unplanned_bounds` too, which use no planned finger forces."""
     controls: bool = True
-    rules: tuple[str, ...] = ()
-    """Names of other validators' acceptance rules that also judge the same trials."""
     trials: int = 0
     """How many times all trials that hold a wrench are repeated with noise."""
     noise: Noise = field(default_factory=Noise)
@@ -181,11 +199,9 @@ class Agenda:
         whole(self.random_wrenches, "random_wrenches", most=MOST_RANDOM_WRENCHES)
         whole(self.trials, "trials", most=MOST_TRIALS)
         seed_of(self.seed)
-        for name in ("critical_friction", "independent", "controls", "keep_traces"):
+        for name in ("critical_friction", "controls", "keep_traces"):
             switch(getattr(self, name), name)
         instance(self.noise, Noise, "noise")
-        several(self.rules, partial(text, name="rules"), "rules", "names")
-        rules_named(self.rules)
         each = partial(instance, kind=NamedWrench, name="wrenches")
         several(self.wrenches, each, "wrenches", "NamedWrench values")
         drawn = (RANDOM.format(place) for place in range(self.random_wrenches))

@@ -1,28 +1,34 @@
-"""Makes negative controls: contact sets derived from a grasp that are proved not force-closed.
+"""Makes negative controls, contact sets that are proved unable to hold the object, and tries them.
 
-A validator that never rejects anything proves nothing. Each control therefore carries a proof: a
-separating wrench that no contact forces within the friction cones oppose, whatever the fingers do.
-This wrench is the first load that the control is tested with.
+A validator that never rejects anything proves nothing. Each control is derived from a grasp and
+carries a proof that it is not force-closed: a separating wrench that no contact forces within the
+friction cones oppose, whatever the fingers do. In simulation it is loaded with this wrench. If
+contact forces cannot balance even the bare squeeze, it is also tried without a load. The fingers do
+their best: they apply the forces that need the least friction or, if none balance, those closest to
+balance.
 """
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, cross
+from grasp_core.arrays import Array, cross, to_digits
 from grasp_core.by_value import ByValue
-from grasp_core.closure.contact_arrays import stacked, unit_size
+from grasp_core.closure.contacts import stacked
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
-from grasp_core.closure.margin_program import deepest_forces
 from grasp_core.errors import SolverError, UndecidedError
+from grasp_core.forces.contact_forces import closest_forces, least_friction_forces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from sim_validate.validation.paper_as_printed import uncorrected_contacts
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.rig import Rig, squeezed
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.simulation.traces import LET_GO, HoldVerdict, Outcome, Trace, judge
 
 FRICTION_SHARE = 0.9
 """Friction of the low-friction control, relative to the lowest at which the grasp is in closure."""
@@ -30,10 +36,6 @@ LEAST_FRICTION = 1e-4
 """Lowest friction of a negative control; the simulator's own limit is 1e-5."""
 SEARCH = 64
 """Number of random displacements of the contacts that are tried to lose force closure."""
-KEPT = 64
-"""How many quadruples of faces keep their uncorrected contacts for the next grasp."""
-SURE = 1e-9
-"""Margin of closure above which compiled code is trusted where nothing depends on it."""
 TOWARD_CORNER = 0.95
 """How far a moved contact goes towards a corner of its face, as a share of the way."""
 
@@ -59,11 +61,9 @@ def negative_controls(
 ) -> tuple[Control, ...]:
     """Make the negative controls that exist for a grasp, at most one of each kind.
 
-    The kinds are friction below the critical one, fingers removed, a normal flipped, contacts moved
-    on their faces, which takes them out of the grasp's region, and the paper's uncorrected
-    constructions on the same faces. With torsion all of them are proved open as soft fingers.
-
-    Takes `torsion_m` [m].
+    The kinds are friction below the critical one, fingers removed, a normal flipped, and contacts
+    moved on their faces, out of the grasp's region. With torsion (`torsion_m` [m]) all of them are
+    proved open as soft fingers.
     """
     rng = np.random.default_rng(seed)
     candidates = (
@@ -71,7 +71,6 @@ def negative_controls(
         _fingers_removed(grasp, friction, torsion_m),
         _normal_flipped(grasp, friction, torsion_m),
         _contacts_moved(body, grasp, friction, torsion_m, rng),
-        _uncorrected(body, grasp, friction, torsion_m),
     )
     return tuple(found for tries in candidates if (found := next(tries, None)) is not None)
 
@@ -116,44 +115,6 @@ def _normal_flipped(grasp: Grasp, friction: float, torsion_m: float) -> Iterator
         yield from _refuted("normal_flipped", contacts, friction, torsion_m)
 
 
-def _uncorrected(
-    body: Polyhedron, grasp: Grasp, friction: float, torsion_m: float
-) -> Iterator[Control]:
-    """Yield contacts that the paper's printed programs accept, but that are not closed.
-
-    They depend on the faces alone, so grasps on the same faces have the same ones.
-    """
-    control = _uncorrected_on(body, tuple(sorted(grasp.faces)), friction, torsion_m)
-    if control is not None:
-        yield control
-
-
-@lru_cache(maxsize=KEPT)
-def _uncorrected_on(
-    body: Polyhedron, faces: tuple[int, ...], friction: float, torsion_m: float = 0.0
-) -> Control | None:
-    try:
-        for supposed, positions, normals in uncorrected_contacts(body, faces, friction):
-            for points in positions[_may_be_open(positions, normals, supposed)]:
-                contacts = [Contact(at, way) for at, way in zip(points, normals, strict=True)]
-                for control in _refuted("uncorrected", contacts, supposed, torsion_m):
-                    return control
-    except SolverError:
-        pass
-    return None
-
-
-def _may_be_open(positions: Array, normals: Array, friction: float) -> Indices:
-    """Find sets of contacts, of (g, k, 3), that compiled code does not find closed.
-
-    This only saves proofs: a set that is left out makes no control, and the others are proved.
-    """
-    arms, _, _ = unit_size(positions)
-    every = np.broadcast_to(normals, positions.shape)
-    _, _, margins = deepest_forces(arms, every, np.full(len(positions), friction))
-    return np.flatnonzero(~((margins[:, 0] > SURE) & (margins[:, 1] >= margins[:, 0])))
-
-
 def _contacts_moved(
     body: Polyhedron, grasp: Grasp, friction: float, torsion_m: float, rng: np.random.Generator
 ) -> Iterator[Control]:
@@ -183,3 +144,109 @@ def _refuted(
         return
     if not certificate.closed:
         yield Control(name, tuple(contacts), friction, certificate)
+
+
+SEPARATING = "separating"
+"""Name of the trial with the separating wrench, which the contacts provably cannot resist."""
+UNLOADED = "unloaded"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControlLoad:
+    """A load under which a negative control must let go of the object."""
+
+    name: str
+    load: Load
+    settling: float
+    """Friction coefficient while the object settles, before the load is applied."""
+    required_friction: float | None
+    """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ControlTrial(ByValue):
+    """One simulated trial of a negative control under one load."""
+
+    name: str
+    wrench: Array
+    """Applied external wrench, (6,) [N, N m], torque about the centre of mass."""
+    required_friction: float | None
+    """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
+    hold: HoldVerdict
+    trace: Trace | None
+    """Recorded motion in the trial; kept only if asked for."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ControlVerdict(ByValue):
+    """How a negative control, a contact set proved not to be force-closed, ended in simulation."""
+
+    control: Control
+    tried: tuple[ControlTrial, ...]
+    """Trials of the loads that no contact forces can balance."""
+
+    @property
+    def held(self) -> bool:
+        """Whether the control held any of the loads, which it must not."""
+        return any(trial.hold.outcome is Outcome.HELD for trial in self.tried)
+
+    @property
+    def let_go(self) -> bool:
+        """Whether the object moved in every trial, as it must."""
+        return all(trial.hold.outcome in LET_GO for trial in self.tried)
+
+
+def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup) -> ControlVerdict:
+    """Simulate a negative control under the loads that it must not hold."""
+    rig, loads = control_case(body, control, setup)
+    traces = rig.hold([each.load for each in loads], [each.settling for each in loads])
+    layout = rig.bench.scene.layout
+    tried = tuple(
+        ControlTrial(
+            each.name, each.load.wrench, each.required_friction, judge(trace, layout, setup.hold),
+            trace if agenda.keep_traces else None,
+        )
+        for each, trace in zip(loads, traces, strict=True)
+    )  # fmt: skip
+    return ControlVerdict(control, tried)
+
+
+def control_case(
+    body: Polyhedron, control: Control, setup: Setup
+) -> tuple[Rig, tuple[ControlLoad, ...]]:
+    """Close fingers on a control, and find the loads that it must not hold."""
+    # Other contacts than the grasp's may lack room for its fingertips or lie off the mesh.
+    fingers = replace(setup.fingers, radius_m=None)
+    on_pads = replace(setup, fingers=fingers, surface="pads")
+    scene = on_pads.scene(body, control.contacts, control.friction)
+    idle = _planned(body, control, setup, UNLOADED, np.zeros(6))
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    rig = squeezed(bench, setup, idle.load.forces, control.friction, idle.settling)
+    # The separating wrench is a linear function of wrenches. With torques measured in object
+    # radii its coefficients are times the scale; the wrench along them is times it once more.
+    scale = np.array([1.0] * 3 + [body.radius] * 3)
+    facing = -control.separating_wrench(body.center_of_mass) * scale**2
+    size = setup.hold.control_load * setup.fingers.max_normal_force_n
+    wrench = to_digits(size * facing / float(np.linalg.norm(facing / scale)))
+    loads = [_planned(body, control, setup, SEPARATING, wrench)]
+    if control.certificate.margin < -setup.hold.least_excess:  # no forces balance the bare squeeze
+        loads.append(idle)
+    return rig, tuple(loads)
+
+
+def _planned(
+    body: Polyhedron, control: Control, setup: Setup, name: str, wrench: Array
+) -> ControlLoad:
+    """Plan forces for a wrench: of least friction, or nearest to balance where none balance it."""
+    positions = np.array([contact.position for contact in control.contacts])
+    normals = np.array([contact.normal for contact in control.contacts])
+    largest = setup.fingers.max_normal_force_n
+    limits = (setup.hold.least_normal_share * largest, largest)
+    given, center = (positions, normals, control.friction, wrench), body.center_of_mass
+    balanced = least_friction_forces(*given, normal_force=limits, center=center)
+    if balanced is None:
+        needed, forces = None, closest_forces(*given, normal_force=limits, center=center)
+    else:
+        needed, forces = float(to_digits(np.array(balanced[1]))), balanced[0]
+    settling = setup.hold.settling_friction * max(control.friction, needed or 0.0)
+    return ControlLoad(name, Load(wrench, to_digits(forces)), settling, needed)

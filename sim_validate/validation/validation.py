@@ -6,38 +6,45 @@ friction is found in simulation too, and on request the limits. The grasp is con
 wrenches hold. The run can be trusted when the simulator is faithful (`gate`) and no control holds.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from grasp_core.checked import coefficient, instance
+from grasp_core.checked import coefficient, function, instance, several, whole
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, UndecidedError
-from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from scenes.fingertips import clashes
-from scenes.mjcf import Scene
-from sim_validate.simulation.critical_friction import CriticalFriction, released_friction
-from sim_validate.simulation.gate.gate import Gate, require_faithful
-from sim_validate.simulation.gate.mesh_contacts import require_touch
-from sim_validate.simulation.hold_verdict import invalid_start, judge
+from sim_validate.parallel.processes import Shared, each, processes
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.gate import (
+    Gate,
+    measured_gate,
+    remember_gate,
+    require_faithful,
+    require_touch,
+)
+from sim_validate.simulation.limits import (
+    CriticalFriction,
+    SimulatedLimit,
+    bisected_limits,
+    ramped_limits,
+    released_friction,
+)
 from sim_validate.simulation.loads import PlannedLoad, planned_loads
-from sim_validate.simulation.other_rules import FORCE_AXES, accepted, rules_named
 from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.simulation.simulate import Bench
-from sim_validate.simulation.traces import Trace
-from sim_validate.simulation.unplanned_bounds import Bounds, independent_bounds
-from sim_validate.simulation.wrench_limits import SimulatedLimit, bisected_limits, ramped_limits
-from sim_validate.validation.control_trials import ControlVerdict, try_control
-from sim_validate.validation.controls import negative_controls
-from sim_validate.validation.grasp_verdict import Verdict
-from sim_validate.validation.repeats import Robustness, for_repeats, robustness
-from sim_validate.validation.wrench_verdict import WrenchVerdict
+from sim_validate.simulation.traces import invalid_start, judge
+from sim_validate.validation.controls import ControlVerdict, negative_controls, try_control
+from sim_validate.validation.noise import for_repeats, robustness
+from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 Chosen = TypeVar("Chosen")
 
@@ -74,33 +81,70 @@ def validate(
             f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"
         )
     gate = require_faithful(setup, friction, body.radius)
-    return validated(
-        body, replace(grasp, critical_friction=critical), friction, gate, agenda, setup
-    )
+    return tested(body, replace(grasp, critical_friction=critical), friction, gate, agenda, setup)
 
 
-def validated(
+def tested(
     body: Polyhedron, grasp: Grasp, friction: float, gate: Gate, agenda: Agenda, setup: Setup
 ) -> Verdict:
     """Test a grasp whose closure is proved, with a simulator that was checked before."""
     require_touch(body, grasp.contacts, setup)
     scene = setup.scene(body, grasp, friction)
-    trial = _Bout(body, grasp, friction, scene, agenda, setup)
-    wrenches = trial.wrenches()
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    rig = squeezed(bench, setup, scene.layout.squeeze_forces, friction)
+    loads = planned_loads(body, grasp.contacts, friction, rig.idle, agenda, setup)
+    wrenches = _held_wrenches(body, grasp, rig, loads, agenda)
+    critical = CriticalFriction(grasp.critical_friction)
+    if agenda.critical_friction:
+        with suppress(UndecidedError):
+            critical = released_friction(
+                bench, grasp.positions, grasp.normals, critical.predicted, setup
+            )
+    controls, repeats = tuple[ControlVerdict, ...](), None
+    if agenda.controls:
+        made = negative_controls(body, grasp, friction, agenda.seed, setup.torsion_m)
+        controls = tuple(try_control(body, each, agenda, setup) for each in made)
+    if agenda.trials:  # the same fingertips hold the same wrenches
+        named = [(planned.name, planned.load.wrench) for planned in loads]
+        repeats = robustness(body, grasp, friction, named, agenda, for_repeats(setup, scene))
     return Verdict(
         id=grasp.id,
         contacts=grasp.contacts,
         friction=friction,
-        critical_friction=trial.critical(),
+        critical_friction=critical,
         wrenches=wrenches,
-        controls=trial.controls(),
-        bounds=trial.bounds(),
-        robustness=trial.robustness(),
-        accepted_by=trial.accepted_by(),
+        controls=controls,
+        robustness=repeats,
         gate=gate,
         scene=scene,
         setup=setup,
         agenda=agenda,
+    )
+
+
+def _held_wrenches(
+    body: Polyhedron, grasp: Grasp, rig: Rig, loads: Sequence[PlannedLoad], agenda: Agenda
+) -> tuple[WrenchVerdict, ...]:
+    """Judge the hold of every load and, if asked for, find its limit."""
+    layout, limits = rig.bench.scene.layout, [planned.limit for planned in loads]
+    traces = rig.hold([planned.load for planned in loads])
+    overlap = clashes(body, grasp.positions, grasp.normals, layout.drive.radius_m)
+    found: Sequence[SimulatedLimit | None] = [None] * len(limits)
+    if agenda.limits != "none":
+        search = ramped_limits if agenda.limits == "ramp" else bisected_limits
+        found = search(rig, limits)
+    verdicts = [judge(trace, layout, rig.setup.hold) for trace in traces]
+    return tuple(
+        WrenchVerdict(
+            name=planned.name,
+            wrench=planned.load.wrench,
+            predicted_limit=planned.predicted_limit,
+            required_friction=planned.required_friction,
+            hold=invalid_start(verdict, overlap) if overlap else verdict,
+            simulated_limit=limit,
+            trace=trace if agenda.keep_traces else None,
+        )
+        for planned, trace, verdict, limit in zip(loads, traces, verdicts, found, strict=True)
     )
 
 
@@ -149,93 +193,99 @@ def _given(value: Chosen | None, default: Chosen, name: str) -> Chosen:
     return value
 
 
-class _Bout:
-    """A grasp on the bench, with the trials of an agenda."""
+Progress: TypeAlias = Callable[[int, int, Verdict], object]
+"""Function that is told the number of grasps done, the number of all, and the last verdict."""
 
-    def __init__(
-        self, body: Polyhedron, grasp: Grasp, friction: float, scene: Scene,
-        agenda: Agenda, setup: Setup,
-    ) -> None:  # fmt: skip
-        self.body, self.grasp, self.friction = body, grasp, friction
-        self.agenda, self.setup, self.layout = agenda, setup, scene.layout
-        self.bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
-        self.rig: Rig = squeezed(self.bench, setup, self.layout.squeeze_forces, friction)
-        self.loads = planned_loads(body, grasp.contacts, friction, self.rig.idle, agenda, setup)
-        self.traces = self.rig.hold([planned.load for planned in self.loads])
 
-    def wrenches(self) -> tuple[WrenchVerdict, ...]:
-        """Judge the hold of every load and, if asked for, find its limit."""
-        radius = self.layout.drive.radius_m
-        overlap = clashes(self.body, self.grasp.positions, self.grasp.normals, radius)
-        return tuple(
-            self._wrench(planned, trace, limit, overlap)
-            for planned, trace, limit in zip(self.loads, self.traces, self._limits(), strict=True)
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One grasp to validate, as it is sent to a worker process."""
+
+    body: Polyhedron
+    grasp: Grasp
+    friction: float
+    agenda: Agenda
+    setup: Setup
+    gate: Gate | None = None
+    """How the simulator did on the known cases, so that worker processes need not ask again."""
+
+    def __reduce__(self) -> tuple[Callable[..., "Job"], tuple[object, ...]]:
+        """Send the object so that all grasps of a worker process have the same one."""
+        rest = (self.grasp, self.friction, self.agenda, self.setup, self.gate)
+        return _arrived, (Shared(self.body), *rest)
+
+
+def _arrived(body: Shared[Polyhedron], *rest: Any) -> Job:
+    return Job(body.value, *rest)
+
+
+def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
+    """Yield one verdict per job, in order; the number of processors does not change the results."""
+    count = processes(len(jobs), processors)
+    return each(verdict_of, prepared(jobs, processors), jobs=count)
+
+
+def prepared(jobs: Sequence[Job], processors: int) -> list[Job]:
+    """Check the simulator for each job, and give each an equal share of processors that remain."""
+    threads = max(1, processors // processes(len(jobs), processors))
+    return [
+        replace(
+            job, setup=replace(job.setup, threads=threads),
+            gate=measured_gate(job.setup, job.friction, job.body.radius),
         )
+        for job in jobs
+    ]  # fmt: skip
 
-    def _wrench(
-        self, planned: PlannedLoad, trace: Trace, limit: SimulatedLimit | None,
-        overlap: Sequence[str],
-    ) -> WrenchVerdict:  # fmt: skip
-        verdict = judge(trace, self.layout, self.setup.hold)
-        return WrenchVerdict(
-            name=planned.name,
-            wrench=planned.load.wrench,
-            predicted_limit=planned.predicted_limit,
-            required_friction=planned.required_friction,
-            hold=invalid_start(verdict, overlap) if overlap else verdict,
-            simulated_limit=limit,
-            trace=trace if self.agenda.keep_traces else None,
-        )
 
-    def _limits(self) -> tuple[SimulatedLimit | None, ...]:
-        limits = [planned.limit for planned in self.loads]
-        if self.agenda.limits == "ramp":
-            return ramped_limits(self.rig, limits)
-        if self.agenda.limits == "bisection":
-            return bisected_limits(self.rig, limits)
-        return (None,) * len(limits)
+def verdict_of(job: Job) -> Verdict:
+    """Validate one grasp."""
+    if job.gate is not None:
+        remember_gate(job.gate, job.setup, job.friction, job.body.radius)
+    return validate(job.body, job.grasp, job.friction, agenda=job.agenda, setup=job.setup)
 
-    def critical(self) -> CriticalFriction:
-        """Predict the critical friction and, if asked for, find it in simulation."""
-        predicted = self.grasp.critical_friction
-        if not self.agenda.critical_friction:
-            return CriticalFriction(predicted)
-        grasp, setup = self.grasp, self.setup
-        try:
-            return released_friction(self.bench, grasp.positions, grasp.normals, predicted, setup)
-        except UndecidedError:
-            return CriticalFriction(predicted)
 
-    def controls(self) -> tuple[ControlVerdict, ...]:
-        """Try the negative controls, if asked for."""
-        if not self.agenda.controls:
-            return ()
-        found = negative_controls(
-            self.body, self.grasp, self.friction, self.agenda.seed, self.setup.torsion_m
-        )
-        return tuple(try_control(self.body, each, self.agenda, self.setup) for each in found)
+def validate_all(
+    body: Polyhedron,
+    grasps: Iterable[Grasp],
+    friction: float = 0.5,
+    *,
+    agenda: Agenda | None = None,
+    setup: Setup | None = None,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> tuple[Verdict, ...]:
+    """Test many grasps of one object in simulation, each as `validate` does.
 
-    def bounds(self) -> Bounds | None:
-        """Find bounds without planned forces, if asked for."""
-        if not self.agenda.independent:
-            return None
-        limits = [planned.limit for planned in self.loads]
-        critical = self.grasp.critical_friction
-        return independent_bounds(self.body, self.grasp, critical, self.rig, limits)
+    Args:
+        body: The object.
+        grasps: Grasps in force closure at this friction, such as a plan.
+        friction: Coulomb coefficient at every contact.
+        agenda: Which trials to run; the default agenda if None.
+        setup: How trials are simulated; the default setup if None.
+        jobs: Largest number of processors to use; results do not depend on it. From 16 grasps on
+            they are used as processes.
+        progress: Called after each grasp, in order, with the number of grasps done, the number of
+            all, and the verdict. What it raises ends the loop.
 
-    def robustness(self) -> Robustness | None:
-        """Repeat the holds with noise, if asked for: the same fingertips hold the same wrenches."""
-        if not self.agenda.trials:
-            return None
-        setup = for_repeats(self.setup, self.bench.scene)
-        loads = [(planned.name, planned.load.wrench) for planned in self.loads]
-        return robustness(self.body, self.grasp, self.friction, loads, self.agenda, setup)
+    Returns:
+        One verdict per grasp, in order.
 
-    def accepted_by(self) -> dict[str, bool]:
-        """Apply the rules of other tools, which look at where the object ends, to whole trials."""
-        rules = rules_named(self.agenda.rules)
-        if not rules:
-            return {}
-        pulls = [planned.load for planned in self.loads if planned.name in FORCE_AXES]
-        pulled = self.rig.hold(pulls, whole=True)
-        return {rule.name: accepted(rule, pulled, self.layout, self.setup.hold) for rule in rules}
+    Raises:
+        InputError: A grasp is not on the body's faces, or not closed at this friction.
+        UnfaithfulError: The simulator fails its checks with these settings.
+    """
+    check_body(body)
+    coefficient(friction)
+    kind = partial(instance, kind=Grasp, name="grasps")
+    listed = several(grasps, kind, "grasps", "Grasp values")
+    agenda, setup = asked_for(agenda, setup)
+    whole(jobs, "jobs", least=1)
+    if progress is not None:
+        function(progress, "progress")
+    tasks = [Job(body, grasp, friction, agenda, setup) for grasp in listed]
+    verdicts: list[Verdict] = []
+    for verdict in validated(tasks, jobs) if jobs > 1 else map(verdict_of, tasks):
+        verdicts.append(verdict)
+        if progress is not None:
+            progress(len(verdicts), len(tasks), verdict)
+    return tuple(verdicts)

@@ -8,7 +8,6 @@ from functools import cache
 
 import numpy as np
 
-from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.optimizing.best import result
 from grasp_core.optimizing.best.support_cuts import CutTree
 from grasp_core.quality.ferrari_canny import FerrariCanny
@@ -24,33 +23,6 @@ def known(seed):
     """A genuine best grasp, and a quality that its contacts reach for certain."""
     found = table.best(seed)
     return found, hull_radius(found.quality.wrenches, 16)
-
-
-@cache
-def known_ceiling(seed):
-    """A genuine ceiling, and a quality that contacts in the middle of its faces reach."""
-    while True:
-        found = table.ceiling(seed)
-        t = found.proof
-        if len(t.deeds):
-            best = max(reached(t, np.random.default_rng(i)) for i in range(40))
-            if best > 2e-3:
-                return found, best
-        seed += TREES
-
-
-def reached(t, rng):
-    on = [rng.choice(np.flatnonzero(t.owners == i)) for i in range(4)]
-    polygons = t.grounds.polygons()
-    ways = [rng.dirichlet(np.ones(len(polygons[p]))) @ polygons[p] for p in on]
-    x = np.vstack([t.grounds.places(p, y[None]) for p, y in zip(on, ways, strict=True)])
-    w = WrenchSet.at(x, t.grounds.normals[on], np.full(4, t.friction))
-    return hull_radius(w)
-
-
-def threshold(t, reach, rng):
-    """A threshold that is refuted although it is reached by far more than rounding."""
-    return max((reach - (t.bound - t.threshold)) * (1.0 - power(rng, -6, -0.1)), 1e-6)
 
 
 def changed_deeds(t, rng):
@@ -86,18 +58,8 @@ def changed_numbers(t, rng):
     return {"twists": twists, "lines": lines}
 
 
-def tiny_trees(_, rng):
-    """Trees of few steps from the start."""
-    n = int(rng.integers(1, 8))
-    deeds = rng.choice([0, 0, 0, 15, 16, 17, 32, 35], size=n)
-    lines = np.array([[*rng.normal(size=2), 0.0], [1e49, -1e49, 1e49], [3.0, 0.0, 0.0]])
-    return {"deeds": deeds, "asked": rng.integers(3, size=n), "lines": lines}
-
-
 def more_maps(t, rng):
     """Maps that are no symmetries, or next to nothing, in any number."""
-    if t.owners is not None:
-        return {}
     angle = rng.choice([1e-10, 1e-9, 2e-9, 1e-8, np.pi, 2 * np.pi / 3])
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
@@ -107,11 +69,11 @@ def more_maps(t, rng):
 
 
 def lowered(t, reach, rng):
-    """A tree with a threshold that contacts reach, repaired in one way or several."""
-    low = threshold(t, reach, rng)
-    ways = [changed_deeds, changed_numbers, tiny_trees, more_maps]
+    """A tree with a threshold that contacts reach by far more than rounding, and other fields."""
+    low = max((reach - (t.bound - t.threshold)) * (1.0 - power(rng, -6, -0.1)), 1e-6)
+    ways = [changed_deeds, changed_numbers, more_maps]
     changed = {}
-    for way in rng.permutation(4)[: rng.integers(0, 3)]:
+    for way in rng.permutation(3)[: rng.integers(0, 3)]:
         changed |= ways[way](t, rng)
     most = (t.bound - t.threshold) if "maps" not in changed else 3e-7
     low = min(low, max(reach - most, 1e-6) * (1.0 - 1e-6))
@@ -135,12 +97,6 @@ def lower_best(rng):
     return lambda: replace(found, quality=replace(q, lower=lower, upper=lower))
 
 
-def lower_ceilings(rng):
-    found, reach = known_ceiling(int(rng.integers(TREES)))
-    make = lowered(found.proof, reach, rng)
-    return lambda: replace(found, proof=make())
-
-
 def unreplayed(monkeypatch):
     """Trees are not replayed."""
     monkeypatch.setattr(CutTree, "_replayed", always(True))
@@ -154,4 +110,3 @@ def any_quality(monkeypatch):
 
 TREE = Attack(lambda rng: cycled(rng, [lower_bounds]), (unreplayed,), 2000)
 BEST = Attack(lambda rng: cycled(rng, [lower_best]), (unreplayed, any_quality), 600)
-CEILING = Attack(lambda rng: cycled(rng, [lower_ceilings]), (unreplayed,), 800)

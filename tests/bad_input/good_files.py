@@ -29,6 +29,19 @@ def good(name: str) -> bytes:
     return (Path(_folder().name) / name).read_bytes()
 
 
+def reading(file: str, command: str, folder: Path) -> list[str]:
+    """The words of a command in which FILE stands for a file, or comes last, and {grasps} for one.
+
+    The other file is made there: a whole `good.json`.
+    """
+    words = command.split()
+    if "{grasps}" in words:
+        (folder / "good.json").write_bytes(good("grasps.json"))
+        words[words.index("{grasps}")] = "good.json"
+    words = words if "FILE" in words else [*words, "FILE"]
+    return [file if word == "FILE" else word for word in words]
+
+
 def grasps_text() -> str:
     """A grasps.json with one grasp of the tetrahedron."""
     return good("grasps.json").decode()

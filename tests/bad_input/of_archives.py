@@ -52,17 +52,12 @@ OUTSIDE = '<?xml version="1.0"?><!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/pass
 MESHES = {
     "a bomb called 3mf": ("part.3mf", zipped(("3dmodel.model", bytes(50_000_000))), "ending"),
     "a zip bomb called obj": ("part.obj", zipped(("part.obj", bytes(50_000_000))), "zip|unpack"),
-    "a zip in a zip": ("part.ply", zipped(("a.zip", zipped(("b", b"c")))), "zip|unpack"),
     "a name that climbs": ("part.obj", zipped(("../../part.obj", b"v")), "zip|unpack"),
-    "an absolute name": ("part.obj", zipped(("/etc/part.obj", b"v")), "zip|unpack"),
     "10^4 entries": ("part.obj", zipped(*((str(i), b"") for i in range(10_000))), "zip|unpack"),
-    "entities": ("part.dae", ENTITIES, "ending"),
     "entities called off": ("part.off", ENTITIES, "XML|convert"),
     "an entity outside": ("part.x3d", OUTSIDE, "ending"),
     "an entity outside called ply": ("part.ply", OUTSIDE, "XML|convert"),
-    "10^5 deep XML": ("part.amf", "<a>" * 100_000, "ending"),
     "a compressed OFF": ("part.off.gz", b"\x1f\x8b\x08", "ending"),
-    "a tar": ("part.tar", b"a" * 512, "ending"),
 }  # fmt: skip
 NPZS = {
     "no archive": (b"PK nothing", "npz"),

@@ -30,7 +30,7 @@ ON_GRASPS = {
     "replay full --out made": "full",
     "dataset verify full": "full",
     "dataset verify nowhere": "nowhere",
-    "dataset export full --to csv --out made": "full",
+    "dataset export full --out made": "full",
     "dataset build tetrahedron --out full": "full",
     "dataset build nobody.stl --friction 0.5 --out made": "nobody.stl",
     "baseline check nowhere.json": "nowhere.json",

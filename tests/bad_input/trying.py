@@ -1,28 +1,25 @@
-"""Commands tried out: each in a process of its own, what it says, costs and leaves behind.
+"""A case tried out: what the command says, costs and leaves behind, and what is wrong with that."""
 
-Python and the packages are imported once, by a process that then forks for each command, so that
-hundreds take minutes. Run as `python -m tests.bad_input.trying`, it takes a line of JSON for each
-command, and answers with one.
-"""
-
-import atexit
-import json
+import contextlib
+import io
 import os
 import resource
-import signal
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from sim_validate.main import main
 from tests.bad_input.cases import Case
+from tests.patience import HANGING_S
 
-LONGEST_S = 200.0
-"""After which a command is ended: it hangs, however busy the machine is."""
-ADDRESS_SPACE = 16 * 2**30
-"""Of a command, so that none takes the machine with it."""
+COMMAND = [sys.executable, "-P", "-c", "from sim_validate.main import run_and_exit as r; r()"]
+LINES, LETTERS = 24, 2000
+"""Of one screen."""
+USAGE = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +29,12 @@ class Tried:
     code: int
     out: str
     err: str
-    seconds: float
-    """Of a processor, spent by it and by the processes that it waited for."""
-    megabytes: float
     left: tuple[str, ...]
     """Files that were not there before."""
+    seconds: float
+    """Of a processor."""
+    megabytes: float
+    """By which the largest memory of this process grew."""
 
     @property
     def message(self) -> str:
@@ -44,105 +42,76 @@ class Tried:
         return " ".join(self.err.translate(dict.fromkeys(map(ord, "│╭╰─╮╯"), " ")).split())
 
 
-class Trials:
-    """Tries commands one after another."""
-
-    def __init__(self) -> None:
-        root = Path(__file__).parents[2]
-        self.server = subprocess.Popen(
-            [sys.executable, "-P", "-m", "tests.bad_input.trying"], stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(root)},
-        )  # fmt: skip
-
-    def __enter__(self) -> "Trials":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.server.stdin.close()
-        self.server.wait(30)
-        self.server.stdout.close()
-
-    def tried(self, case: Case) -> Tried:
-        """Make a case's files and run its command."""
-        with tempfile.TemporaryDirectory() as folder:
-            argv = case.make(Path(folder))
-            before = set(_files(Path(folder)))
-            asked = {"argv": argv, "cwd": folder, "environment": dict(case.environment)}
-            self.server.stdin.write(json.dumps(asked) + "\n")
-            self.server.stdin.flush()
-            said = json.loads(self.server.stdout.readline())
-            left = sorted(set(_files(Path(folder))) - before)
-        return Tried(**said, left=tuple(left))
+def tried(case: Case, *, apart: bool = False) -> Tried:
+    """Make a case's files and run its command here, or apart, in a process of its own."""
+    with tempfile.TemporaryDirectory() as folder, _working_in(folder):
+        argv = case.make(Path(folder))
+        before, begun, peak = set(_files(folder)), time.process_time(), _peak()
+        run = _apart if apart or case.environment else _here
+        code, out, err = run(case, argv)
+        left = tuple(sorted(set(_files(folder)) - before))
+        return Tried(code, out, err, left, time.process_time() - begun, _peak() - peak)
 
 
-def _files(folder: Path) -> list[str]:
-    return [
-        os.fsencode(path.relative_to(folder)).decode("utf-8", "replace")
-        for path in folder.rglob("*")
-        if not path.is_dir()
-    ]
-
-
-def serve() -> None:
-    """Answer requests until there are no more."""
-    import numpy.linalg
-
-    import sim_validate.commands.plan
-    import sim_validate.commands.validate
-    import sim_validate.main  # noqa: F401 - for those that are forked
-
-    del numpy
-    for line in sys.stdin:
-        asked = json.loads(line)
-        with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-            child = os.fork()
-            if child == 0:
-                _run(asked, out.fileno(), err.fileno())
-            code, used = _waited(child)
-            said = {"code": code, "seconds": used.ru_utime + used.ru_stime,
-                    "megabytes": used.ru_maxrss / 1024}  # fmt: skip
-            for name, stream in (("out", out), ("err", err)):
-                stream.seek(0)
-                said[name] = stream.read().decode("utf-8", "replace")
-        print(json.dumps(said), flush=True)
-
-
-def _run(asked: dict, out: int, err: int) -> None:
-    """In the forked process: the command, as the program would run it."""
-    code = 70
+def _here(_: Case, argv: list[str]) -> tuple[int, str, str]:
+    out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", "replace") for _ in range(2))
+    given, sys.argv = sys.argv, ["graspproof", *argv]
     try:
-        os.setsid()
-        resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
-        os.chdir(asked["cwd"])
-        os.environ.update(asked["environment"])
-        nothing = os.open(os.devnull, os.O_RDONLY)
-        for have, want in ((nothing, 0), (out, 1), (err, 2)):
-            os.dup2(have, want)
-        from sim_validate.main import main
-
-        sys.argv = ["graspproof", *asked["argv"]]
-        code = main(asked["argv"])
-    except BaseException:
-        import traceback
-
-        traceback.print_exc()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            code = main(argv)
     finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        atexit._run_exitfuncs()
-        os._exit(code)
+        sys.argv = given
+    for stream in (out, err):
+        stream.seek(0)  # which writes what is held back
+    return code, out.read(), err.read()
 
 
-def _waited(child: int) -> tuple[int, resource.struct_rusage]:
-    begun = time.monotonic()
-    while True:
-        ended, status, used = os.wait4(child, os.WNOHANG)
-        if ended:
-            return os.waitstatus_to_exitcode(status), used
-        if time.monotonic() - begun > LONGEST_S:
-            os.killpg(child, signal.SIGKILL)
-        time.sleep(0.005)
+def _apart(case: Case, argv: list[str]) -> tuple[int, str, str]:
+    root = str(Path(__file__).parents[2])
+    environment = {**os.environ, "PYTHONPATH": root, **dict(case.environment)}
+    done = subprocess.run([*COMMAND, *argv], env=environment, stdin=subprocess.DEVNULL,
+                          capture_output=True, timeout=HANGING_S, check=False)  # fmt: skip
+    return done.returncode, *(
+        each.decode("utf-8", "replace") for each in (done.stdout, done.stderr)
+    )
 
 
-if __name__ == "__main__":
-    serve()
+@contextlib.contextmanager
+def _working_in(folder: str) -> Iterator[None]:
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before)
+
+
+def _files(folder: str) -> list[str]:
+    paths = (path for path in Path(folder).rglob("*") if not path.is_dir())
+    return [os.fsencode(path).decode("utf-8", "replace") for path in paths]
+
+
+def _peak() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def complaints(case: Case, found: Tried) -> list[str]:
+    """What is wrong with an answer; nothing if all is as promised."""
+    said = found.message
+    wrong = {
+        f"exit code {found.code}, expected {case.code}": found.code != case.code,
+        "a traceback": "Traceback" in found.err or "internal error" in found.err,
+        f"left {found.left[:3]}": bool(found.left),
+        "control characters": any(not c.isprintable() and c != "\n" for c in found.err),
+    }
+    if case.code:
+        wrong |= {
+            "no message": not said,
+            "more than a screen": len(found.err.splitlines()) > LINES or len(found.err) > LETTERS,
+            "results beside a refusal": bool(found.out) and case.code != USAGE,
+            "no name of the program": case.code != USAGE and "graspproof: " not in said,
+        }
+    missing = [word for word in case.says if word.lower() not in said.lower()]
+    return [name for name, holds in wrong.items() if holds] + [
+        f"does not say {w!r}" for w in missing
+    ]

@@ -1,9 +1,9 @@
-"""Time beside what a user would otherwise run, after everybody's answers agreed.
+"""Time of plans and of validations, after their answers were checked.
 
     python -m tests.benchmarks [--only SECTION ..] [--json FILE]
 
-Sections: enumeration, families, planning, metrics, validation. Each first compares answers, and
-ends with an error if they differ. All of it takes some minutes, in one process on one core.
+Sections: planning, validation. Each first checks answers, and ends with an error if they are wrong.
+All of it takes some minutes, in one process on one core.
 """
 
 import argparse
@@ -12,7 +12,7 @@ import json
 import os
 from pathlib import Path
 
-SECTIONS = ("enumeration", "families", "planning", "metrics", "validation")
+SECTIONS = ("planning", "validation")
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -23,7 +23,7 @@ def main():
     options = parser.parse_args()
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))  # before NumPy reads them
     found = []
-    print(f"{'median':>12s}  {'ratio (95 %)':>22s}  what")
+    print(f"{'median':>12s}  what")
     for section in options.only:
         rows = importlib.import_module(f"tests.benchmarks.{section}").rows()
         found += rows
@@ -33,9 +33,8 @@ def main():
 
 
 def line(row):
-    ratio = f"{row.ratio:.1f} ({row.low:.1f} .. {row.high:.1f})" if row.ratio else ""
     took = duration(row.median_us) if row.median_us else ""
-    return f"{took:>12s}  {ratio:>22s}  {row.what}  {row.remark}".rstrip()
+    return f"{took:>12s}  {row.what}  {row.remark}".rstrip()
 
 
 def duration(microseconds):

@@ -19,13 +19,13 @@ import numpy as np
 import grasp_core as gc
 import scenes
 from sim_validate.parallel.processes import available_cores, each
-from sim_validate.simulation.critical_friction import released_friction
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.limits import released_friction
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.simulate import Bench
+from tests.benchmarks.objects import FAMILIES
 
 WORST = 0.005
 """Largest error of a critical friction, relative to the predicted one."""
-FAMILIES = ("concurrent", "pencil", "regulus", "free")
 OBJECTS = (
     "tetrahedron", "octahedron", "wedge", "chamfered-box", "double-wedge-bar", "prism",
     "l-bracket", "cross", "screwdriver", "hexagonal-pyramid", "random-8-3", "random-12-1",

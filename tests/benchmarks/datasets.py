@@ -16,15 +16,14 @@ from pathlib import Path
 import sim_validate
 from grasp_core.processes import local_processes
 from scenes.example_objects import example_names
-from sim_validate.datasets.building.build import build
-from sim_validate.datasets.building.make_unit import made_of
-from sim_validate.datasets.building.worker import Limits
+from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.make_unit import made_of
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.parquet import parquet_bytes
 from sim_validate.datasets.units import body_of, units_of
-from sim_validate.datasets.verifying.redo import Sample
-from sim_validate.datasets.verifying.verify import verify
+from sim_validate.datasets.verify import Sample, verify
+from sim_validate.datasets.workers import Limits
 
 FRICTIONS = (0.3, 0.5)
 PROFILED = 3

@@ -1,6 +1,6 @@
 """Our imitation of DexGraspBench's test beside its own evaluator, on 48 records of each hand.
 
-    python -m tests.benchmarks.dexgraspbench write FOLDER [--whole-way] [--open-finger]
+    python -m tests.benchmarks.dexgraspbench write FOLDER
     python -m tests.benchmarks.dexgraspbench compare FOLDER
 
 The first writes records of grasps of six built-in objects by Allegro and LEAP, for its evaluator to
@@ -9,21 +9,19 @@ judge: in its checkout, for each hand, with its own MuJoCo,
     python src/main.py hand=HAND task=eval exp_name=records save_root=FOLDER
 
 The second judges the same files here and prints how many verdicts are alike. It ends with an error
-if more than three differ. `--whole-way` has fingers come from as far as they open, each meeting the
-object when it does; `--open-finger` keeps one finger open, another in each record.
+if more than three differ.
 """
 
 import argparse
 import sys
-from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 import grasp_core as gc
-import scenes
 import sim_validate as sv
+from tests.benchmarks.objects import scaled
 
 OBJECTS = {
     "dodecahedron": 0.032, "box": 0.033, "wedge": 0.035, "octahedron": 0.035, "icosahedron": 0.032,
@@ -35,12 +33,6 @@ TORQUE_N_M = 0.7
 """Limit of joints in our own trials; DexGraspBench has none."""
 
 
-def scaled(name):
-    body = scenes.example_object(name)
-    vertices = (body.vertices - body.center_of_mass) * OBJECTS[name] / body.radius
-    return gc.Polyhedron.from_mesh(vertices, body.triangles, name=name)
-
-
 def reached(hand, body):
     """Yield poses that have an opening."""
     finger = gc.Finger(radius_m=0.012, approach_m=0.03)
@@ -50,24 +42,14 @@ def reached(hand, body):
             yield found
 
 
-def with_open_finger(record, number):
-    own = slice(7 + 4 * number, 11 + 4 * number)
-    grasp, squeeze = np.array(record.grasp), np.array(record.squeeze)
-    grasp[own] = squeeze[own] = record.pregrasp[own]
-    return replace(record, grasp=grasp, squeeze=squeeze)
-
-
-def write(folder, options):
+def write(folder):
     for hand in map(gc.load_hand, HANDS):
         place = folder / f"records_{hand.name}" / "graspdata"
         for name in OBJECTS:
-            body = scaled(name)
+            body = scaled(name, OBJECTS[name])
             seen = str(sv.write_dex_object(body, folder / "objects" / name).resolve())
             for number, found in enumerate(islice(reached(hand, body), EACH)):
-                gap = {"gap_m": None} if options.whole_way else {}
-                record = sv.dex_record(hand, found, seen, **gap)
-                if options.open_finger:
-                    record = with_open_finger(record, number % 4)
+                record = sv.dex_record(hand, found, seen)
                 sv.write_dex_record(record, place / f"{name}_{number}.npy")
     return 0
 
@@ -80,7 +62,8 @@ def compare(folder):
         for path in sorted((folder / f"records_{name}" / "graspdata").glob("*.npy")):
             judged = folder / f"records_{name}" / "evaluation" / path.name
             theirs.append(bool(np.load(judged, allow_pickle=True).item()["succ_flag"]))
-            body = scaled(path.stem.rsplit("_", 1)[0])
+            about = path.stem.rsplit("_", 1)[0]
+            body = scaled(about, OBJECTS[about])
             found = sv.reach_of_record(sv.load_dex_record(path), hand, body, FRICTION)
             verdict = sv.judge_hand_by("dexgraspbench", hand, body, found, FRICTION)
             ours.append(verdict.theirs)
@@ -95,10 +78,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=("write", "compare"))
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--whole-way", action="store_true")
-    parser.add_argument("--open-finger", action="store_true")
     options = parser.parse_args()
-    return write(options.folder, options) if options.what == "write" else compare(options.folder)
+    return write(options.folder) if options.what == "write" else compare(options.folder)
 
 
 if __name__ == "__main__":

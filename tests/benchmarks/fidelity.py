@@ -5,8 +5,7 @@ coefficient is that share of the object's radius, and finds limits by repeated h
 yield a little before they turn, which a ramp may read as the limit.
 
 Grasps of all families on several objects, friction 0.2 to 0.8: critical friction, largest wrench in
-random directions, holds inside and outside the predicted limit, negative controls with what other
-tools' rules make of them, bounds that do not know the planned forces, and speed.
+random directions, holds inside and outside the predicted limit, and negative controls.
 """
 
 import sys
@@ -14,32 +13,24 @@ import time
 from collections import Counter
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 
 import grasp_core as gc
 import scenes
-from grasp_core.closure.contact_arrays import contact_frictions
-from grasp_core.closure.soft.contacts import contact_torsions
-from grasp_core.quality.wrench_body import WrenchBody
-from grasp_core.quality.wrench_limit import limit_of
+from grasp_core.closure.contacts import contact_frictions
+from grasp_core.closure.soft_contacts import contact_torsions
+from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from scenes.physics import PhysicsSettings
 from sim_validate.parallel.processes import available_cores, each
-from sim_validate.records.verdicts_json import verdicts_to_json
-from sim_validate.simulation.critical_friction import released_friction
-from sim_validate.simulation.gate.gate import require_faithful
-from sim_validate.simulation.hold_verdict import Outcome, judge
-from sim_validate.simulation.other_rules import RULES
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.limits import bisected_limits, part, ramped_limits, released_friction
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.simulation.simulate import Bench
-from sim_validate.simulation.unplanned_bounds import independent_bounds
-from sim_validate.simulation.wrench_limits import bisected_limits, part, ramped_limits
-from sim_validate.validation.control_trials import try_control
-from sim_validate.validation.controls import negative_controls
-from sim_validate.validation.validation import validate
+from sim_validate.simulation.traces import Outcome, judge
+from sim_validate.validation.controls import negative_controls, try_control
+from tests.benchmarks.objects import FAMILIES
 
 OBJECTS = (
     "tetrahedron", "octahedron", "wedge", "chamfered-box", "double-wedge-bar", "box", "prism",
@@ -47,7 +38,6 @@ OBJECTS = (
     "random-16-1", "random-20-7",
 )  # fmt: skip
 FRICTIONS = (0.2, 0.35, 0.5, 0.8)
-FAMILIES = ("concurrent", "pencil", "regulus", "free")
 QUICK = (("wedge", "chamfered-box", "l-bracket", "random-12-1"), (0.3, 0.6))
 SOFT = (*QUICK[0], "box", "tetrahedron"), (0.2, 0.5)
 EACH = 3
@@ -55,8 +45,6 @@ EACH = 3
 DIRECTIONS = 24
 INSIDE, OUTSIDE = 0.9, 1.1
 HELD_DIRECTIONS = 10
-BOUNDED = 8
-"""Of every so many grasps one is tried without planned forces."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +72,6 @@ class Found:
     inside: list
     outside: list
     controls: list
-    accepted: Counter
-    bounds: object
 
 
 def cases(objects, frictions, each_family, torsion=0.0):
@@ -123,17 +109,12 @@ def examine(case):
     ends = [judge(trace, layout, setup.hold).outcome for trace in rig.hold(tried)]
     critical = gc.critical_friction(case.grasp, torsion_m=setup.torsion_m)
     known = replace(case.grasp, critical_friction=critical)
-    agenda = Agenda(rules=tuple(RULES))
     verdicts = [
-        try_control(case.body, control, agenda, setup)
+        try_control(case.body, control, Agenda(), setup)
         for control in negative_controls(
             case.body, known, case.friction, case.place, setup.torsion_m
         )
     ]
-    accepted = Counter(name for each in verdicts for name, yes in each.accepted_by.items() if yes)
-    bounds = None
-    if case.place % BOUNDED == 0:
-        bounds = independent_bounds(case.body, case.grasp, critical, rig, near)
     measured = bisected_limits(rig, near) if case.torsion else ramped_limits(rig, limits)
     return Found(
         family=case.grasp.family,
@@ -143,14 +124,12 @@ def examine(case):
         inside=ends[: len(near)],
         outside=ends[len(near) :],
         controls=[(each.control.name, each.held, each.let_go) for each in verdicts],
-        accepted=accepted,
-        bounds=bounds,
     )
 
 
 MUST_BE_ZERO = (
     "critical_not_found", "limits_not_found", "false_unstable", "false_stable", "controls_held",
-    "controls_not_let_go", "bounds_on_the_wrong_side",
+    "controls_not_let_go",
 )  # fmt: skip
 
 
@@ -163,8 +142,6 @@ def report(found):
     outside = Counter(end for f in found for end in f.outside)
     controls = [control for f in found for control in f.controls]
     kinds = Counter(kind for kind, _, _ in controls)
-    bounds = [(f.bounds, f.critical.predicted) for f in found if f.bounds]
-    accepted = sum((f.accepted for f in found), Counter())
     off, wide = np.abs(ratios - 1.0), np.abs(shares - 1.0)
     tiny = [f.critical for f in found if f.critical.predicted < 1e-3]
     figures = {
@@ -193,55 +170,10 @@ def report(found):
         "control_kinds": dict(kinds),
         "controls_held": sum(held for _, held, _ in controls),
         "controls_not_let_go": sum(not failed for _, _, failed in controls),
-        "controls_accepted_by": {name: accepted[name] for name in RULES},
-        "bounded": len(bounds),
-        "bounds_on_the_wrong_side": sum(not b.agree(critical) for b, critical in bounds),
     }
     for name, value in figures.items():
         print(f"{name.replace('_', ' '):34s} {value}")
     return figures
-
-
-def throughput():
-    """Full validations per second on a body of twenty faces, and what each phase takes."""
-    body = scenes.example_object("random-20-7")
-    grasps = gc.plan(body, 0.5, limit=24).grasps
-    agenda = Agenda(random_wrenches=13, controls=False)
-    print(f"{len(body.faces)} faces, 26 wrenches and the critical friction:")
-    for jobs, threads in ((1, 1), (1, 2), (available_cores(), 1)):
-        trials = [(body, grasp, agenda, threads) for grasp in grasps]
-        run = iter(each(_validated, trials * 2, jobs=jobs))
-        next(run)  # starting the processes is not what is measured
-        begun = time.perf_counter()
-        count = sum(1 for _ in run)
-        rate = count / (time.perf_counter() - begun)
-        print(f"  {jobs} processes, {threads} threads each: {rate:.1f} validations per second")
-    for wrenches in (0, 13, 39, 91):
-        begun = time.perf_counter()
-        for grasp in grasps[:8]:
-            _validated((body, grasp, replace(agenda, random_wrenches=wrenches), 1))
-        spent = (time.perf_counter() - begun) / 8
-        print(f"  {13 + wrenches:3d} wrenches: {1e3 * spent:.0f} ms, "
-              f"{1e3 * spent / (13 + wrenches):.2f} ms each")  # fmt: skip
-
-
-def _validated(trial):
-    body, grasp, agenda, threads = trial
-    return validate(body, grasp, 0.5, agenda=agenda, setup=Setup(threads=threads)).held
-
-
-def repeats():
-    """Whether results are the same at one and two threads, and again; and no file appears."""
-    body = scenes.example_object("random-12-1")
-    grasps = gc.plan(body, 0.5, limit=4, families=FAMILIES).grasps
-    before, texts = set(Path().iterdir()), set()
-    for threads in (1, 2, 2):
-        setup = Setup(threads=threads)
-        agenda = Agenda(random_wrenches=3, limits="ramp", independent=True, rules=tuple(RULES))
-        verdicts = [validate(body, grasp, 0.5, agenda=agenda, setup=setup) for grasp in grasps]
-        texts.add(verdicts_to_json(body, 0.5, verdicts, require_faithful(setup), complete=True))
-    print(f"different texts of three runs at 1, 2 and 2 threads: {len(texts)}")
-    print(f"files that appeared meanwhile: {sorted(set(Path().iterdir()) - before)}")
 
 
 def main():
@@ -255,9 +187,6 @@ def main():
     found = list(each(examine, chosen, jobs=available_cores()))
     print(f"examined in {time.perf_counter() - begun:.0f} s")
     figures = report(found)
-    if not quick and not torsion:
-        throughput()
-        repeats()
     wrong = [name for name in MUST_BE_ZERO if figures[name]]
     if wrong:
         sys.exit(f"these must be zero: {', '.join(wrong)}")

@@ -9,12 +9,7 @@ its face, as it rolls by its radius times the turn: predictions are for faces th
 an error if the median error of the others is above 1 %, or 99 % of them are not within 3 %; a
 failure of the simulator counts as the largest error.
 
-    python -m tests.benchmarks.first_slips [--quick] [--meshes FOLDER] [--jobs N] [--worst N]
-
-With `--meshes` the mesh files of a folder are planned and squeezed instead, at the contacts where
-fingertips at the planned places meet their triangles. The faces that may be left are then the
-triangles' own planes: the way to an edge ends at the nearest triangle with another normal. Larger
-turns are not simulated there: each step takes milliseconds with the triangles that they need.
+    python -m tests.benchmarks.first_slips [--quick] [--jobs N] [--worst N]
 """
 
 import argparse
@@ -22,33 +17,24 @@ import sys
 import time
 from dataclasses import dataclass
 from itertools import chain
-from pathlib import Path
 
 import numpy as np
 
 import grasp_core as gc
-from grasp_core.geometry.nearest_points import nearest_on_surface, nearest_on_triangles
 from sim_validate.parallel.processes import each
 from tests.benchmarks import held_grasps as held
 
 EACH, DIRECTIONS = 20, 24
 QUICK_OBJECTS, QUICK_EACH = 5, 4
-MESH_EACH = 12
 STIFFNESSES = (500.0, 2000.0, 10_000.0)
 MASSES_KG = (0.05, 2.0)
 LEVER = 0.5
 """Torque of a unit force, in object radii."""
 TURNED = 0.5
 """Turn [rad] above which directions are listed apart."""
-SAME_PLANE = 1e-3
-"""Angle between normals of triangles below which a fingertip rolls on as on one plane [rad]."""
 BEYOND = 1.15
 """Largest multiple that is tried, of the predicted one."""
 MEDIAN, MOST = 0.01, 0.03
-TOUCHES = 50
-"""Steps in which a fingertip finds the triangles that it touches."""
-TOUCHED = 1e-9
-"""Distance at which it does, in object radii."""
 
 
 @dataclass(frozen=True)
@@ -77,10 +63,7 @@ def measure(unit):
     mass = float(np.exp(rng.uniform(*np.log(MASSES_KG))))
     body = held.body_of(case.source)
     name = f"{body.name} {case.grasp.id}"
-    contacts = case.grasp if not Path(case.source).suffix else touched(body, case.grasp)
-    if contacts is None:
-        return nothing(name, case, stiffness, mass, "a fingertip meets several places at once")
-    best = held.squeezed(body, contacts, gc.any_direction(mass), stiffness)
+    best = held.squeezed(body, case.grasp, gc.any_direction(mass), stiffness)
     if best is None:
         return nothing(name, case, stiffness, mass, "no squeeze holds stably")
     ways = rng.normal(size=(DIRECTIONS, 6))
@@ -88,20 +71,15 @@ def measure(unit):
     ways[:, 3:] *= LEVER * body.radius
     slips = [gc.first_slip(best.grip, way) for way in ways]
     ends = [(slip, way) for slip, way in zip(slips, ways, strict=True) if slip.event == "slip"]
-    if Path(case.source).suffix:
-        ends = [(slip, way) for slip, way in ends if slip.turn_rad <= TURNED]
     if not ends:
         return nothing(name, case, stiffness, mass, "no direction ends in a slip")
     turns = np.array([slip.turn_rad for slip, _ in ends])
-    bench = held.bench_of(body, best.grip, mass, float(turns.max()))
+    bench = held.bench_of(body, best.grip, mass)
     time_s = held.slowness(bench, best.grip)
     drives = [held.ramp(slip.multiple * way, BEYOND, time_s) for slip, way in ends]
     ratios = np.array(list(held.first_slips(bench, best.grip, drives)))
     predicted = np.array([slip.multiple for slip, _ in ends])
-    if Path(case.source).suffix:
-        ways_out = flat_distances(body, best.grip)
-    else:
-        ways_out = edge_distances(body, case.grasp)
+    ways_out = edge_distances(body, case.grasp)
     rolls = turns * float((best.grip.tip_radius_m / ways_out).max())
     return Found(name, case.family, stiffness, mass, predicted, predicted * ratios, turns, rolls)
 
@@ -114,19 +92,6 @@ def edge_distances(body, grasp):
     ])  # fmt: skip
 
 
-def flat_distances(body, grip):
-    """Return how far each contact is from triangles that turn away from its plane, (4,) [m]."""
-    corners = body.vertices[body.triangles]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
-    found = []
-    for point, normal in zip(body.center_of_mass + grip.arms, grip.normals, strict=True):
-        other = corners[np.abs(normals @ normal) < np.cos(SAME_PLANE)]
-        gaps = np.linalg.norm(nearest_on_triangles(other, point) - point, axis=-1)
-        found.append(max(float(gaps.min()), 1e-9))
-    return np.array(found)
-
-
 def edge_distance(polygon, point, normal):
     """Return the distance from a convex polygon's edges, (n, 3); almost zero outside."""
     along = np.roll(polygon, -1, axis=0) - polygon
@@ -137,22 +102,6 @@ def edge_distance(polygon, point, normal):
 def nothing(name, case, stiffness, mass, why):
     none = np.zeros(0)
     return Found(name, case.family, stiffness, mass, none, none, none, none, why)
-
-
-def touched(body, grasp):
-    """Find the contacts of fingertips at the planned places with the triangles; None if unclear."""
-    radius = held.tip_radius(body, grasp)
-    normals = np.array([one.normal for one in grasp.contacts])
-    centers = np.array([one.position for one in grasp.contacts]) - radius * normals
-    for _ in range(TOUCHES):
-        points = nearest_on_surface(body.vertices, body.triangles, centers)
-        away = points - centers
-        gaps = np.linalg.norm(away, axis=1)
-        normals = away / gaps[:, None]
-        centers = points - radius * normals
-        if np.abs(gaps - radius).max() <= TOUCHED * body.radius:
-            return [gc.Contact(p, n) for p, n in zip(points, normals, strict=True)]
-    return None
 
 
 def report(found, worst):
@@ -200,13 +149,12 @@ def list_groups(real, errors, small):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--meshes", type=Path)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--worst", type=int, default=8)
     options = parser.parse_args()
     begun = time.perf_counter()
-    sources = held.meshes_in(options.meshes) if options.meshes else list(held.OBJECTS)
-    count = QUICK_EACH if options.quick else MESH_EACH if options.meshes else EACH
+    sources = list(held.OBJECTS)
+    count = QUICK_EACH if options.quick else EACH
     sources = sources[:: max(1, len(sources) // QUICK_OBJECTS)] if options.quick else sources
     cases = list(chain.from_iterable(map(held.planned, sources, [count] * len(sources))))
     planned = time.perf_counter()

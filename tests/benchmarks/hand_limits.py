@@ -13,6 +13,7 @@ that of any orientation.
 import argparse
 import time
 from collections import Counter
+from itertools import combinations
 
 import numpy as np
 
@@ -20,12 +21,12 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from sim_validate.simulation.hold_verdict import holds
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.limits import part, ramped_limits
 from sim_validate.simulation.loads import loads_as_they_are, planned_loads
 from sim_validate.simulation.rig import squeezed
-from sim_validate.simulation.simulate import Bench
-from sim_validate.simulation.wrench_limits import part, ramped_limits
-from tests.benchmarks.payloads import directions
+from sim_validate.simulation.traces import holds
+from tests.benchmarks.objects import scaled
 
 FRICTION, RADIUS_M, APPROACH_M = 0.5, 0.035, 0.03
 OBJECTS = ("dodecahedron", "wedge", "l-bracket", "hex-nut", "box")
@@ -35,13 +36,6 @@ BELOW, ABOVE = 0.9, 1.1
 LOOSE, HOPEFUL = 0.98, 1.01
 """Least and largest share of the least simulated mass that a hand may be promised to carry."""
 AGENDA = sv.Agenda(random_wrenches=13, limits="ramp", critical_friction=False)
-
-
-def scaled(name):
-    """A built-in object of the size of a hand."""
-    body = scenes.example_object(name)
-    vertices = (body.vertices - body.center_of_mass) * RADIUS_M / body.radius
-    return gc.Polyhedron.from_mesh(vertices, body.triangles, name=name)
 
 
 def reached(hand, body, count):
@@ -82,7 +76,7 @@ def limits(count):
     each = -(-count // (len(HANDS) * len(OBJECTS)))
     for name in HANDS:
         hand = gc.load_hand(name)
-        for body in map(scaled, OBJECTS):
+        for body in (scaled(name, RADIUS_M) for name in OBJECTS):
             for found in reached(hand, body, each):
                 for torque in TORQUES:
                     strong = hand.with_torque_limits(torque, "this benchmark")
@@ -117,7 +111,7 @@ def limits(count):
 def payloads(count):
     """Print errors of the largest mass in each direction, and of those in any orientation."""
     hand, setup = gc.load_hand("leap").with_torque_limits(0.35, "this benchmark"), sv.hand_setup()
-    body, most = scaled("dodecahedron"), setup.fingers.max_normal_force_n
+    body, most = scaled("dodecahedron", RADIUS_M), setup.fingers.max_normal_force_n
     ratios, least, spread, lowered, seconds = [], [], [], [], []
     for found in reached(hand, body, count):
         begun = time.process_time()
@@ -146,6 +140,16 @@ def payloads(count):
     )
     wrong = [not LOOSE <= share <= HOPEFUL for share in least]
     return int(np.isnan(ratios).sum()) + sum(wrong)
+
+
+def directions():
+    """The corners and the middles of the edges of an icosahedron, (42, 3)."""
+    golden = 0.5 * (1.0 + np.sqrt(5.0))
+    flat = np.array([[0.0, s, t * golden] for s in (1, -1) for t in (1, -1)])
+    corners = np.concatenate([np.roll(flat, turn, axis=1) for turn in range(3)])
+    edges = [a + b for a, b in combinations(corners, 2) if np.linalg.norm(a - b) < 2.1]
+    ways = np.concatenate([corners, edges])
+    return ways / np.linalg.norm(ways, axis=1)[:, None]
 
 
 def carried(hand, body, found, way, setup):

@@ -3,7 +3,6 @@
 Fingertips have a tenth of the object's radius, or less where they would overlap something.
 """
 
-from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,18 +11,17 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
-from grasp_core.mesh_files.reading import FORMATS
-from scenes.execution.held_mjcf import SAMPLE_S, build_held_scene
+from scenes.execution.held_mjcf import build_held_scene
 from scenes.fingertips import fitting_radius
 from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench
-from sim_validate.execution.drives import Drive, idle
+from sim_validate.execution.paths import Drive, idle
 from sim_validate.execution.predictions import held_dynamics
 from sim_validate.execution.slips import outcome
+from tests.benchmarks.objects import FAMILIES, PAPER
 
 FRICTION = 0.5
 PUSH_N = 10.0
-FAMILIES = ("concurrent", "pencil", "regulus", "free")
 OBJECTS = (
     "box", "tetrahedron", "octahedron", "wedge", "chamfered-box", "double-wedge-bar", "prism",
     "l-bracket", "cross", "screwdriver", "hexagonal-pyramid", "dodecahedron", "random-8-3",
@@ -35,9 +33,6 @@ RADIANS = 180.0
 """Time in which a load grows, at least, in radians of the slowest natural motion at rest. The
 object lags behind the load by the inverse of that, times twice the damping ratio, and grips become
 softer as they turn: with a third of the time soft fingertips seem to hold 5 to 15 % more."""
-HELD_S = 0.1
-SPARE = 1.0
-"""How much farther a curved surface is there than fingertips come, in their radii."""
 LOST = 3.0
 """Distance at which an object is lost and its trial ends, in its radii."""
 
@@ -53,35 +48,16 @@ class Case:
     grasp: gc.Grasp
 
 
-def options_of(description: str) -> Namespace:
-    """Read the options of a benchmark that squeezes grasps of built-in objects."""
-    parser = ArgumentParser(description=description.splitlines()[0])
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--stiffness", type=float, default=10_000.0)
-    parser.add_argument("--jobs", type=int, default=2)
-    return parser.parse_args()
-
-
-def planned_cases(each: int) -> list[Case]:
-    """Plan some grasps of each of `OBJECTS`, object by object."""
-    return [case for source in OBJECTS for case in planned(source, each)]
-
-
 def body_of(source: str) -> gc.Polyhedron:
     """Load a built-in object or a mesh file."""
     path = Path(source)
     return gc.load_polyhedron(path) if path.suffix else scenes.example_object(source)
 
 
-def meshes_in(folder: Path) -> list[str]:
-    """List the mesh files of a folder."""
-    return [str(p) for p in sorted(folder.iterdir()) if p.suffix.lstrip(".").lower() in FORMATS]
-
-
 def planned(source: str, count: int) -> list[Case]:
     """Plan a number of grasps of an object, as evenly from the families as it has them."""
     body = body_of(source)
-    methods = FAMILIES if len(body.faces) <= 100 else FAMILIES[:3]
+    methods = FAMILIES if len(body.faces) <= 100 else PAPER
     lists = [gc.plan(body, FRICTION, families=(one,), limit=count).grasps for one in methods]
     found = [
         Case(source, method, grasps[turn])
@@ -92,41 +68,22 @@ def planned(source: str, count: int) -> list[Case]:
     return found[:count]
 
 
-def tip_radius(body: gc.Polyhedron, contacts: gc.Grasp | list[gc.Contact]) -> float:
-    """Choose a radius of fingertips that fits."""
-    listed = contacts.contacts if isinstance(contacts, gc.Grasp) else contacts
-    points = np.array([one.position for one in listed])
-    normals = np.array([one.normal for one in listed])
-    return fitting_radius(body, points, normals)
-
-
 def squeezed(
-    body: gc.Polyhedron, contacts: gc.Grasp | list[gc.Contact], loads: gc.LoadSet,
-    stiffness: float,
-) -> gc.BestSqueeze | None:  # fmt: skip
+    body: gc.Polyhedron, grasp: gc.Grasp, loads: gc.LoadSet, stiffness: float
+) -> gc.BestSqueeze | None:
     """Find the best squeeze with pushes up to `PUSH_N`; None if there is none."""
     try:
         return gc.best_squeeze(
-            body, contacts, FRICTION, loads, max_push_n=PUSH_N, stiffness=stiffness,
-            tip_radius_m=tip_radius(body, contacts),
+            body, grasp, FRICTION, loads, max_push_n=PUSH_N, stiffness=stiffness,
+            tip_radius_m=fitting_radius(body, grasp.positions, grasp.normals),
         )  # fmt: skip
     except gc.NoForcesError:
         return None
 
 
-def bench_of(
-    body: gc.Polyhedron, grip: gc.Grip, mass_kg: float, turn_rad: float | None = None
-) -> HeldBench:
-    """Compile the scene of a squeezed object.
-
-    A curved surface is there where fingertips come if nothing slips while the object turns by no
-    more than an angle: they move along with the object, and roll by their radius times the angle.
-    """
-    reach = None
-    if turn_rad is not None and body.patches is not None:
-        reach = (1.0 + turn_rad + SPARE) * float(grip.tip_radius_m.max())
-    scene = build_held_scene(body, grip, mass_kg, reach_m=reach)
-    return HeldBench(scene, lost_m=LOST * body.radius)
+def bench_of(body: gc.Polyhedron, grip: gc.Grip, mass_kg: float) -> HeldBench:
+    """Compile the scene of a squeezed object."""
+    return HeldBench(build_held_scene(body, grip, mass_kg), lost_m=LOST * body.radius)
 
 
 def slowness(bench: HeldBench, grip: gc.Grip) -> float:
@@ -142,13 +99,6 @@ def ramp(wrench: np.ndarray, most: float, duration_s: float) -> Drive:
     return replace(idle(count), wrenches=shares[:, None] * wrench, shares=shares)
 
 
-def raised(wrench: np.ndarray, duration_s: float) -> Drive:
-    """Return the drive of a wrench that grows smoothly, and stays."""
-    rise = paths.smooth(paths.samples(duration_s))
-    shares = np.concatenate([rise, np.ones(paths.samples(HELD_S))])
-    return replace(idle(len(shares)), wrenches=shares[:, None] * wrench, shares=shares)
-
-
 def first_slips(bench: HeldBench, grip: gc.Grip, drives: list[Drive]) -> Iterator[float]:
     """Yield the simulated multiple of first slip of each drive; NaN where the simulator fails."""
     _, state = bench.settled(paths.closing())
@@ -162,32 +112,6 @@ def first_slips(bench: HeldBench, grip: gc.Grip, drives: list[Drive]) -> Iterato
                 motion, bench.scene.layout, replace(drive, shares=shares), grip.friction
             )
             yield found.first_slip * float(drive.shares.max())
-
-
-def slid(bench: HeldBench, grip: gc.Grip, drives: list[Drive]) -> list[bool]:
-    """Return whether a contact slips in each drive; a failure of the simulator counts as slip."""
-    _, state = bench.settled(paths.closing())
-    return [
-        bool(motion.faults) or outcome(motion, bench.scene.layout, drive, grip.friction).slipped
-        for motion, drive in zip(bench.run(drives, state), drives, strict=True)
-    ]
-
-
-def shaken(gravity: np.ndarray, way: np.ndarray, size: float, hertz: float) -> Drive:
-    """Return the drive of a palm shaken along a direction under weight, slowly begun.
-
-    Args:
-        gravity: (3,) [m/s^2].
-        way: Unit direction of the largest acceleration, (3,).
-        size: Largest acceleration [m/s^2].
-        hertz: Frequency.
-    """
-    return paths.shake(gravity, size * np.concatenate([way, np.zeros(3)]), hertz)
-
-
-def seconds(drive: Drive) -> float:
-    """Return the duration of a drive [s]."""
-    return SAMPLE_S * len(drive)
 
 
 def spread(values: np.ndarray) -> str:

@@ -20,7 +20,7 @@ from scipy.optimize import linprog
 
 import grasp_core as gc
 from scenes.example_objects import example_object
-from tests.benchmarks.planning import PAPER, TEN_DEGREES, sphere_hull
+from tests.benchmarks.objects import PAPER, TEN_DEGREES, sphere_hull
 
 ALL = (11, 18, 24, 30)
 """Numbers of faces of random objects all of whose quadruples are decided, by all methods."""

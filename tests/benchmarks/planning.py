@@ -1,27 +1,25 @@
 """Whole plans: the best few of small and large objects, all grasps of small ones, and growth.
 
-The hull of points on a sphere has as many triangular faces as wanted. A plan with a limit has to
-hold the largest discs of a plan without one, where that is affordable; that is checked first.
+A plan with a limit has to hold the largest discs of a plan without one, where that is affordable;
+that is checked first.
 """
 
 import subprocess
 import sys
 
 import numpy as np
-import trimesh
 
 import grasp_core as gc
 from scenes.example_objects import example_object
+from tests.benchmarks.objects import PAPER, TEN_DEGREES, sphere_hull
 from tests.benchmarks.timing import Row, once
 
 LIMIT = 100
 FACES = (12, 30, 100, 200, 400, 800)
 MEMORY = ((200, "normal"), (800, "normal"), (800, "tilted"))
-PAPER = ("concurrent", "pencil", "regulus")
-TEN_DEGREES = 0.1763
 MEASURED = """
 import grasp_core as gc
-from tests.benchmarks.planning import PAPER, TEN_DEGREES, sphere_hull
+from tests.benchmarks.objects import PAPER, TEN_DEGREES, sphere_hull
 body = sphere_hull({faces})
 gc.plan(sphere_hull(8), TEN_DEGREES, limit=4)
 if {limit}:
@@ -30,14 +28,6 @@ print(*[line.split()[1] for line in open("/proc/self/status") if line.startswith
 """
 ALL = ("tetrahedron", "octahedron", "wedge", "dodecahedron")
 CHECKED = "random-14-1"
-
-
-def sphere_hull(faces, seed=0):
-    """A polytope with so many triangles."""
-    points = np.random.default_rng(seed).normal(size=(faces // 2 + 2, 3))
-    hull = trimesh.convex.convex_hull(points / np.linalg.norm(points, axis=1, keepdims=True))
-    name = f"hull of {faces} faces"
-    return gc.Polyhedron.from_mesh(hull.vertices, hull.faces, name=name, faces="planar")
 
 
 def check():

@@ -1,7 +1,7 @@
 """Published tests against what is proved: `python -m tests.benchmarks.protocols`.
 
 Planned grasps of 15 built-in objects, scaled to a radius of 5 cm, and negative controls made from
-them (fingers removed, a normal flipped, contacts moved, the paper's constructions as printed) are
+them (fingers removed, a normal flipped, contacts moved) are
 judged by every published test with four fingertips that push with up to 10 N. The truth is
 predicted: a grasp is in force closure at friction 0.5 and resists all loads of the test, by at
 least one multiple; a control is proved not to be in force closure at a friction of 0.5 or less.
@@ -24,13 +24,13 @@ from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 
 import grasp_core as gc
-import scenes
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.protocols.judging import judge_by
-from sim_validate.protocols.named_protocols import PROTOCOLS
+from sim_validate.protocols.published import PROTOCOLS
 from sim_validate.validation.controls import negative_controls
+from tests.benchmarks.objects import scaled
 
 OBJECTS = (
     "wedge", "dodecahedron", "l-bracket", "random-8-3", "prism", "screwdriver", "box", "cross",
@@ -69,17 +69,11 @@ def judged(case):
     return case.kind, found
 
 
-def scaled(name):
-    body = scenes.example_object(name)
-    vertices = (body.vertices - body.center_of_mass) * RADIUS_M / body.radius
-    return Polyhedron.from_mesh(vertices, body.triangles, name=name)
-
-
 def cases(options):
     count = QUICK_EACH if options.quick else EACH
     grasps, controls = [], []
     for name in OBJECTS:
-        body = scaled(name)
+        body = scaled(name, RADIUS_M)
         common = (tuple(options.only), options.same_friction)
         own = []
         for grasp in gc.plan(body, FRICTION, limit=count).grasps:
@@ -124,7 +118,7 @@ def report(results, names):
         right = sum(row[1] == row[3] for row in rows)
         good &= all(row[2] for row in planned if row[3]) and not kept
         print(
-            f"  {PROTOCOLS[name].label:36s} {passed:3d} of {len(planned)} | {accepted:3d} of "
+            f"  {name:20s} {passed:3d} of {len(planned)} | {accepted:3d} of "
             f"{len(open_ones)}; ours {held} | {kept}; predicted {true} | 0; "
             f"{100.0 * right / len(rows):.1f} %"
         )

@@ -14,8 +14,8 @@ from pathlib import Path
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.mesh_files.reading import FORMATS
 from sim_validate.parallel.processes import available_cores, each
+from tests.benchmarks.objects import meshes_in
 
 FRICTION = 0.5
 TIP, APPROACH = 0.06, 0.5
@@ -48,7 +48,7 @@ def main():
     """Print a line per file; fail where a grasp does not hold or a control does."""
     folder = Path(sys.argv[1])
     limit = int(sys.argv[sys.argv.index("--limit") + 1]) if "--limit" in sys.argv else 24
-    paths = sorted(p for p in folder.iterdir() if p.suffix.lstrip(".").lower() in FORMATS)
+    paths = meshes_in(folder)
     print("file                             faces       grasps certified regions held "
           "controls not let go, mismatches, plan s  all s")  # fmt: skip
     bad = False

@@ -1,13 +1,12 @@
 """How large are certified regions, and are all choices of contacts in them closed?
 
-    python -m tests.benchmarks.regions [--grasps 500] [--cones N] [--simulate 25] [--closely 20]
+    python -m tests.benchmarks.regions [--grasps 500] [--cones N] [--simulate 25]
 
 Per family, on built-in and random objects: how many grasps got regions, the exact test on random
 choices of contacts in them (corners often), and sizes beside the paper's own regions. Of the first
 ones, simulation of twenty choices each, and of contacts that walk outwards together, from the
-centres through the border until they are not held. Of `--closely` many, other ways to certify, the
-predecessor's squares, and the largest disc for which no open choice was found by descent. An hour
-for everything, half with `--cones 1250`; `--grasps 20 --simulate 2 --closely 2` for some minutes.
+centres through the border until they are not held. An hour for everything, half with
+`--cones 1250`; `--grasps 20 --simulate 2` for some minutes.
 """
 
 import argparse
@@ -20,12 +19,12 @@ import numpy as np
 import grasp_core as gc
 import scenes
 import sim_validate as sv
+from grasp_core.objects.face_pieces import piece_of
 from grasp_core.regions.certify_regions import CONES, certify_regions
 from grasp_core.values import Contact
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.records.regions import area_of
-from tests.benchmarks.open_choices import largest_possible, unit_pieces
-from tests.benchmarks.predecessor import largest_squares
+from tests.benchmarks.objects import FAMILIES
 
 FRICTION = 0.5
 OBJECTS = (
@@ -33,17 +32,9 @@ OBJECTS = (
     "hexagonal-pyramid", "box", "prism", "double-wedge-bar", "hex-nut", "l-bracket", "cross",
     "screwdriver", "mug",
 )  # fmt: skip
-FAMILIES = ("concurrent", "pencil", "regulus", "free")
 SLACK = 1e-7
 WALKS = np.concatenate([[0.95, 1.0], np.arange(1.02, 1.2, 0.02), np.arange(1.2, 4.01, 0.1)])
 """How far contacts walk, relative to the border."""
-WAYS = {
-    "discs": {},
-    "fast": {"max_cones": CONES // 8},
-    "more cones": {"max_cones": 5 * CONES},
-    "recentered": {"recenter": True},
-    "area": {"balance": "area"},
-}
 
 
 @dataclass(frozen=True)
@@ -54,7 +45,6 @@ class Task:
     seed: int
     choices: int
     simulate: bool
-    closely: bool
     cones: int
 
 
@@ -70,8 +60,7 @@ class Answer:
     walks: list = field(default_factory=list)
     """How far contacts walked until they were not closed, and not held, in borders' distances."""
     sizes: dict = field(default_factory=dict)
-    """By way: disc, least inscribed radius, total area in object radii, seconds."""
-    possible: float = float("nan")
+    """Of the paper's regions and ours: disc, least inscribed radius, total area, seconds."""
 
 
 def main():
@@ -79,8 +68,7 @@ def main():
     parser.add_argument("--grasps", type=int, default=500)
     parser.add_argument("--choices", type=int, default=200)
     parser.add_argument("--simulate", type=int, default=25)
-    parser.add_argument("--closely", type=int, default=20)
-    parser.add_argument("--cones", type=int, default=CONES, help="for all but the close looks")
+    parser.add_argument("--cones", type=int, default=CONES)
     parser.add_argument("--family", action="append", choices=FAMILIES)
     asked = parser.parse_args()
     tasks = list(tasks_of(asked))
@@ -111,7 +99,7 @@ def tasks_of(asked):
         chosen = sorted((place, name) for name, n in counts.items() for place in range(n))
         for number, (place, name) in enumerate(chosen[: asked.grasps]):
             yield Task(name, family, place, number, asked.choices, number < asked.simulate,
-                       number < asked.closely, asked.cones), limit  # fmt: skip
+                       asked.cones), limit  # fmt: skip
 
 
 def examine(given):
@@ -120,31 +108,19 @@ def examine(given):
     grasp = gc.plan(body, FRICTION, families=(task.family,), limit=limit).grasps[task.place]
     sizes = {"paper": (grasp.radius / body.radius, grasp.radius / body.radius,
                        sum(map(area_of, grasp.regions)) / body.radius**2, 0.0)}  # fmt: skip
-    proved = None
-    for way, settings in WAYS.items():
-        if way != "discs" and not task.closely:
-            continue
-        begun = time.perf_counter()
-        cones = {} if task.closely else {"max_cones": task.cones}
-        found = certify_regions(body, grasp, FRICTION, **cones | settings)
-        if found is not None:
-            sizes[way] = (*size(found, body), time.perf_counter() - begun)
-        if way == "discs":
-            proved = found
-    if task.closely and task.family == "concurrent":
-        sizes["squares"] = squares(body, grasp)
+    begun = time.perf_counter()
+    proved = certify_regions(body, grasp, FRICTION, max_cones=task.cones)
     if proved is None:
         return Answer(task.family, proved=False, sizes=sizes)
+    sizes["discs"] = (*size(proved, body), time.perf_counter() - begun)
     rng = np.random.default_rng(task.seed)
     opened = sum(not gc.force_closure(drawn(proved, rng), grasp.normals, FRICTION).closed
                  for _ in range(task.choices))  # fmt: skip
     held = [holds(body, grasp, drawn(proved, rng)) for _ in range(20 if task.simulate else 0)]
-    largest = largest_possible(body, grasp, FRICTION, rng) if task.closely else float("nan")
     return Answer(
         task.family, True, proved.verify(), opened, task.choices,
         sum(each is False for each in held), sum(each is not None for each in held),
-        walks(body, grasp, proved, rng) if task.simulate else [],
-        sizes, largest / body.radius,
+        walks(body, grasp, proved, rng) if task.simulate else [], sizes,
     )  # fmt: skip
 
 
@@ -152,15 +128,6 @@ def size(proved, body):
     inscribed = min(region.inscribed_radius for region in proved.regions)
     area = sum(map(area_of, proved.regions))
     return proved.radius / body.radius, inscribed / body.radius, area / body.radius**2
-
-
-def squares(body, grasp):
-    """The predecessor's squares for the planner's force cones, on the pieces with the contacts."""
-    begun = time.perf_counter()
-    half = largest_squares(unit_pieces(body, grasp), grasp.force_cones)
-    if half is None:  # a focus behind some fingers
-        return (float("nan"),) * 4
-    return half, half, 4 * (2 * half) ** 2, time.perf_counter() - begun
 
 
 def drawn(proved, rng):
@@ -247,12 +214,6 @@ def show(family, answers):
             print(f"  {len(far)} {kind} walks, {len(ended)} end on the faces: {told(ended[:, 0])} "
                   f"not closed, {told(ended[:, 1])} not held; {too_early} too early")  # fmt: skip
     table(done)
-    close = [a for a in done if np.isfinite(a.possible)]
-    for way in WAYS:
-        shares = [a.sizes[way][0] / a.possible for a in close if way in a.sizes]
-        if shares and way not in {"recentered", "area"}:
-            print(f"  {way}: {np.median(shares):.2f} of the largest disc possible (median of "
-                  f"{len(shares)}; least {min(shares):.2f})")  # fmt: skip
     return opened + dropped + unverified + early
 
 
@@ -264,16 +225,26 @@ def told(far):
 
 
 def table(done):
-    """Medians of sizes, of all and of those that were looked at closely."""
-    closely = [answer for answer in done if "area" in answer.sizes]
-    for whose, answers in ((f"all {len(done)}", done), (f"{len(closely)} closely", closely)):
-        print(f"  {whose}, medians in object radii: disc, least inscribed, total area, seconds")
-        for way in ("paper", *WAYS, "squares"):
-            rows = [a.sizes[way] for a in answers if way in a.sizes]
-            rows = [row for row in rows if np.isfinite(row).all()]
-            if len(rows) > len(answers) // 2:
-                figures = "  ".join(f"{figure:8.4f}" for figure in np.median(rows, axis=0))
-                print(f"    {way:<11} {figures}  ({len(rows)})")
+    """Medians of sizes."""
+    print("  medians in object radii: disc, least inscribed, total area, seconds")
+    for way in ("paper", "discs"):
+        rows = [answer.sizes[way] for answer in done]
+        figures = "  ".join(f"{figure:8.4f}" for figure in np.median(rows, axis=0))
+        print(f"    {way:<11} {figures}")
+
+
+def unit_pieces(body, grasp):
+    """The convex pieces that contacts are on, at unit size."""
+    found = []
+    for index, point in zip(grasp.faces, grasp.positions, strict=True):
+        face = body.faces[index]
+        pieces = [piece_of(index, face.normal, (corners - body.center_of_mass) / body.radius)
+                  for corners in face.pieces]  # fmt: skip
+        at = (point - body.center_of_mass) / body.radius
+        found.append(
+            max(pieces, key=lambda p, at=at: (p.b - p.E @ p.frame.T @ (at - p.origin)).min())
+        )
+    return found
 
 
 if __name__ == "__main__":

@@ -67,6 +67,6 @@ def rows():
     seconds = in_turns({name: run(agenda) for name, agenda in runs.items()}, [every] * BLOCKS)
     cases = BLOCKS * len(every)
     return [
-        row("validation", name, cases, own, remark="" if place else told)
+        row("validation", name, cases, own, "" if place else told)
         for place, (name, own) in enumerate(zip(runs, np.asarray(seconds), strict=True))
     ]

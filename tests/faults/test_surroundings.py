@@ -14,18 +14,13 @@ from sim_validate.main import main
 from sim_validate.parallel import compiling
 from sim_validate.parallel import processes as engines
 from tests.faults.conftest import CLI, KEPT, ROOT, contents
-from tests.marks import more
 from tests.patience import HANGING_S
 
 RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]
 NOWHERE = "/proc/nowhere"
 NO_HOME = {"HOME": NOWHERE, "XDG_CONFIG_HOME": NOWHERE, "XDG_CACHE_HOME": NOWHERE}
-COLD = "no folder for kernels"
-"""Compiles all loops again, beside their modules, which `test_compiled` sees of one of them."""
 SURROUNDINGS = {
     "no home": {**NO_HOME, "XDG_CACHE_HOME": str(KEPT.parent)},
-    "no folder for matplotlib": {"MPLCONFIGDIR": NOWHERE, "MPLBACKEND": "nonsense"},
-    COLD: {"NUMBA_CACHE_DIR": NOWHERE, "XDG_CACHE_HOME": NOWHERE},
     "no threads": {"OMP_NUM_THREADS": "many"},
     "no temporary folder": {"TMPDIR": NOWHERE},
     "no locale": {"LC_ALL": "xx_XX", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"},
@@ -40,22 +35,10 @@ def usual(tmp_path_factory):
     return contents(folder)
 
 
-def surroundings(named):
-    """Settings of the environment: those of one name, or all but the slow ones together."""
-    if named in SURROUNDINGS:
-        return SURROUNDINGS[named]
-    return {
-        key: value
-        for name in SURROUNDINGS
-        if name != COLD
-        for key, value in SURROUNDINGS[name].items()
-    }
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("named", ["all at once", *more(*SURROUNDINGS)])
-def test_surroundings_change_no_byte(named, usual, graspproof, tmp_path):
-    done = graspproof(*RUN, "--out", str(tmp_path / "b"), env=surroundings(named))
+def test_surroundings_change_no_byte(usual, graspproof, tmp_path):
+    together = {name: value for each in SURROUNDINGS.values() for name, value in each.items()}
+    done = graspproof(*RUN, "--out", str(tmp_path / "b"), env=together)
     assert (done.returncode, done.stderr) == (0, "")
     assert contents(tmp_path / "b") == usual
 
@@ -87,22 +70,6 @@ def test_where_no_folder_keeps_an_inner_loop_it_is_compiled_again():
     assert (there.stderr, here.stderr) == ("", "")
     *own, kept = here.stdout.splitlines()
     assert (there.stdout.splitlines(), kept) == ([*own, "not kept"], "kept")
-
-
-@pytest.mark.slow
-@pytest.mark.more
-def test_a_run_that_compiles_all_of_its_inner_loops_ends_as_usual(usual, tmp_path):
-    words = [*RUN, "--no-report", "--out", str(tmp_path)]
-    script = f"""{NO_FOLDER}
-from grasp_core.compiled import compiled, state_of
-from sim_validate.main import main
-assert main({words!r}) == 0
-print(state_of(compiled("grasp_core.solvers.lp_kernel").solve))
-"""
-    done = said_by(script)
-    assert (done.stdout, done.stderr) == ("not kept\n", "")
-    assert contents(tmp_path) == {name: usual[name] for name in contents(tmp_path)}
-    assert "verdicts.json" in contents(tmp_path)
 
 
 @pytest.mark.slow
@@ -182,8 +149,10 @@ def test_results_depend_on_neither_processes_nor_cores(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("more", [[], ["--optimize"], ["--regions"]])
+@pytest.mark.parametrize(
+    ("number", "more"),
+    [(signal.SIGINT, []), (signal.SIGTERM, ["--optimize"]), (signal.SIGINT, ["--regions"])],
+)
 def test_an_interrupt_while_planning_leaves_nothing_half(number, more, tmp_path):
     words = ["run", "icosahedron", "--limit", "400", *more, "--jobs", "1", "--out", "out"]
     process = subprocess.Popen(

@@ -27,8 +27,8 @@ CHANGING = (
     "os.chown", "os.truncate", "os.utime", "shutil.rmtree", "shutil.move", "shutil.copyfile",
 )  # fmt: skip
 OURS = ("grasp_core.processes", "frames.py")
-LIBRARIES_ASK = ("def get_version(library_handle)", "fc-list")
-"""GLFW's Python package for its version, matplotlib for fonts, the first time."""
+LIBRARIES_ASK = ("def get_version(library_handle)",)
+"""GLFW's Python package for its version, the first time."""
 
 
 class Witness:

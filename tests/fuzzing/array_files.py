@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from pyarrow import parquet
 
-from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.given_contacts import contacts_text, given_from_json
 from sim_validate.datasets.parquet import parquet_bytes, read_columns
+from sim_validate.datasets.tables import TABLES
 from sim_validate.files.npz import arrays_of
 from sim_validate.records.regions import SHAPES, regions_of
 from tests.fuzzing.targets import Target

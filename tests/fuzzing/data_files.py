@@ -9,32 +9,36 @@ from typing import Any
 from pydantic_core import to_jsonable_python
 
 import grasp_core as gc
-from grasp_core.files.complaints import record_of
+from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import text_of
 from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
 from grasp_core.records.grasps_json import SavedGrasps, grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
-from sim_validate.baselines.baseline_json import baseline_from_json, baseline_to_json
+from sim_validate.baselines.baseline import baseline_from_json, baseline_to_json
 from sim_validate.baselines.settings import of_settings
-from sim_validate.baselines.suite_toml import suite_from_tables
+from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.cli.config_file import flags_from
-from sim_validate.datasets.building.staging import UnitRecord
 from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
 from sim_validate.datasets.given_contacts import given_from_json
-from sim_validate.datasets.manifest import Listed, Manifest, manifest_from_json, manifest_to_json
-from sim_validate.datasets.quarantine import left_out_from
+from sim_validate.datasets.manifest import (
+    Listed,
+    Manifest,
+    left_out_from,
+    manifest_from_json,
+    manifest_to_json,
+)
+from sim_validate.datasets.staging import UnitRecord
 from sim_validate.files.toml_tables import tables_of_toml
-from sim_validate.records.executions_json import executions_from_json, executions_to_json
-from sim_validate.records.regions_schema import RegionsFile
-from sim_validate.records.saved_reaches import reaches_from_json
-from sim_validate.records.saved_verdicts import verdicts_of
+from sim_validate.records.executions import executions_from_json, executions_to_json
+from sim_validate.records.reaches import reaches_from_json
+from sim_validate.records.regions import RegionsFile
 from sim_validate.records.setup_toml import setup_from_tables, tables_of
-from sim_validate.records.transfers.saved_transfer import transfer_from_json
-from sim_validate.records.transfers.transfer_json import transfer_to_json
+from sim_validate.records.transfers import transfer_from_json, transfer_to_json
+from sim_validate.records.verdicts import verdicts_of
 from sim_validate.records.wrenches import wrenches_from_json
 from sim_validate.simulation.setup import Setup
 from tests.fuzzing.targets import Target
-from tests.scenes.drawing.hands.standing import reaches_text
+from tests.scenes.drawing.standing import reaches_text
 from tests.sim_validate.records.executed import executions_text
 
 STABILITY = Path(__file__).parents[1] / "stability" / "box"
@@ -342,7 +346,7 @@ TARGETS = (
            lambda: [executions_text().encode()], _same_executions, "json"),
     Target("transfer", lambda data: transfer_from_json(text_of(data)), lambda: [_transfer_seed()],
            _same_transfer, "json"),
-    Target("regions", lambda data: record_of(RegionsFile, text_of(data), "regions.json", schema=3),
+    Target("regions", lambda data: record_of(RegionsFile, text_of(data), "regions.json", schema=1),
            lambda: [_json(REGIONS)], _same_record, "json"),
     Target("reaches", lambda data: reaches_from_json(text_of(data)),
            lambda: [reaches_text().encode()],

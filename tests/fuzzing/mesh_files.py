@@ -1,4 +1,4 @@
-"""Readers of mesh files as targets, against two other readings, and the making of solids."""
+"""Readers of mesh files as targets, against another reading, and the making of solids."""
 
 import io
 import json
@@ -12,7 +12,6 @@ import grasp_core as gc
 from grasp_core.mesh_files.reading import FORMATS, mesh_of_bytes
 from tests.fuzzing.plain_meshes import PLAIN
 from tests.fuzzing.targets import Target
-from tests.fuzzing.trimesh_readings import by_trimesh, is_misread
 
 MOST = 10_000
 """Triangles of a fuzzed file."""
@@ -20,14 +19,10 @@ ROUNDING = 1e-9
 VOLUME_ROUNDING = 1e-6
 
 
-def triangles_of(kind, data, most):
+def triangles_of(kind, data, most=MOST):
     """The vertices and triangles of a file's bytes."""
     mesh = mesh_of_bytes(kind, data, most)
     return mesh.vertices, mesh.triangles
-
-
-def read(kind, data):
-    return triangles_of(kind, data, MOST)
 
 
 def first_least(corners):
@@ -37,18 +32,10 @@ def first_least(corners):
 
 
 def same_triangles(kind, data, found):
-    """All triangles are those of the plain reading, and of trimesh where it reads the file."""
+    """All coordinates are those of the plain reading, triangle by triangle, in any order."""
     points, corners = found
-    same_rows(kind, points[corners], PLAIN[kind](data))
-    others = by_trimesh(kind, data)
-    if others is not None and not is_misread(kind, data):
-        same_rows(kind, points[corners], others)
-
-
-def same_rows(kind, triangles, others):
-    """All coordinates are the same, triangle by triangle, in any order."""
-    rows = sorted(first_least(each) for each in triangles)
-    plain = sorted(first_least(each) for each in others)
+    rows = sorted(first_least(each) for each in points[corners])
+    plain = sorted(first_least(each) for each in PLAIN[kind](data))
     assert len(rows) == len(plain), (len(rows), len(plain))
     if rows == plain:
         return
@@ -205,7 +192,7 @@ TARGETS = [
     *(
         Target(
             kind,
-            partial(read, kind),
+            partial(triangles_of, kind),
             partial(seeds, kind),
             partial(same_triangles, kind),
             WRITTEN[kind],

@@ -1,14 +1,10 @@
-"""Files changed as people and attackers change them: values, keys and nesting, not only bytes."""
+"""Files changed as people and attackers change them: values, keys, words and lines, not bytes."""
 
 import io
 import json
 import random
 import zipfile
-from collections.abc import Callable
 from typing import Any
-
-Mutate = Callable[[bytes, int], bytes]
-"""Changes bytes, up to a size."""
 
 RAW = (
     "NaN", "-Infinity", "1e999", "-1e999", "-0", "-0.0", "1e-400", "1E3", "0.1e1", "1.0", "01",
@@ -24,28 +20,38 @@ TOML_RAW = (
     '""', '"../../x"', '"/etc/passwd"', '"\\u0000"', '"\\u001b[2J"', "[]", "{}", "[[1]]", "{a = 1}",
     "1979-05-27", "07:32:00", "[" * 3000, "[" * 900 + "]" * 900, "0x10", "1_000", "'''a\nb'''",
 )  # fmt: skip
-MOST_CHANGED = 1e300
-"""Larger numbers are left as they are."""
+WORDS = (
+    b"nan", b"inf", b"-inf", b"1e999", b"1e308", b"1e-400", b"-0", b"0", b"-1", b"3", b"4", b"99",
+    b"4294967295", b"9223372036854775808", b"0.1.2", b"1_0", b"1e", b"1-e3", b"0x1", b"1,5", b"f",
+    b"v", b"vn", b"OFF", b"COFF", b"vertex", b"normal", b"solid", b"endsolid", b"facet",
+    b"element", b"property", b"list", b"uchar", b"int", b"double", b"1/2/3", b"1//", b"/1", b"#",
+    b"\\", b"curv", b"o", b"g", b"l", b"s", b"vertex_index", b"x", b"\xc2\x85", b"\x0c",
+    b"\xef\xbb\xbf",
+)  # fmt: skip
+"""Words that mean something in some mesh file, or look as if they did."""
 HOLE = "\u2603hole\u2603"
 """Stands in a document where raw text is to be put."""
 
 
+def changed(written: str, data: bytes, rng: random.Random) -> bytes | None:
+    """An input changed in the way of its kind; None where bytes are to be changed."""
+    ways = {"json": json_changed, "toml": toml_changed, "words": words_changed, "glb": glb_changed,
+            "npz": npz_changed}  # fmt: skip
+    return ways[written](data, rng) if written in ways and rng.random() < 0.85 else None
+
+
 def json_changed(data: bytes, rng: random.Random) -> bytes | None:
     """A JSON text with some values and keys changed; None where it is none."""
+    raw: list[str] = []
     try:
         document = json.loads(data)
-    except (ValueError, RecursionError):
-        return None
-    raw: list[str] = []
-    for _ in range(rng.choice((1, 1, 1, 2, 4))):
-        document = _changed(document, rng, raw)
-    try:
+        for _ in range(rng.choice((1, 1, 1, 2, 4))):
+            document = _changed(document, rng, raw)
         text = json.dumps(document)
-    except (ValueError, RecursionError):
+    except (ValueError, RecursionError, OverflowError):
         return None
-    mark = json.dumps(HOLE)
     for value in raw:
-        text = text.replace(mark, value, 1)
+        text = text.replace(json.dumps(HOLE), value, 1)
     if rng.random() < 0.05 and text.startswith("{"):
         text = text[:-1] + "," + text[1:]  # every key twice
     return text.encode()
@@ -57,23 +63,21 @@ def _changed(document: Any, rng: random.Random, raw: list[str]) -> Any:
         raw.append(rng.choice(RAW))
         return HOLE
     holder, key = rng.choice(places)
-    kind = rng.randrange(8)
-    value = holder[key]
+    kind, value = rng.randrange(8), holder[key]
     if kind <= 2:
         raw.append(rng.choice(RAW))
         holder[key] = HOLE
     elif kind == 3:
         del holder[key]
     elif kind == 4 and isinstance(holder, dict):
-        holder[rng.choice([str(key) + "x", "", "schema", "object", "a.b", "\x1b[2J"])] = holder.pop(
-            key
-        )
+        other = rng.choice([str(key) + "x", "", "schema", "object", "a.b", "\x1b[2J"])
+        holder[other] = holder.pop(key)
     elif kind == 5 and isinstance(holder, list):
         holder.insert(rng.randrange(len(holder) + 1), value)
     elif kind == 6:
         other, place = rng.choice(places)  # the value of another place
         holder[key] = other[place] if not isinstance(other[place], dict | list) else value
-    elif isinstance(value, int | float) and abs(value) < MOST_CHANGED:  # truth values, too
+    elif isinstance(value, int | float):  # truth values, too
         holder[key] = rng.choice([-value, value + 1, value * 1e9, value * (1 + 1e-9), float(value)])
     else:
         holder[key] = [value]
@@ -85,8 +89,7 @@ def _places(document: Any) -> Any:
     todo = [document] if isinstance(document, dict | list) else []
     while todo:
         holder = todo.pop()
-        keys = holder.keys() if isinstance(holder, dict) else range(len(holder))
-        for key in list(keys):
+        for key in list(holder) if isinstance(holder, dict) else range(len(holder)):
             yield holder, key
             if isinstance(holder[key], dict | list):
                 todo.append(holder[key])
@@ -95,8 +98,7 @@ def _places(document: Any) -> Any:
 def toml_changed(data: bytes, rng: random.Random) -> bytes | None:
     """A TOML text with a line's value changed, or a line twice, gone, or moved."""
     lines = data.decode("utf-8", "replace").split("\n")
-    at = rng.randrange(len(lines))
-    kind = rng.randrange(6)
+    at, kind = rng.randrange(len(lines)), rng.randrange(6)
     if kind <= 2 and "=" in lines[at]:
         lines[at] = lines[at].split("=", 1)[0] + "= " + rng.choice(TOML_RAW)
     elif kind == 3:
@@ -108,31 +110,62 @@ def toml_changed(data: bytes, rng: random.Random) -> bytes | None:
     return "\n".join(lines).encode()
 
 
-def npz_changed(data: bytes, rng: random.Random, mutate: Mutate) -> bytes | None:
-    """An archive of arrays with a member's bytes changed, or gone, twice, or called otherwise."""
+def npz_changed(data: bytes, rng: random.Random) -> bytes | None:
+    """An archive of arrays with some bytes of a member changed, or it gone, twice, or renamed."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = [(each.filename, archive.read(each)) for each in archive.infolist()]
-    except Exception:  # whatever a mutated archive makes zipfile raise
+        at, kind = rng.randrange(len(members)), rng.randrange(6)
+    except Exception:  # whatever a changed archive makes zipfile raise
         return None
-    if not members:
-        return None
-    at = rng.randrange(len(members))
-    name, held = members[at]
-    kind = rng.randrange(6)
+    name, held = members[at][0], bytearray(members[at][1])
     if kind == 0:
         del members[at]
     elif kind == 1:
-        members.append((name, held))
+        members.append(members[at])
     elif kind == 2:
-        members[at] = (rng.choice(["../" + name, "/" + name, name + "x", "", "a\0b"]), held)
+        members[at] = (rng.choice(["../" + name, "/" + name, name + "x", ""]), bytes(held))
     else:
-        head, body = held[:128], held[128:]
-        head, body = (mutate(head, 160), body) if kind < 5 else (head, mutate(body, len(body) + 8))
-        members[at] = (name, head + body)
+        for _ in range(min(len(held), rng.choice((1, 1, 4)))):
+            held[rng.randrange(len(held) if kind == 3 else min(len(held), 128))] = rng.randrange(
+                256
+            )
+        members[at] = (name, bytes(held))
     made = io.BytesIO()
-    how = rng.choice([zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
-    with zipfile.ZipFile(made, "w", how) as archive:
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
         for each, content in members:
-            archive.writestr(zipfile.ZipInfo(each), content, how)
+            archive.writestr(zipfile.ZipInfo(each), content)
     return made.getvalue()
+
+
+def words_changed(data: bytes, rng: random.Random) -> bytes | None:
+    """A text with a word changed, gone or twice, or a line gone, twice, moved or cut."""
+    lines = data.split(b"\n")
+    at = rng.randrange(len(lines))
+    words, kind = lines[at].split(b" "), rng.randrange(8)
+    if kind <= 3:
+        place = rng.randrange(len(words))
+        words[place : place + rng.randrange(2)] = [rng.choice(WORDS)]
+        lines[at] = b" ".join(words)
+    elif kind == 4:
+        lines.insert(rng.randrange(len(lines) + 1), lines[at])
+    elif kind == 5:
+        del lines[at]
+    elif kind == 6:
+        lines[at : at + 1] = [b" ".join(words[:1]), b" ".join(words[1:])]
+    else:
+        lines.append(lines.pop(at))
+    return rng.choice([b"\n", b"\n", b"\n", b"\r\n", b"\r"]).join(lines)
+
+
+def glb_changed(data: bytes, rng: random.Random) -> bytes | None:
+    """A GLB with its tree changed, and all lengths as they must be."""
+    if len(data) < 20:
+        return None
+    size = int.from_bytes(data[12:16], "little")
+    tree = json_changed(data[20 : 20 + size], rng)
+    if tree is None:
+        return None
+    tree += b" " * (-len(tree) % 4)
+    rest = len(tree).to_bytes(4, "little") + b"JSON" + tree + data[20 + size :]
+    return data[:8] + (12 + len(rest)).to_bytes(4, "little") + rest

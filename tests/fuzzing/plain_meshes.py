@@ -81,6 +81,14 @@ PLY_CODES = {
 }  # fmt: skip
 
 
+def number(word):
+    """Of a word; nan in a column that is not used, or the file would be refused."""
+    try:
+        return float(word)
+    except ValueError:
+        return math.nan
+
+
 def of_ply(data: bytes) -> list[Triangle]:
     data = unmarked(data)
     ended = re.search(rb"\n[ \t]*end_header[ \t]*\r?\n|\r[ \t]*end_header[ \t]*\r", data)
@@ -94,7 +102,7 @@ def of_ply(data: bytes) -> list[Triangle]:
         if kind == "ascii":
             place += 1
             word = words[place - 1]
-            value = float("nan" if b"nan(" in word.lower() else word)
+            value = number(word)
             return struct.unpack(code, struct.pack(code, value))[0] if code in "ef" else value
         form = ("<" if kind == "binary_little_endian" else ">") + code
         place += struct.calcsize(form)

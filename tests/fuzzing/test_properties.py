@@ -1,18 +1,13 @@
 """One value of a file that is read becomes another: it is refused by name, or read as it is now."""
 
 import json
-from dataclasses import fields, replace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import grasp_core as gc
-from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
 from sim_validate.datasets.given_contacts import GivenGrasp, given_from_json, given_text
-from sim_validate.datasets.manifest import Listed, manifest_from_json, manifest_to_json
-from sim_validate.files.toml_tables import tables_of_toml
-from tests.fuzzing.data_files import MANIFEST
 from tests.fuzzing.targets import targets
 
 JSON_READERS = [name for name, target in targets().items() if target.written == "json"]
@@ -78,40 +73,6 @@ def test_one_other_value_is_refused_by_name_or_read(name):
     one()
     assert ended["refused"] > 5
     assert ended["read"] > 0
-
-
-WORDS = st.text(st.characters(exclude_categories=("Cs",)), max_size=20)
-PATHS = st.from_regex(r"[a-z0-9_-]{1,20}(/[a-z0-9_.-]{0,9}[a-z])?", fullmatch=True)
-
-
-@FEW
-@given(
-    st.builds(
-        DatasetConfig,
-        objects=st.lists(WORDS, min_size=1, max_size=3, unique=True).map(tuple),
-        frictions=st.lists(st.floats(1e-6, 1000.0), min_size=1, max_size=3, unique=True).map(tuple),
-        limit=st.integers(1, 10**9),
-        seed=st.integers(0, 2**63 - 1),
-        scenes=st.booleans(),
-        title=WORDS,
-        creator=WORDS,
-    )
-)
-def test_a_configuration_survives_its_text(config):
-    assert config_from_settings(tables_of_toml(config_to_toml(config))) == config
-
-
-@FEW
-@given(
-    st.dictionaries(WORDS, WORDS, max_size=3),
-    st.lists(PATHS, unique=True, max_size=4),
-    st.integers(0, 2**40),
-)
-def test_a_manifest_survives_its_text(versions, paths, count):
-    files = tuple(Listed(path, count, "0" * 64) for path in sorted(paths))
-    manifest = replace(MANIFEST, versions=versions, units=count, files=files)
-    found = manifest_from_json(manifest_to_json(manifest))
-    assert all(getattr(found, f.name) == getattr(manifest, f.name) for f in fields(manifest))
 
 
 COORDINATES = st.integers(-(10**6), 10**6).map(lambda x: x / 7.0)

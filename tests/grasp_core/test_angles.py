@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 
-from grasp_core.angles import kept_angle, radians_of
+from grasp_core.frames import kept_angle, radians_of
 
 ANGLES = [
     float(scale * share)

@@ -9,8 +9,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.by_value import ByValue
-from sim_validate.records.transfers.saved_transfer import transfer_from_json
-from sim_validate.records.transfers.transfer_json import transfer_to_json
+from sim_validate.records.transfers import transfer_from_json, transfer_to_json
 
 FRICTION = 0.5
 

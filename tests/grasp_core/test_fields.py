@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.fields import are_units, is_array, is_indices
+from grasp_core.arrays import are_units, is_array, is_indices
 from scenes.example_objects import example_object
 
 OTHERS = [np.float16, np.float32, np.longdouble, np.int8, np.int32, np.int64, np.uint64, ">f8"]

@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.short_text import counted, summary, vector
+from grasp_core.by_value import counted, summary, vector
 from scenes.example_objects import example_object
 
 TWO_LINES = 300

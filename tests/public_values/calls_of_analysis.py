@@ -74,11 +74,6 @@ CALLS = [
         "jobs": AT_LEAST_ONE,
     }),
     Call("gc.iter_grasps", lambda: {"body": body()}, PLANNED),
-    Call("gc.plan_of", lambda: {"body": body(), "grasps": [grasp()], "friction": 0.5}, {
-        "body": VALUE,
-        "grasps": SEVERAL | {"twice": [grasp()] * 2, "an id": [grasp().id]},
-        "friction": FRICTION,
-    }),
     Call("gc.save_grasps", lambda: {"path": "grasps.json", "plan": gc.plan(body(), limit=1)}, {
         "path": PATH, "plan": VALUE,
     }, succeeds_in="tests/grasp_core/records/test_grasps_files.py"),
@@ -112,9 +107,6 @@ CALLS = [
         "edges": COUNT | {"two": 2, "a million": 10**6},
     }),
     Call("gc.min_weight", two_arrays(friction=0.5), contacts() | {
-        "friction": each_of(FRICTION, "zero"), "edges": COUNT | {"two": 2, "a million": 10**6},
-    }),
-    Call("gc.min_weights", many_arrays, contacts(many=True) | {
         "friction": each_of(FRICTION, "zero"), "edges": COUNT | {"two": 2, "a million": 10**6},
     }),
     Call("gc.smallest_singular_value", lambda: {"positions": TETRA_CENTERS, "torque_scale": 1.0}, {
@@ -199,10 +191,8 @@ CALLS = [
     Call("gc.certify_regions", of_grasp(friction=0.5), BODY_AND_GRASP | {
         "friction": FRICTION,
         "reserve": NOT_NEGATIVE | {"all": 1.0},
-        "balance": WORD,
         "recenter": SWITCH,
         "clearance": NOT_NEGATIVE | {"larger than the object": 1.0},
         "max_cones": COUNT | {"few": 63},
-        "cones": {"a count": 1000, "text": "many"},
     }),
 ]  # fmt: skip

@@ -11,7 +11,6 @@ from tests.public_values.bad_values import (
     NOT_NUMBERS,
     PATH,
     POSITIVE,
-    SEED,
     SEVERAL,
     TEXT,
     VALUE,
@@ -46,14 +45,14 @@ CALLS = [
         "protocol": "dexonomy", "body": body(), "grasp": grasp(), "friction": 0.5,
     }, {
         "protocol": NAME, "body": VALUE, "grasp": SEVERAL, "friction": FRICTION,
-        "setup": optional(VALUE), "seed": SEED,
+        "setup": optional(VALUE),
     }),
     Call("sv.judge_hand_by", lambda: {
         "protocol": "dexonomy", "hand": hinged_hand(), "body": cube(), "reach": stance(0.5),
         "friction": 0.5,
     }, {
         "protocol": NAME, "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": FRICTION,
-        "setup": optional(VALUE), "seed": SEED,
+        "setup": optional(VALUE),
     }),
     Call("sv.DexRecord", recorded, {
         "object_path": TEXT, "object_scale": POSITIVE,
@@ -74,11 +73,11 @@ CALLS = [
     }),
     Call("sv.load_dex_record", lambda: {"path": "no/such/0.npy"}, {
         "path": PATH | {"nowhere": "no/such/0.npy"},
-    }, succeeds_in="tests/sim_validate/peer_files/test_dexgraspbench_records.py"),
+    }, succeeds_in="tests/sim_validate/test_dexgraspbench.py"),
     Call("sv.write_dex_record", lambda: {"record": record(), "path": "no/such/0.npy"}, {
         "record": VALUE, "path": PATH,
-    }, succeeds_in="tests/sim_validate/peer_files/test_dexgraspbench_records.py"),
+    }, succeeds_in="tests/sim_validate/test_dexgraspbench.py"),
     Call("sv.write_dex_object", lambda: {"body": body(), "folder": "no/such"}, {
         "body": VALUE, "folder": PATH,
-    }, succeeds_in="tests/sim_validate/peer_files/test_dexgraspbench_records.py"),
+    }, succeeds_in="tests/sim_validate/test_dexgraspbench.py"),
 ]  # fmt: skip

@@ -44,7 +44,7 @@ CALLS = [
         "path": PATH | {"unknown ending": "a.obj", "no ending": "a"},
         "to": WORD,
         "fingertip_radius_m": optional(POSITIVE),
-    }, succeeds_in="tests/scenes/exports/test_formats.py"),
+    }, succeeds_in="tests/scenes/test_exports.py"),
     Call("scenes.example_names", dict, {}),
     Call("scenes.example_object", lambda: {"name": "box"}, {
         "name": TEXT | {
@@ -96,13 +96,13 @@ CALLS = [
     }, succeeds_in="tests/sim_validate/commands/test_regions.py"),
     Call("sv.load_executions", lambda: {"path": "no/such/executions.json"}, {
         "path": PATH | {"nowhere": "no/such/executions.json"},
-    }, succeeds_in="tests/sim_validate/records/test_executions_json.py"),
+    }, succeeds_in="tests/sim_validate/records/test_executions.py"),
     Call("sv.load_transfer", lambda: {"path": "no/such/transfer.json"}, {
         "path": PATH | {"nowhere": "no/such/transfer.json"},
-    }, succeeds_in="tests/sim_validate/records/test_saved_transfer.py"),
+    }, succeeds_in="tests/sim_validate/records/test_transfers.py"),
     Call("sv.load_verdicts", lambda: {"path": "no/such/verdicts.json"}, {
         "path": PATH | {"nowhere": "no/such/verdicts.json"},
-    }, succeeds_in="tests/sim_validate/records/test_saved_verdicts.py"),
+    }, succeeds_in="tests/sim_validate/records/test_verdicts.py"),
     Call("sv.margin_figure", of_grasp(friction=0.5), BODY_AND_GRASP | {
         "friction": FRICTION, "max_normal_force_n": POSITIVE,
     }, slow=True),
@@ -142,9 +142,8 @@ CALLS = [
     Call("sv.Agenda", dict, {
         "random_wrenches": COUNT,
         "wrenches": SEVERAL,
-        **dict.fromkeys(("critical_friction", "independent", "controls", "keep_traces"), SWITCH),
+        **dict.fromkeys(("critical_friction", "controls", "keep_traces"), SWITCH),
         "limits": WORD,
-        "rules": SEVERAL | {"unknown": ("nonsense",), "numbers": (1, 2)},
         "trials": COUNT,
         "noise": VALUE,
         "seed": SEED,

@@ -10,24 +10,24 @@ import grasp_core as gc
 import sim_validate as sv
 from grasp_core.checked import BOUNDS
 from grasp_core.hands.reach import HandReach
-from grasp_core.objects.face import PatchLimits
+from grasp_core.objects.surface import PatchLimits
 from scenes.example_objects import example_object
 from scenes.execution.held import HeldSettings
 from scenes.fingertips import FingerSettings
 from scenes.physics import PhysicsSettings
-from sim_validate.baselines.parts.if_changed import IfChanged
+from sim_validate.baselines.part import IfChanged
 from sim_validate.cli import (
     command_flags,
+    dataset_flags,
     execution_flags,
     flag_groups,
     hand_flags,
-    learning_flags,
     transfer_flags,
 )
 from sim_validate.cli.flag_bounds import Bound
-from sim_validate.datasets.learning.settings import Learning
+from sim_validate.datasets.config import Learning
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.simulation.noise import Noise
+from sim_validate.simulation.setup import Noise
 from tests.sim_validate.rigs import grasps
 
 ENDS = {end for ends in BOUNDS.values() for end in ends.values()}
@@ -125,8 +125,7 @@ Settings = {
     "random wrenches": (
         flag_groups.Testing, "random_wrenches", lambda value: sv.Agenda(random_wrenches=value),
     ),
-    "points": (learning_flags.Learned, "points", lambda value: Learning(points=value)),
-    "synthetic": (learning_flags.Learned, "synthetic", lambda value: Learning(synthetic=value)),
+    "synthetic": (dataset_flags.Learned, "synthetic", lambda value: Learning(synthetic=value)),
     **{
         f"execute {name}": (execution_flags.Executing, name, executing(name)) for name in EXECUTION
     },

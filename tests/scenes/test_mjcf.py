@@ -1,4 +1,5 @@
 from dataclasses import asdict
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -164,6 +165,10 @@ def test_fingers_push_as_hard_as_their_keyframe_says(held):
         assert lost < 0.05 * most
         assert push == pytest.approx(share * most, abs=lost)
         assert np.linalg.norm(data.qpos[:3]) < 1e-3 * scene.layout.radius_m
+
+
+def test_the_text_is_xml_for_readers_other_than_mujoco(held):
+    assert ElementTree.fromstring(held[2].xml).tag == "mujoco"  # noqa: S314 - our own text
 
 
 def test_numbers_are_written_in_full(held):

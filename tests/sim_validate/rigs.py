@@ -6,14 +6,13 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
-from grasp_core.closure.contact_arrays import contact_frictions
-from grasp_core.quality.wrench_body import WrenchBody
-from grasp_core.quality.wrench_limit import limit_of
+from grasp_core.closure.contacts import contact_frictions
+from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from scenes.mjcf import build_scene
+from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.simulate import Bench
 
 MAX_FORCE = 10.0
 

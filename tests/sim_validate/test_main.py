@@ -64,7 +64,7 @@ def test_a_report_that_fails_leaves_the_run_as_it_is(monkeypatch, capsys):
     def broken(*_, **__):
         raise OSError(28, "No space left on device", "a.webp")
 
-    monkeypatch.setattr("sim_validate.commands.report.write_report", broken)
+    monkeypatch.setattr("sim_validate.commands.view.write_report", broken)
     assert main(["run", "tetrahedron", "--limit", "1", "-q"]) == Exit.GOOD
     assert "no report: a.webp: No space left on device" in capsys.readouterr().err
 
@@ -75,7 +75,7 @@ def test_a_verdict_has_the_fields_that_users_rely_on(here, capsys):
     (verdict,) = document["verdicts"]
     assert {
         "id", "contacts_sha256", "outcome", "held", "mismatches", "critical_friction", "wrenches",
-        "controls", "bounds", "robustness", "accepted_by", "settings", "versions",
+        "controls", "robustness", "settings", "versions",
     } == set(verdict)  # fmt: skip
     assert verdict["mismatches"] == []
     friction = verdict["critical_friction"]
@@ -219,7 +219,7 @@ def test_a_config_file_sets_flags_and_flags_override_it(here, capsys):
 
 @pytest.mark.usefixtures("here")
 def test_a_control_that_holds_makes_the_run_fail(monkeypatch, capsys):
-    monkeypatch.setattr("sim_validate.validation.control_trials.judge", _always_held)
+    monkeypatch.setattr("sim_validate.validation.controls.judge", _always_held)
     assert main(["run", "wedge", "--limit", "1", "--jobs", "1", "--no-report"]) == Exit.NEGATIVE
     assert "negative controls were let go (all should)" in capsys.readouterr().out
 
@@ -309,7 +309,7 @@ def test_an_interrupted_run_keeps_what_is_done(here):
 
 
 def _always_held(trace, *_):
-    from sim_validate.simulation.hold_verdict import HoldVerdict, Outcome
+    from sim_validate.simulation.traces import HoldVerdict, Outcome
 
     return HoldVerdict(Outcome.HELD, "", 0.0, 0.0, 0.0, trace.slips_m.max(axis=0), None)
 

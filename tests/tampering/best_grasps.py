@@ -4,7 +4,7 @@ import numpy as np
 
 import grasp_core as gc
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.quality.resisted_loads import resisted_loads
+from grasp_core.quality.measures import resisted_loads
 from tests.tampering import wrench_bounds
 
 SETS, MEASURED = 400, 12

@@ -1,7 +1,9 @@
 """Force closure by its definition: exact cones by Clarabel, long numbers, and ranks.
 
 Nothing of the package is asked, here and in `on_planes` and `wrench_bounds`. Slacks are those that
-the certificates state, doubled.
+the certificates state, doubled. A contact without torsion is one whose coefficient mu_t is zero;
+local coordinates are (push, tangent / mu, tangent / mu, torque / mu_t), so that every cone is the
+same.
 """
 
 import math
@@ -48,31 +50,34 @@ def locals_of(x, n, mu):
     return np.hstack(columns)
 
 
-def margin_of(x, n, mu):
-    """Optimum of the margin program: t / (mu or 1) + |tangent / mu| <= push; -inf if none."""
-    k, flat = len(x), mu == 0.0
-    n = n / np.linalg.norm(n, axis=1, keepdims=True)
-    pushing = np.tile([True, False, False], k)
-    free = pushing | np.repeat(~flat, 3)
-    W = locals_of(unit_arms(x)[0], n, mu)[:, free]
+def soft_locals(x, n, mu, mu_t):
+    """Wrenches of local coordinates at unit size, (6, 4k), zeros where a coefficient is."""
+    arms, size = unit_arms(x)
+    hard = locals_of(arms, n, mu).reshape(6, len(x), 3)
+    turning = np.vstack([np.zeros((3, len(x))), mu_t / size * n.T])
+    return np.concatenate([hard, turning[:, :, None]], axis=2).reshape(6, -1)
+
+
+def margin_of(x, n, mu, mu_t=None):
+    """The largest t with t / (mu or 1) + |(tangents / mu, torque / mu_t)| <= push; -inf if none.
+
+    Pushes have sum one; t is in units of the largest friction, or of one.
+    """
+    k, mu_t = len(x), np.zeros(len(x)) if mu_t is None else mu_t
+    used = np.column_stack([mu >= 0.0, mu > 0.0, mu > 0.0, mu_t > 0.0]).ravel()
+    W = soft_locals(x, n / np.linalg.norm(n, axis=1, keepdims=True), mu, mu_t)[:, used]
     _, sizes, rows = np.linalg.svd(W, full_matrices=False)  # without redundant equations
     W = rows[sizes > 1e-12 * sizes[0]]
-    m, count = len(W), int(free.sum())
-    scale = float(mu.max()) or 1.0
-    depth = np.where(pushing, np.repeat(scale / np.where(flat, 1.0, mu), 3), 0.0)[free]
-    order = np.argsort(~np.repeat(flat, 3)[free], kind="stable")
-    A = np.zeros((m + 1 + count, count + 1))
-    A[:m, :-1], A[m, :-1] = W, pushing[free]
-    A[m + 1 + np.arange(count), order] = -1.0
-    A[m + 1 :, -1] = depth[order]
-    b = np.zeros(len(A))
-    b[m] = 1.0
-    equations = np.vstack([W, pushing[free]])
+    m, scale = len(W), float(mu.max()) or 1.0
+    A, b = np.zeros((m + 1 + 4 * k, int(used.sum()) + 1)), np.zeros(m + 1 + 4 * k)
+    A[:m, :-1], A[m, :-1], b[m] = W, np.arange(4 * k)[used] % 4 == 0, 1.0
+    A[m + 1 + np.flatnonzero(used), np.arange(used.sum())] = -1.0
+    A[m + 1 :: 4, -1] = scale / np.where(mu == 0.0, 1.0, mu)
+    equations = A[: m + 1, :-1]
     nearest = np.linalg.lstsq(equations, b[: m + 1], rcond=1e-12)[0]
     if np.abs(equations @ nearest - b[: m + 1]).max() > 1e-7:
         return -math.inf  # no forces balance, whatever their cones
-    q = np.append(np.zeros(count), -1.0)
-    found = conic(q, A, b, m + 1, int(flat.sum()), int((~flat).sum()))
+    found = conic(np.append(np.zeros(A.shape[1] - 1), -1.0), A, b, m + 1, 0, k)
     name = str(found.status)
     if "PrimalInfeasible" in name:
         return -math.inf
@@ -87,27 +92,42 @@ def contacts_make_sense(x, n, mu):
     )  # fmt: skip
 
 
+def torsions_make_sense(mu, mu_t):
+    return (
+        np.shape(mu_t) == np.shape(mu) and bool(np.isfinite(mu_t).all() and (mu_t >= 0.0).all())
+        and bool(mu_t.any()) and not ((mu_t > 0.0) & (mu == 0.0)).any()
+    )  # fmt: skip
+
+
 def closure(c):
-    """A closure certificate is true in every field."""
-    x, n, mu = c.positions, c.normals, c.friction
+    """A closure certificate is true in every field.
+
+    One that has lost its torsion speaks of hard contacts, of which it may still be true.
+    """
+    x, n, mu, mu_t = c.positions, c.normals, c.friction, c.torsion_m
     if not contacts_make_sense(x, n, mu) or not isinstance(c.closed, bool):
         return False
+    if not (c.torques is None if mu_t is None else torsions_make_sense(mu, mu_t)):
+        return False
+    mu_t = np.zeros(len(x)) if mu_t is None else mu_t
     n = n / np.linalg.norm(n, axis=1, keepdims=True)
-    optimum = margin_of(x, n, mu)
-    slack = TOLERANCE * (mu.max() + min(abs(c.margin), 1e6))
-    full = np.linalg.matrix_rank(locals_of(unit_arms(x)[0], n, mu), 1e-10) == 6
+    optimum = margin_of(x, n, mu, mu_t)
+    reach = mu_t.max() / unit_arms(x)[1]
+    slack = TOLERANCE * (mu.max() + reach + min(abs(c.margin), 1e6))
+    full = np.linalg.matrix_rank(soft_locals(x, n, mu, mu_t), 1e-10) == 6
     if c.closed:
-        return (
+        torques = np.zeros(len(x)) if c.torsion_m is None else c.torques
+        return bool(
             full and c.separating_wrench is None and 0.0 < c.margin <= optimum + slack
-            and _balance(c.forces, x, n, mu)
+            and balance(c.forces, x, n, mu, torques, mu_t)
         )  # fmt: skip
     if c.margin == 0.0:  # nothing but the lack of closure
         bounded = not full or optimum <= slack
     else:
         bounded = optimum <= c.margin + slack or (c.margin == -math.inf and optimum <= -0.9e6)
     return bool(
-        c.forces is None and c.margin <= 0.0 and bounded
-        and separates(c.separating_wrench, x, n, mu)
+        c.forces is None and c.torques is None and c.margin <= 0.0 and bounded
+        and separates(c.separating_wrench, x, n, mu, mu_t)
     )  # fmt: skip
 
 
@@ -122,7 +142,7 @@ def interval(c):
             return False
         forces = _balanced(c.forces, x, n, upper)
         pushes = np.einsum("ki,ki->k", forces, n).sum()
-        if not (pushes > 0.0 and _balance(forces / pushes, x, n, mu)):
+        if not (pushes > 0.0 and balance(forces / pushes, x, n, mu)):
             return False
     if lower == 0.0:
         return c.twist is None
@@ -147,23 +167,30 @@ def _balanced(f, x, n, friction):
     return f
 
 
-def _balance(f, x, n, mu):
-    if np.shape(f) != np.shape(x) or not np.isfinite(f).all():
+def balance(f, x, n, mu, m=None, mu_t=None):
+    """Forces, and torques about normals, are inside their cones, balance, and push by one."""
+    m, mu_t = (np.zeros(len(x)) if each is None else each for each in (m, mu_t))
+    if np.shape(f) != np.shape(x) or np.shape(m) != np.shape(mu) or not np.isfinite(f).all():
         return False
+    arms, size = unit_arms(x)
     along = np.einsum("ki,ki->k", f, n)
     across = np.linalg.norm(f - along[:, None] * n, axis=1)
-    torque = np.cross(unit_arms(x)[0], f).sum(axis=0)
-    inside = np.where(mu > 0.0, across < mu * along, (across <= UNIT) & (along > 0.0))
-    off = max(np.abs(f.sum(axis=0)).max(), np.abs(torque).max(), abs(along.sum() - 1.0))
-    return bool(inside.all()) and off <= UNIT
+    slides = np.where(mu > 0.0, across / np.where(mu > 0.0, mu, 1.0), 0.0)
+    turns = np.where(mu_t > 0.0, np.abs(m) / np.where(mu_t > 0.0, mu_t, 1.0), 0.0)
+    loose = max(across[mu == 0.0].max(initial=0.0), np.abs(m[mu_t == 0.0]).max(initial=0.0) / size)
+    torque = np.cross(arms, f).sum(axis=0) + (m / size) @ n
+    off = max(np.abs(f.sum(axis=0)).max(), np.abs(torque).max(), abs(along.sum() - 1.0), loose)
+    return bool((np.hypot(slides, turns) < along).all()) and off <= UNIT * (1 + (mu_t / size).max())
 
 
-def separates(y, x, n, mu):
-    """To within rounding of 1e-12 at unit size, and of where the frame's origin is."""
+def separates(y, x, n, mu, mu_t=0.0):
+    """The supports of the cones along a twist are not positive.
+
+    To within rounding of 1e-12 at unit size, and of where the frame's origin is.
+    """
     if np.shape(y) != (6,) or not np.isfinite(y).all():
         return False
-    y = np.asarray(y, dtype=np.longdouble)
-    x = np.asarray(x, dtype=np.longdouble)
+    y, x = np.asarray(y, dtype=np.longdouble), np.asarray(x, dtype=np.longdouble)
     center, (_, size) = x.mean(axis=0), unit_arms(np.asarray(x, dtype=float))
     v = y[:3] + np.cross(y[3:], x)
     along = np.einsum("ki,ki->k", v, n)
@@ -171,7 +198,8 @@ def separates(y, x, n, mu):
     length = float(np.hypot(np.linalg.norm((y[:3] + np.cross(y[3:], center)).astype(float)),
                             np.linalg.norm(y[3:].astype(float)) * size))  # fmt: skip
     far = 1.0 + np.linalg.norm(center.astype(float)) / size
-    excess = (along.astype(float) + mu * across) / np.sqrt(1.0 + mu**2)
+    swung = np.hypot(mu * across, mu_t * (n @ y[3:]).astype(float))
+    excess = (along.astype(float) + swung) / np.sqrt(1.0 + mu**2 + (mu_t / size) ** 2)
     return length > 0.0 and bool((excess <= 1e-11 * far * length).all())
 
 

@@ -204,7 +204,7 @@ def payload(c):
             return False
         claimed = SimpleNamespace(
             found=ray, positions=g.arms, normals=g.normals, friction=g.friction,
-            max_normal_force=most, center=np.zeros(3), motors=c.fixed.motors,
+            max_normal_force=most, center=np.zeros(3), motors=c.fixed.motors, torsion_m=0.0,
         )  # fmt: skip
         if not wrench_limit(claimed):
             return False

@@ -13,12 +13,10 @@ import numpy as np
 import grasp_core as gc
 import scenes
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.execution.carried_mass import carried_mass
-from grasp_core.execution.carrying_hand import CarryingHand
+from grasp_core.execution.carried_mass import CarryingHand, carried_mass
 from grasp_core.families.free import Absence, place_free
 from grasp_core.objects.face_pieces import unit_pieces
-from grasp_core.quality.measures import Measure
-from grasp_core.quality.resisted_loads import resisted_loads
+from grasp_core.quality.measures import Measure, resisted_loads
 from grasp_core.regions.certify_regions import certify_regions
 from sim_validate.records.regions import SHAPES, proof_arrays, regions_of
 from tests.judges import random_contacts
@@ -27,7 +25,6 @@ from tests.tampering import (
     exact_closure,
     hand_payloads,
     on_planes,
-    soft_contacts,
     squeezes,
     wrench_bounds,
 )
@@ -334,15 +331,14 @@ TABLE = {
     "TwistCover": Row(
         cover, lambda c, rng: on_planes.all_closed(c.regions, c.normals, c.friction, rng), 0.5
     ),
-    "WrenchLimit": Row(
-        wrench_limit,
-        lambda c, _: wrench_bounds.wrench_limit(c),
-    ),
+    "WrenchLimit": Row(wrench_limit, lambda c, _: wrench_bounds.wrench_limit(c)),
     "a closure certificate with torsion": Row(
-        soft_closure, lambda c, _: soft_contacts.closure(c), 2.0
+        soft_closure, lambda c, _: exact_closure.closure(c), 2.0
     ),
     "a quality with torsion": Row(soft_quality, wrench_bounds.quality),
-    "a wrench limit with torsion": Row(soft_wrench_limit, lambda c, _: soft_contacts.limit(c)),
+    "a wrench limit with torsion": Row(
+        soft_wrench_limit, lambda c, _: wrench_bounds.wrench_limit(c)
+    ),
     "BestSqueeze": Row(best_squeeze, lambda c, _: squeezes.squeeze(c), 0.8),
     "CutTree": Row(cut_tree, best_grasps.proof, 0.8),
     "BestGrasp": Row(best, best_grasps.best, 0.4),

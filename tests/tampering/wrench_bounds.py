@@ -7,8 +7,9 @@ from tests.tampering.exact_closure import (
     UNIT,
     conic,
     contacts_make_sense,
-    locals_of,
+    soft_locals,
     tangents,
+    torsions_make_sense,
     unit_arms,
 )
 
@@ -108,39 +109,42 @@ def wrench_limit(c):
     """The largest multiple, solved again, is between the limit and the upper bound."""
     found, x, n, largest = c.found, c.positions, c.normals, c.max_normal_force
     mu = np.full(len(x), c.friction) if np.ndim(c.friction) == 0 else np.asarray(c.friction)
+    mu_t = np.zeros(len(x)) if np.ndim(c.torsion_m) == 0 else np.asarray(c.torsion_m)
     if not contacts_make_sense(np.asarray(x), np.asarray(n), mu):
         return False
-    middle = x.mean(axis=0)
-    arms, size = unit_arms(x)
-    load = np.append(
-        found.wrench[:3], (found.wrench[3:] - np.cross(middle - c.center, found.wrench[:3])) / size
-    )
-    k, length = len(x), np.linalg.norm(load)
+    if np.ndim(c.torsion_m) and not torsions_make_sense(mu, mu_t):
+        return False
+    k, (arms, size) = len(x), unit_arms(x)
+    lever = np.cross(x.mean(axis=0) - c.center, found.wrench[:3])
+    load = np.append(found.wrench[:3], (found.wrench[3:] - lever) / size)
+    length = np.linalg.norm(load)
     torques, room = torques_of(c.motors, n, largest)
-    A = np.zeros((6 + k + len(room) + 3 * k, 3 * k + 1))
-    A[:6, :-1], A[:6, -1] = locals_of(arms, n, mu), load / length
-    A[6 + np.arange(k), 3 * np.arange(k)] = 1.0
-    A[6 + k : -3 * k, :-1] = torques @ scaled(mu)
-    A[-3 * k :, :-1] = -np.eye(3 * k)
-    solved = conic(
-        np.append(np.zeros(3 * k), -1.0),
-        A,
-        np.r_[np.zeros(6), np.ones(k), room, np.zeros(3 * k)],
-        6,
-        k + len(room),
-        k,
-    )
+    hard = np.arange(4 * k) % 4 < 3
+    A = np.zeros((6 + k + len(room) + 4 * k, 4 * k + 1))
+    A[:6, :-1], A[:6, -1] = soft_locals(x, n, mu, mu_t), load / length
+    A[6 + np.arange(k), 4 * np.arange(k)] = 1.0
+    A[6 + k : -4 * k, np.flatnonzero(hard)] = torques @ scaled(mu)
+    A[-4 * k :, :-1] = -np.eye(4 * k)
+    b = np.r_[np.zeros(6), np.ones(k), room, np.zeros(4 * k)]
+    solved = conic(np.append(np.zeros(4 * k), -1.0), A, b, 6, k + len(room), k)
     best = largest * solved.x[-1] / length
-    slack = 1e-6 * (best + largest / length)
-    f = found.forces / largest
+    f, m = found.forces / largest, np.zeros(k)
+    if mu_t.any():
+        m = found.torques / largest
     along = np.einsum("ki,ki->k", f, n)
     across = np.linalg.norm(f - along[:, None] * n, axis=1)
-    left = np.append(f.sum(axis=0), np.cross(arms, f).sum(axis=0)) + found.limit / largest * load
-    weight = np.sqrt(1.0 + mu.max() ** 2)
+    levers = np.where(mu_t > 0.0, mu / np.where(mu_t > 0.0, mu_t, 1.0), 0.0)
+    left = np.append(f.sum(axis=0), np.cross(arms, f).sum(axis=0) + (m / size) @ n)
+    left += found.limit / largest * load
+    turned = (mu_t / size / np.maximum(mu, 1e-3)).max()
+    weight = np.sqrt(1.0 + mu.max() ** 2) * (1.0 + turned)
+    slack = 1e-6 * (weight if mu_t.any() else 1.0) * (best + largest / length)
     strong = np.abs(torques).max(initial=1.0)
     return bool(
         found.limit <= best + slack and found.upper >= best - slack and found.limit <= found.upper
-        and (across <= mu * along + 1e-6 * weight).all() and along.max() <= 1.0 + 1e-6 * weight
+        and (m[mu_t == 0.0] == 0.0).all()
+        and (np.hypot(across, levers * m) <= mu * along + 1e-6 * weight).all()
+        and along.max() <= 1.0 + 1e-6 * weight
         and (torques @ local_of(f, n) <= room + 1e-6 * weight * strong).all()
         and np.linalg.norm(left) <= 1e-6 * weight and abs(found.facet @ found.wrench + 1.0) <= 1e-6
     )  # fmt: skip

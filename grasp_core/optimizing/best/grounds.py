@@ -1,8 +1,31 @@
-"""Says where on an object's faces contacts may be: convex polygons clear of the edges.
+"""Says where on an object's faces contacts may be, and which of these places are alike.
 
 A contact keeps a stated distance from the edges of its face, or half the radius of the largest disc
 in the face where that is less. Faces that are not convex are cut into convex pieces afterwards, so
 that contacts may be on the lines between these.
+
+A symmetry of the object moves contacts to others, of which only one set has to be looked at.
+Solved: first nodes of a search that hold at least one image of every four contacts.
+
+Derivation. A symmetry that maps every piece of the faces to a piece, and the loads that count to
+such loads, keeps the measure of contacts. All keep wrenches of unit length, and the weight.
+Let pieces that symmetries map to each other form an orbit, with its first piece for all. Of the
+orbits on which contacts are, take the first, k. A symmetry moves a contact of this orbit to the
+orbit's first piece r_k; call it finger 0. The others are on pieces of the orbits from k on. The
+symmetries that keep r_k move finger 0 on it; of its images, one is nearest to a point q of the
+piece, so that
+
+    |x - q| <= |x - h q|   for all symmetries h that keep r_k,                            (1)
+
+which is a half-plane for each h.
+
+Each map is exact up to `EXACT`, in pieces, normals and products of maps, which a check of all maps
+and products shows. Two maps are applied at most, so that contacts are moved to within 1e-8 of
+others that the proof is about, with normals as near: their measure differs by less than
+1e-7 (1 + mu). Loads of a task are mapped to within `EXACT` of the longest load L, so that answers
+a(y) = t d(y), t L <= 8 (1 + mu), of unit twists are off by less than 2e-8 (1 + mu); those of the
+moved contacts are off by 5e-8 (1 + mu). Half-planes (1) are moved outwards by `WIDENED` for the
+same reason.
 """
 
 from collections.abc import Sequence
@@ -10,13 +33,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices
+from grasp_core.arrays import Array, Indices, frozen, frozen_indices, is_array, is_indices
 from grasp_core.by_value import ByValue
+from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
-from grasp_core.fields import is_array, is_indices
 from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face, unit_pieces
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.trimmed_faces import clear_of_edges
+from grasp_core.objects.standard_order import clear_of_edges
+from grasp_core.objects.symmetries import symmetries
+from grasp_core.quality.measures import FERRARI_CANNY, Measure
+from grasp_core.values import FINGERS
 
 ROOM = 24
 """Room for the corners of a polygon, that of the compiled cuts."""
@@ -30,6 +56,13 @@ LARGEST = 2.0
 HALF = 0.5
 SEARCH_DIGITS = 11
 """Digits after the point that a search is given of polygons (see `support_cuts`)."""
+EXACT = 1e-9
+"""Largest distance between a piece's corner, or normal, as a map moves it, and another's."""
+WIDENED = 1e-8
+MOST_MAPS = 128
+ASIDE = (0.37, 0.11)
+"""Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
+KERNEL = "grasp_core.optimizing.best.cuts_kernel"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -86,10 +119,7 @@ class Grounds(ByValue):
 
 
 def grounds_of(body: Polyhedron, clearance: float) -> Grounds:
-    """Return where contacts may be on an object.
-
-    Takes `clearance` [m].
-    """
+    """Return where contacts may be on an object."""
     pieces: list[FacePiece] = []
     for face, rooms in enumerate(pieces_by_face(body)):
         if len(rooms) == 1:
@@ -143,3 +173,105 @@ def _is_convex(corners: Array) -> bool:
     angles = np.arctan2(turns, along)
     one_way = (angles > -UNIT).all() or (angles < UNIT).all()
     return bool(one_way and abs(abs(float(angles.sum())) - 2.0 * np.pi) < UNIT)
+
+
+def exact_maps(body: Polyhedron, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> Array:
+    """Return the symmetries of an object that map pieces and loads exactly enough, (g, 3, 3).
+
+    Only the identity is returned if they do not form a group.
+    """
+    alone = np.eye(3)[None]
+    found = symmetries(body)
+    every = np.concatenate([alone, found.rotations[1:], found.reflections])
+    every = every[measure.keeps(every, EXACT)]
+    kept = np.array([each for each in every if _images(each[None], grounds)[0].min() >= 0])
+    return kept if len(kept) <= MOST_MAPS and fitting(kept, grounds, measure) else alone
+
+
+def fitting(maps: Array, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> bool:
+    """Return whether maps are orthogonal, form a group, and keep the pieces and the loads."""
+    if len(maps) > MOST_MAPS or np.abs(maps[0] - np.eye(3)).max() > 0.0:
+        return False
+    square = maps @ maps.transpose(0, 2, 1) - np.eye(3)
+    if np.abs(square).max() > EXACT or (_images(maps, grounds) < 0).any():
+        return False
+    if not measure.keeps(maps, EXACT).all():
+        return False
+    products = np.einsum("aij,bjk->abik", maps, maps)
+    return all(
+        np.abs(products[a][:, None] - maps[None]).max(axis=(2, 3)).min(axis=1).max() <= EXACT
+        for a in range(len(maps))
+    )
+
+
+def _images(maps: Array, grounds: Grounds) -> Indices:
+    """Return the piece that each map moves each piece to, -1 if none, (g, p)."""
+    polygons = grounds.polygons()
+    in_space = [grounds.places(p, polygon) for p, polygon in enumerate(polygons)]
+    found = np.full((len(maps), len(in_space)), -1)
+    turned = grounds.normals @ maps.transpose(0, 2, 1)
+    apart = np.abs(turned[:, :, None] - grounds.normals[None, None]).max(axis=3)
+    for g, p, q in np.argwhere(apart <= EXACT).tolist():
+        if len(in_space[p]) == len(in_space[q]):
+            corners = in_space[p] @ maps[g].T
+            off = np.abs(corners[:, None] - in_space[q][None]).max(axis=2)
+            nearest = off.argmin(axis=1)
+            near = off[np.arange(len(corners)), nearest].max() <= EXACT
+            if near and len(set(nearest.tolist())) == len(corners):
+                found[g, p] = q
+    return found
+
+
+def first_nodes(
+    grounds: Grounds, maps: Array, owners: Indices | None = None
+) -> tuple[Array, Indices, Indices]:
+    """Return the nodes from which a search starts, one for each orbit of pieces.
+
+    Without symmetries there is one, in which every finger may be anywhere, or on its own pieces.
+
+    Takes `maps` (g, 3, 3); `owners` (p,). Gives corners of each finger's polygons, (c, 4, p, 24,
+    2); how many, (c, 4, p); whether fingers are fresh, (c, 4).
+    """
+    pieces = len(grounds.counts)
+    if owners is not None:
+        counts = np.where(owners == np.arange(FINGERS)[:, None], grounds.counts, 0)[None]
+        corners = np.where((counts > 0)[..., None, None], grounds.corners, 0.0)
+        return corners, counts.astype(np.int64), np.zeros((1, FINGERS), dtype=np.int64)
+    if len(maps) == 1:
+        corners = np.broadcast_to(grounds.corners, (1, FINGERS, pieces, ROOM, 2)).copy()
+        counts = np.broadcast_to(grounds.counts, (1, FINGERS, pieces)).copy()
+        return corners, counts, np.ones((1, FINGERS), dtype=np.int64)
+    images = _images(maps, grounds)
+    # a symmetry's inverse is one as well, so that the images of a piece are its orbit
+    leaders = images.min(axis=0)
+    firsts = np.flatnonzero(leaders == np.arange(pieces))
+    corners = np.zeros((len(firsts), FINGERS, pieces, ROOM, 2))
+    counts = np.zeros((len(firsts), FINGERS, pieces), dtype=np.int64)
+    fresh = np.ones((len(firsts), FINGERS), dtype=np.int64)
+    fresh[:, 0] = 0
+    for case, first in enumerate(firsts):
+        later = leaders >= first
+        corners[case, 1:, later] = grounds.corners[later][:, None]
+        counts[case, 1:, later] = grounds.counts[later][:, None]
+        polygon, count = _nearest_part(grounds, maps[images[:, first] == first], int(first))
+        corners[case, 0, first], counts[case, 0, first] = polygon, count
+    return corners, counts, fresh
+
+
+def _nearest_part(grounds: Grounds, keeping: Array, piece: int) -> tuple[Array, int]:
+    """Cut a piece to the part nearer to a point of it than to the point's images, by (1)."""
+    clip = compiled(KERNEL).clip
+    polygon, count = grounds.corners[piece].copy(), int(grounds.counts[piece])
+    middle = polygon[:count].mean(axis=0)
+    aside = sum(share * (polygon[k] - middle) for k, share in enumerate(ASIDE))
+    q = grounds.places(piece, (middle + aside)[None])[0]
+    for turn in keeping[1:]:
+        # (1): 2 x.(hq - q) <= |hq|^2 - |q|^2 with x = o + F p
+        away = turn @ q - q
+        limit = 0.5 * (float((turn @ q) @ (turn @ q)) - float(q @ q))
+        line = np.array([*(away @ grounds.frames[piece]), limit - away @ grounds.origins[piece]])
+        line[2] += WIDENED * float(np.linalg.norm(away))
+        out = np.zeros((ROOM, 2))
+        count = clip(polygon, count, line, 1.0, out)
+        polygon = out
+    return polygon, count

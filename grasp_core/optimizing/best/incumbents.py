@@ -13,11 +13,9 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.polygons import edge_rows
 from grasp_core.objects.face_pieces import FacePiece
-from grasp_core.optimizing.ascent import ContactFaces
+from grasp_core.optimizing.ascent import ContactFaces, climbs_for_weight
 from grasp_core.optimizing.best.grounds import Grounds
-from grasp_core.optimizing.best.searching.parts import Found
-from grasp_core.optimizing.best.searching.search import Searching
-from grasp_core.optimizing.best.task_ascent import climbed_for_task, climbs_for_weight
+from grasp_core.optimizing.best.search import Found, Searching
 from grasp_core.quality.ferrari_canny import wrench_set_quality
 from grasp_core.solvers.ties import largest_first, on_grid, surpassing
 from grasp_core.values import FINGERS
@@ -38,10 +36,7 @@ pieces end in several local optima."""
 
 
 def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Found | None:
-    """Return good contacts, or None if no random ones are in force closure.
-
-    Takes `twists` (n, 6).
-    """
+    """Return good contacts, or None if no random ones are in force closure."""
     alike, climbs = Counter[tuple[int, ...]](), 0
     best: Found | None = None
     for on, at in _closed_sets(searching, twists, rng):
@@ -109,7 +104,7 @@ def climbed(searching: Searching, on: Sequence[int] | Indices, at: Array) -> Fou
     if measure.name == "weight":
         every = climbs_for_weight(faces, at)
     elif measure.name == "task":
-        every = [climbed_for_task(faces, measure, at)]
+        every = [faces.climbed_for_task(measure, at)]
     else:
         every = [faces.climbed(at)[0]]
     for moved in every:

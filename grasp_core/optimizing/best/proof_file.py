@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
-from grasp_core.files.text_files import read_bytes
-from grasp_core.files.whole_files import write_parts
+from grasp_core.files.text_files import read_bytes, write_parts
 from grasp_core.optimizing.best.grounds import Grounds
 from grasp_core.optimizing.best.support_cuts import CutTree
 from grasp_core.quality.measures import Measure

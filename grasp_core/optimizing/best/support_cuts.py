@@ -57,7 +57,7 @@ are off by less than 1e-10, its supports by 2e-10 (1 + mu), and t d(y) of a task
 It refutes a threshold that is lower by `SEARCHED_BELOW`, more than all of these, so that what
 answers in the replay answers in the search. No proof rests on that: the replay decides.
 
-Symmetries. See `same_places`: contacts can be moved by a symmetry, at the cost of its error. It
+Symmetries. See `grounds`: contacts can be moved by a symmetry, at the cost of its error. It
 takes the place of rounding in (3) and (4): `INEXACT` is added to `ROUNDING`.
 """
 
@@ -66,13 +66,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices
+from grasp_core.arrays import (
+    Array,
+    Indices,
+    frozen,
+    frozen_indices,
+    is_a,
+    is_array,
+    is_indices,
+    is_number,
+)
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.compiled import compiled
-from grasp_core.fields import is_a, is_array, is_indices, is_number
-from grasp_core.optimizing.best.grounds import Grounds
-from grasp_core.optimizing.best.same_places import first_nodes, fitting
+from grasp_core.optimizing.best.grounds import Grounds, first_nodes, fitting
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS
 
@@ -85,7 +92,7 @@ SEARCHED_BELOW = 1e-9
 """How far below its threshold a proof is searched for, over 1 + mu, so that replaying it, with
 other roundings, meets no case that is just decided the other way."""
 INEXACT = 1e-7
-"""How far errors of symmetries can lift a measure, over 1 + mu (see `same_places`)."""
+"""How far errors of symmetries can lift a measure, over 1 + mu (see `grounds`)."""
 TWIST_SLACK = 1e-12
 """How far unit twists may be from length one: their lengths are rounded by less than 1e-15, and a
 wrench is shorter than 8 (1 + mu), so that a support is off by a hundredth of `ROUNDING` at most."""

@@ -6,8 +6,8 @@ from pathlib import Path
 from grasp_core.errors import InputError
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import FORMATS
-from grasp_core.objects.face import PatchLimits
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
+from grasp_core.objects.surface import PatchLimits
 from grasp_core.planning.reach import Finger
 from scenes.example_objects import example_object
 from sim_validate.cli import flag_groups

@@ -9,8 +9,7 @@ from sim_validate.cli import flag_groups
 from sim_validate.cli.flag_bounds import FlagsError
 from sim_validate.records.setup_toml import setup_from_file
 from sim_validate.records.wrenches import weights, wrenches_from_file
-from sim_validate.simulation.noise import Noise
-from sim_validate.simulation.setup import Agenda, Setup, with_planned_radius
+from sim_validate.simulation.setup import Agenda, Noise, Setup, with_planned_radius
 
 
 def finger_settings(given: flag_groups.Fingers) -> FingerSettings:
@@ -73,8 +72,6 @@ def _agenda(testing: flag_groups.Testing, seed: int, folder: Path | None) -> Age
         random_wrenches=testing.random_wrenches,
         wrenches=(*own, *weight),
         limits=testing.limits,
-        independent=testing.independent,
-        rules=testing.also_judge_by,
         trials=testing.repeats.trials,
         noise=noise_of(testing.repeats),
         keep_traces=testing.traces,

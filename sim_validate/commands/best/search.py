@@ -16,7 +16,7 @@ from grasp_core.values import Grasp
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.best.best_json import Rated, best_to_document
+from sim_validate.records.best import Rated, best_to_document
 
 FILE, PROOF = "best.json", "best-proof.npz"
 STEPS = 100

@@ -5,8 +5,6 @@ The maps use Hammer's projection, which keeps areas; +x is in the middle and -x 
 
 import math
 from collections.abc import Iterator
-from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -15,13 +13,12 @@ from grasp_core.checked import positive
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.quality.wrench_limits import many_limits
+from grasp_core.quality.wrench_limits import wrench_limits
 from grasp_core.values import Grasp
-from scenes.drawing.canvas import figure_of
-from scenes.drawing.flat.colours import BAD, LEVELS, NEUTRAL, PAPER, levels_of
-from scenes.drawing.flat.panels import SMALL
-from scenes.drawing.flat.scales import ticks_in
-from scenes.drawing.flat.sheets import (
+from scenes.drawing.colours import BAD, LEVELS, NEUTRAL, PAPER, levels_of
+from scenes.drawing.panels import SMALL, ticks_in
+from scenes.drawing.pictures import check_drawn
+from scenes.drawing.sheets import (
     Area,
     Image,
     Mark,
@@ -32,7 +29,6 @@ from scenes.drawing.flat.sheets import (
     ink_line,
     outlined,
 )
-from scenes.drawing.pictures import check_drawn
 from scenes.fingertips import FingerSettings
 
 LONGITUDES, LATITUDES = 21, 11
@@ -63,7 +59,7 @@ little off the poles."""
 
 def margin_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = USUAL_PUSH_N
-) -> Any:
+) -> Sheet:
     """Draw the largest force and torque that a grasp resists in every direction.
 
     Args:
@@ -73,13 +69,13 @@ def margin_figure(
         max_normal_force_n: Largest normal force of each finger [N].
 
     Returns:
-        A matplotlib figure.
+        A sheet with all panels, which a notebook shows and `write` puts into a file.
 
     Raises:
         InputError: The grasp does not lie on the body, or is not in force closure at this friction.
     """
     panels = margin_panels(body, grasp, friction, max_normal_force_n=max_normal_force_n)
-    return figure_of(beside(panels))
+    return beside(panels)
 
 
 def margin_panels(
@@ -104,22 +100,21 @@ def margins(
         )
     ways = np.zeros((LATITUDES * LONGITUDES, 6))
     ways[:, :3] = directions_of_map().reshape(-1, 3)
-    find = partial(_limits, body, grasp, friction, max_normal_force_n, certificate.forces)
-    forces = find(ways)
+    forces = _limits(body, grasp, friction, max_normal_force_n, ways)
     ways = np.roll(ways, 3, axis=1) * body.radius
-    torques = find(ways)
+    torques = _limits(body, grasp, friction, max_normal_force_n, ways)
     return forces, MILLI * body.radius * torques
 
 
 def _limits(
-    body: Polyhedron, grasp: Grasp, friction: float, largest: float, inside: Array, wrenches: Array
-) -> Array:  # fmt: skip
+    body: Polyhedron, grasp: Grasp, friction: float, largest: float, wrenches: Array
+) -> Array:
     """Compute how far each wrench of a map is resisted, (LATITUDES, LONGITUDES)."""
     different, same = np.unique(np.round(wrenches, SAME), axis=0, return_inverse=True)
-    limits = many_limits(
-        grasp.positions, grasp.normals, friction, different, inside, max_normal_force=largest,
-        center=body.center_of_mass,
-    )  # fmt: skip
+    found = wrench_limits(
+        grasp, None, friction, different, max_normal_force=largest, center=body.center_of_mass
+    )
+    limits = np.array([each.limit for each in found])
     return limits[same.reshape(-1)].reshape(LATITUDES, LONGITUDES)
 
 

@@ -2,17 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.canvas import figure_of
-from scenes.drawing.flat.colours import BAD, FINGERS, INK, NEUTRAL
-from scenes.drawing.flat.panels import ROW, Entry, Panel, keyed
-from scenes.drawing.flat.scales import Scale, ticks_in
-from scenes.drawing.flat.sheets import Mark, Sheet, beside
-from sim_validate.replaying.replay import Replayed
+from scenes.drawing.colours import BAD, FINGERS, INK, NEUTRAL
+from scenes.drawing.panels import ROW, Entry, Panel, Scale, keyed, ticks_in
+from scenes.drawing.sheets import Mark, Sheet
+from sim_validate.replaying import Replayed
 
 WIDTH, HEIGHT = 300.0, 316.0
 """Size of a panel [pixels]."""
@@ -31,17 +28,11 @@ LEAST_PUSH = 1e-3
 """Share of a finger's largest push below which its use of friction is not shown."""
 
 
-def motion_figure(found: Replayed, threshold_m: float) -> Any:
+def motion_panels(found: Replayed, threshold_m: float) -> tuple[Sheet, Sheet, Sheet]:
     """Draw displacement, normal forces and use of friction over the time of one trial.
 
-    Takes `threshold_m` [m]. Gives a matplotlib figure. Friction is lowered to the one under test at
-    time zero.
+    Takes `threshold_m` [m]. Friction is lowered to the one under test at time zero.
     """
-    return figure_of(beside(motion_panels(found, threshold_m)))
-
-
-def motion_panels(found: Replayed, threshold_m: float) -> tuple[Sheet, Sheet, Sheet]:
-    """Draw the panels of `motion_figure` as sheets of their own."""
     watched = found.watched
     share = friction_used(watched.pushes_n, watched.friction)
     return (

@@ -9,7 +9,6 @@ line that touches the disc and the projection.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -18,12 +17,10 @@ from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.values import Grasp
-from scenes.drawing.canvas import figure_of
-from scenes.drawing.flat.colours import BAD, GOOD, INK
-from scenes.drawing.flat.panels import ROW, Entry, Panel, keyed, thinned
-from scenes.drawing.flat.scales import Scale, ticks_in
-from scenes.drawing.flat.sheets import Area, Line, Mark, Sheet, beside, circle, outlined
+from scenes.drawing.colours import BAD, GOOD, INK
+from scenes.drawing.panels import ROW, Entry, Panel, Scale, keyed, thinned, ticks_in
 from scenes.drawing.pictures import check_drawn
+from scenes.drawing.sheets import Area, Line, Mark, Sheet, beside, circle, outlined
 from scenes.drawing.views import View, best_view
 
 WIDTH, HEIGHT = 300.0, 338.0
@@ -44,7 +41,7 @@ SMALLEST_NORMAL = np.finfo(np.float64).tiny
 
 def wrench_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None
-) -> Any:
+) -> Sheet:
     """Draw projections of the wrench set: on its weakest direction, on forces and on torques.
 
     Args:
@@ -54,12 +51,12 @@ def wrench_figure(
         view: The view in which forces and torques are seen; None for that of the grasp's picture.
 
     Returns:
-        A matplotlib figure.
+        A sheet with all panels, which a notebook shows and `write` puts into a file.
 
     Raises:
         InputError: The grasp does not lie on the body, or the friction is out of range.
     """
-    return figure_of(beside(wrench_panels(body, grasp, friction, view=view)))
+    return beside(wrench_panels(body, grasp, friction, view=view))
 
 
 def wrench_panels(

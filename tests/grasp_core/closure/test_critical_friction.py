@@ -7,7 +7,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure import critical_friction as critical
 from grasp_core.closure import friction_search
-from grasp_core.closure.contact_arrays import unit_size
+from grasp_core.closure.contacts import unit_size
 from grasp_core.compiled import compiled
 from scenes.example_objects import example_object
 from tests.grasp_core.bodies import BODIES

@@ -14,8 +14,8 @@ import pytest
 from scipy import sparse
 
 import grasp_core as gc
+from grasp_core.closure.contacts import contact_frames, grasp_map
 from grasp_core.closure.friction_interval import FRICTIONLESS
-from grasp_core.closure.wrenches import contact_frames, grasp_map
 from scenes.example_objects import example_object
 from tests.grasp_core.exact_judges import closed_exactly, open_exactly
 from tests.grasp_core.grid_contacts import contact_sets

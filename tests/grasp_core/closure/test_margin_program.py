@@ -5,7 +5,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure import decision
-from grasp_core.closure.contact_arrays import unit_size
+from grasp_core.closure.contacts import unit_size
 from grasp_core.closure.decision import _decided_by_programs, _decided_quickly
 from grasp_core.closure.proofs import proves_closure, refutes_closure
 

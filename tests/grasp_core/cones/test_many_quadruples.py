@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from grasp_core.cones.many_quadruples import (
+from grasp_core.cones.spanning import (
+    cones_positively_span,
     each_cones_positively_span,
     each_positively_spans,
+    positively_span,
+    span_angle,
     span_angles,
 )
-from grasp_core.cones.spanning import cones_positively_span, positively_span, span_angle
 
 MANY = 2000
 

@@ -7,7 +7,7 @@ from scipy.linalg import null_space
 from scipy.optimize import minimize
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import grasp_map, in_frames
+from grasp_core.closure.contacts import grasp_map, in_frames
 from grasp_core.execution.worst_loads import Reactions
 from tests.grasp_core.execution.held import (
     ASIDE,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import cross_matrix
+from grasp_core.closure.contacts import cross_matrix
 from grasp_core.execution.beyond_slip import _returned, loss_multiples
 from grasp_core.execution.first_slip import slip_steps
 from tests.grasp_core.execution.held import box, directions, opposed_grip, planned_grips

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import grasp_map, normal_and_tangential
+from grasp_core.closure.contacts import grasp_map, normal_and_tangential
 from tests.grasp_core.execution.held import directions, opposed_grip, planned_grips
 
 ACROSS = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])

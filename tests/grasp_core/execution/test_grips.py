@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import grasp_map
-from grasp_core.execution.equilibrium import at_rest, stepped
+from grasp_core.closure.contacts import grasp_map
+from grasp_core.execution.first_slip import at_rest, stepped
 from tests.grasp_core.execution.held import box, opposed, opposed_grip, planned_grips, pressed
 
 

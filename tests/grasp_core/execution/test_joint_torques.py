@@ -10,7 +10,7 @@ from scipy.optimize import linprog, minimize
 
 import grasp_core as gc
 import scenes
-from grasp_core.closure.wrenches import grasp_map, in_frames
+from grasp_core.closure.contacts import grasp_map, in_frames
 from grasp_core.execution.worst_loads import Reactions
 from tests.grasp_core.execution.held import box, directions, opposed, opposed_grip, planned
 from tests.grasp_core.execution.jointed import LEVER_M, hand_of, jaws, lifting, pushing

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.families import free as patch
-from grasp_core.families import free_contacts
+from grasp_core.families import free
 from grasp_core.families.free import Absence, Undecided, close_patch
 from grasp_core.families.placements import Placement
 from grasp_core.objects.booleans import extrusion
@@ -103,7 +102,7 @@ def test_placements_balance_strictly_inside_their_faces_and_cones():
         assert np.abs(wrench(placed.positions, placed.forces)).max() < TOLERANCE
         assert pushes.sum() == pytest.approx(1.0, abs=TOLERANCE)
         assert (slides < friction * pushes).all()
-        assert insets(pieces, placed.positions).min() > free_contacts.LEAST_INSET - TOLERANCE
+        assert insets(pieces, placed.positions).min() > free.LEAST_INSET - TOLERANCE
         assert insets(pieces, placed.positions).min() == pytest.approx(placed.merit, abs=TOLERANCE)
         assert gc.classify_lines(placed.positions, placed.forces) == "regulus"
     assert len(found) >= 250
@@ -116,7 +115,7 @@ def test_a_linear_program_with_inner_pyramids_accepts_the_placements(every):
         normals = normals_of(pieces)
         assert pyramid_margin(placed.positions, normals, friction, 128, outer=False) > 0.0
         spread = np.linalg.svd(placed.positions - placed.positions.mean(axis=0), compute_uv=False)
-        assert spread[1] > free_contacts.LEAST_INSET
+        assert spread[1] > free.LEAST_INSET
     assert len(found) >= 250 // every
 
 
@@ -187,7 +186,7 @@ def test_splitting_proves_absence_where_the_patch_of_the_whole_faces_is_closed()
     pieces = quadruple(name, indices)
     whole = close_patch(pieces, tuple(piece.corners for piece in pieces), friction)
     assert whole.closed
-    assert place(pieces, friction) == Undecided(2, 1.0)
+    assert place(pieces, friction) == Undecided(1.0)
     absence = split_absence()
     assert isinstance(absence, Absence)
     assert len(absence.leaves) > 1
@@ -195,12 +194,12 @@ def test_splitting_proves_absence_where_the_patch_of_the_whole_faces_is_closed()
     climb(np.random.default_rng(5), pieces, friction, samples=400, steps=200)
 
 
-@pytest.mark.parametrize("restarts", [0, patch.RESTARTS])
+@pytest.mark.parametrize("restarts", [0, free.RESTARTS])
 def test_splitting_finds_a_grasp_that_restarts_miss(monkeypatch, restarts):
-    monkeypatch.setattr(patch, "RESTARTS", restarts)
+    monkeypatch.setattr(free, "RESTARTS", restarts)
     name, indices, friction = NEEDS_A_SPLIT
     pieces = quadruple(name, indices)
-    assert place(pieces, friction) == Undecided(2, 1.0)
+    assert place(pieces, friction) == Undecided(1.0)
     found = place(pieces, friction, cells=100)
     assert isinstance(found, Placement)
     assert gc.force_closure(found.positions, normals_of(pieces), friction).closed
@@ -208,16 +207,16 @@ def test_splitting_finds_a_grasp_that_restarts_miss(monkeypatch, restarts):
 
 def test_restarts_and_splits_stand_in_for_the_first_try(monkeypatch):
     """With the forces of the whole patch unused, half of the ways still lead to a grasp."""
-    tried = patch.grasp_from_patch
+    tried = free.grasp_from_patch
 
     def only_smaller(pieces, part, certificate, friction):
         whole = all(one is piece.corners for one, piece in zip(part, pieces, strict=True))
         return None if whole else tried(pieces, part, certificate, friction)
 
-    monkeypatch.setattr(patch, "grasp_from_patch", only_smaller)
+    monkeypatch.setattr(free, "grasp_from_patch", only_smaller)
     cases = of_kind(Placement)[::5]
     restarted = [place(pieces, friction) for pieces, friction, _ in cases]
-    monkeypatch.setattr(patch, "RESTARTS", 0)
+    monkeypatch.setattr(free, "RESTARTS", 0)
     split = [place(pieces, friction, cells=20) for pieces, friction, _ in cases]
     for found in (restarted, split):
         held = 0
@@ -266,7 +265,7 @@ def test_a_grasp_of_two_parallel_slabs_is_not_along_one_line():
     placed = place(walls, 0.5)
     assert isinstance(placed, Placement)
     spread = np.linalg.svd(placed.positions - placed.positions.mean(axis=0), compute_uv=False)
-    assert spread[1] > free_contacts.LEAST_INSET
+    assert spread[1] > free.LEAST_INSET
 
 
 def test_friction_must_be_positive():

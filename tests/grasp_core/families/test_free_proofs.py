@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.families.face_parts import part_at
-from grasp_core.families.free import Absence, close_patch
+from grasp_core.families.free import Absence, close_patch, part_at
 from tests.grasp_core.families.free_cases import (
     OBJECTS,
     faces_of,

@@ -17,9 +17,8 @@ from grasp_core.closure.lines import plucker_vectors
 from grasp_core.cones.spanning import balancing_weights
 from grasp_core.families.pencil import CELL_A, place_pencil
 from grasp_core.families.placements import Placement
-from grasp_core.families.regulus import place_regulus
-from grasp_core.families.regulus_program import LEAST_DEPTH
-from sim_validate.validation.paper_as_printed import (
+from grasp_core.families.regulus import LEAST_DEPTH, place_regulus
+from tests.grasp_core.families.printed_paper import (
     LEAST,
     PAIR,
     Discs,

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from grasp_core.families import free_contacts
-from grasp_core.families.free_contacts import place_by_forces
+from grasp_core.families import free
+from grasp_core.families.free import place_by_forces
 from grasp_core.families.placements import Placement
 from tests.grasp_core.families.free_cases import (
     OBJECTS,
@@ -36,13 +36,11 @@ def test_contacts_for_given_forces_balance_them_nearly_as_far_inside_as_any():
             forces = forces.reshape(4, 3)
             assert np.abs(wrench(known, forces)).max() < 1e-12
             placed = place_by_forces(pieces, forces)
-            if insets(pieces, known).min() < free_contacts.LEAST_INSET + TOLERANCE:
+            if insets(pieces, known).min() < free.LEAST_INSET + TOLERANCE:
                 continue
             assert isinstance(placed, Placement)
             assert np.abs(wrench(placed.positions, forces)).max() < TOLERANCE
-            assert (
-                placed.merit >= free_contacts.INSET_KEPT * insets(pieces, known).min() - TOLERANCE
-            )
+            assert placed.merit >= free.INSET_KEPT * insets(pieces, known).min() - TOLERANCE
             assert insets(pieces, placed.positions).min() >= placed.merit - TOLERANCE
             tested += 1
     assert tested >= 90

@@ -8,8 +8,14 @@ import grasp_core as gc
 from grasp_core.closure.lines import plucker_vectors
 from grasp_core.families import regulus as regulus_grasps
 from grasp_core.families.placements import NoPlacement, Placement
-from grasp_core.families.regulus import CHOICES, _best_choice, _best_of, place_regulus
-from grasp_core.families.regulus_program import LEAST_DEPTH, nearly_symmetric
+from grasp_core.families.regulus import (
+    CHOICES,
+    LEAST_DEPTH,
+    _best_choice,
+    _best_of,
+    nearly_symmetric,
+    place_regulus,
+)
 from tests.grasp_core.quadruples import paired_quadruples
 
 TOLERANCE = 1e-7

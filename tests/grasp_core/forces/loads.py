@@ -5,11 +5,9 @@ import math
 import numpy as np
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import contact_frames, grasp_map
+from grasp_core.closure.contacts import contact_frames, grasp_map
 from grasp_core.cones.pyramids import PYRAMID_SIDES
-from grasp_core.quality.wrench_body import WrenchBody
-from grasp_core.quality.wrench_limit import limit_of
-from grasp_core.quality.wrench_limits import axis_wrenches
+from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from scenes.example_objects import example_object
 from tests.judges import random_contacts
 

@@ -4,13 +4,9 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import grasp_map, normal_and_tangential
-from grasp_core.forces.contact_forces import (
-    NoForcesError,
-    closest_forces,
-    contact_forces,
-    least_friction_forces,
-)
+from grasp_core.closure.contacts import grasp_map, normal_and_tangential
+from grasp_core.errors import NoForcesError
+from grasp_core.forces.contact_forces import closest_forces, contact_forces, least_friction_forces
 from scenes.example_objects import example_object
 from tests.grasp_core.forces.loads import (
     LIMITS,

@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from grasp_core.closure.wrenches import normal_and_tangential
+from grasp_core.closure.contacts import normal_and_tangential
 from grasp_core.forces.contact_forces import (
     contact_forces,
     least_friction_forces,
 )
-from grasp_core.quality.wrench_body import WrenchBody
-from grasp_core.quality.wrench_limit import limit_of
+from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from tests.grasp_core.forces.loads import LIMITS, SLACK, balanced_wrenches, cases
 from tests.judges import random_contacts
 

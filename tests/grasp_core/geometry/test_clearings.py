@@ -4,8 +4,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from grasp_core.geometry.clearings import clearest_point, clearing
 from grasp_core.geometry.polygons import edge_rows, is_convex, signed_area
+from grasp_core.objects.curved_patches import clearest_point, clearing
 
 GAP = 1e-6
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from grasp_core.hands.by_identity import kept_by_identity
+from grasp_core.hands.hand_arrays import kept_by_identity
 
 
 class Large:

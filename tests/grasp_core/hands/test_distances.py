@@ -7,16 +7,16 @@ import trimesh
 
 import scenes
 from grasp_core.compiled import compiled
-from grasp_core.hands.distances.surface import surface_tree
+from grasp_core.hands.collisions import surface_tree
 
 BOXES, SURFACES = (
-    "grasp_core.hands.distances.boxes_kernel", "grasp_core.hands.distances.surface_kernel",
+    "grasp_core.hands.distances_kernel", "grasp_core.hands.distances_kernel",
 )  # fmt: skip
 EXACT = 1e-7
 """Accuracy of the program that judges: its own tolerance is 1e-15 on squares."""
 
 
-HULLS = "grasp_core.hands.distances.hulls_kernel"
+HULLS = "grasp_core.hands.distances_kernel"
 
 
 def test_hulls_are_as_far_apart_as_the_program_says():

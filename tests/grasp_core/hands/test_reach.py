@@ -9,10 +9,10 @@ import pytest
 import trimesh
 
 import grasp_core as gc
-from grasp_core.hands.distances.collisions import FAR, clearances, tip_distances, tip_gaps
+from grasp_core.hands.collisions import FAR, clearances, tip_distances, tip_gaps
 from grasp_core.hands.hand import Hand, HandFinger
 from grasp_core.hands.kinematics import places
-from grasp_core.hands.posing.pose_search import TOUCHING
+from grasp_core.hands.pose_search import TOUCHING
 from tests.grasp_core.hands.gripping import FRICTION, finger, grasps, plain_hand, reaches, scaled
 from tests.hand_models import hand_mjcf, numbers
 from tests.marks import MORE

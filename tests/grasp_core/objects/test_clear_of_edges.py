@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.objects.trimmed_faces import clear_of_edges
+from grasp_core.objects.standard_order import clear_of_edges
 from scenes.example_objects import example_object
 
 

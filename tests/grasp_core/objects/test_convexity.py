@@ -6,7 +6,7 @@ import trimesh
 
 import grasp_core as gc
 import scenes
-from grasp_core.objects.convexity import is_convex
+from grasp_core.objects.polyhedron import is_convex
 
 
 @pytest.mark.parametrize("subdivisions", [1, 2, 3])

@@ -7,9 +7,9 @@ import trimesh
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.objects.booleans import Solid
-from grasp_core.objects.holes import caps_of
 from grasp_core.objects.planar_faces import triangle_neighbours
 from grasp_core.objects.solid_checks import balanced, surface_fault
+from grasp_core.objects.sound_surface import caps_of
 
 SIZE = (0.1, 0.2, 0.3)
 FRICTION = 0.5

@@ -3,7 +3,7 @@ import pytest
 from trimesh.triangles import mass_properties as judged
 
 from grasp_core.objects.booleans import Solid, extrusion, hull
-from grasp_core.objects.mass import mass_properties
+from grasp_core.objects.build import mass_properties
 
 
 def test_a_box_has_the_values_of_the_textbook():

@@ -184,3 +184,9 @@ def test_a_missing_triangle_and_a_wrong_winding_are_mended_together():
     assert body.volume == pytest.approx(mesh.volume, rel=1e-12)
     assert body.surface.holes == 1
     assert len(body.notes) == 3
+
+
+def test_triangles_without_area_alone_are_no_solid():
+    with pytest.raises(gc.MeshError, match="no triangle has an area") as caught:
+        gc.Polyhedron.from_mesh([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], [[0, 1, 1], [2, 2, 2]])
+    assert caught.value.reason is gc.MeshRefusal.ZERO_VOLUME

@@ -4,8 +4,8 @@ import pytest
 import grasp_core as gc
 from grasp_core.objects.booleans import hull
 from grasp_core.objects.on_faces import check_on_faces
-from grasp_core.objects.trimmed_faces import shared_quadruples, with_halves
-from grasp_core.planning.blocks import FIRST_FACES
+from grasp_core.objects.standard_order import shared_quadruples, with_halves
+from grasp_core.planning.quadruples import FIRST_FACES
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
 from tests.judges import random_rotation

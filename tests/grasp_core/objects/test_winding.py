@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from grasp_core.objects.winding import sampled, winding_on, wound_alike
+from grasp_core.objects.sheets import sampled, winding_on, wound_alike
 
 
 def seen(rectangle, eye):

@@ -9,8 +9,8 @@ import grasp_core as gc
 from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.objects.standard_order import standard
-from grasp_core.planning.blocks import all_blocks
 from grasp_core.planning.planned_cones import PlannedCones
+from grasp_core.planning.quadruples import all_blocks
 from scenes.example_objects import example_object
 
 TEN_DEGREES = math.tan(math.radians(10.0))

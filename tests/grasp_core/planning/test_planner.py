@@ -8,7 +8,7 @@ import grasp_core as gc
 from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.planning.request import METHODS
 from scenes.example_objects import example_object
-from tests.benchmarks.planning import sphere_hull
+from tests.benchmarks.objects import sphere_hull
 from tests.judges import pyramid_margin, random_rotation
 from tests.marks import MORE, more
 
@@ -277,12 +277,6 @@ def test_grasps_are_streamed_as_they_are_found():
     first = next(streamed)
     everything = {first.id} | {grasp.id for grasp in streamed}
     assert everything == {grasp.id for grasp in gc.plan(body, 0.4).grasps}
-
-
-def test_the_old_name_of_max_face_parts_is_refused_with_the_new_one():
-    for planner in (gc.plan, gc.iter_grasps):
-        with pytest.raises(gc.InputError, match="max_face_parts"):
-            planner(example_object("tetrahedron"), cells=2)
 
 
 @pytest.mark.parametrize("name", ["hexagonal-pyramid", *more("l-bracket")])

@@ -7,8 +7,7 @@ from scipy.spatial import ConvexHull
 
 import grasp_core as gc
 from grasp_core.quality import ferrari_canny as module
-from grasp_core.quality.wrench_body import WrenchBody
-from grasp_core.quality.wrench_limit import limit_of
+from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
 
 TETRA = TETRA_CENTERS, TETRA_NORMALS, 0.5

@@ -6,9 +6,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import contact_frames
-from grasp_core.compiled import compiled
-from grasp_core.quality import metrics
+from grasp_core.closure.contacts import contact_frames
 from scenes.example_objects import example_object
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
 
@@ -84,40 +82,6 @@ def test_min_weight_and_singular_value_do_not_depend_on_order():
     )
 
 
-def contact_sets(rng, count):
-    positions, normals = zip(*(random_contacts(rng) for _ in range(count)), strict=True)
-    return np.array(positions), np.array(normals)
-
-
-@pytest.mark.parametrize("edges", [4, 8])
-def test_min_weights_are_those_of_the_definition(edges):
-    """As close as `RESIDUAL` over the number of edges allows either program to be wrong."""
-    rng = np.random.default_rng(edges)
-    positions, normals = contact_sets(rng, 150)
-    friction = rng.uniform(0.1, 1.0, size=(150, 4))
-    found = gc.min_weights(positions, normals, friction, edges=edges)
-    W = metrics._many_pyramid_wrenches(positions, normals, friction, edges)
-    assert np.isfinite(metrics._at_once(W)).sum() >= 145
-    for i, (points, units) in enumerate(zip(positions, normals, strict=True)):
-        one = gc.min_weight(points, units, friction[i], edges=edges)
-        assert found[i] == pytest.approx(one, abs=1e-9)
-        assert found[i] == pytest.approx(min_weight_by_definition(W[i]), abs=1e-9)
-    assert min((found > 0.0).sum(), (found < 0.0).sum()) >= 20
-
-
-def test_friction_is_one_for_all_one_for_each_finger_or_one_each():
-    positions, normals = contact_sets(np.random.default_rng(5), 4)
-    fingers = np.array([0.3, 0.5, 0.7, 0.9])
-    every = gc.min_weights(positions, normals, fingers)
-    assert (every == gc.min_weights(positions, normals, np.tile(fingers, (4, 1)))).all()
-    assert every[1] == pytest.approx(gc.min_weight(positions[1], normals[1], fingers), abs=1e-12)
-    same = gc.min_weights(positions, normals, 0.4)
-    assert (same == gc.min_weights(positions, normals, np.full(4, 0.4))).all()
-    for wrong in (-0.1, [0.5, 0.5], np.full((3, 4), 0.5)):
-        with pytest.raises(gc.InputError, match="friction"):
-            gc.min_weights(positions, normals, wrong)
-
-
 def test_frames_of_many_contacts_are_those_of_one_set():
     grasps = gc.plan(example_object("random-12-1"), 0.5, limit=20).grasps
     normals = np.array([grasp.normals for grasp in grasps])
@@ -125,37 +89,6 @@ def test_frames_of_many_contacts_are_those_of_one_set():
     for frames, units in zip(contact_frames(normals), normals, strict=True):
         np.testing.assert_allclose(frames, contact_frames(units), atol=1e-15)
     assert len(normals) >= 20
-
-
-def test_weights_of_degenerate_sets_are_left_to_the_reference():
-    pair = np.array([[1.0, 0, 0], [-1, 0, 0]])
-    assert gc.min_weights(pair[None], -pair[None], 0.5)[0] == pytest.approx(1.0 / 16.0)
-    normals = np.tile([0.0, 0, 1], (4, 1))
-    positions = np.array([TETRA_CENTERS, TETRA_CENTERS])
-    found = gc.min_weights(positions, np.array([normals, TETRA_NORMALS]))
-    assert found[0] == -math.inf
-    assert found[1] == pytest.approx(gc.min_weight(TETRA_CENTERS, TETRA_NORMALS), abs=1e-12)
-
-
-@pytest.mark.parametrize("spoil", ["twists", "multipliers", "rows", "numbers"])
-def test_wrong_vertices_are_left_to_the_reference(monkeypatch, spoil):
-    def vertices(W, twists, multipliers, rows):
-        honest(W, twists, multipliers, rows)
-        if spoil == "rows":
-            rows[:] = (rows + 1) % W.shape[1]
-        elif spoil == "multipliers":
-            multipliers *= -1.0
-        else:
-            twists *= 1.001 if spoil == "twists" else np.nan
-
-    kernel = compiled(metrics.KERNEL)
-    honest = kernel.vertices
-    positions, normals = contact_sets(np.random.default_rng(7), 20)
-    right = gc.min_weights(positions, normals)
-    monkeypatch.setattr(kernel, "vertices", vertices)
-    W = metrics._many_pyramid_wrenches(positions, normals, np.full((20, 4), 0.5), 8)
-    assert np.isnan(metrics._at_once(W)).all()
-    np.testing.assert_allclose(gc.min_weights(positions, normals), right, atol=1e-9)
 
 
 def test_hull_volume_is_that_of_qhull_on_the_edges():

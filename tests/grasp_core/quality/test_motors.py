@@ -5,11 +5,14 @@ import pytest
 from scipy.optimize import linprog
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import grasp_map
-from grasp_core.quality.weakest_wrench import SETTLED, weakest_from
-from grasp_core.quality.wrench_body import WrenchBody
-from grasp_core.quality.wrench_limit import limit_of
-from grasp_core.quality.wrench_limits import axis_wrenches
+from grasp_core.closure.contacts import grasp_map
+from grasp_core.quality.wrench_limits import (
+    SETTLED,
+    WrenchBody,
+    axis_wrenches,
+    limit_of,
+    weakest_from,
+)
 from tests.judges import random_contacts
 
 SIDES = 64

@@ -8,8 +8,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.quality.ferrari_canny import wrench_set_quality
-from grasp_core.quality.measures import Measure
-from grasp_core.quality.resisted_loads import resisted_loads
+from grasp_core.quality.measures import Measure, resisted_loads
 from scenes.example_objects import example_object
 
 WEIGHT = Measure("weight")

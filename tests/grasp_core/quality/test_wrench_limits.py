@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import grasp_map, normal_and_tangential
-from grasp_core.quality import wrench_body
-from grasp_core.quality.weakest_wrench import weakest_from
-from grasp_core.quality.wrench_body import WrenchBody
-from grasp_core.quality.wrench_limit import limit_of
-from grasp_core.quality.wrench_limits import axis_wrenches, max_resisted_wrench
+from grasp_core.closure.contacts import grasp_map, normal_and_tangential
+from grasp_core.quality import wrench_limits
+from grasp_core.quality.wrench_limits import (
+    WrenchBody,
+    axis_wrenches,
+    limit_of,
+    max_resisted_wrench,
+    weakest_from,
+)
 from scenes.example_objects import example_object
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
 
@@ -153,8 +156,8 @@ def test_multipliers_without_power_bound_nothing(monkeypatch, share):
         answer = minimize(program)
         return dataclasses.replace(answer, z=share * answer.z)
 
-    minimize = wrench_body.minimize
-    monkeypatch.setattr(wrench_body, "minimize", powerless)
+    minimize = wrench_limits.minimize
+    monkeypatch.setattr(wrench_limits, "minimize", powerless)
     positions, normals = np.vstack([np.eye(3), -np.eye(3)]), np.vstack([-np.eye(3), np.eye(3)])
     body = WrenchBody(positions, normals, np.full(6, 0.4), 3.0)
     with pytest.raises(gc.SolverError, match="power"):

@@ -62,20 +62,9 @@ def test_a_file_keeps_the_versions_that_made_its_grasps(plan, tmp_path):
 
 def test_chosen_grasps_make_a_plan_that_can_be_saved(plan, tmp_path):
     grasps = list(islice(gc.iter_grasps(plan.body, 0.5), 3))
-    own = gc.plan_of(plan.body, grasps, 0.5)
-    assert own.grasps == tuple(grasps)
-    assert own.outcomes.held + own.outcomes.open == own.counts.quadruples == 70
-    assert gc.load_grasps(gc.save_grasps(tmp_path / "own.json", own)) == own
+    own = replace(plan, grasps=tuple(grasps))
+    assert gc.load_grasps(gc.save_grasps(tmp_path / "own.json", own)).grasps == tuple(grasps)
     assert main(["validate", str(tmp_path / "own.json"), "--limit", "1"]) == 0
-
-
-def test_grasps_that_do_not_fit_together_make_no_plan(plan):
-    with pytest.raises(gc.InputError, match="two have the id"):
-        gc.plan_of(plan.body, [plan[0], plan[0]], 0.5)
-    with pytest.raises(gc.InputError, match="friction cone"):
-        gc.plan_of(plan.body, plan, 0.05)
-    with pytest.raises(gc.InputError, match=r"face|lie"):
-        gc.plan_of(scenes.example_object("box"), plan, 0.5)
 
 
 def test_what_is_no_plan_or_no_file_of_grasps_is_refused(plan, tmp_path):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-import grasp_core.regions.cover_search as search
-from grasp_core.closure.wrenches import contact_frames
+import grasp_core.regions.largest_discs as search
+from grasp_core.closure.contacts import contact_frames
 from grasp_core.regions.proof import SLACK
 from grasp_core.regions.sites import Sites
 from tests.grasp_core.regions.reference_cover_search import reference_cover

@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 import grasp_core as gc
 from grasp_core.compiled import compiled
 from grasp_core.errors import SolverError
-from grasp_core.families.batches.placing import ManyPlacements
+from grasp_core.families.placing import ManyPlacements
 from grasp_core.solvers import lp
 from grasp_core.solvers.lp import (
     Below,

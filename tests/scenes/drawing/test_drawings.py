@@ -7,8 +7,14 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.drawing.drawings import BAR_LENGTH, MOST_TRIANGLES, drawing_of, finger_size, glass
-from scenes.drawing.ruled_surfaces import rulings
+from scenes.drawing.drawings import (
+    BAR_LENGTH,
+    MOST_TRIANGLES,
+    drawing_of,
+    finger_size,
+    glass,
+    rulings,
+)
 from scenes.drawing.shapes import Shape, cone_sides, extent_of, ring, tube
 from tests.scenes.meshes import sphere_mesh
 from tests.sim_validate.rigs import grasps

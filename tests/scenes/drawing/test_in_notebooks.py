@@ -11,7 +11,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.drawing import in_notebooks
-from scenes.drawing.flat.colours import FINGERS
+from scenes.drawing.colours import FINGERS
 from tests.grasp_core.curved import curved_body
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -2,7 +2,7 @@
 
 import itertools
 
-from scenes.drawing.flat.letters import width_of
+from scenes.drawing.panels import width_of
 
 
 def box(words):

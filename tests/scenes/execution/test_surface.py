@@ -11,8 +11,7 @@ from scipy.spatial import ConvexHull
 
 import grasp_core as gc
 import scenes
-from scenes.execution.clearance import Surface
-from scenes.execution.surface import touched_solids
+from scenes.execution.surface import Surface, touched_solids
 from tests.scenes.meshes import dented_ball
 
 NEAR = 1e-6

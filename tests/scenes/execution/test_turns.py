@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scenes.execution.turns import hinged, rotations
+from scenes.execution.held import hinged, rotations
 
 
 def turn_about(axis, angle):

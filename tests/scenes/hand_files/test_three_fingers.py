@@ -11,8 +11,8 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.errors import UndecidedError
-from grasp_core.hands.distances.collisions import overlapping_pairs
-from grasp_core.hands.posing.pose_search import TOUCHING
+from grasp_core.hands.collisions import overlapping_pairs
+from grasp_core.hands.pose_search import TOUCHING
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
 from tests.hand_models import numbers
 from tests.three_fingers import THREE_TIPS, three_fingers_file, three_fingers_mjcf

@@ -6,16 +6,16 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.baselines.baseline_json import (
+from sim_validate.baselines.baseline import (
     baseline_from_json,
     baseline_to_json,
+    entry_of,
     read_baseline,
     write_baseline,
 )
-from sim_validate.baselines.entries import entry_of
 from sim_validate.baselines.settings import How, of_settings, settings_of
-from sim_validate.simulation.hold_verdict import Outcome
 from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.simulation.traces import Outcome
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY
 from tests.sim_validate.rigs import grasps
 

@@ -4,6 +4,7 @@ import dataclasses
 
 import pytest
 
+from sim_validate.baselines.baseline import Baseline, Entry
 from sim_validate.baselines.compare import (
     OTHER_VERSIONS,
     Carried,
@@ -12,8 +13,7 @@ from sim_validate.baselines.compare import (
     compare,
     failing,
 )
-from sim_validate.baselines.entries import Baseline, Entry
-from sim_validate.simulation.hold_verdict import Outcome
+from sim_validate.simulation.traces import Outcome
 
 ENTRY = Entry(
     id="c-0-1-2-3",

@@ -9,19 +9,28 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from scenes.example_objects import example_object
-from sim_validate.baselines.baseline_json import baseline_from_json, baseline_to_json
-from sim_validate.baselines.check import Checked, demanded
+from sim_validate.baselines.baseline import (
+    ExecutionEntry,
+    baseline_from_json,
+    baseline_to_json,
+    execution_entry,
+    fields_of,
+    properties_of,
+)
+from sim_validate.baselines.check import Checked, Measured, demanded
 from sim_validate.baselines.compare import Status, compare
 from sim_validate.baselines.demands import survival
-from sim_validate.baselines.entries import fields_of, properties_of
-from sim_validate.baselines.executions import ExecutionEntry, execution_entry, not_survived
-from sim_validate.baselines.measure import Measured
+from sim_validate.baselines.explain import not_survived
 from sim_validate.baselines.settings import How, of_settings, settings_of
-from sim_validate.baselines.suite_toml import suite_from_tables
-from sim_validate.execution.asked import asked_execution
-from sim_validate.execution.jobs import ExecutedGrasp
+from sim_validate.baselines.suite import suite_from_tables
+from sim_validate.execution.settings import asked_execution
 from sim_validate.execution.trials import Skipped
-from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
+from sim_validate.execution.verdict import (
+    ExecutedGrasp,
+    Execution,
+    ExecutionControl,
+    ExecutionTrial,
+)
 from sim_validate.simulation.setup import Agenda, Setup
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, OTHER_ARITHMETIC, OTHERS
 

@@ -16,7 +16,7 @@ import pytest
 
 import sim_validate as sv
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.datasets.verifying.verify import verify
+from sim_validate.datasets.verify import verify
 from sim_validate.main import main
 from tests.marks import more
 from tests.patience import HANGING_S

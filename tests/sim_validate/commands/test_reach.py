@@ -9,18 +9,17 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.files.complaints import record_of
+from grasp_core.files.json_text import record_of
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.hand_flags import Reach
-from sim_validate.commands.hands import simulated
-from sim_validate.commands.hands.reach import say_where_to_look
-from sim_validate.files.stale_results import REACHES
-from sim_validate.hands.jobs import held_by_hands
+from sim_validate.commands import reach as simulated
+from sim_validate.commands.reach import say_where_to_look
+from sim_validate.files.result_folders import REACHES
+from sim_validate.hands.execute_hand import held_by_hands
 from sim_validate.hands.validate_hand import MOST_PUSH_N
 from sim_validate.main import main
-from sim_validate.records.reaches_schema import ReachesFile
-from sim_validate.records.saved_reaches import read_reaches
+from sim_validate.records.reaches import ReachesFile, read_reaches
 from tests.grasp_core.hands.gripping import plain_hand
 from tests.hand_models import hand_mjcf
 from tests.three_fingers import THREE_TIPS, three_fingers_file
@@ -151,9 +150,6 @@ def test_poses_of_coupled_joints_obey_and_are_kept_with_the_couplings(grasps, tm
     assert [(c.joint, c.driver, c.ratio) for c in saved.hand.couplings] == [
         ("left_curl", "left_bend", 1.0), ("right_curl", "right_bend", 1.0),
     ]  # fmt: skip
-    old = json.loads(text)
-    del old["hand"]["model"]["couplings"], old["hand"]["model"]["notes"]
-    assert record_of(ReachesFile, json.dumps(old), REACHES, schema=1)
 
 
 @pytest.mark.parametrize("flags", [("--simulate",), ("--mass-kg", "0.05")])
@@ -175,14 +171,6 @@ def test_where_no_three_contacts_close_the_command_says_so(tmp_path, capsys):
     record = record_of(ReachesFile, (tmp_path / REACHES).read_text(), REACHES, schema=1)
     assert record["summary"]["no_closure"] == 1
     assert record["reaches"][0]["reason"] == "no closure"
-
-
-def test_files_from_before_hands_with_three_fingers_are_read(grasps, tmp_path):
-    main(["reach", str(grasps), "--limit", "1", "--out", str(tmp_path), "-q"])
-    old = json.loads((tmp_path / REACHES).read_text())
-    del old["summary"]["no_closure"], old["reaches"][0]["pose"]["used"]
-    read = record_of(ReachesFile, json.dumps(old), REACHES, schema=1)
-    assert len(read["reaches"][0]["pose"]["contacts"]) == 4
 
 
 def test_a_simulated_hand_holds_and_its_grasps_are_ranked(grasps, tmp_path, capsys):

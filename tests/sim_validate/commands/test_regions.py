@@ -231,11 +231,7 @@ def test_fingers_on_one_face_and_certified_regions_do_not_go_together(capsys):
     assert "leave one of the two flags out" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("flags", [["--balance", "area"], ["--recenter"]])
-def test_other_balances_are_said_in_the_file(folder, flags, capsys):
+def test_other_centres_are_said_in_the_file(folder, capsys):
     asked = ["regions", str(folder / "grasps.json"), "--limit", "1", "--max-cones", "500", "--json"]
-    assert main([*asked, *flags]) == Exit.GOOD
-    found = json.loads(capsys.readouterr().out)
-    assert (found["balance"], found["recenter"]) == (
-        ("area", False) if "area" in flags else ("radius", True)
-    )
+    assert main([*asked, "--recenter"]) == Exit.GOOD
+    assert json.loads(capsys.readouterr().out)["recenter"] is True

@@ -1,4 +1,4 @@
-"""Trials of every kind of file, replayed from the command line."""
+"""Trials of verdicts and of rows of datasets, replayed from the command line."""
 
 import json
 
@@ -17,7 +17,7 @@ NOISE = ("--noise-shift", ".02", "--noise-turn-deg", "3", "--noise-friction", ".
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A run with a task that is too much, and a baseline of it."""
+    """A run with a task that is too much."""
     folder = tmp_path_factory.mktemp("run")
     task = {"wrenches": [{"name": "too much", "force_n": [0, 0, 90]}]}
     (folder / "task.json").write_text(json.dumps(task))
@@ -26,8 +26,6 @@ def folder(tmp_path_factory):
     trials = ("--wrenches", str(folder / "task.json"), "--seed", "3")
     grasps = str(folder / "grasps.json")
     assert main(["validate", grasps, *trials, "--out", str(folder), "-q"]) == Exit.NEGATIVE
-    baseline = str(folder / "b.json")
-    assert main(["baseline", "record", grasps, "-o", baseline, *trials, "-q"]) == Exit.GOOD
     return folder
 
 
@@ -85,18 +83,6 @@ def test_repeats_with_noise(folder, replay, tmp_path):
     held = next(number for number in range(12) if number not in numbers)
     found = replay(*about, "--trial", held, "--wrench", "+force_x")
     assert found["recorded_outcome"] == "held"
-
-
-def test_baselines_and_grasps(folder, replay):
-    name = verdicts_in(folder)[1]["id"]
-    found = replay(folder / "b.json", "--grasp", name)
-    assert (found["wrench"], found["recorded_outcome"]) == ("too much", "slipped")
-    found = replay(folder / "grasps.json", "--grasp", name)
-    assert (found["wrench"], found["recorded_outcome"], found["outcome"]) == (
-        "weakest",
-        None,
-        "held",
-    )
 
 
 def test_files_are_written(folder, replay, tmp_path, monkeypatch):
@@ -160,8 +146,8 @@ def test_dataset_rows(tmp_path, replay, capsys):
     ("name", "text", "message"),
     [
         ("x.json", "", "not complete JSON"),
-        ("x.json", "[]", "expected a baseline, verdicts or grasps"),
-        ("x.json", "{}", "expected a baseline, verdicts or grasps"),
+        ("x.json", "[]", "x.json"),
+        ("x.json", "{}", "schema: the key is missing; expected 1"),
         ("x.json", '{"verdicts": []}', "schema: the key is missing; expected 1"),
         ("x.json", json.dumps(HEAD), "complete: missing"),
         ("x.json", json.dumps(NO_VERDICTS), "is missing"),
@@ -202,16 +188,12 @@ def test_grasps_of_another_object_are_refused(folder, tmp_path, capsys):
 
 
 def test_other_contacts_under_the_same_id_are_refused(folder, tmp_path, capsys):
-    for name in ("b.json", "verdicts.json"):
-        text = (folder / name).read_text()
-        record = json.loads(text)
-        first = record["grasps" if name == "b.json" else "verdicts"][0]
-        path = tmp_path / name
-        path.write_text(text.replace(first["contacts_sha256"], "0" * 64))
-        grasps = str(folder / "grasps.json")
-        asked = ["replay", str(path), "--grasp", first["id"], "--grasps", grasps]
-        assert main(asked) == Exit.INPUT
-        assert "have changed since these results" in capsys.readouterr().err
+    text, first = (folder / "verdicts.json").read_text(), verdicts_in(folder)[0]
+    path = tmp_path / "verdicts.json"
+    path.write_text(text.replace(first["contacts_sha256"], "0" * 64))
+    grasps = str(folder / "grasps.json")
+    assert main(["replay", str(path), "--grasp", first["id"], "--grasps", grasps]) == Exit.INPUT
+    assert "have changed since these results" in capsys.readouterr().err
 
 
 def test_a_wrench_with_a_minus_sign_is_named_with_an_equals_sign(folder, replay):

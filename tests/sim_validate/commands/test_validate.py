@@ -1,15 +1,12 @@
 """What the flags of `validate` and `run` put into a verdict."""
 
 import json
-from typing import get_args
 
 import numpy as np
 import pytest
 
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.cli.flag_groups import RuleName
 from sim_validate.main import main
-from sim_validate.simulation.other_rules import RULES
 
 TASK = '{"wrenches": [{"name": "lift", "force_n": [0, 0, -3], "torque_n_m": [0, 0.01, 0]}]}'
 
@@ -64,20 +61,6 @@ def test_limits_are_found_beside_the_predicted_ones(verdict, way):
         assert trial["simulated_limit"] == pytest.approx(trial["predicted_limit"], rel=0.02)
 
 
-def test_bounds_and_rules_of_others_are_reported(planned, capsys):
-    flags = ["--independent", "--also-judge-by", "2cm", "--also-judge-by", "six-forces"]
-    assert main(["validate", "grasps.json", *flags, "--out", "v"]) == Exit.GOOD
-    shown = capsys.readouterr().out
-    for words in ("without planned forces (bounds)", "rigid tips", "GenDexGrasp", "six-forces"):
-        assert words in shown
-    (verdict,) = json.loads((planned / "v" / "verdicts.json").read_text())["verdicts"]
-    assert verdict["accepted_by"] == {"2cm": True, "six-forces": True}
-    assert all(not each["accepted_by"]["six-forces"] for each in verdict["controls"].values())
-    bounds, critical = verdict["bounds"], verdict["critical_friction"]["predicted"]
-    assert bounds["friction_at_most"] is None or bounds["friction_at_most"] >= critical
-    assert len(bounds["limit_shares"]) == 13
-
-
 def test_traces_tell_how_contacts_moved(planned):
     command = ["validate", "grasps.json", "--traces", "--out", "v", "-q"]
     assert main(command) == Exit.GOOD
@@ -128,7 +111,6 @@ def test_settings_of_a_file_are_in_force_and_in_the_record(planned, verdict):
         (["--traces"], Exit.USAGE, "with --out DIR too"),
         (["--wrenches", "none.json"], Exit.INPUT, "none.json"),
         (["--setup", "none.toml"], Exit.INPUT, "none.toml"),
-        (["--also-judge-by", "1cm"], Exit.USAGE, "six-forces"),
         (["--limits", "guess"], Exit.USAGE, "bisection"),
         (["--weight-n", "1", "--down", "0", "0", "0"], Exit.USAGE, "zero"),
     ],
@@ -174,7 +156,3 @@ def test_what_a_verdict_lists_may_be_given_back(planned, verdict):
         lines += [f"{name} = {json.dumps(value)}" for name, value in given.items()]
     (planned / "same.toml").write_text("\n".join(lines))
     assert verdict("--setup", "same.toml")["settings"] == settings
-
-
-def test_rules_on_the_command_line_are_those_that_exist():
-    assert get_args(RuleName) == tuple(RULES)

@@ -4,7 +4,7 @@ import pytest
 
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.simulation.engine import compiled
+from sim_validate.simulation.bench import compiled
 from tests.three_fingers import THREE_TIPS, three_fingers_mjcf
 
 BOX = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]

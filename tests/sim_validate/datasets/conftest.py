@@ -1,11 +1,12 @@
-"""A dataset of two objects at two frictions, and copies of it to spoil."""
+"""Datasets of few objects, and copies of them to spoil."""
 
 import shutil
 
 import pytest
 
-from sim_validate.datasets.building.build import build
+from sim_validate.datasets.build import build
 from tests.sim_validate.datasets.engines import Here, silent
+from tests.sim_validate.datasets.learned import LEARNED
 from tests.sim_validate.datasets.pair import CONFIG
 from tests.sim_validate.datasets.small import build_small
 
@@ -27,3 +28,18 @@ def dataset(tmp_path_factory):
 @pytest.fixture
 def copy(dataset, tmp_path):
     return shutil.copytree(dataset, tmp_path / "copy")
+
+
+@pytest.fixture(scope="session")
+def learned(tmp_path_factory):
+    """The dataset of `learned.py`, only to be read."""
+    pytest.importorskip("pyarrow")
+    folder = tmp_path_factory.mktemp("learned") / "ds"
+    built = build(LEARNED, folder, Here(), silent)
+    assert (built.units, built.quarantined) == (2, 0)
+    return folder
+
+
+@pytest.fixture
+def spoiled(learned, tmp_path):
+    return shutil.copytree(learned, tmp_path / "copy")

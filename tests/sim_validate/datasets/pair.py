@@ -1,6 +1,7 @@
 """Settings of a dataset of two objects at two frictions, and its rows."""
 
 from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.parquet import read_rows
 
 CONFIG = DatasetConfig(
@@ -9,6 +10,6 @@ CONFIG = DatasetConfig(
 
 
 def all_rows(folder, name):
-    return [
-        row for path in sorted(folder.glob(f"data/{name}/*.parquet")) for row in read_rows(path)
-    ]
+    tables = read_manifest(folder).tables
+    paths = sorted(folder.glob(f"data/{name}/*.parquet"))
+    return [row for path in paths for row in read_rows(path, name, tables)]

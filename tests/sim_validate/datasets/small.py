@@ -1,6 +1,6 @@
 """A small dataset for tests, with one object in each split."""
 
-from sim_validate.datasets.building.build import build
+from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
 from tests.sim_validate.datasets.engines import Here, silent
 

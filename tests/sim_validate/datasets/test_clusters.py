@@ -8,13 +8,12 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.processes import local_processes
-from sim_validate.datasets.building import driver
-from sim_validate.datasets.building.build import build
-from sim_validate.datasets.building.driver import drive
-from sim_validate.datasets.building.staging import Staging
-from sim_validate.datasets.building.worker import Limits, do_unit
+from sim_validate.datasets import workers
+from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.units import WorkerError, units_of
+from sim_validate.datasets.workers import Limits, do_unit, drive
 from sim_validate.parallel.clusters import dask_workers, ray_workers
 from tests.sim_validate.datasets.engines import Here, contents, silent
 
@@ -79,8 +78,8 @@ def test_what_ends_or_hangs_is_given_up_and_the_others_are_done(engine, tmp_path
 
 
 def test_a_worker_with_other_packages_ends_the_run(engine, tmp_path, monkeypatch):
-    other = dict(driver.provenance()) | {"mujoco": "3.0.0"}
-    monkeypatch.setattr(driver, "provenance", lambda: other)
+    other = dict(workers.provenance()) | {"mujoco": "3.0.0"}
+    monkeypatch.setattr(workers, "provenance", lambda: other)
     with pytest.raises(WorkerError, match=r"another version of mujoco.* instead of 3\.0\.0"):
         build(CONFIG, tmp_path / "ds", engine, silent, LIMITS)
 

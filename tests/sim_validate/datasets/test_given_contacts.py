@@ -11,12 +11,11 @@ import sim_validate
 from scenes.example_objects import example_object
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets import units as units_module
-from sim_validate.datasets.building.build import build
+from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.exports.formats import export
 from sim_validate.datasets.given_contacts import read_given
-from sim_validate.datasets.verifying.redo import Sample
-from sim_validate.datasets.verifying.verify import verify
+from sim_validate.datasets.isaac import export
+from sim_validate.datasets.verify import Sample, verify
 from sim_validate.files.writing import write_arrays
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, contents, silent
@@ -219,17 +218,16 @@ def test_judged_grasps_are_exported_with_what_could_not_be_tried(planned, tmp_pa
         tmp_path / "g.json", [("a", good.positions, good.normals), ("b", off, good.normals)]
     )
     judged(tmp_path / "ds", path)
-    for to, files in (("npz", 4), ("csv", 4), ("mjcf", 1), ("isaac", 1)):
-        done = export(tmp_path / "ds", to, tmp_path / to, None, silent)
-        assert done.files == files
-    with np.load(tmp_path / "npz" / "grasps.npz", allow_pickle=False) as arrays:
-        given = arrays["label"] == "given"
-        assert list(arrays["held"][given]) == list(arrays["force_closed"][given]) == [1, -1]
-        again = judged(
-            tmp_path / "again",
-            write_arrays(
-                tmp_path / "again.npz",
-                {name: arrays[name][given] for name in ("contact_points_m", "contact_normals")},
-            ),
-        )
+    assert export(tmp_path / "ds", tmp_path / "isaac", None, silent).files == 1
+    arrays = sim_validate.load_dataset(tmp_path / "ds")["grasps"]
+    given = arrays["label"] == "given"
+    for name in ("held", "force_closed"):
+        np.testing.assert_array_equal(arrays[name][given], [1.0, np.nan])
+    again = judged(
+        tmp_path / "again",
+        write_arrays(
+            tmp_path / "again.npz",
+            {name: arrays[name][given] for name in ("contact_points_m", "contact_normals")},
+        ),
+    )
     np.testing.assert_array_equal(again["held"], [1.0, np.nan])

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import sim_validate
-from sim_validate.datasets.columns import TABLES
+from sim_validate.datasets.open_dataset import by_object, select
 from sim_validate.datasets.parquet import parquet_bytes, read_columns, read_rows
+from sim_validate.datasets.tables import TABLES
 
 pytest.importorskip("pyarrow")
 SPLITS = ("train", "validation", "test")
@@ -185,3 +186,17 @@ def test_the_page_says_the_same_lines(folder):
     ]
     assert len(lines) == 6
     assert all(line.removesuffix('["grasps"]') in said for line in lines)
+
+
+@pytest.mark.parametrize("split", SPLITS)
+def test_every_row_is_met_once_with_its_object(folder, split):
+    chosen = select(folder, split)
+    groups = list(by_object(chosen))
+    assert len(groups) == chosen.counts()["objects"]
+    for name in TABLES:
+        assert sum(len(group[name]) for group in groups) == chosen.counts()[name] > 0
+    for group in groups:
+        (owner,) = group["objects"]
+        assert {row["object_id"] for row in group["grasps"]} == {owner["object_id"]}
+        names = {row["grasp_id"] for row in group["grasps"]}
+        assert {row["grasp_id"] for row in group["trials"]} == names

@@ -5,11 +5,11 @@ import pytest
 
 import grasp_core as gc
 from sim_validate.datasets import parquet as tables
-from sim_validate.datasets.building.make_unit import made_of
-from sim_validate.datasets.columns import KEYS, TABLES, Column
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.object_rows import split_of
+from sim_validate.datasets.make_unit import made_of
 from sim_validate.datasets.parquet import parquet_bytes, read_rows
+from sim_validate.datasets.rows import split_of
+from sim_validate.datasets.tables import KEYS, TABLES, Column
 from sim_validate.datasets.units import body_of, units_of
 
 pytest.importorskip("pyarrow")
@@ -39,9 +39,9 @@ def written(rows, tmp_path):
 def test_a_file_of_another_version_is_refused(written, monkeypatch):
     table = TABLES["objects"]
     monkeypatch.setitem(tables.TABLES, "objects", (*table, Column("taste", "text", "new")))
-    for read in (read_rows, lambda path: list(tables.each_batch(path, "objects"))):
+    for read in (read_rows, lambda *of: list(tables.each_batch(*of))):
         with pytest.raises(gc.InputError, match="expected the columns of"):
-            read(written["objects"])
+            read(written["objects"], "objects")
 
 
 def test_rows_have_exactly_the_columns_of_their_tables(rows):
@@ -77,7 +77,7 @@ def test_a_unit_holds_grasps_their_controls_and_the_trials_of_both(unit, rows):
 
 def test_tables_are_read_as_they_were_written(rows, written):
     for name, path in written.items():
-        back = read_rows(path)
+        back = read_rows(path, name)
         given = sorted(rows[name], key=lambda row: [row[key] for key in KEYS[name]])
         assert len(back) == len(given) >= 1
         for row, original in zip(back, given, strict=True):
@@ -113,7 +113,7 @@ def test_columns_say_their_units(written):
 
 def test_no_flipped_bit_in_a_page_changes_rows_in_silence(written):
     path = written["trials"]
-    whole, rows = path.read_bytes(), read_rows(path)
+    whole, rows = path.read_bytes(), read_rows(path, "trials")
     footer = len(whole) - 8 - int.from_bytes(whole[-8:-4], "little")
     noticed = 0
     for place in range(4, footer, footer // 80):
@@ -121,7 +121,7 @@ def test_no_flipped_bit_in_a_page_changes_rows_in_silence(written):
         spoiled[place] ^= 0x10
         path.write_bytes(bytes(spoiled))
         try:
-            assert read_rows(path) == rows
+            assert read_rows(path, "trials") == rows
         except gc.InputError:
             noticed += 1
     assert noticed >= 1
@@ -132,7 +132,7 @@ def test_a_cut_file_is_noticed(written):
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(gc.InputError, match="damaged"):
-        read_rows(path)
+        read_rows(path, "trials")
 
 
 def test_two_rows_with_one_name_are_refused(rows):
@@ -166,4 +166,4 @@ def test_columns_of_other_types_and_another_table_are_refused(written, tmp_path)
 def test_files_that_claim_too_much_are_refused_before_they_are_read(written, monkeypatch):
     monkeypatch.setattr(tables, "MOST_ROWS", 1)
     with pytest.raises(gc.InputError, match=r"claims [0-9]+ rows, .* limits are 1 and"):
-        read_rows(written["trials"])
+        read_rows(written["trials"], "trials")

@@ -7,7 +7,7 @@ import grasp_core as gc
 import sim_validate as sv
 from scenes.example_objects import example_object
 from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
-from sim_validate.execution.asked import AskedExecution, asked_execution, execution_table
+from sim_validate.execution.settings import AskedExecution, asked_execution, execution_table
 
 TABLE = {
     "density_kg_m3": 700, "trials": ["lift", "weight"], "tip_radius_m": 0.004,

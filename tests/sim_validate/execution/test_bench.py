@@ -10,7 +10,7 @@ import scenes
 from scenes.execution.held_mjcf import SAMPLE_S
 from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench
-from sim_validate.execution.drives import Pose, Table, idle, joined
+from sim_validate.execution.paths import Pose, Table, idle, joined
 from sim_validate.execution.slips import outcome, seen
 from tests.grasp_core.execution.held import box
 from tests.sim_validate.execution.held_rigs import (

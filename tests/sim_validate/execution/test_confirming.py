@@ -10,8 +10,14 @@ import scenes
 import sim_validate as sv
 from sim_validate.execution import execute
 from sim_validate.execution.bench import HeldBench
-from sim_validate.execution.confirming import FINE_S, confirming_bench, run_again
-from sim_validate.execution.execute import chosen_squeeze, held_scene, run_trials
+from sim_validate.execution.execute import (
+    FINE_S,
+    chosen_squeeze,
+    confirming_bench,
+    held_scene,
+    run_again,
+    run_trials,
+)
 from sim_validate.execution.predictions import held_dynamics
 from sim_validate.execution.slips import outcome
 from sim_validate.execution.trials import trials_of

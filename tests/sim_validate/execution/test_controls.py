@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from grasp_core.closure.wrenches import cross_matrix
+from grasp_core.closure.contacts import cross_matrix
 from scenes.example_objects import example_object
 from sim_validate.execution.controls import SURE, idle, slipping_load, weaker_grips
 from sim_validate.execution.execute import chosen_squeeze, held_scene

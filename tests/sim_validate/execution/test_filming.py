@@ -8,9 +8,8 @@ from PIL import Image
 
 import grasp_core as gc
 from scenes.drawing.clips import GraphicsError
-from sim_validate.execution import filming
-from sim_validate.execution.filming import FRAMES, film, worth_seeing
-from sim_validate.execution.jobs import ExecutionJob
+from sim_validate.execution import jobs
+from sim_validate.execution.jobs import FRAMES, ExecutionJob, film, worth_seeing
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import Execution, ExecutionTrial
 from tests.sim_validate.rigs import grasps
@@ -76,7 +75,7 @@ def asked(held):
         return path
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(filming, "write_held_clip", write)
+        patch.setattr(jobs, "write_held_clip", write)
         film(ExecutionJob(*held, FRICTION, SETTINGS), "shake along z", held[0].name)
     return found
 
@@ -104,7 +103,7 @@ def test_what_is_filmed_is_the_motion_in_its_true_size(asked):
 
 def test_a_trial_is_filmed_with_the_physics_of_its_execution(held, asked, monkeypatch, tmp_path):
     drawn = []
-    monkeypatch.setattr(filming, "write_held_clip", lambda scene, *_, **__: drawn.append(scene))
+    monkeypatch.setattr(jobs, "write_held_clip", lambda scene, *_, **__: drawn.append(scene))
     job = ExecutionJob(*held, FRICTION, SETTINGS, {"timestep": 0.001})
     film(job, "shake along z", tmp_path / "clip.gif")
     assert drawn[0].physics == replace(asked["scene"].physics, timestep=0.001)

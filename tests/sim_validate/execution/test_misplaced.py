@@ -7,7 +7,7 @@ import trimesh
 from grasp_core.execution.grips import unsqueezed
 from scenes.execution.held import TOUCH, held_layout
 from scenes.fingertips import fitting_radius
-from sim_validate.execution.misplaced import ROOM, met, misplacements
+from sim_validate.execution.trials import ROOM, met, misplacements
 from tests.sim_validate.execution.held_rigs import planned
 
 OFF_M, OFF_RAD = 0.002, np.radians(3.0)

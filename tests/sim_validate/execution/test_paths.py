@@ -5,7 +5,7 @@ import pytest
 
 from scenes.execution.held_mjcf import SAMPLE_S
 from sim_validate.execution import paths
-from sim_validate.execution.drives import idle, joined
+from sim_validate.execution.paths import idle, joined
 from tests.sim_validate.execution.held_rigs import G, icosphere
 
 DOWN = np.array([0.0, 0.0, -G])

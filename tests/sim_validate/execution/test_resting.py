@@ -8,7 +8,7 @@ import trimesh
 
 import scenes
 from grasp_core.objects.polyhedron import Polyhedron
-from sim_validate.execution.resting import CLEAR, resting, rests
+from sim_validate.execution.trials import CLEAR, resting, rests
 from tests.judges import random_rotation
 
 OBJECTS = ("tetrahedron", "box", "dodecahedron", "wedge", "screwdriver", "mug", "l-bracket")

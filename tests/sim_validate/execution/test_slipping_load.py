@@ -7,7 +7,7 @@ import grasp_core as gc
 import sim_validate as sv
 from scenes.example_objects import example_object
 from scenes.execution.held import held_layout
-from sim_validate.execution import misplaced, slips
+from sim_validate.execution import slips, trials
 from sim_validate.execution.controls import slipping_load
 from sim_validate.execution.execute import chosen_squeeze
 
@@ -40,12 +40,12 @@ def test_fingertips_meet_the_same_points_of_triangles_nearby_as_of_all(bracket, 
     body, grasps = bracket
     best = chosen_squeeze(body, grasps[0], FRICTION, SETTINGS)
     layout = held_layout(body, best.grip, SETTINGS.mass_kg)
-    near = misplaced._near(layout, layout.tip_centers[:1], 1e-3)
+    near = trials._near(layout, layout.tip_centers[:1], 1e-3)
     assert 0 < len(near) < len(layout.triangles)
-    poses = misplaced.misplacements(layout, 2e-3, 0.03, 20, seed=1)
-    few = misplaced.met(layout, poses, 2e-3, 0.03)
-    monkeypatch.setattr(misplaced, "_near", lambda layout, *_: layout.triangles)
-    np.testing.assert_array_equal(few, misplaced.met(layout, poses, 2e-3, 0.03))
+    poses = trials.misplacements(layout, 2e-3, 0.03, 20, seed=1)
+    few = trials.met(layout, poses, 2e-3, 0.03)
+    monkeypatch.setattr(trials, "_near", lambda layout, *_: layout.triangles)
+    np.testing.assert_array_equal(few, trials.met(layout, poses, 2e-3, 0.03))
 
 
 def test_a_slip_in_the_first_sample_of_a_load_has_a_multiple():

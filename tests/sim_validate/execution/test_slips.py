@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from scenes.execution.turns import hinged, rotations
+from scenes.execution.held import hinged, rotations
 from sim_validate.execution.bench import HeldMotion
-from sim_validate.execution.drives import Table, idle
+from sim_validate.execution.paths import Table, idle
 from sim_validate.execution.slips import SLID, TOUCHED, outcome, seen, slides
 from tests.judges import random_rotation
 from tests.sim_validate.execution.held_rigs import box_scene

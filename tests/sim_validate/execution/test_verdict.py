@@ -6,13 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim_validate.execution.jobs import ExecutedGrasp, best_executed
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import Skipped
 from sim_validate.execution.verdict import (
+    ExecutedGrasp,
     Execution,
     ExecutionControl,
     ExecutionTrial,
+    best_executed,
     ended,
     losses_in_words,
     trial_in_words,

@@ -12,8 +12,8 @@ from sim_validate.main import main
 from sim_validate.parallel import compiling
 
 ROOT = Path(__file__).parents[3]
-SELDOM = {"many_chains"}
-"""A loop for many poses at once, which no command needs."""
+SELDOM = {"many_chains", "deepest", "tip_point"}
+"""Small loops for fingertips in an object and for many poses, which few commands need."""
 
 
 def loops_that_are_not_kept():

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import warnings
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -58,6 +59,14 @@ def run_pytest_alone(folder, *arguments):
         line, cwd=folder, env=plain, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False
     )
     return ran.returncode, ran.stdout.decode()
+
+
+def properties_in(junit):
+    """The properties of each test, by name, of a file that `--junitxml` has written."""
+    return [
+        {each.get("name"): each.get("value") for each in case.iter("property")}
+        for case in ElementTree.parse(junit).getroot().iter("testcase")  # noqa: S314 - ours
+    ]
 
 
 def copied(project, folder):

@@ -1,26 +1,28 @@
 """Files of grasps as tests of somebody else's: baselines, blessing, reports."""
 
 import json
-import shlex
-from xml.etree import ElementTree
 
 import pytest
 
 from grasp_core.files.text_files import write_text
 from sim_validate.baselines.compare import Status
-from sim_validate.baselines.suite_toml import suite_from_toml
+from sim_validate.baselines.suite import suite_from_toml
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
-from tests.sim_validate.plugin.project import CODE, copied, run_pytest, run_pytest_alone
+from tests.sim_validate.plugin.project import (
+    CODE,
+    copied,
+    properties_in,
+    run_pytest,
+    run_pytest_alone,
+)  # fmt: skip
 
 
 def test_grasps_that_stay_as_they_were_pass(blessed, tmp_path):
     code, said = run_pytest(blessed, "--junitxml", str(tmp_path / "j.xml"))
     assert code == 0, said
     assert "2 passed" in said
-    cases = ElementTree.parse(tmp_path / "j.xml").getroot().iter("testcase")  # noqa: S314 - ours
-    for case in cases:
-        kept = {each.get("name"): each.get("value") for each in case.iter("property")}
+    for kept in properties_in(tmp_path / "j.xml"):
         assert kept["status"] == "same"
         assert kept["outcome"] == "held"
 
@@ -48,12 +50,13 @@ def test_a_regression_says_what_was_and_what_is(blessed, tmp_path):
     assert "predicted" in said
     grasps = tmp_path / "grasps.json"
     assert f"graspproof baseline check {baseline} --grasps {grasps}" in said
-    assert f"replay {baseline} --grasp {name} --grasps {grasps} --out replay" in said
+    assert f"graspproof validate {grasps} --out seen; graspproof replay seen" in said
+    assert f" --grasp {name} --grasps {grasps} --out replay" in said
     assert "gone: missing" in said
     assert "Traceback" not in said
 
 
-def test_a_grasp_that_slips_says_at_which_wrench_and_how_to_replay_it(blessed, tmp_path):
+def test_a_grasp_that_slips_says_at_which_wrench(blessed, tmp_path):
     """A wrench in the baseline's settings that no finger can hold."""
     copied(blessed, tmp_path)
     baseline = tmp_path / "wedge.baseline.json"
@@ -66,17 +69,14 @@ def test_a_grasp_that_slips_says_at_which_wrench_and_how_to_replay_it(blessed, t
     assert "first wrench that was not held: far too much [0.0, 0.0, 90.0" in said
     assert "predicted limit 0." in said
     line = next(line for line in said.splitlines() if "graspproof replay" in line)
-    words = shlex.split(line.split("graspproof ", 1)[1])
-    assert "--wrench=far too much" in words
-    assert main([*words[:-1], str(tmp_path / "replay"), "-q"]) == Exit.NEGATIVE
-    assert (tmp_path / "replay" / "trace.csv").is_file()
+    assert "--wrench='far too much'" in line
 
 
 @pytest.mark.parametrize(
     "workers",
     [pytest.param((), id="alone"), pytest.param(("-n", "2"), id="xdist", marks=pytest.mark.slow)],
 )
-def test_a_report_has_a_line_for_each_grasp(blessed, tmp_path, workers):
+def test_the_file_of_results_has_the_status_and_figures_of_each_grasp(blessed, tmp_path, workers):
     copied(blessed, tmp_path)
     baseline = tmp_path / "wedge.baseline.json"
     record = json.loads(baseline.read_text())
@@ -84,20 +84,15 @@ def test_a_report_has_a_line_for_each_grasp(blessed, tmp_path, workers):
     baseline.write_text(json.dumps(record))
     write_text(tmp_path / "test_mine.py", CODE)
     code, said = (run_pytest_alone if workers else run_pytest)(
-        tmp_path, "--grasp-report", "out/report", *workers
+        tmp_path, "--junitxml", "j.xml", *workers
     )
     assert code == 1, said
-    found = json.loads((tmp_path / "out" / "report" / "report.json").read_text())["grasps"]
-    assert sorted(line["status"] for line in found) == ["regressed", "same", "stable", "unstable"]
-    regressed = next(line for line in found if line["status"] == "regressed")
-    assert regressed["before"]["limit_n"] == 1e3
-    assert regressed["after"]["limit_n"] < 10.0
-    assert "graspproof replay" in regressed["why"]
-    page = (tmp_path / "out" / "report" / "index.html").read_text()
-    assert page.count("<tr") == 5
-    assert "was 1000" in page
-    for status in ("regressed", "same", "stable", "unstable"):
-        assert f">1 {status}</li>" in page
+    kept = properties_in(tmp_path / "j.xml")
+    ended = [value for each in kept for name, value in each.items() if name.endswith("status")]
+    assert sorted(ended) == ["regressed", "same", "stable", "unstable"]
+    regressed = next(each for each in kept if each.get("status") == "regressed")
+    assert float(regressed["limit_n"]) < 10.0
+    assert "graspproof replay" in said
 
 
 def test_without_a_baseline_it_is_said_how_to_make_one(blessed, tmp_path):

@@ -10,19 +10,18 @@ import pytest
 import grasp_core as gc
 from grasp_core.errors import InputError
 from scenes.mjcf_text import quaternion
-from scenes.tested.hand_scene import HandServos, hand_scene
-from sim_validate.peer_files.dexgraspbench_records import FREE
-from sim_validate.peer_files.hand_files import hand_file
-from sim_validate.peer_files.hand_records import (
+from scenes.tested import HandServos, hand_scene
+from sim_validate.dexgraspbench import (
+    FREE,
     dex_record,
+    hand_file,
     pose_of,
     reach_of_record,
     recorded_postures,
 )
 from sim_validate.protocols.judging import judge_hand_by
-from sim_validate.protocols.named_protocols import protocol
-from sim_validate.protocols.their_verdict import their_verdict
-from sim_validate.protocols.timelines import CHUNK, timeline
+from sim_validate.protocols.published import protocol
+from sim_validate.protocols.runs import CHUNK, their_verdict, timeline
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
 TEST = protocol("dexgraspbench")
@@ -137,11 +136,11 @@ def test_a_run_is_what_a_plain_loop_of_steps_gives():
     model = mujoco.MjModel.from_xml_string(made.xml)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
-    wanted, farthest = {sample for sample, _ in run.looks}, 0.0
+    farthest = 0.0
     for sample, (told, wrench) in enumerate(zip(run.commands, run.wrenches, strict=True)):
         data.mocap_pos[0], data.mocap_quat[0], data.ctrl[:] = told[:3], told[3:FREE], told[FREE:]
         data.xfrc_applied[model.body("object").id] = wrench
         mujoco.mj_step(model, data, nstep=CHUNK)
-        if sample in wanted:
+        if sample in run.looks:
             farthest = max(farthest, float(np.linalg.norm(data.qpos[:3])))
     assert their_verdict(TEST, made)[2].displacement_m == pytest.approx(farthest, abs=1e-9)

@@ -7,10 +7,9 @@ import pytest
 
 import grasp_core as gc
 from scenes.fingertips import FingerSettings
-from scenes.tested.fingertip_scene import fingertip_scene
-from sim_validate.protocols.named_protocols import protocol
-from sim_validate.protocols.published import Step
-from sim_validate.protocols.timelines import CHUNK, timeline
+from scenes.tested import fingertip_scene
+from sim_validate.protocols.published import Step, protocol
+from sim_validate.protocols.runs import CHUNK, timeline
 from tests.grasp_core.hands.gripping import scaled
 
 BODY = scaled("dodecahedron", 0.05)
@@ -27,7 +26,6 @@ def laid(*steps):
 def test_fingers_close_then_squeeze_at_equal_steps():
     """Ten commands of ten steps from open to touching, ten more to squeezing, as DexGraspBench."""
     found = laid(Step(0.4))
-    assert found.closed == 20
     assert found.commands[9] == pytest.approx(np.zeros(12))
     assert found.commands[4] == pytest.approx(0.5 * SCENE.opened)
     assert found.commands[14] == pytest.approx(0.5 * SCENE.squeezing)
@@ -35,18 +33,14 @@ def test_fingers_close_then_squeeze_at_equal_steps():
     assert not found.wrenches[:20].any()
 
 
-def test_a_force_is_there_at_once_or_rises():
-    found = laid(Step(0.4, pull_m_s2=(0.0, 0.0, -10.0), force_n=(1.0, 0.0, 0.0)))
-    assert (found.wrenches[20:] == [1.0, 0.0, -1.0, 0.0, 0.0, 0.0]).all()
-    rising = laid(Step(0.4, force_n=(2.0, 0.0, 0.0), rises=True)).wrenches[20:, 0]
-    assert rising == pytest.approx(2.0 * np.arange(1, 11) / 10)
+def test_a_force_is_there_at_once():
+    found = laid(Step(0.4, pull_m_s2=(0.0, 0.0, -10.0)))
+    assert (found.wrenches[20:] == [0.0, 0.0, -1.0, 0.0, 0.0, 0.0]).all()
 
 
 def test_looks_are_at_their_times_and_at_the_end():
     found = laid(Step(2.0, look_s=0.2), Step(0.4))
-    samples = [sample for sample, _ in found.looks]
-    assert samples == [20 + 5 * number - 1 for number in range(1, 11)] + [20 + 60 - 1]
-    assert [first for _, first in found.looks] == [20] * 10 + [70]
+    assert list(found.looks) == [20 + 5 * number - 1 for number in range(1, 11)] + [20 + 60 - 1]
 
 
 def test_a_palm_that_starts_and_stops_pulls_the_object_back_and_forth():
@@ -82,7 +76,6 @@ def test_a_turn_acts_by_the_inertia_about_its_axis():
 
 def test_a_test_without_closing_starts_with_the_load():
     at_once = replace(TEST, close_s=0.0, squeeze_s=0.0)
-    found = timeline(at_once, SCENE, (Step(0.4, force_n=(0.0, 1.0, 0.0)),))
-    assert found.closed == 0
+    found = timeline(at_once, SCENE, (Step(0.4, pull_m_s2=(0.0, 10.0, 0.0)),))
     assert (found.commands == SCENE.squeezing).all()
     assert (found.wrenches[:, 1] == 1.0).all()

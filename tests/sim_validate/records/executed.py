@@ -10,7 +10,7 @@ import sim_validate as sv
 from sim_validate.execution.enough import Enough
 from sim_validate.execution.trials import Skipped
 from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
-from sim_validate.records.executions_json import executions_to_json
+from sim_validate.records.executions import executions_to_json
 
 SETTINGS = sv.ExecutionSettings(
     mass_kg=0.3, trials=("shake", "lift"), seed=7, shake_g=0.0, knock_n_s=0.02,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.files.strict_json import BESIDE, DEEPEST, object_of, value_of
+from grasp_core.files.json_text import BESIDE, DEEPEST, object_of, value_of
 from grasp_core.files.text_files import read_bytes, read_text
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.given_contacts import read_given

@@ -7,7 +7,8 @@ import re
 import pytest
 
 from sim_validate.main import main
-from sim_validate.reports.best_possible import possible_facts, read_possible
+from sim_validate.records.best import best_of
+from sim_validate.reports.grasp_page import possible_facts
 from sim_validate.reports.report import write_report
 
 
@@ -23,7 +24,7 @@ def test_each_page_says_the_share_that_its_grasp_reaches_of_the_bound(folder):
     best = json.loads((folder / "best.json").read_text())
     write_report(folder, jobs=1, every_copy=True)
     shares = {each["id"]: each["share_of_bound"] for each in best["planned"]}
-    shares[best["grasp"]["id"]] = best["quality_n"][0] / best["bound_n"]
+    shares[best["grasp"]["id"]] = best["quality"][0] / best["bound"]
     assert len(shares) == 4
     for name, share in shares.items():
         text = (folder / "report" / "grasps" / f"{name}.html").read_text()
@@ -49,9 +50,9 @@ def test_without_a_search_pages_say_nothing_of_the_possible(tmp_path):
 def test_other_measures_are_named(tmp_path):
     words = ["plan", "tetrahedron", "--limit", "1", "--best", "--gap", "0.4", "--jobs", "1"]
     assert main([*words, "--measure", "weight", "--out", str(tmp_path), "-q"]) == 0
-    found = read_possible(tmp_path / "best.json")
-    assert found.measure == "weight"
-    ((name, value, meaning),) = possible_facts(found, found.best)
+    found = best_of((tmp_path / "best.json").read_text())
+    assert found["measure"] == "weight"
+    ((name, value, meaning),) = possible_facts(found, found["grasp"]["id"])
     assert name == "Share of the possible"
     assert float(value.split()[0]) >= 60.0
     assert meaning.startswith("weight held in every orientation")
@@ -61,10 +62,10 @@ def test_other_measures_are_named(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"bound_n": -1.0}, "bound_n"),
-        ({"bound_n": 0.1}, "expected at least the quality"),
+        ({"bound": -1.0}, "bound"),
+        ({"bound": 0.1}, "expected at least the quality"),
         ({"schema": 3}, "schema"),
-        ({"planned": [{"id": "x"}]}, "quality_n"),
+        ({"planned": [{"id": "x"}]}, "quality"),
         ({"object": {"name": "x", "content_sha256": "y"}}, "object"),
     ],
 )

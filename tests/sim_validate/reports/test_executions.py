@@ -9,25 +9,29 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from grasp_core.closure.contact_arrays import contacts_sha256
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from scenes.execution.held import HeldSettings
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.executions import execution_settings
-from sim_validate.execution.jobs import ExecutedGrasp
+from sim_validate.execution.enough import accelerations_g
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import Skipped
-from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
-from sim_validate.files.stale_results import remove_executions
+from sim_validate.execution.verdict import (
+    ExecutedGrasp,
+    Execution,
+    ExecutionControl,
+    ExecutionTrial,
+)
+from sim_validate.files.result_folders import remove_executions
 from sim_validate.main import main
-from sim_validate.records.executions_json import Executions, executions_to_json, load_executions
+from sim_validate.records.executions import Executions, executions_to_json, load_executions
 from sim_validate.records.grasps import read_grasps
 from sim_validate.reports import drawn_grasps
 from sim_validate.reports import report as reports
-from sim_validate.reports.charts.survival_charts import (
-    accelerations_g,
+from sim_validate.reports.charts.run_charts import (
     certified_multiples,
     certified_steps,
     survival_sentence,

@@ -8,7 +8,6 @@ import pytest
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.reports.report import write_report
-from sim_validate.reports.stability_page import write_report as write_stability
 from tests.browser import (
     CLIPPED,
     CONTRASTS,
@@ -19,9 +18,8 @@ from tests.browser import (
     opened,
     requests_of,
 )
-from tests.scenes.drawing.hands.standing import GRASP, run_with_hand
+from tests.scenes.drawing.standing import GRASP, run_with_hand
 from tests.sim_validate.reports.test_report import EVIL, changed
-from tests.sim_validate.reports.test_stability_page import WHY, line
 
 pytestmark = [pytest.mark.slow, needs_browser]
 
@@ -188,21 +186,19 @@ def test_a_page_by_itself_turns(browser, small_run, tmp_path):
 
 @pytest.fixture(scope="module")
 def shown(small_report, small_run, tmp_path_factory):
-    """The four kinds of pages, and those of a report with a hand."""
+    """The three kinds of pages, and those of a report with a hand."""
     held = write_report(run_with_hand(tmp_path_factory.mktemp("hand")), jobs=1).index.parent
     folder = tmp_path_factory.mktemp("shown")
     asked = ["view", str(small_run / "grasps.json"), "--page", str(folder / "turn.html"), "-q"]
     assert main(asked) == Exit.GOOD
-    lines = [line(f"c-{i}-5-6-7", "regressed", WHY) for i in range(12)]
-    lines += [line(f"c-{i}-1-2-3", "same") for i in range(12)]
     return {
         "index": small_report / "index.html", "grasp": pages_of(small_report)[1],
-        "turntable": folder / "turn.html", "stability": write_stability(folder / "stable", lines),
+        "turntable": folder / "turn.html",
         "hands": held / "index.html", "hand": held / "grasps" / f"{GRASP}.html",
     }  # fmt: skip
 
 
-KINDS = ("index", "grasp", "turntable", "stability", "hands", "hand")
+KINDS = ("index", "grasp", "turntable", "hands", "hand")
 WIDTHS = (390, 1280, 1600)
 
 

@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
-from scenes.drawing.flat.colours import FINGERS, HAND
+from scenes.drawing.colours import FINGERS, HAND
 from scenes.drawing.turntable import UNITS
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.records.saved_reaches import read_reaches
+from sim_validate.records.reaches import read_reaches
 from sim_validate.reports.report import write_report
-from sim_validate.reports.run_folder import runs_in
-from tests.scenes.drawing.hands.standing import (
+from tests.scenes.drawing.standing import (
     FRICTION,
     GRASP,
     POSITIONS,
@@ -133,27 +132,6 @@ def test_the_command_of_the_page_seeks_the_pose_again(report, monkeypatch):
     assert (command.grasp, command.friction, command.starts) == (GRASP, FRICTION, 100)
 
 
-def test_a_hand_of_an_earlier_version_is_found_by_its_name(tmp_path):
-    """Files without the hand's parts: the built-in hand is taken, if its fingertips touch."""
-
-    def older(record):
-        del record["hand"]["model"]
-        for each in record["reaches"]:
-            del each["contacts_sha256"]
-
-    folder = changed_run(tmp_path, older)
-    saved = runs_in(folder)[0].reaches
-    assert saved.hand == standing()[2]
-
-
-def without_model(name):
-    def change(record):
-        record["hand"]["name"] = name
-        del record["hand"]["model"]
-
-    return change
-
-
 def moved(record):
     record["hand"]["model"]["fingers"][0]["tip_center_m"][2] += 0.001
 
@@ -165,8 +143,6 @@ def renamed(record):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (without_model("my-hand"), "The hand my-hand cannot be drawn: reaches.json is of a"),
-        (without_model("leap"), "The hand leap cannot be drawn: with the joint angles"),
         (moved, "its fingertips do not touch at the contacts there"),
         (renamed, "The hand allegro cannot be drawn"),
     ],

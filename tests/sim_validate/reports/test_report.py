@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
-from scenes.drawing.flat.colours import FINGERS
+from scenes.drawing.colours import FINGERS
 from scenes.drawing.painting import DARKEST, LIGHT
 from scenes.drawing.turntable import UNITS
 from scenes.drawing.views import DISTANCE
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.records import saved_verdicts
+from sim_validate.records import verdicts
 from sim_validate.records.grasps import read_grasps
 from sim_validate.reports.agreement import said_of
 from sim_validate.reports.pages import asset
@@ -178,7 +178,7 @@ def changed(path, change):
 
 def counted(document, _=None):
     """Make the summary that of the verdicts."""
-    document["summary"].update(saved_verdicts._counts(document["verdicts"]))
+    document["summary"].update(verdicts._counts(document["verdicts"]))
 
 
 def without_proofs(document):
@@ -300,7 +300,7 @@ def test_pages_of_an_earlier_report_are_removed_and_nothing_else(copy):
 
 def test_pages_are_not_put_among_other_things(copy, tmp_path, capsys):
     """Such as the pages and pictures of somebody else's site."""
-    names = ("index.html", "style.css", "pictures/a.webp")
+    names = ("index.html", "style.css", "clips/a.webp")
     for name in names:
         (tmp_path / "site" / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "site" / name).write_text("mine")

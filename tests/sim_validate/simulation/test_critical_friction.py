@@ -9,10 +9,10 @@ import scenes
 import sim_validate as sv
 from scenes.mjcf import build_scene
 from sim_validate.simulation import schedules
-from sim_validate.simulation.critical_friction import bisected, forces_just_above, released_friction
-from sim_validate.simulation.protocol import FrictionProtocol
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.limits import bisected, forces_just_above, released_friction
+from sim_validate.simulation.schedules import FrictionProtocol
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.simulate import Bench
 from tests.marks import more
 from tests.sim_validate.rigs import grasps
 

@@ -6,19 +6,23 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from sim_validate.simulation.early_ends import USABLE, WATCHED, EarlyEnds, Thresholds, displaced
-from sim_validate.simulation.hold_verdict import Outcome, judge
-from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol
-from sim_validate.simulation.schedules import Clock, Load, hold, release
+from sim_validate.simulation.early_ends import USABLE, WATCHED, EarlyEnds, Thresholds
+from sim_validate.simulation.limits import part
+from sim_validate.simulation.schedules import (
+    Clock,
+    FrictionProtocol,
+    HoldProtocol,
+    Load,
+    hold,
+    release,
+)
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.traces import traces
-from sim_validate.simulation.wrench_limits import part
-from sim_validate.validation.control_trials import control_case
-from sim_validate.validation.controls import negative_controls
-from tests.benchmarks.early_ends import compared
+from sim_validate.simulation.traces import Outcome, displaced, judge, traces
+from sim_validate.validation.controls import control_case, negative_controls
 from tests.marks import more
 from tests.sim_validate.rigs import grasps, limiting_loads, rig_of
 from tests.sim_validate.simulation.test_traces import motion, pose
+from tests.sim_validate.simulation.whole_and_early import compared
 
 CLOCK = Clock(0.01)
 LENGTH = 66
@@ -92,7 +96,8 @@ def test_held_objects_move_no_farther_than_the_bound_to_the_end(held):
     loads = [part(rig.idle, limit, share) for limit in limits for share in (0.3, 0.8, 0.95)]
     limit = HoldProtocol().hold_threshold * rig.bench.scene.layout.grasp_size_m
     ended = 0
-    for whole, early in zip(rig.hold(loads, whole=True), rig.hold(loads), strict=True):
+    wholes = replace(rig, whole=True).hold(loads)
+    for whole, early in zip(wholes, rig.hold(loads), strict=True):
         assert len(whole.times_s) == 40
         if len(early.times_s) < 40:
             assert whole.start_m + whole.displacements_m.max() < USABLE * limit
@@ -269,7 +274,7 @@ def test_a_bench_forgets_earlier_trials(held):
     fresh = rig_of(body, grasp, 0.5)
     still = Load(np.zeros(6), rig.idle.forces)
     fresh.hold([Load(np.full(6, 1e14), rig.idle.forces)] * 3)
-    (after,), (before,) = fresh.hold([still], whole=True), rig.hold([still], whole=True)
+    (after,), (before,) = (replace(each, whole=True).hold([still]) for each in (fresh, rig))
     np.testing.assert_array_equal(after.displacements_m, before.displacements_m)
     assert after.warnings == before.warnings == 0
     assert after.finite

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from sim_validate.simulation.engine import STATE, batch, compiled, state_parts, step, unlogged
+from scenes.silent_mujoco import unlogged
+from sim_validate.simulation.bench import STATE, batch, compiled, state_parts, step
 
 FALLING = """<mujoco><option integrator="discrete"/><worldbody><body><freejoint/>
 <geom size=".1" mass="1"/></body></worldbody></mujoco>"""

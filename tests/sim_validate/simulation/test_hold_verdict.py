@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import scenes
-from sim_validate.simulation.hold_verdict import Outcome, invalid_start, judge
-from sim_validate.simulation.protocol import HoldProtocol
-from sim_validate.simulation.traces import Trace
+from sim_validate.simulation.schedules import HoldProtocol
+from sim_validate.simulation.traces import Outcome, Trace, invalid_start, judge
 from tests.sim_validate.rigs import grasps
 
 

@@ -8,10 +8,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import contact_frames
+from grasp_core.closure.contacts import contact_frames
 from grasp_core.objects.on_faces import face_under
 from sim_validate.cli import flag_groups
-from sim_validate.simulation.noise import Noise, disturbed
+from sim_validate.simulation.setup import Noise
+from sim_validate.validation.noise import disturbed
 from tests.grasp_core.curved import curved_body
 from tests.sim_validate.rigs import grasps
 

@@ -2,9 +2,14 @@ import numpy as np
 import pytest
 
 from sim_validate.simulation import schedules
-from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
-from sim_validate.simulation.schedules import Clock, Load
-from sim_validate.simulation.wrench_limits import OVERLOAD, part
+from sim_validate.simulation.limits import OVERLOAD, part
+from sim_validate.simulation.schedules import (
+    Clock,
+    FrictionProtocol,
+    HoldProtocol,
+    LimitProtocol,
+    Load,
+)
 from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
 
 CLOCK = Clock(0.01)

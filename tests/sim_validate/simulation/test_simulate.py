@@ -9,13 +9,12 @@ import grasp_core as gc
 import scenes
 from grasp_core.arrays import to_digits
 from sim_validate.simulation import schedules
-from sim_validate.simulation.hold_verdict import Outcome, judge
-from sim_validate.simulation.protocol import HoldProtocol
+from sim_validate.simulation.bench import CHUNK, Bench
+from sim_validate.simulation.limits import part
 from sim_validate.simulation.rig import squeezed
-from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.schedules import HoldProtocol, Load
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.simulate import CHUNK, Bench
-from sim_validate.simulation.wrench_limits import part
+from sim_validate.simulation.traces import Outcome, judge
 from tests.sim_validate.rigs import grasps, limiting_loads, rig_of
 
 BLOW_UP = np.full(6, 1e14)

@@ -11,13 +11,13 @@ import scenes
 import sim_validate as sv
 from scenes.physics import PhysicsSettings
 from sim_validate.records.setup_toml import setup_from_tables, tables_of
-from sim_validate.simulation.gate.gate import measured_gate, require_faithful
-from sim_validate.simulation.hold_verdict import Outcome, judge
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.gate import measured_gate, require_faithful
+from sim_validate.simulation.limits import bisected_limits
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.simulation.simulate import Bench
-from sim_validate.simulation.wrench_limits import bisected_limits
+from sim_validate.simulation.traces import Outcome, judge
 from tests.sim_validate.rigs import grasps
 
 FRICTION = 0.5

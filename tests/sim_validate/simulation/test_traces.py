@@ -6,7 +6,7 @@ import pytest
 import scenes
 from scenes.layout import TOUCH
 from scenes.mjcf_text import quaternion
-from sim_validate.simulation.simulate import Motion
+from sim_validate.simulation.bench import Motion
 from sim_validate.simulation.traces import (
     displaced,
     rotated,

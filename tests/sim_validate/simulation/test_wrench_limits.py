@@ -3,11 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim_validate.simulation.protocol import LimitProtocol
-from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.limits import _onset, bisected_limits, ramped_limits
+from sim_validate.simulation.schedules import LimitProtocol, Load
 from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.traces import Trace
-from sim_validate.simulation.wrench_limits import _onset, bisected_limits, ramped_limits
 from tests.sim_validate.rigs import grasps, limiting_loads, rig_of
 
 FAMILIES = ("concurrent", "pencil", "regulus", "free")

@@ -8,9 +8,9 @@ import grasp_core as gc
 import sim_validate as sv
 from scenes.example_objects import example_object
 from sim_validate import Agenda, Setup
-from sim_validate.simulation.gate import gate as gate_module
-from sim_validate.simulation.gate.gate import measured_gate
-from sim_validate.validation.jobs import Job, prepared, verdict_of
+from sim_validate.simulation import gate as gate_module
+from sim_validate.simulation.gate import measured_gate
+from sim_validate.validation.validation import Job, prepared, verdict_of
 
 FRICTION = 0.5
 SHORT = Agenda(critical_friction=False, controls=False)

@@ -19,7 +19,7 @@ def test_what_the_regions_say_is_so_in_simulation(family):
         body = scenes.example_object(name)
         if not gc.plan(body, FRICTION, families=(family,), limit=1).grasps:
             continue
-        task = Task(name, family, 0, 0, choices=60, simulate=True, closely=False, cones=CONES)
+        task = Task(name, family, 0, 0, choices=60, simulate=True, cones=CONES)
         answer = examine((task, 1))
         assert answer.proved
         assert answer.verified

@@ -7,11 +7,11 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.simulation.hold_verdict import Outcome
-from sim_validate.simulation.noise import Noise
 from sim_validate.simulation.rig import squeezed
-from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
-from sim_validate.validation.repeats import disturbed_in, heavier, interval, noisy_trial
+from sim_validate.simulation.setup import Agenda, NamedWrench, Noise, Setup
+from sim_validate.simulation.traces import Outcome
+from sim_validate.validation.noise import disturbed_in, heavier, noisy_trial
+from sim_validate.validation.verdict import interval
 from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
@@ -93,7 +93,7 @@ def test_a_simulator_that_holds_what_it_must_not_is_contradicted(monkeypatch):
     def sticking(bench, setup, idle, _, high):
         return squeezed(bench, setup, idle, sticky, max(high, sticky))
 
-    monkeypatch.setattr("sim_validate.validation.control_trials.squeezed", sticking)
+    monkeypatch.setattr("sim_validate.validation.controls.squeezed", sticking)
     wrong = noisy_trial(body, slippery, loads, 0, Setup())
     assert wrong.outcome is Outcome.HELD
     assert wrong.contradictions

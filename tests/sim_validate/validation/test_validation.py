@@ -9,11 +9,10 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.fingertips import FingerSettings, clashes
-from sim_validate.records.verdicts_json import trace_arrays, verdicts_to_json
-from sim_validate.simulation.hold_verdict import Outcome
-from sim_validate.simulation.other_rules import RULES
-from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.records.verdicts import trace_arrays, verdicts_to_json
+from sim_validate.simulation.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
+from sim_validate.simulation.traces import Outcome
 from sim_validate.validation.controls import negative_controls
 from tests.marks import MORE, more
 from tests.sim_validate.rigs import grasps
@@ -72,9 +71,7 @@ def test_holding_leaves_a_wide_margin_to_the_threshold():
 
 def test_all_that_can_be_asked_for_repeats_to_the_last_digit_at_any_number_of_threads():
     body, (grasp, *_) = grasps("random-12-1", 0.4, 1)
-    agenda = Agenda(
-        random_wrenches=2, limits="ramp", independent=True, rules=tuple(RULES), keep_traces=True
-    )
+    agenda = Agenda(random_wrenches=2, limits="ramp", keep_traces=True)
     texts, traces = set(), []
     for threads in (1, 2):
         verdict = sv.validate(body, grasp, 0.4, agenda=agenda, setup=Setup(threads=threads))
@@ -293,13 +290,12 @@ def _weaker(kind):
 def test_trials_that_say_nothing_neither_confirm_nor_contradict():
     body, (grasp, *_) = grasps("wedge", 0.5, 1)
     tear = NamedWrench("tear", np.array([0, 0, 1e4, 0, 0, 0]))
-    agenda = Agenda(wrenches=(tear,), rules=tuple(RULES), limits="bisection", keep_traces=True)
+    agenda = Agenda(wrenches=(tear,), limits="bisection", keep_traces=True)
     verdict = sv.validate(body, grasp, 0.5, agenda=agenda, setup=Setup(timeout_s=1e-9))
     assert {trial.hold.outcome for trial in verdict.wrenches} == {Outcome.TIMEOUT}
     assert not any(trial.contradiction for trial in verdict.wrenches)
     assert not any(trial.simulated_limit for trial in verdict.wrenches)
     assert not any(control.let_go or control.held for control in verdict.controls)
-    assert not any(verdict.accepted_by.values())
     assert not verdict.controls_let_go
     assert not verdict.good
 

@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.optimizing.best import levels as searching
-from grasp_core.optimizing.best.grounds import grounds_of
+from grasp_core.optimizing.best import best_grasp as searching
+from grasp_core.optimizing.best import search
+from grasp_core.optimizing.best.grounds import exact_maps, grounds_of
 from grasp_core.optimizing.best.incumbents import CLIMBED, climbed
 from grasp_core.optimizing.best.proof_file import read_proof, write_proof
-from grasp_core.optimizing.best.same_places import exact_maps
-from grasp_core.optimizing.best.searching import search
-from grasp_core.optimizing.best.searching.search import Searching
-from grasp_core.optimizing.best.searching.stop import Stop
+from grasp_core.optimizing.best.search import Searching, Stop
 from scenes.example_objects import example_object
 from tests.grasp_core.optimizing.best.independent_replay import replays
 from tests.grasp_core.optimizing.best.supports_of_contacts import supports

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import linprog
 
 import grasp_core as gc
-from grasp_core.closure.wrenches import contact_frames
+from grasp_core.closure.contacts import contact_frames
 from scenes.example_objects import example_object
 
 ANY = 1e-3

@@ -10,17 +10,13 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
-from grasp_core.optimizing.best import levels as searching
-from grasp_core.optimizing.best.grounds import grounds_of
+from grasp_core.optimizing.ascent import _weakest
+from grasp_core.optimizing.best import best_grasp as searching
+from grasp_core.optimizing.best.grounds import exact_maps, grounds_of
 from grasp_core.optimizing.best.proof_file import read_proof, write_proof
-from grasp_core.optimizing.best.same_places import exact_maps
-from grasp_core.optimizing.best.searching.parts import DEEP
-from grasp_core.optimizing.best.searching.search import Searching
-from grasp_core.optimizing.best.searching.stop import Stop
+from grasp_core.optimizing.best.search import DEEP, Searching, Stop
 from grasp_core.optimizing.best.support_cuts import ROUNDING, CutTree
-from grasp_core.optimizing.best.task_ascent import _weakest
-from grasp_core.quality.measures import Measure
-from grasp_core.quality.resisted_loads import ResistedLoads, resisted_loads
+from grasp_core.quality.measures import Measure, ResistedLoads, resisted_loads
 from scenes.example_objects import example_object
 from tests.grasp_core.optimizing.best.independent_replay import replays
 from tests.grasp_core.optimizing.best.supports_of_contacts import supports
@@ -289,7 +285,7 @@ def test_compiled_demands_are_those_of_the_definition(measure):
         assert asked == pytest.approx(max(hardest @ y, 0.0), abs=1e-13)
 
 
-TWISTS = "grasp_core.optimizing.best.searching.twists_kernel"
+TWISTS = "grasp_core.optimizing.best.twists_kernel"
 
 
 @pytest.mark.slow

@@ -5,10 +5,10 @@ import pytest
 import grasp_core as gc
 import scenes
 from sim_validate.records.setup_toml import setup_from_tables
-from sim_validate.simulation.gate.gate import require_faithful
+from sim_validate.simulation.gate import require_faithful
 from sim_validate.simulation.setup import Setup
 from sim_validate.validation.validation import simulated_critical_friction
-from sim_validate.validation.wrench_verdict import AGREEMENT
+from sim_validate.validation.verdict import AGREEMENT
 from tests.marks import MORE, more
 
 USUAL, TINY = 0.07, 5e-4

@@ -6,9 +6,8 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.physics import PhysicsSettings
-from sim_validate.simulation.gate.gate import measured_gate, require_faithful
-from sim_validate.simulation.gate.mesh_contacts import require_touch
-from sim_validate.simulation.protocol import FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.simulation.gate import measured_gate, require_faithful, require_touch
+from sim_validate.simulation.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.simulation.setup import Setup
 from tests.marks import more
 from tests.sim_validate.rigs import grasps

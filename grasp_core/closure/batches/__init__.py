@@ -1,1 +1,0 @@
-"""Decides force closure of many sets of contacts at once, with the proofs of `force_closure`."""

@@ -1,0 +1,179 @@
+"""Checks contacts, and builds their frames and the matrices from contact forces to wrenches.
+
+A wrench is (force, torque), (6,), with the torque about a stated centre. A contact force is what
+the finger applies to the object, in the object's frame.
+"""
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from functools import partial
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import SMALLEST_SIZE, Array, frozen, frozen_each, frozen_units, real_array
+from grasp_core.checked import LARGEST_FRICTION, instance, several, shown
+from grasp_core.errors import InputError
+from grasp_core.frames import plane_tangents
+from grasp_core.values import FINGERS, Contact, Grasp
+
+FEWEST = 2
+"""Least number of contacts that can balance anything."""
+WRENCH = 6
+"""Number of components of a wrench."""
+
+
+def stacked(contacts: Iterable[Contact]) -> tuple[Array, Array]:
+    """Return the positions [m] and inward normals of contacts, each (k, 3)."""
+    listed = tuple(contacts)
+    positions = np.array([contact.position for contact in listed])
+    return positions, np.array([contact.normal for contact in listed])
+
+
+def contact_arrays(
+    positions: ArrayLike | Grasp | Iterable[Grasp] | Sequence[Contact], normals: ArrayLike | None,
+    *, many: bool = False,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return checked positions and normals of one set of contacts, or of many sets.
+
+    Takes `positions` (k, 3) or (g, k, 3) [m].
+    """
+    given: Any = positions
+    if normals is None and many:
+        return _of_grasps((given,) if isinstance(given, Grasp) else given)
+    held = None if many else contacts_in(given)
+    if held is not None and normals is not None:
+        what = "a Grasp is" if isinstance(given, Grasp) else "Contacts are"
+        raise InputError(f"normals must be left out where {what} given, got {shown(normals)}")
+    if isinstance(given, Grasp):
+        return given.positions, given.normals
+    if held is not None:
+        given, units = stacked(held)
+    elif normals is not None:
+        units = normals
+    else:
+        raise InputError(
+            "normals are missing; pass positions and normals, a Grasp, or a sequence of Contacts"
+        )
+    points = frozen(given, (None, None, 3) if many else (None, 3), "positions")
+    if points.shape[-2] < FEWEST:
+        raise InputError(f"positions must hold at least two contacts, got {points.shape[-2]}")
+    check_spread(np.ptp(points, axis=-2))
+    return points, frozen_units(units, points.shape, "normals")
+
+
+def contacts_in(given: Any) -> tuple[Contact, ...] | None:
+    """Return the contacts of a Grasp or of a sequence of Contacts; None for anything else."""
+    if isinstance(given, Grasp):
+        return given.contacts
+    if not isinstance(given, list | tuple):
+        return None
+    listed = cast("list[object] | tuple[object, ...]", given)
+    if not listed or not isinstance(listed[0], Contact):
+        return None
+    check = partial(instance, kind=Contact, name="positions", remedy="all must be Contacts")
+    return several(listed, check, "positions", "Contacts")
+
+
+def _of_grasps(given: Any) -> tuple[Array, Array]:
+    check = partial(instance, kind=Grasp, name="positions", remedy="or pass normals too")
+    grasps = several(given, check, "positions", "Grasp values")
+    shape = (len(grasps), FINGERS, 3)
+    points = np.array([grasp.positions for grasp in grasps], dtype=np.float64).reshape(shape)
+    units = np.array([grasp.normals for grasp in grasps], dtype=np.float64).reshape(shape)
+    return points, units
+
+
+def check_spread(extents: Array, name: str = "positions") -> None:
+    """Refuse contacts that are apart by so little that squares of lengths vanish.
+
+    Takes `extents` (..., 3) [m].
+    """
+    sizes: Array = extents.max(axis=-1)
+    tiny = (sizes > 0.0) & (sizes < SMALLEST_SIZE)
+    if tiny.any():
+        raise InputError(
+            f"{name} must spread over at least {SMALLEST_SIZE:g} m, got "
+            f"{float(sizes[tiny].min()):.3g}; use other units"
+        )
+
+
+def contact_frictions(friction: ArrayLike, shape: int | tuple[int, int]) -> Array:
+    """Return one checked Coulomb coefficient for each contact.
+
+    Takes `friction` (k,) or (g, k); `shape` (g, k).
+    """
+    sizes = (shape,) if isinstance(shape, int) else shape
+    values = real_array(friction, "friction")
+    if values.ndim < len(sizes):
+        values = np.broadcast_to(frozen_each(values, sizes[-1], "friction"), sizes)
+    mu = frozen(values, sizes, "friction")
+    if (mu < 0.0).any():
+        raise InputError(f"friction must not be negative, got {float(mu.min()):.6g}")
+    if (mu > LARGEST_FRICTION).any():
+        raise InputError(
+            f"friction must be at most {LARGEST_FRICTION:g}, got {float(mu.max()):.6g}"
+        )
+    return mu
+
+
+def unit_size(points: Array) -> tuple[Array, Array, Array]:
+    """Scale contacts (..., k, 3) so that the longest arm from their mean has length one.
+
+    Gives arms from the mean contact over the longest, (..., k, 3); that centre, (..., 3) [m]; and
+    that length, (...) [m], which is one where all contacts are in one place.
+    """
+    centers: Array = points.mean(axis=-2)
+    arms = points - centers[..., None, :]
+    lengths: Array = np.linalg.norm(arms, axis=-1).max(axis=-1)
+    sizes = np.where(lengths > 0.0, lengths, 1.0)
+    return arms / sizes[..., None, None], centers, sizes
+
+
+def contacts_sha256(contacts: Iterable[Contact]) -> str:
+    """Hash positions and normals in finger order with SHA-256; 0.0 and -0.0 count as equal."""
+    # adding zero turns -0.0 into 0.0
+    numbers = np.concatenate([part.ravel() for part in stacked(contacts)]) + 0.0
+    return hashlib.sha256(numbers.astype("<f8").tobytes()).hexdigest()
+
+
+def grasp_map(positions: Array, center: Array | None = None) -> Array:
+    """Build the matrix that maps stacked contact forces (3k,) to their wrench, (..., 6, 3k).
+
+    Takes `positions` (..., k, 3) [m]; `center` (3,) [m].
+    """
+    arms = positions if center is None else positions - center
+    x, y, z = arms[..., 0], arms[..., 1], arms[..., 2]
+    G = np.zeros((*arms.shape[:-2], WRENCH, arms.shape[-2], 3))
+    G[..., 0, :, 0] = G[..., 1, :, 1] = G[..., 2, :, 2] = 1.0
+    G[..., 3, :, 1], G[..., 3, :, 2] = -z, y
+    G[..., 4, :, 0], G[..., 4, :, 2] = z, -x
+    G[..., 5, :, 0], G[..., 5, :, 1] = -y, x
+    return G.reshape(*arms.shape[:-2], WRENCH, 3 * arms.shape[-2])
+
+
+def in_frames(G: Array, frames: Array) -> Array:
+    """Rewrite a matrix on stacked forces (m, 3k) for coordinates in contact frames (k, 3, 3)."""
+    m, k = len(G), len(frames)
+    return np.einsum("mki,kij->mkj", G.reshape(m, k, 3), frames).reshape(m, 3 * k)
+
+
+def cross_matrix(vector: Array) -> Array:
+    """Build the matrix C of a cross product: C @ b is vector x b."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def contact_frames(normals: Array) -> Array:
+    """Build orthonormal contact frames, columns (normal, tangent, tangent), (..., 3, 3)."""
+    rows = normals.reshape(-1, 3).tolist()
+    columns = [((x, y, z), *plane_tangents(x, y, z)) for x, y, z in rows]
+    return np.array(columns).reshape(*normals.shape, 3).swapaxes(-1, -2)
+
+
+def normal_and_tangential(forces: Array, normals: Array) -> tuple[Array, Array]:
+    """Split forces (..., k, 3) into normal components and tangential lengths."""
+    along = np.einsum("...i,...i->...", forces, normals)
+    across = forces - along[..., None] * normals
+    return along, np.sqrt(np.einsum("...i,...i->...", across, across))

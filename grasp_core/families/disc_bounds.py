@@ -1,0 +1,172 @@
+"""Bounds discs from above: by the corners of the faces alone, or by small linear programs.
+
+Reach, width and heights across bound discs by the corners alone, which costs almost no time.
+
+Reach. With positive weights w of sum w_i a_i = 0 for the axes, and contacts c_i on the faces,
+sum w_i a_i.(x0 - c_i) = -sum w_i a_i.c_i wherever the focus x0 is. So the weighted mean of the
+distances along the axes is, over the corners of each face, at most
+
+    -sum w_i min a_i.c_i for a focus before the fingers, sum w_i max a_i.c_i for one behind.  (1)
+
+Width. If two axes lead from one focus back to their contacts, c_i = x - s_i a_i and
+c_j = x - s_j a_j, then d = (a_i - a_j) / (1 - a_i.a_j) has d.a_i = 1 and d.a_j = -1, and so
+
+    s_i + s_j = d.(c_j - c_i),                                                                (2)
+
+which the corners of the two faces bound. See `concurrent_radius_bounds` and `pencil_radius_bounds`
+for what reach and width mean for discs.
+
+Across. Let N be the unit vector across both axes of one pair of a pencil. It is across the line of
+the foci too, so both foci c have the same height h = N.c, and so have the disc centres q_i and q_j
+of that pair. As a disc of radius r reaches r |T'N| to either side, the heights of the corners, from
+lo_i to hi_i, leave r |T_i'N| <= hi_i - h and r |T_j'N| <= h - lo_j, or
+
+    r (|T_i'N| + |T_j'N|) <= hi_i - lo_j.                                                     (3)
+
+A finger m of the other pair is at N.q_m = h - s_m N.a_m with s_m >= r / tan(psi / 2). In place of j
+it makes the left side of (3) larger by
+
+    r |N.a_m| / tan(psi / 2).                                                                 (4)
+
+(3) and (4) spare programs that would find discs below the least radius, or below those already
+found.
+
+Programs. An attempt is four faces in the order of the fingers, with a force cone each. Where a
+construction has discs, the bound is the value of the first program of `largest_discs`, which
+maximises the smallest radius, on the convex hulls of the faces: no choice of their pieces offers
+more. For reguli the bound only says whether any slopes are feasible on the hulls.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import compiled
+from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
+from grasp_core.families.concurrent import concurrent_radius_bounds
+from grasp_core.families.constructions import LEAST_RADIUS, PAIRINGS, Construction
+from grasp_core.families.kernel_tables import Attempts, Corners, FaceTable, face_table
+from grasp_core.families.pencil import pencil_radius_bounds
+from grasp_core.families.regulus import regulus_bounds
+from grasp_core.objects.face_pieces import Shapes
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.solvers.lp import RESIDUAL
+from grasp_core.values import FINGERS, Family
+
+KERNEL = "grasp_core.families.corner_bounds_kernel"
+LEAST_SINE = 1e-6
+"""Half angles between axes with a sine up to this are so small that they bound no width."""
+KERNELS: dict[Family, str] = {
+    "concurrent": "grasp_core.families.concurrent_kernel",
+    "pencil": "grasp_core.families.pencil_kernel",
+}
+
+
+def corners_of(body: Polyhedron) -> Corners:
+    """Return the corners of each face at object size one, the first corner repeated.
+
+    Lengths are divided by the object's radius and counted from its centre of mass.
+    """
+    corners = [
+        (np.vstack([face.polygon, *face.holes]) - body.center_of_mass) / body.radius
+        for face in body.faces
+    ]
+    counts = np.array([len(each) for each in corners])
+    most = int(counts.max(initial=0))
+    padded = [np.vstack([each, np.repeat(each[:1], most - len(each), axis=0)]) for each in corners]
+    return Corners(np.array(padded), counts)
+
+
+def disc_limits(
+    corners: Corners, normals: Array, faces: Indices, axes: Array, half_angles: Array
+) -> Array:
+    """Bound the radius of the smallest disc of many quadruples from above, (q, 4).
+
+    Takes `normals` (f, 3); `faces` (q, 4); `axes` (q, 4, 3); `half_angles` (q,) [rad]. Gives upper
+    bounds on the smallest of four discs: in a concurrent grasp, then in a pencil in each of the
+    `PAIRINGS`. They are in units of the corners.
+    """
+    limits = np.empty((len(faces), 1 + len(PAIRINGS)))
+    compiled(KERNEL).fill(
+        corners, np.ascontiguousarray(normals), np.ascontiguousarray(faces),
+        np.ascontiguousarray(axes), np.ascontiguousarray(half_angles), limits,
+    )  # fmt: skip
+    return limits
+
+
+def angle_limits(extent: float, widths: Array, half_angles: Array) -> Array:
+    """Bound the discs from above where only the cones' half-angles are known, (q, 4).
+
+    Takes `widths` (q, 4, 4); `half_angles` (q,) [rad].
+    """
+    reaches = np.full(len(half_angles), extent)
+    concurrent = concurrent_radius_bounds(reaches, widths, half_angles)
+    return np.hstack([concurrent, pencil_radius_bounds(reaches, widths, half_angles, PAIRINGS)])
+
+
+def distances(corners: Corners) -> Array:
+    """Bound the distance between points of two faces from above, (f, f)."""
+    middles = corners.points.mean(axis=1)
+    radii = np.linalg.norm(corners.points - middles[:, None], axis=-1).max(axis=1)
+    between = np.linalg.norm(middles[:, None] - middles, axis=-1)
+    # between the middles, and from each middle to the farthest corner
+    return between + radii[:, None] + radii
+
+
+def widths_apart(faces: Indices, apart: Array, halves: Array, leaning: Array) -> Array:
+    """Bound the sum of two contacts' distances from a common focus, (q, 4, 4).
+
+    These are the s_i + s_j of (2), for axes that lean from the normals. The vector d of (2) has the
+    length 2 / |a_i - a_j|, and the angle between the axes differs from the angle between the
+    normals by at most the sum of both leans.
+
+    Takes `faces` (q, 4); `apart` (f, f); `halves` (f, f) [rad]; `leaning` (q,) [rad].
+    """
+    widths = np.full((len(faces), FINGERS, FINGERS), np.inf)
+    for i, j in combinations(range(FINGERS), 2):
+        pair = faces[:, i], faces[:, j]
+        # |a_i - a_j| is twice the sine of half the angle between them
+        sines = np.sin(np.maximum(halves[pair] - leaning, 0.0))
+        bound = np.where(sines > LEAST_SINE, apart[pair] / np.maximum(sines, LEAST_SINE), np.inf)
+        widths[:, i, j] = widths[:, j, i] = bound
+    return widths
+
+
+@dataclass(frozen=True, eq=False)
+class AttemptBounds:
+    """Upper bounds on disc radii for attempts on one object's faces."""
+
+    shapes: Shapes
+
+    def of(self, construction: Construction, attempts: Attempts, least: float) -> Array:
+        """Bound the smallest radius from above, (a,) [object radii]; infinite if not proved.
+
+        For reguli the bounds are infinite or, where no slopes are feasible, minus infinity.
+        """
+        attempts = Attempts(
+            np.ascontiguousarray(attempts.faces),
+            np.ascontiguousarray(attempts.axes),
+            np.ascontiguousarray(attempts.half_angles),
+        )
+        if construction.limits is None:
+            merits, _ = regulus_bounds(self._table, attempts, -np.inf)
+            # merits are no radii: only a proof that excludes all slopes tells anything
+            return np.where(merits == -np.inf, -np.inf, np.inf)
+        # hulls stand for faces of several pieces: they offer no less than any piece
+        kernel = compiled(KERNELS[construction.family])
+        bounds = np.empty(len(attempts.faces))
+        if construction.family == "pencil":
+            kernel.pencil_bounds(self._table, attempts, LEAST_RADIUS, least, bounds)
+        else:
+            turns = np.array(facet_turns(PYRAMID_SIDES))
+            kernel.concurrent_bounds(self._table, attempts, turns, least, bounds)
+        # a proved bound may be off by what the check of multipliers allows
+        return bounds + RESIDUAL
+
+    @cached_property
+    def _table(self) -> FaceTable:
+        """Put the hulls of all faces into one table."""
+        return face_table([shape.hull if shape else None for shape in self.shapes])

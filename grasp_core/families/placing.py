@@ -1,0 +1,313 @@
+"""Places contacts for many attempts of one construction, with the regions of the fingers.
+
+Convex pieces in the order of the fingers are taken with a force cone each. Compiled code
+solves the programs of the concurrent and the pencil construction and checks its answers by their
+residuals; what it does not prove is left to the construction itself, one attempt at a time.
+
+An attempt may have several choices of force cones, and its faces several convex pieces each. The
+contacts with the largest discs count, moved to the true surface where faces are curved.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.by_value import trusted
+from grasp_core.compiled import compiled
+from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
+from grasp_core.errors import SolverError
+from grasp_core.families.concurrent import BEFORE, BEHIND, MIXED_SIDES
+from grasp_core.families.constructions import (
+    DISC_CORNERS,
+    LEAST_RADIUS,
+    MIXED,
+    Construction,
+    regions_of,
+)
+from grasp_core.families.kernel_tables import (
+    LEFT,
+    PLACED,
+    Attempts,
+    FaceTable,
+    Footprints,
+    Placed,
+    face_table,
+    room_for,
+)
+from grasp_core.families.placements import Placement
+from grasp_core.families.true_surface import on_true_surface
+from grasp_core.objects.face_pieces import FacePiece, FaceShape, Shapes, choices_near
+from grasp_core.solvers.ties import surpassing
+from grasp_core.values import (
+    FINGERS,
+    ContactRegion,
+    FaceQuadruple,
+    ForceCone,
+    RegionKind,
+    four,
+)
+
+Ask: TypeAlias = tuple[FaceQuadruple, Sequence[ForceCone], float]
+"""One attempt: faces in finger order, a force cone on each, and the least radius that counts."""
+MOST_CHOICES = 8
+"""Most choices of pieces tried on faces that are not convex; the free method multiplies it by
+`max_face_parts`."""
+
+Cones: TypeAlias = tuple[ForceCone, ForceCone, ForceCone, ForceCone]
+Planned: TypeAlias = tuple[
+    tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...] | None
+]
+"""Convex pieces of four faces, their force cones, the contacts placed on them, and the regions of
+the fingers where they are known."""
+Settled: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...]]
+"""Pieces of the true surface, force cones, contacts, and the regions of the fingers."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Known:
+    """What compiled code says about one attempt: contacts with regions, or that there are none."""
+
+    placement: Placement | None
+    regions: tuple[ContactRegion, ...] | None
+    """Regions of the fingers, in the pieces' units; None where they are left to the construction.
+    """
+
+
+@dataclass(frozen=True, eq=False)
+class ManyPlacements:
+    """Places contacts on convex pieces, one for each face of an object."""
+
+    pieces: Sequence[FacePiece | None]
+    """The piece of each face; None for faces without room."""
+
+    def of(self, construction: Construction, asked: Sequence[Ask]) -> list[Known | None]:
+        """Place contacts for each attempt; None where that is left to the construction itself."""
+        if construction.limits is None or not asked:
+            return [None] * len(asked)
+        attempts = Attempts(
+            np.array([faces for faces, _, _ in asked], dtype=np.int64),
+            np.array([[cone.axis for cone in cones] for _, cones, _ in asked]),
+            np.array([cones[0].half_angle for _, cones, _ in asked]),
+        )
+        least = np.array([each for _, _, each in asked])
+        placed = room_for(len(asked))
+        if construction.family == "pencil":
+            kernel = compiled("grasp_core.families.pencil_kernel")
+            kernel.place(self._table, attempts, LEAST_RADIUS, least, placed)
+            regions = self._discs(attempts, placed)
+        else:
+            turns = np.array(facet_turns(PYRAMID_SIDES))
+            sides = MIXED_SIDES if construction is MIXED else (BEFORE, BEHIND)
+            kernel = compiled("grasp_core.families.concurrent_kernel")
+            kernel.place(self._table, attempts, turns, np.array(sides), least, placed)
+            regions = self._footprints(attempts, turns, placed)
+        alike = [len({cone.half_angle for cone in cones}) == 1 for _, cones, _ in asked]
+        return [
+            None if end == LEFT or not same else Known(_placement(placed, place, construction), on)
+            for place, (end, same, on) in enumerate(
+                zip(placed.ends.tolist(), alike, regions, strict=True)
+            )
+        ]
+
+    def _discs(self, attempts: Attempts, placed: Placed) -> list[tuple[ContactRegion, ...] | None]:
+        """Make the discs of pencils, as `constructions` makes them one by one."""
+        rings = placed.positions[:, :, None] + (
+            placed.radii[:, :, None, None] * self._rings[attempts.faces]
+        )
+        counts = np.full(placed.radii.shape, DISC_CORNERS)
+        return _regions("disc", Footprints(rings, counts, placed.radii), placed.ends)
+
+    def _footprints(
+        self, attempts: Attempts, turns: Array, placed: Placed
+    ) -> list[tuple[ContactRegion, ...] | None]:
+        """Cut the regions of concurrent grasps out of their faces."""
+        most = self._table.E.shape[1] + len(turns) + 1
+        shape = placed.radii.shape
+        cut = Footprints(
+            np.zeros((*shape, most, 3)), np.zeros(shape, dtype=np.int64), np.zeros(shape)
+        )
+        kernel = compiled("grasp_core.families.concurrent_kernel")
+        kernel.footprints(self._table, attempts, turns, placed, cut)
+        return _regions("cone", cut, placed.ends)
+
+    @cached_property
+    def _table(self) -> FaceTable:
+        return face_table(self.pieces)
+
+    @cached_property
+    def _rings(self) -> Array:
+        """Border points of a disc of radius one on each face, about its centre, (f, n, 3)."""
+        turns = 2.0 * np.pi * np.arange(DISC_CORNERS) / DISC_CORNERS
+        circle = np.column_stack([np.cos(turns), np.sin(turns)])
+        return np.array([circle @ frame.T for frame in self._table.frames])
+
+
+def _placement(placed: Placed, place: int, construction: Construction) -> Placement | None:
+    """Return the placement of one attempt; None where there is none."""
+    if placed.ends[place] != PLACED:
+        return None
+    foci = 2 if construction.family == "pencil" else 1
+    return Placement(
+        placed.positions[place], placed.forces[place], placed.foci[place, :foci],
+        placed.radii[place], float(placed.merits[place]),
+    )  # fmt: skip
+
+
+def _regions(
+    kind: RegionKind, cut: Footprints, ends: Indices
+) -> list[tuple[ContactRegion, ...] | None]:
+    """Make the regions of each attempt; None where a polygon has no corners."""
+    cut.polygons.setflags(write=False)
+    found: list[tuple[ContactRegion, ...] | None] = []
+    for place, (corners, sizes, end) in enumerate(
+        zip(cut.counts.tolist(), cut.radii.tolist(), ends.tolist(), strict=True)
+    ):
+        known = end == PLACED and min(corners) > 0
+        found.append(
+            four(
+                trusted(
+                    ContactRegion,
+                    kind=kind,
+                    polygon=cut.polygons[place, finger, : corners[finger]],
+                    inscribed_radius=sizes[finger],
+                )
+                for finger in range(FINGERS)
+            )
+            if known
+            else None
+        )
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """One order of the fingers on four faces, with the force cones to try in a construction."""
+
+    faces: FaceQuadruple
+    """The face that each finger touches."""
+    cones: tuple[Cones, ...]
+    """Choices of force cones in finger order, the choice with the largest bound first."""
+    bounds: tuple[float, ...]
+    """Upper bound on the discs of each choice [object radii]; infinite for constructions without
+    discs."""
+
+
+@dataclass(slots=True, eq=False)
+class End:
+    """How one attempt ends."""
+
+    least: float
+    """The merit to exceed: that of the best contacts so far, at first what was asked for."""
+    planned: Planned | None = None
+    """The best contacts so far, on the planes of the faces."""
+    settled: Settled | None = None
+    """Contacts on the true surface; None where there are none."""
+    solved: int = 0
+    """Number of choices of pieces for which contacts were sought."""
+    failed: bool = False
+    """Whether a program was neither solved nor proved infeasible: nothing is known then."""
+
+
+@dataclass(frozen=True, eq=False)
+class Settling:
+    """Places the contacts of one construction on the faces of one object."""
+
+    construction: Construction
+    shapes: Shapes
+
+    def of(self, attempts: Sequence[Attempt], least: float) -> list[End]:
+        """Place contacts for each attempt, with regions, on the true surface."""
+        ends = [End(least) for _ in attempts]
+        going = list(zip(attempts, ends, strict=True))
+        for choice in range(max((len(each.cones) for each in attempts), default=0)):
+            # choices come with falling bounds: the later ones cannot be better either
+            going = [
+                (attempt, end)
+                for attempt, end in going
+                if choice < len(attempt.cones) and attempt.bounds[choice] > end.least
+            ]
+            asked: list[Ask] = [
+                (attempt.faces, attempt.cones[choice], end.least) for attempt, end in going
+            ]
+            known = self._many.of(self.construction, asked)
+            for ask, (_, end), each in zip(asked, going, known, strict=True):
+                self._place(ask, each, end)
+            going = [(attempt, end) for attempt, end in going if not end.failed]
+        for attempt, end in zip(attempts, ends, strict=True):
+            self._settle(attempt, end)
+        return ends
+
+    def _place(self, ask: Ask, known: Known | None, end: End) -> None:
+        """Enter the contacts of one choice of cones if they are better than those before."""
+        try:
+            found = self._best_placement(ask, known, end)
+        except SolverError:
+            end.failed = True
+            return
+        if found:
+            end.planned, end.least = found, surpassing(found[2].merit)
+
+    def _settle(self, attempt: Attempt, end: End) -> None:
+        """Enter the contacts of an attempt, moved to the true surface."""
+        if end.planned is None or end.failed:
+            return
+        chosen, cones, placement, known = end.planned
+        regions = known or regions_of(self.construction.region, chosen, cones, placement)
+        shapes = chosen_shapes(self.shapes, attempt.faces)
+        if all(shape.facets is None for shape in shapes):
+            end.settled = chosen, cones, placement, regions
+            return
+        place = partial(_placed_on, self.construction, cones)
+        try:
+            found = on_true_surface(shapes, chosen, cones, placement, regions, place)
+        except SolverError:
+            end.failed = True
+            return
+        end.settled = None if found is None else (found[0], cones, found[1], regions)
+
+    def _best_placement(self, ask: Ask, known: Known | None, end: End) -> Planned | None:
+        """Place contacts on the best choice of one convex piece per face; None unless above least.
+
+        Where faces have several pieces, their hulls are tried first: a grasp that the hulls do not
+        hold no piece holds, and the contacts on the hulls show which pieces are likely to be best.
+        """
+        construction, (faces, given, least) = self.construction, ask
+        cones, shapes = four(given), chosen_shapes(self.shapes, faces)
+        hulls = tuple(shape.hull for shape in shapes)
+        end.solved += 1
+        whole = construction.place(hulls, cones, least) if known is None else known.placement
+        if not (isinstance(whole, Placement) and whole.merit > least):
+            return None
+        if all(len(shape.pieces) == 1 for shape in shapes):
+            return hulls, cones, whole, None if known is None else known.regions
+        best = None
+        for chosen in choices_near(shapes, whole.positions, MOST_CHOICES):
+            end.solved += 1
+            if construction.limits is not None and min(piece.inradius for piece in chosen) < least:
+                continue
+            placed = construction.place(chosen, cones, least)
+            if isinstance(placed, Placement) and placed.merit > least:
+                best, least = (chosen, cones, placed, None), surpassing(placed.merit)
+        return best
+
+    @cached_property
+    def _many(self) -> ManyPlacements:
+        return ManyPlacements([shape.hull if shape else None for shape in self.shapes])
+
+
+def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]:
+    """Return the shapes of the faces that have room for a contact, in finger order."""
+    return tuple(shape for face in faces if (shape := shapes[face]) is not None)
+
+
+def _placed_on(
+    construction: Construction, cones: Cones, pieces: tuple[FacePiece, ...]
+) -> Placement | None:
+    """Place contacts on convex pieces, with discs however small; None if it is impossible."""
+    placed = construction.place(pieces, cones, 0.0 if construction.limits else -math.inf)
+    return placed if isinstance(placed, Placement) else None

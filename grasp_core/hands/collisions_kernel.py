@@ -1,0 +1,355 @@
+"""Measures how far a hand is from itself, from an object and from a table, compiled."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import loop
+from grasp_core.geometry.vectors_kernel import dotted
+from grasp_core.hands.distances_kernel import (
+    box_box,
+    box_surface,
+    corners_of,
+    hull_hull,
+    hull_surface,
+    into_frame,
+    nearest,
+    windings,
+)
+from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree
+from grasp_core.hands.kinematics_kernel import chains, moved, product
+
+INSIDE = 0.5
+"""Windings of a surface around a point from which the point counts as inside."""
+ROUNDING = 1e-9
+"""Distance beyond a limit from which a quick bound on a distance decides [m]."""
+
+
+@loop()
+def place_shapes(
+    hand: HandArrays, palm_rotation: Array, palm_position: Array, R: Array, p: Array, turned: Array,
+    middles: Array,
+) -> None:  # fmt: skip
+    """Fill in the axes, (s, 3, 3), and middles, (s, 3), of the shapes of a hand."""
+    for s in range(len(hand.shape_links)):
+        link = hand.shape_links[s]
+        frame = palm_rotation if link < 0 else R[link]
+        origin = palm_position if link < 0 else p[link]
+        product(frame, hand.shape_rotations[s], turned[s])
+        moved(frame, origin, hand.shape_positions[s], middles[s])
+
+
+@loop()
+def near_links(hand: HandArrays, middles: Array, limit: float, near: NDArray[np.bool_]) -> None:
+    """Fill in which links, the palm first, may be as near as a limit, by their balls."""
+    for a in range(len(hand.link_shapes)):
+        for b in range(a):
+            one, other, square = hand.link_shapes[a], hand.link_shapes[b], 0.0
+            if one >= 0 and other >= 0:
+                for k in range(3):
+                    square += (middles[one, k] - middles[other, k]) ** 2
+            reach = limit + hand.link_reaches[a] + hand.link_reaches[b]
+            near[a, b] = near[b, a] = reach >= 0.0 and square <= reach * reach
+
+
+@loop()
+def may_be_near(middles: Array, reaches: Array, i: int, j: int, limit: float) -> bool:
+    """Return whether two shapes may be as near as a limit, by the balls that hold them.
+
+    A call with few arguments costs less than one with a whole hand.
+    """
+    square = 0.0
+    for k in range(3):
+        square += (middles[i, k] - middles[j, k]) ** 2
+    reach = limit + reaches[i] + reaches[j]
+    return reach >= 0.0 and square <= reach * reach
+
+
+@loop()
+def _apart_by_faces(hand: HandArrays, turned: Array, middles: Array, i: int, j: int) -> float:
+    """Return how far the boxes of two shapes are apart at least, along the axes of either."""
+    widest = -np.inf
+    for one, other in ((i, j), (j, i)):
+        for a in range(3):
+            height, reach = 0.0, hand.shape_sizes[one, a]
+            for k in range(3):
+                height += turned[one, k, a] * (middles[other, k] - middles[one, k])
+            for b in range(3):
+                along = 0.0
+                for k in range(3):
+                    along += turned[one, k, a] * turned[other, k, b]
+                reach += abs(along) * hand.shape_sizes[other, b]
+            widest = max(widest, abs(height) - reach)
+    return widest
+
+
+@loop()
+def is_block(hand: HandArrays, s: int) -> bool:
+    """Return whether a shape covers a fingertip that is a block."""
+    finger = hand.shape_tips[s]
+    return bool(finger >= 0 and hand.tip_firsts[finger + 1] - hand.tip_firsts[finger] > 1)
+
+
+@loop()
+def core_in(hand: HandArrays, R: Array, middle: Array, s: int) -> tuple[Array, float]:
+    """Return corners (m, 3) whose hull is a shape but for its rounding, and that.
+
+    For a shape that covers a block they are the block's.
+    """
+    if not is_block(hand, s):
+        corners = np.empty((8, 3))
+        corners_of(hand.shape_sizes[s], R, middle, corners)
+        return corners, float(hand.shape_radii[s])
+    first, end = hand.tip_firsts[hand.shape_tips[s]], hand.tip_firsts[hand.shape_tips[s] + 1]
+    corners = np.empty((end - first, 3))
+    for c in range(first, end):
+        moved(R, middle, hand.cover_corners[c], corners[c - first])
+    return corners, float(hand.tip_roundings[hand.shape_tips[s]])
+
+
+@loop()
+def _from_block(
+    hand: HandArrays, turned: Array, middles: Array, block: int, s: int, limit: float, way: Array,
+    point: Array,
+) -> float:  # fmt: skip
+    """Return the distance of a shape from a block, `pair_distance` with the block first.
+
+    It is minus infinity if they overlap by more than their roundings.
+    """
+    finger, local, between = hand.shape_tips[block], np.empty(3), np.empty((3, 3))
+    own = hand.cover_corners[hand.tip_firsts[finger] : hand.tip_firsts[finger + 1]]
+    relative_frame(turned, middles, block, s, local, between)
+    others, rounding = core_in(hand, between, local, s)
+    near, other, both = np.empty(3), np.empty(3), float(hand.tip_roundings[finger]) + rounding
+    apart = hull_hull(own, others, limit + both, near, other)
+    if apart <= ROUNDING:
+        return -np.inf
+    if apart <= limit + both:
+        length = np.sqrt(((other - near) ** 2).sum())
+        for a in range(3):
+            near[a] = (other[a] - near[a]) / length
+            other[a] -= near[a] * rounding
+        moved(turned[block], middles[block], other, point)
+        for a in range(3):
+            way[a] = dotted(turned[block, a], near)
+    return apart - both
+
+
+@loop()
+def relative_frame(
+    turned: Array, middles: Array, i: int, j: int, local: Array, between: Array
+) -> None:  # fmt: skip
+    """Fill in the middle, (3,), and the axes, (3, 3), of a shape j in the frame of a shape i."""
+    into_frame(turned[i], middles[i], middles[j], local)
+    for a in range(3):
+        for b in range(3):
+            between[a, b] = (
+                turned[i, 0, a] * turned[j, 0, b]
+                + turned[i, 1, a] * turned[j, 1, b]
+                + turned[i, 2, a] * turned[j, 2, b]
+            )
+
+
+@loop()
+def pair_distance(
+    hand: HandArrays, turned: Array, middles: Array, i: int, j: int, limit: float, way: Array,
+    point: Array,
+) -> float:  # fmt: skip
+    """Return the signed distance of two shapes of a hand."""
+    both = hand.shape_radii[i] + hand.shape_radii[j]
+    h, g = hand.shape_sizes[i], hand.shape_sizes[j]
+    apart = _apart_by_faces(hand, turned, middles, i, j) - both
+    if apart > limit + ROUNDING:
+        return apart
+    if is_block(hand, i) or is_block(hand, j):
+        block, s = (i, j) if is_block(hand, i) else (j, i)
+        exact = _from_block(hand, turned, middles, block, s, limit, way, point)
+        if exact > -np.inf:  # else what covers the blocks shows the way
+            if block == j:
+                for a in range(3):
+                    way[a] = -way[a]
+            return exact
+    local, between, found, at = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3)
+    relative_frame(turned, middles, i, j, local, between)
+    apart = box_box(h, g, between, local, limit + both, found, at) - both
+    if apart <= limit:
+        for a in range(3):
+            at[a] -= found[a] * hand.shape_radii[j]
+        moved(turned[i], middles[i], at, point)
+        for a in range(3):
+            way[a] = 0.0
+            for b in range(3):
+                way[a] += turned[i, a, b] * found[b]
+    return apart
+
+
+@loop()
+def of_itself(
+    hand: HandArrays, turned: Array, middles: Array, need: float, worst: Indices
+) -> float:
+    """Return the least distance between shapes of a hand that must not overlap."""
+    best, way, point = np.nextafter(need, np.inf), np.empty(3), np.empty(3)
+    near = np.empty((len(hand.link_shapes), len(hand.link_shapes)), np.bool_)
+    near_links(hand, middles, best, near)
+    worst[:] = -1
+    for n in range(len(hand.pairs)):
+        i, j = hand.pairs[n, 0], hand.pairs[n, 1]
+        if not near[hand.shape_links[i] + 1, hand.shape_links[j] + 1]:
+            continue
+        if not may_be_near(middles, hand.shape_reaches, i, j, best):
+            continue
+        apart = pair_distance(hand, turned, middles, i, j, best, way, point)
+        if apart < best:
+            best = apart
+            worst[0], worst[1] = i, j
+    return best
+
+
+@loop()
+def tip_surface(
+    hand: HandArrays, turned: Array, middles: Array, tree: SurfaceTree, finger: int, near: Array,
+    other: Array,
+) -> float:  # fmt: skip
+    """Return the distance of a surface from the hull of a tip's corners, zero if they overlap.
+
+    The tip touches where the distance is its rounding.
+    """
+    s, square = hand.tip_shapes[finger], 0.0
+    if is_block(hand, s):
+        corners, _ = core_in(hand, turned[s], middles[s], s)
+        return hull_surface(
+            corners, np.inf, tree.corners, tree.middles, tree.radii, tree.links, near, other
+        )
+    near[:] = middles[s]
+    nearest(near, np.inf, tree.corners, tree.middles, tree.radii, tree.links, other)
+    for j in range(3):
+        square += (other[j] - near[j]) ** 2
+    return np.sqrt(square)
+
+
+@loop()
+def deepest(corners: Array, tree: SurfaceTree, near: Array, other: Array) -> float:
+    """Return the signed distance from a surface of the corner that is deepest in it."""
+    best, at = np.inf, np.empty(3)
+    for c in range(len(corners)):
+        nearest(corners[c], np.inf, tree.corners, tree.middles, tree.radii, tree.links, at)
+        away = np.sqrt(((corners[c] - at) ** 2).sum())
+        if windings(corners[c], tree.corners) > INSIDE:
+            away = -away
+        if away < best:
+            best = away
+            near[:], other[:] = corners[c], at
+    return best
+
+
+@loop()
+def tip_point(hand: HandArrays, turned: Array, middles: Array, finger: int, point: Array) -> float:
+    """Return the distance of a point from a fingertip, negative within its rounding."""
+    s = hand.tip_shapes[finger]
+    corners, rounding = core_in(hand, turned[s], middles[s], s)
+    alone, near, other = np.empty((1, 3)), np.empty(3), np.empty(3)
+    alone[0] = point
+    return hull_hull(corners, alone, np.inf, near, other) - rounding
+
+
+@loop()
+def of_object(
+    hand: HandArrays, turned: Array, middles: Array, tree: SurfaceTree, needs: Array, worst: Indices
+) -> float:  # fmt: skip
+    """Return the least distance of shapes from a surface, beyond what each of them needs."""
+    best, near, other = np.inf, np.empty(3), np.empty(3)
+    worst[0] = -1
+    low, high = tree.corners[0, 0].copy(), tree.corners[0, 0].copy()
+    for j in range(3):
+        low[j] = tree.middles[0, j] - tree.radii[0]
+        high[j] = tree.middles[0, j] + tree.radii[0]
+    for s in range(len(hand.shape_links)):
+        radius, middle = hand.shape_radii[s], middles[s]
+        if is_block(hand, s):
+            corners, radius = core_in(hand, turned[s], middles[s], s)
+            middle = corners[0]
+            apart = hull_surface(
+                corners, needs[s] + radius, tree.corners, tree.middles, tree.radii, tree.links,
+                near, other,
+            ) - radius - needs[s]  # fmt: skip
+        else:
+            apart = box_surface(
+                hand.shape_sizes[s], turned[s], middles[s], needs[s] + radius, tree.corners,
+                tree.middles, tree.radii, tree.links,
+            ) - radius - needs[s]  # fmt: skip
+        inner = True
+        for j in range(3):
+            inner = inner and low[j] < middle[j] < high[j]
+        if apart >= 0.0 and inner and windings(middle, tree.corners) > INSIDE:
+            apart = -tree.radii[0]
+        if apart < min(best, 0.0):
+            worst[0] = s
+        best = min(best, apart)
+    return best
+
+
+@loop()
+def of_table(
+    hand: HandArrays, turned: Array, middles: Array, up: Array, height: float, worst: Indices
+) -> float:  # fmt: skip
+    """Return the least height of a hand's shapes over a plane."""
+    best = np.inf
+    for s in range(len(hand.shape_links)):
+        if is_block(hand, s):
+            corners, rounding = core_in(hand, turned[s], middles[s], s)
+            lowest = np.inf
+            for c in range(len(corners)):
+                lowest = min(lowest, dotted(up, corners[c]) - height - rounding)
+            if lowest < best:
+                best = lowest
+                worst[0] = s
+            continue
+        lowest = dotted(up, middles[s]) - height - hand.shape_radii[s]
+        for k in range(3):
+            lowest -= hand.shape_sizes[s, k] * abs(
+                up[0] * turned[s, 0, k] + up[1] * turned[s, 1, k] + up[2] * turned[s, 2, k]
+            )
+        if lowest < best:
+            best = lowest
+            worst[0] = s
+    return best
+
+
+@loop()
+def free_postures(
+    hand: HandArrays, angles: Array, apart: float, widest: float, kept: Indices, tips: Array
+) -> int:
+    """Choose joint angles at which a hand is free of itself and its fingertips are near each other.
+
+    Takes `angles` (n, j) [rad]; `apart`, `widest` [m]; `kept` (m,); `tips` (m, f, 3) [m]. Gives how
+    many were chosen, at most m.
+    """
+    count, fingers, found = len(hand.axes), len(hand.tip_radii), 0
+    R, p, W = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty((count, 3))
+    turned, middles = np.empty((len(hand.shape_links), 3, 3)), np.empty((len(hand.shape_links), 3))
+    eye, zero, middle, worst = np.eye(3), np.zeros(3), np.empty(3), np.empty(2, np.int64)
+    for n in range(len(angles)):
+        if found == len(kept):
+            break
+        chains(
+            hand.positions, hand.rotations, hand.axes, hand.starts, eye, zero, angles[n], R, p, W
+        )
+        middle[:] = 0.0
+        for f in range(fingers):
+            last = hand.starts[f + 1] - 1
+            moved(R[last], p[last], hand.tip_centers[f], tips[found, f])
+            for j in range(3):
+                middle[j] += tips[found, f, j] / fingers
+        near = True
+        for f in range(fingers):
+            square = 0.0
+            for j in range(3):
+                square += (tips[found, f, j] - middle[j]) ** 2
+            near = near and square <= widest * widest
+        if not near:
+            continue
+        place_shapes(hand, eye, zero, R, p, turned, middles)
+        if of_itself(hand, turned, middles, apart, worst) >= apart:
+            kept[found] = n
+            found += 1
+    return found

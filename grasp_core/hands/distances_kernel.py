@@ -1,0 +1,510 @@
+"""Measures exact distances between boxes, triangles, points, hulls and surfaces, compiled.
+
+Two convex bodies that do not overlap are nearest at a corner of one and a point of the other, or at
+an edge of each. If they overlap, an axis among the normals and the cross products of edges shows
+how far one must move to be free of the other (separating axes of convex bodies). Distances are
+signed: a negative one is the least such way.
+
+Two hulls are nearest where the hull of the differences of their corners is nearest to the origin.
+That point is approached as Gilbert, Johnson and Keerthi do: by the corner that reaches farthest
+towards the origin, as long as there is one that reaches farther than the point itself. The point
+lies in a triangle of corners; of the triangles that the new corner makes with two of the old ones,
+that which is nearest to the origin is kept.
+
+Source: E. G. Gilbert, D. W. Johnson and S. S. Keerthi, A fast procedure for computing the distance
+between complex objects in three-dimensional space, 1988.
+"""
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import loop
+from grasp_core.geometry.vectors_kernel import cross, dotted
+
+PARALLEL = 1e-10
+"""Sine of the angle between edges below which their cross product is no axis."""
+CORNERS = 3
+BOX_CORNERS, BOX_EDGES = 8, 12
+MOST_STEPS = 100
+"""Largest number of corners that are tried: the bound of the loop, which ends after ten or so."""
+CLOSE = 1e-13
+"""Share of a squared distance by which a corner must be nearer to the origin to count."""
+DEEPEST = 64
+"""Places on the stack of a walk through the tree; a tree of 2^32 triangles needs fewer."""
+
+
+@loop()
+def point_triangle(p: Array, T: Array, near: Array, weights: Array) -> float:
+    """Fill in the point of a triangle, (3, 3), nearest to a point, and return its squared distance.
+
+    The last two corners may be one point.
+
+    Source: C. Ericson, Real-Time Collision Detection, section 5.1.5 (regions of Voronoi).
+    """
+    ab, ac, ap = T[1] - T[0], T[2] - T[0], p - T[0]
+    d1, d2 = dotted(ab, ap), dotted(ac, ap)
+    bp, cp = p - T[1], p - T[2]
+    d3, d4, d5, d6 = dotted(ab, bp), dotted(ac, bp), dotted(ab, cp), dotted(ac, cp)
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    v, w = 0.0, 0.0
+    if d1 <= 0.0 and d2 <= 0.0:
+        pass
+    elif d3 >= 0.0 and d4 <= d3:
+        v = 1.0
+    elif d6 >= 0.0 and d5 <= d6:
+        w = 1.0
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v = d1 / (d1 - d3)
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        w = d2 / (d2 - d6)
+    elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        v = 1.0 - w
+    else:
+        total = va + vb + vc
+        v, w = vb / total, vc / total
+    weights[0], weights[1] = v, w
+    square = 0.0
+    for j in range(3):
+        near[j] = T[0, j] + v * ab[j] + w * ac[j]
+        square += (p[j] - near[j]) ** 2
+    return square
+
+
+@loop()
+def segment_segment(a: Array, u: Array, b: Array, v: Array, between: Array, end: Array) -> float:
+    """Return the squared distance of the segments a + s u and b + t v, s and t from 0 to 1.
+
+    `between` is filled with the way from the first to the second, `end` with its end.
+
+    Source: C. Ericson, Real-Time Collision Detection, section 5.1.9.
+    """
+    r = a - b
+    uu, vv, uv, ur, vr = dotted(u, u), dotted(v, v), dotted(u, v), dotted(u, r), dotted(v, r)
+    s, t = 0.0, 0.0
+    if uu > 0.0 and vv > 0.0:
+        whole = uu * vv - uv * uv
+        if whole > PARALLEL * PARALLEL * uu * vv:
+            s = min(max((uv * vr - ur * vv) / whole, 0.0), 1.0)
+        t = (uv * s + vr) / vv
+        if t < 0.0:
+            t = 0.0
+            s = min(max(-ur / uu, 0.0), 1.0)
+        elif t > 1.0:
+            t = 1.0
+            s = min(max((uv - ur) / uu, 0.0), 1.0)
+    elif uu > 0.0:
+        s = min(max(-ur / uu, 0.0), 1.0)
+    elif vv > 0.0:
+        t = min(max(vr / vv, 0.0), 1.0)
+    square = 0.0
+    for j in range(3):
+        end[j] = b[j] + t * v[j]
+        between[j] = end[j] - a[j] - s * u[j]
+        square += between[j] ** 2
+    return square
+
+
+@loop()
+def point_box(p: Array, h: Array) -> float:
+    """Return the squared distance of a point from the box |x_i| <= h_i, zero inside."""
+    square = 0.0
+    for j in range(3):
+        out = max(abs(p[j]) - h[j], 0.0)
+        square += out * out
+    return square
+
+
+@loop()
+def into_frame(R: Array, middle: Array, p: Array, out: Array) -> None:
+    """Fill in a point's coordinates in the frame with axes R (columns) and the given origin."""
+    for i in range(3):
+        out[i] = (
+            R[0, i] * (p[0] - middle[0])
+            + R[1, i] * (p[1] - middle[1])
+            + R[2, i] * (p[2] - middle[2])
+        )
+
+
+@loop()
+def corners_of(h: Array, R: Array, middle: Array, out: Array) -> None:
+    """Fill in the corners of a box with axes R (columns), (8, 3); corner k has the signs of k."""
+    for k in range(BOX_CORNERS):
+        for i in range(3):
+            out[k, i] = middle[i]
+            for j in range(3):
+                out[k, i] += R[i, j] * (h[j] if k >> j & 1 else -h[j])
+
+
+@loop()
+def edges_of(corners: Array, starts: Array, along: Array) -> None:
+    """Fill in where the edges of a box start and how they run, (12, 3) each."""
+    n = 0
+    for j in range(3):
+        for k in range(BOX_CORNERS):
+            if not k >> j & 1:
+                for i in range(3):
+                    starts[n, i] = corners[k, i]
+                    along[n, i] = corners[k | 1 << j, i] - corners[k, i]
+                n += 1
+
+
+@loop()
+def _gap(axis: Array, h: Array, points: Array) -> float:
+    """Return how far a box |x_i| <= h_i and points are apart along an axis; -inf for no axis."""
+    length = np.sqrt(dotted(axis, axis))
+    if length < PARALLEL:
+        return -np.inf
+    reach = (abs(axis[0]) * h[0] + abs(axis[1]) * h[1] + abs(axis[2]) * h[2]) / length
+    low, high = np.inf, -np.inf
+    for k in range(len(points)):
+        height = dotted(axis, points[k]) / length
+        low, high = min(low, height), max(high, height)
+    return max(low - reach, -high - reach)
+
+
+@loop()
+def box_triangle(h: Array, T: Array, limit: float) -> float:
+    """Return the signed distance of the box |x_i| <= h_i from a triangle, (3, 3) in its frame."""
+    axis, unit, sides = np.empty(3), np.zeros(3), np.empty((CORNERS, 3))
+    for k in range(CORNERS):
+        for j in range(3):
+            sides[k, j] = T[(k + 1) % CORNERS, j] - T[k, j]
+    cross(sides[0], sides[1], axis)
+    widest = _gap(axis / max(np.sqrt(dotted(axis, axis)), 1e-300), h, T)
+    for j in range(3):
+        unit[:] = 0.0
+        unit[j] = 1.0
+        widest = max(widest, _gap(unit, h, T))
+        if widest > limit:
+            return widest
+        for k in range(CORNERS):
+            length = np.sqrt(dotted(sides[k], sides[k]))
+            if length > 0.0:
+                cross(unit, sides[k] / length, axis)
+                widest = max(widest, _gap(axis, h, T))
+    if widest <= 0.0 or widest > limit:
+        return widest
+    corners, starts, along = np.empty((8, 3)), np.empty((12, 3)), np.empty((12, 3))
+    corners_of(h, np.eye(3), np.zeros(3), corners)
+    edges_of(corners, starts, along)
+    best, near, between, weights = np.inf, np.empty(3), np.empty(3), np.empty(2)
+    for k in range(CORNERS):
+        best = min(best, point_box(T[k], h))
+    for k in range(BOX_CORNERS):
+        best = min(best, point_triangle(corners[k], T, near, weights))
+    for e in range(BOX_EDGES):
+        for k in range(CORNERS):
+            best = min(best, segment_segment(starts[e], along[e], T[k], sides[k], between, near))
+    return np.sqrt(best)
+
+
+@loop()
+def _try_axis(axis: Array, h: Array, points: Array, widest: float, best: Array) -> float:
+    """Return the larger of `widest` and the gap along an axis, and keep the axis if it is that."""
+    length = np.sqrt(dotted(axis, axis))
+    if length < PARALLEL:
+        return widest
+    reach = (abs(axis[0]) * h[0] + abs(axis[1]) * h[1] + abs(axis[2]) * h[2]) / length
+    low, high = np.inf, -np.inf
+    for k in range(len(points)):
+        height = dotted(axis, points[k]) / length
+        low, high = min(low, height), max(high, height)
+    gap, sign = low - reach, 1.0
+    if -high - reach > gap:
+        gap, sign = -high - reach, -1.0
+    if gap > widest:
+        for j in range(3):
+            best[j] = sign * axis[j] / length
+        return gap
+    return widest
+
+
+@loop()
+def box_box(
+    h: Array, g: Array, R: Array, middle: Array, limit: float, way: Array, point: Array
+) -> float:  # fmt: skip
+    """Return the signed distance of the box |x_i| <= h_i from another box."""
+    others = np.empty((8, 3))
+    corners_of(g, R, middle, others)
+    axis, unit, widest = np.empty(3), np.zeros(3), -np.inf
+    for j in range(3):
+        unit[:] = 0.0
+        unit[j] = 1.0
+        widest = _try_axis(unit, h, others, widest, way)
+        for i in range(3):
+            axis[i] = R[i, j]
+        widest = _try_axis(axis, h, others, widest, way)
+        if widest > limit:
+            return widest
+    for j in range(3):
+        unit[:] = 0.0
+        unit[j] = 1.0
+        for k in range(3):
+            for i in range(3):
+                point[i] = R[i, k]
+            cross(unit, point, axis)
+            widest = _try_axis(axis, h, others, widest, way)
+        if widest > limit:
+            return widest
+    if widest <= 0.0:
+        lowest = np.inf
+        for k in range(BOX_CORNERS):
+            height = dotted(way, others[k])
+            if height < lowest:
+                lowest = height
+                point[:] = others[k]
+        return widest
+    return _nearest_features(h, g, R, middle, others, way, point)
+
+
+@loop()
+def _nearest_features(
+    h: Array, g: Array, R: Array, middle: Array, others: Array, way: Array, point: Array
+) -> float:  # fmt: skip
+    """Compute the distance of two boxes that do not overlap, from corners and edges."""
+    corners, local, best = np.empty((8, 3)), np.empty(3), np.inf
+    between, end = np.empty(3), np.empty(3)
+    corners_of(h, np.eye(3), np.zeros(3), corners)
+    for k in range(BOX_CORNERS):
+        square = point_box(others[k], h)
+        if square < best:
+            best = square
+            point[:] = others[k]
+            for j in range(3):
+                way[j] = others[k, j] - min(max(others[k, j], -h[j]), h[j])
+        into_frame(R, middle, corners[k], local)
+        square = point_box(local, g)
+        if square < best:
+            best = square
+            for j in range(3):
+                local[j] = min(max(local[j], -g[j]), g[j])
+            for i in range(3):
+                point[i] = middle[i]
+                for j in range(3):
+                    point[i] += R[i, j] * local[j]
+                way[i] = point[i] - corners[k, i]
+    starts, along, froms, ways = (
+        np.empty((12, 3)), np.empty((12, 3)), np.empty((12, 3)), np.empty((12, 3))
+    )  # fmt: skip
+    edges_of(corners, starts, along)
+    edges_of(others, froms, ways)
+    for e in range(BOX_EDGES):
+        for k in range(BOX_EDGES):
+            square = segment_segment(starts[e], along[e], froms[k], ways[k], between, end)
+            if square < best:
+                best = square
+                way[:], point[:] = between, end
+    distance = np.sqrt(best)
+    for j in range(3):
+        way[j] /= max(distance, 1e-300)
+    return distance
+
+
+@loop()
+def _reaching(points: Array, way: Array, sign: float) -> int:
+    """Return the number of the point that reaches farthest along sign * way."""
+    best, farthest = 0, -np.inf
+    for n in range(len(points)):
+        height = sign * dotted(points[n], way)
+        if height > farthest:
+            best, farthest = n, height
+    return best
+
+
+@loop()
+def _holds_origin(S: Array, w: Array) -> bool:
+    """Return whether the origin is within the tetrahedron of a triangle S and a point w."""
+    way, turns = np.empty(3), np.empty(4)
+    for n in range(3):
+        cross(S[n], S[(n + 1) % 3], way)
+        turns[n] = dotted(way, w)
+    cross(S[0], S[1], way)
+    turns[3] = -dotted(way, S[2])
+    return bool((turns > 0.0).all() or (turns < 0.0).all())
+
+
+@loop()
+def _nearer(S: Array, w: Array, at: Array) -> int:
+    """Choose the corner of a triangle S that the point w replaces, and fill in the nearest point.
+
+    Gives the corner's number, or -1 if no such triangle is nearer to the origin than `at`.
+    """
+    tried, zero, chosen, least = np.empty((3, 3)), np.zeros(3), -1, dotted(at, at)
+    near, weights = np.empty(3), np.empty(2)
+    for n in range(3):
+        if S[n, 0] == w[0] and S[n, 1] == w[1] and S[n, 2] == w[2]:
+            return -1
+    if _holds_origin(S, w):
+        at[:] = 0.0
+        return 0
+    for n in range(3):
+        tried[:] = S
+        tried[n] = w
+        square = point_triangle(zero, tried, near, weights)
+        if square < least:
+            least, chosen = square, n
+            at[:] = near
+    return chosen
+
+
+@loop()
+def hull_hull(
+    corners: Array, others: Array, limit: float, near: Array, other: Array
+) -> float:  # fmt: skip
+    """Return the distance between the hulls of two sets of corners, zero where they overlap.
+
+    It is that of two planes between which no hull is, so that rounding never makes it too large.
+    """
+    at, S, w, zero = corners[0] - others[0], np.empty((3, 3)), np.empty(3), np.zeros(3)
+    pairs, weights, apart = np.zeros((3, 2), np.int64), np.empty(2), 0.0
+    for n in range(3):
+        S[n] = at
+    for step in range(MOST_STEPS):
+        square = dotted(at, at)
+        if square == 0.0:
+            apart = 0.0
+            break
+        i, j = _reaching(corners, at, -1.0), _reaching(others, at, 1.0)
+        w[:] = corners[i] - others[j]
+        ahead = dotted(at, w)
+        apart = max(apart, ahead / np.sqrt(square))
+        if apart > limit:
+            return apart
+        if square - ahead <= CLOSE * square:
+            break
+        place = 1
+        if step > 0:
+            place = _nearer(S, w, at)
+            if place < 0:
+                break
+        S[place], pairs[place, 0], pairs[place, 1] = w, i, j
+        if step == 0:  # a segment, whose second end counts twice
+            S[2], pairs[2] = w, pairs[1]
+            point_triangle(zero, S, at, weights)
+    point_triangle(zero, S, w, weights)
+    for j in range(3):
+        near[j] = other[j] = 0.0
+        for n in range(3):
+            weight = 1.0 - weights[0] - weights[1] if n == 0 else weights[n - 1]
+            near[j] += weight * corners[pairs[n, 0], j]
+            other[j] += weight * others[pairs[n, 1], j]
+    return apart
+
+
+@loop()
+def hull_surface(
+    hull: Array, within: float, corners: Array, middles: Array, radii: Array, links: Indices,
+    near: Array, other: Array,
+) -> float:  # fmt: skip
+    """Return the distance of the hull of corners (m, 3) from a surface, zero where they overlap.
+
+    Takes `middles` (n, 3); `radii` (n,); `links` (n, 2); `near`, `other` (3,). Gives the distance,
+    or infinity if the surface is not within the given one.
+    """
+    stack, gaps, depth, gap2 = np.empty(DEEPEST, np.int64), np.empty(DEEPEST), 1, np.empty(2)
+    best, found, p, s, middle = within, np.inf, np.empty(3), np.empty(3), np.empty((1, 3))
+    stack[0], gaps[0] = 0, 0.0
+    while depth > 0 and found > 0.0:
+        depth -= 1
+        node = stack[depth]
+        if gaps[depth] > best:
+            continue
+        if links[node, 0] < 0:
+            for t in range(links[node, 1], links[node, 1] - links[node, 0]):
+                away = hull_hull(hull, corners[t], best, p, s)
+                if away <= best and away < found:
+                    best = found = away
+                    near[:], other[:] = p, s
+            continue
+        for side in range(2):
+            child = links[node, side]
+            middle[0] = middles[child]
+            radius = float(radii[child])
+            gap2[side] = hull_hull(hull, middle, best + radius, p, s) - radius
+        far = 0 if gap2[0] > gap2[1] else 1
+        for side in (far, 1 - far):
+            if gap2[side] <= best:
+                stack[depth], gaps[depth] = links[node, side], gap2[side]
+                depth += 1
+    return found
+
+
+@loop()
+def nearest(
+    p: Array, within: float, corners: Array, middles: Array, radii: Array, links: Indices,
+    near: Array,
+) -> int:  # fmt: skip
+    """Fill in the point of a surface nearest to a point, and return its triangle.
+
+    Takes `p`, `near` (3,); `middles` (n, 3); `radii` (n,); `links` (n, 2). Gives the triangle's
+    place in the tree, or -1 if none is within the distance.
+    """
+    stack, gaps, found, depth = np.empty(DEEPEST, np.int64), np.empty(DEEPEST), -1, 1
+    best, at, gap2, weights = within * within, np.empty(3), np.empty(2), np.empty(2)
+    stack[0], gaps[0] = 0, 0.0
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        if gaps[depth] > 0.0 and gaps[depth] * gaps[depth] >= best:
+            continue
+        if links[node, 0] < 0:
+            for t in range(links[node, 1], links[node, 1] - links[node, 0]):
+                square = point_triangle(p, corners[t], at, weights)
+                if square < best:
+                    best, found = square, t
+                    near[:] = at
+            continue
+        for side in range(2):
+            child, square = links[node, side], 0.0
+            for j in range(3):
+                square += (p[j] - middles[child, j]) ** 2
+            gap2[side] = np.sqrt(square) - radii[child]
+        far = 0 if gap2[0] > gap2[1] else 1
+        for side in (far, 1 - far):
+            if gap2[side] <= 0.0 or gap2[side] * gap2[side] < best:
+                stack[depth], gaps[depth] = links[node, side], gap2[side]
+                depth += 1
+    return found
+
+
+@loop()
+def box_surface(
+    h: Array, R: Array, middle: Array, limit: float, corners: Array, middles: Array, radii: Array,
+    links: Indices,
+) -> float:  # fmt: skip
+    """Return the signed distance of a box from a surface, or some number above the limit."""
+    stack, depth, local, T = np.empty(DEEPEST, np.int64), 1, np.empty(3), np.empty((3, 3))
+    best = np.nextafter(limit, np.inf)
+    stack[0] = 0
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        into_frame(R, middle, middles[node], local)
+        if np.sqrt(point_box(local, h)) - radii[node] > max(best, 0.0):
+            continue
+        if links[node, 0] >= 0:
+            stack[depth], stack[depth + 1] = links[node, 0], links[node, 1]
+            depth += 2
+            continue
+        for t in range(links[node, 1], links[node, 1] - links[node, 0]):
+            for k in range(3):
+                into_frame(R, middle, corners[t, k], T[k])
+            best = min(best, box_triangle(h, T, best))
+    return best
+
+
+@loop()
+def windings(p: Array, corners: Array) -> float:
+    """Return how often a surface winds around a point: 1 inside, 0 outside.
+
+    Source: A. Van Oosterom and J. Strackee, The solid angle of a plane triangle, 1983.
+    """
+    total, crossed = 0.0, np.empty(3)
+    for t in range(len(corners)):
+        a, b, c = corners[t, 0] - p, corners[t, 1] - p, corners[t, 2] - p
+        cross(b, c, crossed)
+        la, lb, lc = np.sqrt(dotted(a, a)), np.sqrt(dotted(b, b)), np.sqrt(dotted(c, c))
+        below = la * lb * lc + dotted(a, b) * lc + dotted(b, c) * la + dotted(c, a) * lb
+        total += 2.0 * np.arctan2(dotted(a, crossed), below)
+    return total / (4.0 * np.pi)

@@ -1,0 +1,298 @@
+"""Looks for a pose in which a hand's fingertips touch an object in a grasp, and nothing overlaps.
+
+A hand with four fingers or more stands at all contacts. One with three stands at three of them, and
+only at three that are proved to be in force closure without the fourth. That proof is about the
+planned contacts; where fingertips come to rest in their regions, closure is proved again.
+
+From each start, a hand is moved until its fingertips touch, anywhere in their regions or at the
+contacts themselves, and balls that stand for its parts are clear of the object. Then fingertips are
+laid on the surface itself, and exact distances decide.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices, cross
+from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.compiled import compiled
+from grasp_core.errors import SolverError, UndecidedError
+from grasp_core.frames import POSE, plane_tangents
+from grasp_core.hands.collisions import surface_tree
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand_arrays import Pose, Targets, Wanted, hand_arrays
+from grasp_core.hands.starts import Start, starts
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.solvers.ties import largest_first
+from grasp_core.values import FINGERS, Grasp
+
+NARROW = 1e-4
+"""Least inscribed radius of a region that is aimed at; in smaller ones the contact is [m]."""
+SOFT = 2e-3
+"""How far corners of a block below the farthest count while a pose is sought [m]."""
+SHORT = 1e-9
+"""Length below which an edge of a region is left out [m]."""
+TOUCHING = 1e-5
+"""Largest gap or overlap of a fingertip that counts as touching [m]: a tenth of the overlap that
+simulators and makers of hands allow."""
+MOST_STEPS = 60
+GOOD_MM, ROUGH_MM, FINE_MM = 0.05, 1.0, 1e-6
+"""Distances from touching at which the search for a pose ends, from which fingertips are laid on
+the surface, and at which they lie on a flat one [mm]."""
+MOST_TOUCHES, TOUCH_STEPS = 12, 8
+"""Largest number of planes that a fingertip tries on a curved surface, and of steps to each."""
+SETTLED, RESTING_MM = 1e-9, 1e-9
+"""Change of a distance below which a fingertip rests on a surface [m], and distance from touching
+at which it does [mm]."""
+HARD = 1e-4
+"""How far corners of a block below the farthest still count when fingertips are laid down [m]."""
+ROOM = 0.0015
+"""Distance beyond the one asked for that the search keeps from the object [m]."""
+PULL = 0.03
+MARGIN, LEAST_MARGIN = 5e-4, 1e-4
+"""Distances from the edges of regions that are sought, and kept when fingertips are laid down [m].
+"""
+
+
+def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: float) -> Targets:
+    """Say where fingertips are to touch, finger k at the k-th of the contacts that are used."""
+    normals, own = grasp.normals[used], [grasp.regions[int(contact)] for contact in used]
+    aimed = [regions and each.kind != "point" and each.inscribed_radius > NARROW for each in own]
+    rows = [
+        (finger, *row)
+        for finger, region in enumerate(own)
+        if aimed[finger]
+        for row in _edges(region.polygon, normals[finger])
+    ]
+    return Targets(
+        np.arange(len(used), dtype=np.int64),
+        grasp.positions[used],
+        normals,
+        np.array([plane_tangents(*normal) for normal in normals.tolist()]),
+        np.where(aimed, 0.0, 1.0),
+        np.full((len(used), 3), np.nan),
+        SOFT,
+        np.array([row[0] for row in rows], np.int64),
+        np.array([row[1] for row in rows]).reshape(-1, 3),
+        np.array([row[2] for row in rows]).reshape(-1, 3),
+        np.array(up),
+        height,
+    )
+
+
+def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
+    """Return a point of each edge and the unit vector from it into the convex polygon."""
+    along = np.roll(polygon, -1, axis=0) - polygon
+    kept = np.linalg.norm(along, axis=1) > SHORT
+    starts, inward = polygon[kept], cross(normal, along[kept])
+    sides = np.einsum("ej,ej->e", inward, polygon.mean(axis=0) - starts)
+    inward *= np.copysign(1.0 / np.linalg.norm(inward, axis=1), sides)[:, None]
+    return list(zip(starts, inward, strict=True))
+
+
+def is_within(targets: Targets, contact: int, position: Array, slack: float) -> bool:
+    """Return whether a position is in the region that one finger aimed at."""
+    if targets.pinned[contact] > 0.0:
+        return bool(np.linalg.norm(position - targets.origins[contact]) <= slack)
+    own = targets.edge_contacts == contact
+    inside = np.einsum("ej,ej->e", position - targets.edge_points[own], targets.edge_inward[own])
+    return bool(inside.min(initial=np.inf) >= -slack)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactChoices:
+    """Which of a grasp's contacts may be used, and proofs about those that may not."""
+
+    closed: tuple[tuple[int, ...], ...]
+    """Indices of contacts at which fingers may stand, the best choice first."""
+    open: tuple[ClosureCertificate, ...] = ()
+    """Proofs that contacts are not in force closure, one for each choice that is left out."""
+    undecided: int = 0
+    """Number of choices whose closure could be neither proved nor disproved."""
+
+
+def contact_choices(grasp: Grasp, friction: float, fingers: int) -> ContactChoices:
+    """Choose contacts for the fingers of a hand.
+
+    Gives all contacts, if there is a finger for each. Otherwise the choices of as many contacts as
+    there are fingers which alone are in force closure, the largest margin first; equal ones, by
+    `solvers.ties`, stay in the order of their indices.
+    """
+    if fingers >= FINGERS:
+        return ContactChoices((tuple(range(FINGERS)),))
+    closed = list[tuple[int, ...]]()
+    margins, refuted, undecided = list[float](), list[ClosureCertificate](), 0
+    for chosen in combinations(range(FINGERS), fingers):
+        kept = list(chosen)
+        proof = proved_closure(grasp.positions[kept], grasp.normals[kept], friction)
+        if proof is None:
+            undecided += 1
+        elif proof.closed:
+            closed.append(chosen)
+            margins.append(proof.margin)
+        else:
+            refuted.append(proof)
+    order = largest_first(margins) if margins else []
+    return ContactChoices(tuple(closed[n] for n in order), tuple(refuted), undecided)
+
+
+def proved_closure(points: Array, normals: Array, friction: float) -> ClosureCertificate | None:
+    """Prove that contacts are in force closure, or that they are not; None if neither succeeds."""
+    try:
+        return force_closure(points, normals, friction)
+    except (UndecidedError, SolverError):
+        return None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Asked:
+    """What a pose is sought for."""
+
+    hand: Hand
+    body: Polyhedron
+    grasp: Grasp
+    friction: float
+    up: Array
+    """Unit normal of the table, (3,)."""
+    height: float
+    """Its height along it; minus infinity for none [m]."""
+    clearance: float
+    """Least distance of everything from what it must not touch [m], but for links whose tips touch
+    the object: they must only not overlap it."""
+    regions: bool
+    """Whether contacts may be anywhere in their regions."""
+    seed: int
+    most_starts: int
+    """Largest number of starts for each choice of contacts."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundPose:
+    """A pose in which a hand holds an object."""
+
+    used: Indices
+    """Indices of the grasp's contacts at which fingers stand, (k,)."""
+    fingers: Indices
+    """The finger at each of them, (k,)."""
+    joints: Array
+    """Joint angles, (j,) [rad]."""
+    palm_pose: Array
+    """Pose of the palm in the object's frame, (4, 4)."""
+    certificate: ClosureCertificate
+    """Proof of force closure with the contacts that are reached."""
+    within: tuple[bool, ...]
+    """Whether each contact is in its region, or at the planned contact."""
+    touching: Array
+    """Points of blocks that touch, in the last links' frames, (k, 3) [m]; NaN for balls."""
+    starts: int = 1
+    """Number of starts that were tried."""
+
+
+def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | Counter[str]:
+    """Look for a pose from one start after the other; without one, count how starts ended.
+
+    They end `away` (fingertips do not touch), at a `limit` (the same, with a joint at one), with an
+    overlap (`self`, `object`, `table`), or `open` (no force closure).
+    """
+    tally: Counter[str] = Counter()
+    for chosen in choices:
+        used = np.array(chosen, np.int64)
+        aims = targets(
+            asked.grasp, used, regions=asked.regions, up=asked.up, height=asked.height
+        )  # fmt: skip
+        for start in starts(
+            asked.hand, aims.origins, aims.normals, seed=asked.seed, count=asked.most_starts
+        ):
+            ended = _tried(asked, used, aims._replace(fingers=start.fingers), start)
+            if not isinstance(ended, str):
+                return replace(ended, starts=tally.total() + 1)
+            tally[ended] += 1
+    return tally
+
+
+def _tried(asked: Asked, used: Indices, aims: Targets, start: Start) -> FoundPose | str:
+    """Move the hand from one start; return a pose, or what is in the way."""
+    arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
+    kernel = compiled("grasp_core.hands.pose_kernel")
+    pose: Pose = kernel.empty_pose(arrays, len(used))
+    pose.palm[:], pose.origin[:], pose.q[:] = start.rotation, start.position, start.joints
+    sums = kernel.empty_sums(arrays, aims)
+    room = asked.clearance + ROOM
+    far = Wanted(room, asked.clearance, asked.clearance + ROOM, MARGIN, PULL, True, True)
+    kernel.settle(arrays, tree, aims, far, pose, sums, MOST_STEPS, GOOD_MM)
+    if sums.parts[0] > ROUGH_MM:
+        return _why_away(asked.hand, pose.q)
+    near = far._replace(overlaps=False, margin=LEAST_MARGIN, pull=0.0)
+    laid = _laid(asked, aims, near, pose)
+    if laid is None:
+        return _why_away(asked.hand, pose.q)
+    targets, points = laid
+    if blocked := blocking(asked, pose, start.fingers, asked.clearance):
+        return blocked
+    certificate = proved_closure(points, targets.normals, asked.friction)
+    if certificate is None or not certificate.closed:
+        return "open"
+    palm_pose = np.eye(POSE)
+    palm_pose[:3, :3], palm_pose[:3, 3] = pose.palm, pose.origin
+    return FoundPose(
+        used, start.fingers, pose.q, palm_pose, certificate,
+        _are_within(aims, certificate.positions, MARGIN), targets.touching,
+    )  # fmt: skip
+
+
+def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Targets, Array] | None:
+    """Move a hand that is near until its fingertips rest on the surface itself.
+
+    Which point of a block touches is only known then, so that its region is asked for again.
+
+    Gives the planes that are touched and the contacts, (k, 3); None if fingertips do not rest.
+    """
+    arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
+    kernel = compiled("grasp_core.hands.pose_kernel")
+    laid = aims._replace(
+        origins=np.array(aims.origins), normals=np.array(aims.normals),
+        touching=np.array(aims.touching), soft=HARD,
+    )  # fmt: skip
+    sums, balls = kernel.empty_sums(arrays, aims), len(arrays.tip_corners) == len(arrays.tip_radii)
+    points, off, before, inside = np.empty((len(laid.fingers), 3)), np.inf, np.inf, True
+    for _ in range(MOST_TOUCHES):
+        kernel.settle(arrays, tree, laid, near, pose, sums, TOUCH_STEPS, FINE_MM)
+        before, off = off, kernel.lay(arrays, tree, laid, pose, points)
+        inside = balls or all(_are_within(aims, points, TOUCHING))
+        if inside and (off <= RESTING_MM or abs(before - off) <= SETTLED):
+            break
+    return (laid, points) if inside and off <= TOUCHING else None
+
+
+def _are_within(aims: Targets, points: Array, slack: float) -> tuple[bool, ...]:
+    """Return which contacts are in the regions that fingers aimed at."""
+    return tuple(is_within(aims, k, point, slack) for k, point in enumerate(points))
+
+
+def blocking(asked: Asked, pose: Pose, fingers: Indices | None, clearance: float) -> str:
+    """Return what a placed hand overlaps: `self`, `object`, `table`, or nothing."""
+    arrays, worst = hand_arrays(asked.hand), np.empty(2, np.int64)
+    kernel = compiled("grasp_core.hands.collisions_kernel")
+    needs = np.full(len(arrays.shape_links), clearance)
+    if fingers is not None:
+        needs[np.isin(arrays.shape_links, arrays.starts[fingers + 1] - 1)] = 0.0
+        needs[np.isin(arrays.shape_tips, fingers)] = -TOUCHING
+    turned, middles = pose.turned, pose.middles
+    if kernel.of_itself(arrays, turned, middles, clearance, worst) < clearance:
+        return "self"
+    if asked.height > -np.inf:
+        low = kernel.of_table(arrays, turned, middles, asked.up, asked.height, worst[:1])
+        if low < clearance:
+            return "table"
+    tree = surface_tree(asked.body)
+    if kernel.of_object(arrays, turned, middles, tree, needs, worst[:1]) < 0.0:
+        return "object"
+    return ""
+
+
+def _why_away(hand: Hand, q: Array) -> str:
+    low, high = hand.ranges.T
+    return "limit" if (((q <= low) | (q >= high)) & (low < high)).any() else "away"

@@ -1,1 +1,0 @@
-"""Answers what the numbers of known hands are."""

@@ -1,0 +1,438 @@
+"""Searches for a tree of cuts that refutes a threshold, on all cores, the same tree on any number.
+
+A level of the search refutes one threshold. Its tree is begun by one thread up to a depth; each
+node left there is a part of its own, searched with its own twists. A part is a subtree with the
+memory that compiled code works in, which grows where it is full: a stack of nodes that wait, a tree
+of nodes that were visited, and a pool of twists. A part that has visited many nodes leaves those
+that wait to parts of their own, which begin with its twists. Parts are searched in waves of a fixed
+number. After a wave its newest twists, part by part, join those that parts of the trunk begin with.
+So nothing depends on which thread does what, or when; and numbers are on a grid, so that nothing
+depends on last digits (see `support_cuts`). Inside a level depth comes first: a tree that refutes
+one threshold must visit all of its nodes in any order, and the best node first means here the
+loosest threshold first (see `best_grasp`).
+"""
+
+import math
+import threading
+from collections import deque
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.compiled import compiled
+from grasp_core.optimizing.best.grounds import ROOM, SEARCH_DIGITS, Grounds
+from grasp_core.quality.ferrari_canny import FerrariCanny
+from grasp_core.quality.measures import FERRARI_CANNY, Measure, ResistedLoads, measured_set
+from grasp_core.solvers.ties import on_grid
+from grasp_core.values import FINGERS
+
+Nodes: TypeAlias = tuple[Array, Indices, Indices]
+"""Where fingers may be at each of some nodes, as `first_nodes` returns them: corners (n, 4, p,
+any, 2), how many count (n, 4, p), and which fingers are fresh (n, 4)."""
+NODES = "grasp_core.optimizing.best.search_kernel"
+POOL = 512
+"""Twists that a search keeps: asking is most of its work, and takes as long as there are twists."""
+DEEP, FIRST_ROOM = 24, 256
+"""Nodes that may wait in a part at first, and nodes for which its tree has room: most parts are
+small, and clearing more memory took longer than searching them. Room is doubled where it is full.
+"""
+KERNEL = "grasp_core.optimizing.best.search_kernel"
+CUTS = "grasp_core.optimizing.best.cuts_kernel"
+TWISTS = "grasp_core.optimizing.best.twists_kernel"
+PART_DEPTH = 7
+"""Nodes with several children above a node that becomes a part of its own: a full tree has at least
+128 such parts, four waves of them."""
+PART_NODES = 4000
+"""Nodes after which a part leaves those that wait to parts of their own: some parts have a
+hundred times as many as most, and one thread would search them while others wait."""
+MOST_DEPTH = 10**9
+MOST_NODES = 10**10
+"""Nodes after which a search ends as undivided: a core visits about 1e4 in a second."""
+WAVE = 32
+"""Parts that are searched from the same twists: more threads would find nothing to do, and twists
+that a part finds are of no use to the others of its wave."""
+KEPT = 384
+"""Twists that a wave hands on at most: three quarters of a pool, so that as many of the old ones
+stay."""
+BUDGET = 2000
+"""Nodes after which a thread looks whether it should stop: some tenths of a second."""
+MUCH = 1.1
+"""Ratio of qualities from which on contacts are a better start for other thresholds, where the
+measure is not the usual one and the first contacts may be poor."""
+ASIDE = 1.4
+"""Factor that keeps loads of round sizes away from powers of two."""
+SETTLED = 1.0 - 1e-6
+"""Share of a threshold below which contacts count as refuted."""
+EXACT_GAP = 1e-5
+"""Gap between the bounds of the measure of contacts that may be better: a tenth of the smallest gap
+that a search may be asked for."""
+
+
+class Stop:
+    """Tells threads to stop, after a time or when asked."""
+
+    def __init__(self) -> None:
+        self._event = threading.Event()
+
+    def __call__(self) -> bool:
+        """Return whether to stop."""
+        return self._event.is_set()
+
+    def now(self) -> None:
+        """Stop."""
+        self._event.set()
+
+    def spend(self, nodes: int) -> None:
+        """Take note that a thread has visited so many nodes."""
+
+
+class StopAfter(Stop):
+    """Stops one thread after a number of nodes, which does not depend on the clock."""
+
+    def __init__(self, nodes: int) -> None:
+        super().__init__()
+        self._left = nodes
+
+    def spend(self, nodes: int) -> None:
+        """Count nodes, and stop when there were enough."""
+        self._left -= nodes
+        if self._left <= 0:
+            self.now()
+
+
+@contextmanager
+def stopping(seconds: float | None) -> Generator[Stop]:
+    """Yield what stops a search after a time."""
+    stop = Stop()
+    timer = None if seconds is None else threading.Timer(seconds, stop.now)
+    if timer is not None:
+        timer.daemon = True
+        timer.start()
+    try:
+        yield stop
+    finally:
+        if timer is not None:
+            timer.cancel()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """Contacts whose quality, or multiple of a task's loads, is known."""
+
+    pieces: tuple[int, ...]
+    """The piece of each contact, (4,)."""
+    at: Array
+    """Plane coordinates, (4, 2)."""
+    quality: FerrariCanny | ResistedLoads
+
+    def __post_init__(self) -> None:
+        self.at.setflags(write=False)
+
+
+@dataclass(slots=True, eq=False)
+class Part:
+    """A subtree and the state of its search."""
+
+    stack: Any
+    tree: Any
+    pool: Any
+    found: list[Found] = field(default_factory=list[Found])
+    finished: bool = False
+    left: list[Nodes] = field(default_factory=list[Nodes])
+    """Nodes that are left to parts of their own, in the order of the tree."""
+    parts: list["Part"] = field(default_factory=list["Part"])
+    """These parts, in the same order."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Steps:
+    """The nodes of a tree as `CutTree` lists them."""
+
+    deeds: Indices
+    asked: Indices
+    twists: Array
+    lines: Array
+
+
+def leave(part: Part) -> None:
+    """Leave a part's next node, alone, in as little memory as it takes: thousands may wait."""
+    stack, place = part.stack, int(part.stack.top[0]) - 1
+    counts = stack.counts[place : place + 1].copy()
+    corners = stack.corners[place : place + 1, :, :, : counts.max()].copy()
+    part.left.append((corners, counts, stack.fresh[place : place + 1].copy()))
+    stack.top[0] = place
+
+
+def part_from(first: Nodes, pool: Any) -> Part:
+    """Return a part that begins with nodes and the twists of a pool."""
+    nodes = compiled(NODES)
+    corners, counts, fresh = first
+    deep, pieces = max(DEEP, len(corners) + FINGERS + 1), counts.shape[2]
+    stack = nodes.Stack(
+        np.zeros((deep, FINGERS, pieces, ROOM, 2)),
+        np.zeros((deep, FINGERS, pieces), np.int64),
+        np.zeros((deep, FINGERS), np.int64), np.zeros(deep, np.int64), np.zeros(1, np.int64),
+    )  # fmt: skip
+    n = len(corners)
+    # the last one is searched first
+    stack.corners[:n, :, :, : corners.shape[3]] = corners[::-1]
+    stack.counts[:n], stack.fresh[:n] = counts[::-1], fresh[::-1]
+    stack.top[0] = n
+    tree = nodes.Tree(
+        np.zeros(FIRST_ROOM, np.int64), np.zeros(FIRST_ROOM, np.int64),
+        np.zeros((FIRST_ROOM, 6)), np.zeros((FIRST_ROOM, 3)), np.zeros(3, np.int64),
+    )  # fmt: skip
+    return Part(stack, tree, _copied(pool))
+
+
+def _copied(pool: Any) -> Any:
+    """Return a pool with the same twists, all used before a tree begins, which has named none."""
+    copies = type(pool)(*(array.copy() for array in pool))
+    copies.names[:] = -1
+    copies.used[:] -= copies.used.max() + 1
+    return copies
+
+
+def enlarge(part: Part) -> None:
+    """Make room in what is full of a part's stack and tree; few twists serve many nodes."""
+    stack, tree = part.stack, part.tree
+    if int(stack.top[0]) + FINGERS >= len(stack.depths):
+        part.stack = type(stack)(*map(_doubled, stack[:4]), stack.top)
+    sizes = [int(tree.sizes[k]) for k in (0, 0, 1, 2)]
+    arrays = [
+        _doubled(array) if size + 1 >= len(array) else array
+        for array, size in zip(tree[:4], sizes, strict=True)
+    ]
+    part.tree = type(tree)(*arrays, tree.sizes)
+
+
+def _doubled(array: Any) -> Any:
+    return np.concatenate([array, np.zeros_like(array)])
+
+
+def room() -> Any:
+    """Return the memory in which a node is looked at."""
+    return compiled(NODES).Work(
+        np.zeros((FINGERS, POOL)), np.zeros((FINGERS, POOL)), np.zeros(POOL), np.zeros(POOL),
+        np.zeros(FINGERS), np.zeros((FINGERS, 2)), np.zeros(FINGERS, np.int64),
+        np.full(1, -1),
+    )  # fmt: skip
+
+
+def joined(trunk: Part, parts: Sequence[Part]) -> Steps:
+    """Put the trees of parts into their places in the trunk's tree, and in each other's."""
+    nodes = compiled(NODES)
+    every = [trunk, *parts]
+    sizes = np.array([part.tree.sizes for part in every], dtype=np.int64)
+    starts = np.cumsum(sizes, axis=0) - sizes
+    asked: dict[int, Indices] = {}
+    for part, (n, _, _), (_, twists, lines) in zip(every, sizes, starts, strict=True):
+        shifts = np.where(part.tree.deeds[:n] < int(nodes.BY_PIECES), int(twists), int(lines))
+        asked[id(part)] = np.asarray(part.tree.asked[:n], dtype=np.int64) + shifts
+    rows = list(_in_order(trunk, int(nodes.SPLICE)))
+    return Steps(
+        np.concatenate([part.tree.deeds[some] for part, some in rows]),
+        np.concatenate([asked[id(part)][some] for part, some in rows]),
+        np.concatenate([part.tree.twists[:m] for part, m in zip(every, sizes[:, 1], strict=True)]),
+        np.concatenate([part.tree.lines[:m] for part, m in zip(every, sizes[:, 2], strict=True)]),
+    )
+
+
+def _in_order(trunk: Part, splice: int) -> Iterator[tuple[Part, slice]]:
+    """Yield the nodes of parts in the order of the whole tree: children's trees in their places."""
+    path = [(trunk, 0, 0)]
+    while path:
+        part, start, child = path.pop()
+        deeds = part.tree.deeds[: part.tree.sizes[0]]
+        if child == len(part.parts):
+            yield part, slice(start, len(deeds))
+            continue
+        hole = start + int(np.argmax(deeds[start:] == splice))
+        yield part, slice(start, hole)
+        path += [(part, hole + 1, child + 1), (part.parts[child], 0, 0)]
+
+
+_Waiting: TypeAlias = tuple[Part, Nodes, Any]
+"""A node that waits, with the part that left it and the pool of twists that it begins with."""
+
+
+@dataclass(slots=True, eq=False)
+class Searching:
+    """What levels of a search share: pieces, loads, twists, and whether to stop."""
+
+    grounds: Grounds
+    friction: float
+    jobs: int
+    stop: Stop
+    measure: Measure = FERRARI_CANNY
+    spare: float = 0.0
+    """How far below threshold times demand a support still counts as an answer."""
+    pool: Any = None
+    nodes: int = 0
+    """How many nodes were visited in all levels."""
+
+    def __post_init__(self) -> None:
+        self.pool = self.empty_pool()
+
+    @property
+    def count(self) -> int:
+        """Return the number of pieces."""
+        return len(self.grounds.counts)
+
+    @property
+    def pieces(self) -> Any:
+        """Return the pieces as the kernels take them."""
+        grounds = self.grounds
+        each = (grounds.normals, grounds.origins, grounds.frames)
+        return compiled(CUTS).Pieces(
+            *(on_grid(numbers, SEARCH_DIGITS) for numbers in each), float(self.friction)
+        )
+
+    @property
+    def demand(self) -> Any:
+        """Return the loads as the kernels take them."""
+        kernel = compiled(TWISTS)
+        kinds = {"ferrari-canny": kernel.USUAL, "weight": kernel.WEIGHT, "task": kernel.TASK}
+        scale = math.ldexp(1.0, math.frexp(ASIDE * self.measure.size)[1])
+        loads = scale * on_grid(self.measure.loads / scale, SEARCH_DIGITS)
+        return kernel.Demand(int(kinds[self.measure.name]), loads)
+
+    def empty_pool(self) -> Any:
+        """Return a pool without twists."""
+        return compiled(TWISTS).Pool(
+            np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((self.count, 6, POOL)),
+            np.zeros(POOL, np.int64),
+            np.full(POOL, -1), np.zeros(1, np.int64),
+        )  # fmt: skip
+
+    def learn(self, twists: Array, pool: Any = None, now: int = 0) -> None:
+        """Add twists, (n, 6), to a pool, the common one by default."""
+        pool = self.pool if pool is None else pool
+        for y in twists:
+            compiled(TWISTS).learn(pool, self.pieces, self.demand, np.array(y), now)
+
+    def refute(
+        self, nodes: Nodes, threshold: float, known: float
+    ) -> tuple[Steps | None, list[Found]]:
+        """Try to refute that contacts of the first nodes reach a threshold.
+
+        Gives the tree, or None if it was stopped or contacts reach the threshold; contacts found
+        that surpass what is known.
+        """
+        corners, counts, fresh = nodes
+        trunk = part_from((on_grid(corners, SEARCH_DIGITS), counts, fresh), self.pool)
+        self._search(trunk, threshold, known, PART_DEPTH)
+        wave, parts, better = [trunk], list[Part](), list[Found]()
+        waiting = deque[_Waiting]()
+        with ThreadPoolExecutor(self.jobs) as threads:
+            while True:
+                self.nodes += sum(int(part.tree.sizes[0]) for part in wave)
+                better += [found for part in wave for found in part.found]
+                # a wave ends, as each of its parts leaves all that waits after `PART_NODES`
+                if self.nodes > MOST_NODES or not all(part.finished for part in wave):
+                    return None, better
+                for part in wave:
+                    pool = self.pool if part is trunk else part.pool
+                    waiting += [(part, node, pool) for node in part.left]
+                    part.left, part.pool = [], None
+                if not waiting:
+                    return joined(trunk, parts), better
+                wave = [_next(waiting) for _ in range(min(WAVE, len(waiting)))]
+                self._together(threads, wave, threshold, known)
+                self._hand_on(wave)
+                parts += wave
+
+    def _together(
+        self, threads: ThreadPoolExecutor, wave: Sequence[Part], threshold: float, known: float
+    ) -> None:
+        """Search the parts of a wave; an interrupt stops all of them."""
+        try:
+            for ended in [
+                threads.submit(self._search, part, threshold, known, MOST_DEPTH) for part in wave
+            ]:
+                ended.result()
+        except BaseException:
+            self.stop.now()
+            raise
+
+    def _search(self, part: Part, threshold: float, known: float, depth: int) -> None:
+        """Search a part; nodes at a depth are left, and all that wait after `PART_NODES`."""
+        for why in self._runs(part, threshold, known, depth):
+            if why == compiled(KERNEL).PART:
+                leave(part)
+        part.stack = None  # the memory of a part that is done
+
+    def _runs(self, part: Part, threshold: float, known: float, depth: int) -> Iterator[int]:
+        """Run the kernel until a part is done, and yield why it pauses for the caller."""
+        kernel, nodes, pieces = compiled(KERNEL), compiled(NODES), self.pieces
+        work, demand, found_at = room(), self.demand, -1
+        while not self.stop():
+            search = nodes.Search(
+                pieces, part.stack, part.pool, part.tree, work, threshold, demand, self.spare
+            )
+            before = int(part.tree.sizes[0])
+            why = kernel.run(search, BUDGET, depth if before < PART_NODES else -1)
+            self.stop.spend(int(part.tree.sizes[0]) - before)
+            if why == kernel.DONE:
+                part.finished = True
+                return
+            if why == kernel.LOST:
+                return
+            if why == kernel.FULL:
+                enlarge(part)
+            elif why == kernel.FOUND:
+                if not self._is_refuted(part, work, threshold, known):
+                    return
+                size = int(part.tree.sizes[0])
+                # found again: the twist refutes the contacts by less than rounding
+                if size == found_at and not nodes.divide(search, int(part.stack.top[0]) - 1):
+                    return
+                found_at = size
+            yield why
+
+    def _is_refuted(self, part: Part, work: Any, threshold: float, known: float) -> bool:
+        """Return whether contacts found are below the threshold; learn the twist that shows it."""
+        found = self.measured(work.on, work.middle)
+        if found.quality.lower > known:
+            part.found.append(found)
+            if not self.measure.is_usual and found.quality.lower > MUCH * known:
+                return False
+        if found.quality.upper >= SETTLED * threshold:
+            return False
+        now = int(part.tree.sizes[0])
+        self.learn(on_grid(found.quality.direction[None]), part.pool, now)
+        return True
+
+    def measured(self, on: Indices, at: Array) -> Found:
+        """Bound the measure of contacts on pieces, (4,), at plane coordinates, (4, 2)."""
+        quality = measured_set(self.wrenches(on, at), self.measure, EXACT_GAP)
+        return Found(tuple(int(p) for p in on), np.array(at), quality)
+
+    def wrenches(self, on: Indices, at: Array) -> WrenchSet:
+        """Return the wrenches of contacts on pieces, (4,), at plane coordinates, on a grid."""
+        points = np.array([self.grounds.places(p, y[None])[0] for p, y in zip(on, at, strict=True)])
+        friction = np.full(FINGERS, self.friction)
+        return WrenchSet.at(points, self.grounds.normals[on], friction).on_grid()
+
+    def _hand_on(self, wave: Sequence[Part]) -> None:
+        """Add the newest twists of each part to those that the next wave begins with."""
+        each = max(1, KEPT // len(wave))
+        for part in wave:
+            size = int(part.pool.size[0])
+            newest = np.argsort(-part.pool.used[:size], kind="stable")[:each]
+            old = {y.tobytes() for y in self.pool.twists}
+            fresh = [y for y in part.pool.twists[newest] if y.tobytes() not in old]
+            self.learn(np.array(fresh).reshape(-1, 6), now=part.tree.sizes[0])
+
+
+def _next(waiting: deque[_Waiting]) -> Part:
+    """Make a part of the node that has waited longest, below the part that left it."""
+    above, node, pool = waiting.popleft()
+    above.parts.append(part_from(node, pool))
+    return above.parts[-1]

@@ -1,1 +1,0 @@
-"""What does a depth camera see of an object?"""

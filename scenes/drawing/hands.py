@@ -1,0 +1,366 @@
+"""Shows a hand in the pose in which it stands in a grasp: its shapes, and the view to see it from.
+
+Every part is a convex solid, so that pictures draw it as its outline and the sides that face the
+viewer. Long parts are cut into pieces about as long as they are thick: parts are drawn in the order
+of the depths of their middles, which is the right order for parts of like size.
+
+The sides of a rounded box, all points within a radius of a box, are those of a coarse ball whose
+eight octants are moved apart to the corners of the box. The points of the ball are at equal steps
+of latitude and longitude, and those on the border of two octants occur twice, once for the corner
+on either side: what lies between the two is a side of the box or a part of a round edge. Where the
+box or the radius has no size, sides without area are left out. So the same rule makes boxes,
+capsules and balls.
+
+A hand is several times as large as what it holds, and most views show its back only. So the view
+also may be from below, and the contacts and the object should be seen past palm and fingers.
+"""
+
+import importlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array, Indices, frozen, frozen_indices
+from grasp_core.checked import instance
+from grasp_core.errors import InputError
+from grasp_core.frames import POSE
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand_arrays import hand_arrays
+from grasp_core.hands.kinematics import places
+from grasp_core.hands.reach import with_balls
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.solvers.ties import first_best
+from grasp_core.values import Contact, Grasp
+from scenes.drawing.shapes import Role, Shape
+from scenes.drawing.views import DISTANCE, SAME_MERIT, Alone, View, edge_on, least_gaps, views_at
+
+if TYPE_CHECKING:
+    from grasp_core.hands.reach import HandReach
+
+STEPS = 3
+"""Number of sides along a quarter of a circle."""
+FEWEST_CORNERS = 3
+SAME = 1e-9
+"""Distance below which corners of a box of size 1 are one: far above rounding."""
+Truths: TypeAlias = NDArray[np.bool_]
+"""Array of truths, of any shape."""
+Ends: TypeAlias = tuple[bool, bool, bool]
+"""A truth about each axis of a box."""
+LONG, LEAST = 1.2, 2.5
+"""Length of a piece of a part in thicknesses of the part, but at least so many radii of the hand's
+largest fingertip."""
+MOST_PIECES = 6
+"""Largest number of pieces along one axis of a part."""
+OVERLAP = 0.02
+"""How far a piece reaches into the next one, as a share of its length, so that no gap is seen."""
+NUMBER_BEYOND = 2.9
+"""Distance of a finger's number from its contact, through the middle of the fingertip, in the
+fingertip's radii."""
+ELEVATIONS = (18, 28, 40, 0, -18, -28, -40)
+"""Elevations of the views to choose from [deg]; of equally good ones the first is taken."""
+HIDDEN = 4.0
+"""Fault of a view in which the hand hides all contacts."""
+BEHIND = 1.0
+"""Fault of a view in which the hand hides all of the object's faces that it could show."""
+ALONG = 0.8
+"""Fault of a view along the way from the middle of the hand to the object: fingers look short."""
+EDGE_ON = 0.5
+"""Fault of a view in which all of the object's faces are seen nearly as lines."""
+TINY = 1e-12
+"""Least length of a ray along an axis, so that it may be divided by [m]."""
+INSIDE = 0.9
+"""Share of a part's size within which it hides what is behind it: a fingertip's rim hides no
+contact."""
+
+
+def rounded_box(low: Array, high: Array, radius: float, outer: Truths) -> tuple[Array, ...]:
+    """Make the sides of a rounded box, or of a piece of one that is cut across its axes.
+
+    Takes `low`, `high` (3,) [m]; `radius` [m]; `outer` (2, 3). Gives flat sides in the axes of the
+    box, (k, 3) each [m], corners counter-clockwise as seen from outside.
+    """
+    first, last = _ends(outer[0]), _ends(outer[1])
+    sides = _sides(_ends(high > low), radius > 0.0, first, last)
+    corners = _corners(low, high, radius, first, last)
+    return tuple(corners[side] for side in sides)
+
+
+def _ends(row: Truths) -> Ends:
+    x, y, z = row.tolist()
+    return x, y, z
+
+
+def _corners(low: Array, high: Array, radius: float, first: Ends, last: Ends) -> Array:
+    """Place every point of the ball, (rows * columns, 3) [m]."""
+    ways, upper = _grid()
+    reach = radius * np.where(upper, last, first)
+    return (np.where(upper, high, low) + reach * ways).reshape(-1, 3)
+
+
+@cache
+def _sides(long: Ends, rounded: bool, first: Ends, last: Ends) -> tuple[Indices, ...]:
+    """Return the corners of each side that has an area and is not a cut."""
+    # which corners coincide does not depend on sizes, so that a box of size 1 tells
+    high = np.array(long, dtype=float)
+    corners = _corners(-high, high, float(rounded), first, last)
+    cut = np.zeros(len(corners), dtype=np.int64)  # one bit for each cut that a corner lies in
+    for bit, (end, sign) in enumerate([(first, -1.0), (last, 1.0)]):
+        for axis in range(3):
+            if not end[axis]:
+                on = np.abs(corners[:, axis] - sign * high[axis]) < SAME
+                cut |= on.astype(np.int64) << (3 * bit + axis)
+    sides = list[Indices]()
+    for side in _around():
+        here = corners[side]
+        side = side[np.abs(np.roll(here, -1, axis=0) - here).max(axis=1) > SAME]  # each corner once
+        if len(side) >= FEWEST_CORNERS and not np.bitwise_and.reduce(cut[side]):
+            sides.append(side)
+    return tuple(sides)
+
+
+def _around() -> Iterator[Indices]:
+    """Yield the corners of the sides around the poles, and of those between them."""
+    rows, columns = _grid()[0].shape[:2]
+    places: Indices = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
+    yield places[0]
+    yield places[-1, ::-1]
+    for i, j in product(range(rows - 1), range(columns)):
+        k = (j + 1) % columns
+        yield places[[i, i + 1, i + 1, i], [j, j, k, k]]
+
+
+@cache
+def _grid() -> tuple[Array, Truths]:
+    """Return the points of a ball, from its upper pole to its lower one, and their octants.
+
+    Gives unit vectors, (rows, columns, 3), and whether each belongs to the upper half along each
+    axis, of the same shape.
+    """
+    quarter = np.linspace(0.0, 0.5 * np.pi, STEPS + 1)
+    heights = np.concatenate([quarter[::-1], -quarter])
+    above = np.repeat([1.0, -1.0], STEPS + 1)
+    turns = (0.5 * np.pi * np.arange(4)[:, None] + quarter).ravel()
+    middles = np.repeat(0.5 * np.pi * np.arange(4) + 0.25 * np.pi, STEPS + 1)
+    flat, up = np.cos(heights)[:, None], np.sin(heights)[:, None]
+    ones = np.ones((len(heights), len(turns)))
+    ways = np.stack([flat * np.cos(turns), flat * np.sin(turns), up * ones], axis=-1)
+    signs = np.stack(
+        [np.sign(np.cos(middles)) * ones, np.sign(np.sin(middles)) * ones, above[:, None] * ones],
+        axis=-1,
+    )
+    return ways, signs > 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosedHand:
+    """A hand in a pose in which its fingertips touch an object."""
+
+    hand: Hand
+    joints: Array
+    """Joint angles in the order of `hand.joints`, (j,) [rad]."""
+    palm_pose: Array
+    """Pose of the palm in the object's frame, (4, 4)."""
+    fingers: tuple[int, ...]
+    """The hand's finger at each contact."""
+    contacts: tuple[Contact, ...]
+    """Where these fingers touch."""
+
+    def __post_init__(self) -> None:
+        instance(self.hand, Hand, "hand", "load_hand makes one")
+        used = frozen_indices(self.fingers, (len(self.contacts),), "fingers")
+        object.__setattr__(self, "fingers", tuple(used.tolist()))
+        joints, known = len(self.hand.joints), range(len(self.hand.fingers))
+        object.__setattr__(self, "joints", frozen(self.joints, (joints,), "joints"))
+        object.__setattr__(self, "palm_pose", frozen(self.palm_pose, (POSE, POSE), "palm_pose"))
+        if len(set(self.fingers)) < len(self.fingers) or not set(self.fingers) <= set(known):
+            raise InputError(
+                f"fingers must be different fingers of the hand, numbered from 0 to {known[-1]}, "
+                f"got {list(self.fingers)}"
+            )
+
+    @property
+    def tips(self) -> Array:
+        """Return the middles of the fingertips' balls at the contacts, (contacts, 3) [m]."""
+        hand = with_balls(self.hand, self.joints, self.palm_pose, self.fingers, self.contacts)
+        return places(hand, self.joints, self.palm_pose).tips[0, list(self.fingers)]
+
+    @property
+    def finger_names(self) -> tuple[str, ...]:
+        """Return the name of the hand's finger at each contact."""
+        return tuple(self.hand.fingers[finger].name for finger in self.fingers)
+
+    @property
+    def tip_radii(self) -> Array:
+        """Return the radii of these fingertips, (contacts,) [m]."""
+        return np.array([self.hand.fingers[finger].tip.radius for finger in self.fingers])
+
+    @property
+    def positions(self) -> Array:
+        """Return the places of the contacts, (contacts, 3) [m]."""
+        return np.array([contact.position for contact in self.contacts]).reshape(-1, 3)
+
+
+def posed_hand(hand: Hand, reach: "HandReach", grasp: Grasp) -> PosedHand:
+    """Take the pose from what `reach_with` found."""
+    from grasp_core.hands.reach import HandReach  # drawings without a hand need no search for one
+
+    instance(hand, Hand, "hand", "load_hand makes one")
+    instance(reach, HandReach, "reach", "reach_with finds one")
+    if (reach.hand, reach.grasp) != (hand.name, grasp.id):
+        raise InputError(
+            f"reach must be about the hand {hand.name} and the grasp {grasp.id}, got "
+            f"{reach.hand} and {reach.grasp}"
+        )
+    joints, pose, used, contacts = reach.joints, reach.palm_pose, reach.fingers, reach.contacts
+    if joints is None or pose is None or used is None or contacts is None:
+        raise InputError(f"reach must hold a pose to draw, got none: {reach.explanation}")
+    return PosedHand(hand, joints, pose, tuple(used.tolist()), contacts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandParts:
+    """The rounded boxes of which a hand is made, in the object's frame."""
+
+    middles: Array
+    """Middles of the boxes, (n, 3) [m]."""
+    axes: Array
+    """Columns are the boxes' axes, (n, 3, 3)."""
+    half_sizes: Array
+    """Half the boxes' lengths along these axes, (n, 3) [m]."""
+    radii: Array
+    """Distances from the boxes to the surfaces, (n,) [m]."""
+    contacts: tuple[int | None, ...]
+    """The contact at which a part touches, for the parts that are fingertips."""
+    blocks: tuple[Array | None, ...]
+    """Corners of the parts that are blocks, which the boxes cover, (m, 3) [m]."""
+
+
+def parts_of(held: PosedHand) -> HandParts:
+    """Place the parts of a hand; a tip is its block, its ball, or the capsule that ends in it."""
+    arrays = hand_arrays(held.hand)
+    at = places(held.hand, held.joints, held.palm_pose)
+    R = np.concatenate([at.link_rotations[0], held.palm_pose[None, :3, :3]])  # the palm's is -1
+    p = np.concatenate([at.link_positions[0], held.palm_pose[None, :3, 3]])
+    tips: list[int] = arrays.shape_tips.tolist()
+    own = arrays.tip_shapes.tolist()
+    kept = [n for n, tip in enumerate(tips) if n not in own or tips.count(tip) == 1]
+    links: list[int] = arrays.shape_links[kept].tolist()
+    contact_of = {finger: contact for contact, finger in enumerate(held.fingers)}
+    blocks = list[Array | None]()
+    for n, link in zip(kept, links, strict=True):
+        corners = held.hand.fingers[tips[n]].tip.corners if n in own else None
+        blocks.append(None if corners is None else p[link] + corners @ R[link].T)
+    return HandParts(
+        p[links] + np.einsum("nij,nj->ni", R[links], arrays.shape_positions[kept]),
+        R[links] @ arrays.shape_rotations[kept],
+        arrays.shape_sizes[kept],
+        arrays.shape_radii[kept],
+        tuple(contact_of.get(tips[n]) for n in kept),
+        tuple(blocks),
+    )
+
+
+def hand_shapes(held: PosedHand) -> tuple[Shape, ...]:
+    """Return the shapes of a hand in the object's frame, fingertips in the colours of contacts."""
+    parts, shapes = parts_of(held), list[Shape]()
+    least = LEAST * max(finger.tip.radius for finger in held.hand.fingers)
+    for n, contact in enumerate(parts.contacts):
+        role: Role = "hand" if contact is None else "fingertip"
+        if (corners := parts.blocks[n]) is not None:
+            shapes.append(Shape(role, contact, polygons=_hull(corners)))
+            continue
+        for sides in _pieces(parts.half_sizes[n], float(parts.radii[n]), least):
+            placed = tuple(parts.middles[n] + side @ parts.axes[n].T for side in sides)
+            shapes.append(Shape(role, contact, polygons=placed))
+    return tuple(shapes)
+
+
+def _pieces(half: Array, radius: float, least: float) -> Iterator[tuple[Array, ...]]:
+    """Yield the sides of a rounded box, cut into pieces about as long as the box is thick.
+
+    Takes `half` (3,) [m]; `radius`, `least` [m].
+    """
+    lengths = 2.0 * (half + radius)
+    piece = max(LONG * float(lengths.min()), least)
+    counts = np.clip(np.rint(lengths / piece), 1, MOST_PIECES).astype(int)
+    counts[half == 0.0] = 1
+    steps = 2.0 * half / counts
+    for place in product(*map(range, counts.tolist())):
+        at = np.array(place)
+        outer = np.array([at == 0, at == counts - 1])
+        spare = OVERLAP * steps * ~outer
+        yield rounded_box(
+            -half + steps * at - spare[0], -half + steps * (at + 1) + spare[1], radius, outer
+        )
+
+
+def _hull(corners: Array) -> tuple[Array, ...]:
+    """Return the triangles around points, corners counter-clockwise as seen from outside."""
+    spatial: Any = importlib.import_module("scipy.spatial")
+    found = spatial.ConvexHull(corners)
+    sides: Array = corners[found.simplices]
+    across = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
+    inward = np.einsum("ij,ij->i", across, found.equations[:, :3]) < 0.0
+    sides[inward] = sides[inward, ::-1]
+    return tuple(sides)
+
+
+def numbers_behind(held: PosedHand) -> Array:
+    """Return where the numbers of the fingers are written, behind the tips, (contacts, 3) [m]."""
+    places = held.positions
+    ways = (held.tips - places) / held.tip_radii[:, None]
+    return places + NUMBER_BEYOND * held.tip_radii[:, None] * ways
+
+
+def extent_with(body: Polyhedron, parts: HandParts) -> Alone:
+    """Measure a ball around an object and a hand."""
+    reaches = np.linalg.norm(parts.half_sizes, axis=1) + parts.radii
+    middles = np.vstack([parts.middles, body.vertices])
+    sizes = np.concatenate([reaches, np.zeros(len(body.vertices))])
+    low, high = (middles.T - sizes).min(axis=1), (middles.T + sizes).max(axis=1)
+    center = 0.5 * (low + high)
+    return Alone(center, float((np.linalg.norm(middles - center, axis=1) + sizes).max()))
+
+
+def view_of_hand(body: Polyhedron, held: PosedHand) -> View:
+    """Choose a view in which contacts, object and hand are seen."""
+    parts = parts_of(held)
+    extent = extent_with(body, parts)
+    angles, axes = views_at(ELEVATIONS)
+    cameras = extent.center_of_mass + DISTANCE * extent.radius * axes[:, 2]
+    centroids = np.array([face.centroid for face in body.faces])
+    arms = cameras[:, None] - centroids
+    facing = np.einsum("vfi,fi->vf", arms, body.normals) < 0.0  # normals point into the object
+    behind = _hidden(centroids, cameras, parts) & facing
+    covered = behind.sum(axis=1) / np.maximum(facing.sum(axis=1), 1)
+    hidden = _hidden(held.positions, cameras, parts).mean(axis=1)
+    apart = least_gaps(axes, np.vstack([held.positions, numbers_behind(held)]), extent)
+    merits = apart / body.radius - HIDDEN * hidden - BEHIND * covered
+    way = body.center_of_mass - parts.middles.mean(axis=0)
+    along = np.abs(axes[:, 2] @ way) / max(float(np.linalg.norm(way)), TINY)
+    merits -= EDGE_ON * edge_on(body, axes) + ALONG * along
+    return View.of_angles(*angles[first_best(merits, SAME_MERIT)], extent)
+
+
+def _hidden(points: Array, cameras: Array, parts: HandParts) -> Array:
+    """Tell which points (p, 3) the parts of a hand hide from cameras (v, 3), (v, p).
+
+    A ray is inside a box where it is between the two planes of each pair: from the last entry to
+    the first exit. For a rounded box the box in it is taken, which a contact on it is outside of.
+    """
+    sizes = INSIDE * (parts.half_sizes + parts.radii[:, None] / np.sqrt(3.0))
+    hides = np.zeros((len(cameras), len(points)), dtype=bool)
+    for middle, turned, half in zip(parts.middles, parts.axes, sizes, strict=True):
+        starts = (points - middle) @ turned
+        ways = (cameras - middle) @ turned
+        ways = ways[:, None] - starts
+        ways = np.where(np.abs(ways) < TINY, TINY, ways)
+        one, two = (-half - starts) / ways, (half - starts) / ways
+        enters, leaves = np.minimum(one, two).max(axis=2), np.maximum(one, two).min(axis=2)
+        hides |= leaves > np.maximum(enters, 0.0)
+    return hides

@@ -1,0 +1,313 @@
+"""Exports the grasps of a plan as one file of another program: MoveIt messages or a glTF scene.
+
+`moveit` is YAML, written with PyYAML. `graspable_object` has the fields of a
+grasping_msgs/GraspableObject. A moveit_msgs/Grasp in it is meant for one hand, so the four
+fingertips are taken as one: the hand's frame is parallel to the object's and stands at the mean of
+the contacts, and the joints `fingerI_x`, `fingerI_y` and `fingerI_z` slide the centre of fingertip
+I along its axes. `grasp_posture` has their places where the fingertips touch and balanced efforts
+whose normal parts add up to one newton; `pre_grasp_posture` has their places where the fingers have
+drawn back. The approach and the retreats of a Grasp are those of a whole hand, and have length
+zero. Fields that are left out keep their defaults. Such a message says nothing about points on the
+object: contacts, normals, each finger's approach and the figures of each grasp are under
+`fingertips`.
+
+`gltf` is a binary scene, written with trimesh. Each grasp is a node whose frame is the object's.
+Below it are the object and, for each finger, a node at the contact whose z axis is the inward
+normal, and a rod. Matrices of nodes are text with every digit; vertices are numbers of 32 bits.
+glTF says that lengths are metres and that y points up; the object's axes are kept as they are.
+Figures of a grasp are in its node's `extras`. There the grasps stand on a square grid, so that each
+can be seen: `offset` says where the frame of one grasp is.
+
+Sources:
+    moveit_msgs/msg/Grasp.msg and GripperTranslation.msg (github.com/moveit/moveit_msgs);
+    grasping_msgs/msg/GraspableObject.msg and Object.msg (github.com/mikeferguson/grasping_msgs).
+"""
+
+import importlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeAlias, get_args
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import SMALLEST, instance, number, one_of, path_of
+from grasp_core.errors import InputError
+from grasp_core.files.text_files import write_parts, write_text
+from grasp_core.frames import poses_along
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.result import Plan
+from grasp_core.values import FINGERS, Grasp
+from scenes.drawing import colours
+from scenes.fingertips import fitting_radius
+
+ROD_LENGTH = 0.5
+"""Length of the rods where no free lines were planned, in object radii."""
+SPACING = 2.5
+"""Distance between neighbouring grasps of a grid, in object radii and rod lengths: two of each keep
+them apart, and the rest is for the fingertips."""
+Message = dict[str, Any]
+JOINTS = tuple(f"finger{finger}_{axis}" for finger in range(FINGERS) for axis in "xyz")
+MOTIONS = ("pre_grasp_approach", "post_grasp_retreat", "post_place_retreat")
+HEAD = """\
+# Grasps by four spherical fingertips: metres, newtons, vectors in the frame of the object.
+# graspable_object: a grasping_msgs/GraspableObject for a hand with joints fingerI_x, _y and _z.
+# fingertips: what such messages have no fields for.
+"""
+WIDTH = 120
+"""Number of columns after which lists are broken."""
+SECTIONS = 24
+"""Number of corners of the circles that replace round tips and rods."""
+ROUGHNESS = 0.6
+GraspFormat: TypeAlias = Literal["moveit", "gltf"]
+ENDINGS: Mapping[GraspFormat, tuple[str, ...]] = {"moveit": (".yaml", ".yml"), "gltf": (".glb",)}
+"""Endings of the files that each format is written to."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedGrasp:
+    """One grasp as it is shown: poses are (4, 4) matrices that map to the object's frame."""
+
+    grasp: Grasp
+    offset: Array
+    """Where the object's frame stands in a file with several grasps, (3,) [m]."""
+    contacts: Array
+    """Pose at each contact, (4, 4, 4) [m]: the origin is the contact, z the inward normal."""
+    tip_radius: float
+    """Radius of the fingertips, and of the rods behind them [m]."""
+    rods: Array
+    """Pose of each finger's rod, (4, 4, 4) [m]: the origin is the centre of the tip, and z is the
+    direction in which the finger comes in; the rod lies behind the origin."""
+    rod_length: float
+    """Length of the rods, which is how far fingers draw back before a grasp [m]."""
+    figures: Mapping[str, str | float]
+    """What is known of the grasp, by the names that tables have: see `Plan.to_dataframe`."""
+
+
+def placed_grasps(plan: Plan, fingertip_radius_m: float | None) -> tuple[PlacedGrasp, ...]:
+    """Place every grasp of a plan, in order.
+
+    Takes `fingertip_radius_m` [m].
+    """
+    radius, length = fingertip_radius_m, ROD_LENGTH * plan.body.radius
+    if plan.finger is not None:
+        radius, length = radius or plan.finger.radius_m, plan.finger.approach_m
+    columns = math.ceil(math.sqrt(len(plan)))
+    step = SPACING * (plan.body.radius + length)
+    return tuple(
+        PlacedGrasp(
+            grasp=grasp,
+            offset=step * np.array([place % columns, place // columns, 0.0]),
+            contacts=grasp.contact_frames(),
+            tip_radius=(tip := radius or fitting_radius(plan.body, grasp.positions, grasp.normals)),
+            rods=poses_along(
+                grasp.positions - tip * grasp.normals,
+                grasp.normals if grasp.approach_directions is None else grasp.approach_directions,
+            ),
+            rod_length=length,
+            figures=_figures(plan, grasp),
+        )
+        for place, grasp in enumerate(plan.grasps)
+    )
+
+
+def _figures(plan: Plan, grasp: Grasp) -> Mapping[str, str | float]:
+    lower, upper = grasp.ferrari_canny
+    numbers = {
+        "friction": plan.friction,
+        "critical_friction": grasp.critical_friction,
+        "closure_margin": grasp.closure_margin,
+        "ferrari_canny_lower_n": lower,
+        "ferrari_canny_upper_n": upper,
+        "radius_m": grasp.radius,
+    }
+    # JSON has no infinity, which a critical friction is where none suffices
+    finite = {name: value for name, value in numbers.items() if math.isfinite(value)}
+    return {"id": grasp.id, "family": grasp.family, **finite}
+
+
+def graspable_object(body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> Message:
+    """Return a grasping_msgs/GraspableObject: an object with a moveit_msgs/Grasp for each grasp."""
+    return {"object": _object(body), "grasps": [_grasp(body.name, placed) for placed in grasps]}
+
+
+def _object(body: Polyhedron) -> Message:
+    mesh = {
+        "triangles": [{"vertex_indices": corners} for corners in body.triangles.tolist()],
+        "vertices": [_xyz(vertex) for vertex in body.vertices],
+    }
+    return {
+        "header": {"frame_id": body.name},
+        "name": body.name,
+        "properties": [{"name": "content_sha256", "value": body.content_sha256}],
+        "meshes": [mesh],
+        "mesh_poses": [_pose(np.zeros(3))],
+    }
+
+
+def _grasp(frame: str, placed: PlacedGrasp) -> Message:
+    grasp = placed.grasp
+    hand = grasp.positions.mean(axis=0)
+    touching = placed.rods[:, :3, 3] - hand
+    away = touching - placed.rod_length * placed.rods[:, :3, 2]
+    efforts = {"effort": grasp.witness.forces.ravel().tolist()}
+    return {
+        "id": grasp.id,
+        "pre_grasp_posture": _posture(away, {}),
+        "grasp_posture": _posture(touching, efforts),
+        "grasp_pose": {"header": {"frame_id": frame}, "pose": _pose(hand)},
+        "grasp_quality": grasp.ferrari_canny[0],
+        **{
+            name: {
+                "direction": {"header": {"frame_id": frame}, "vector": _xyz(np.zeros(3))},
+                "desired_distance": 0.0,
+                "min_distance": 0.0,
+            }
+            for name in MOTIONS
+        },
+    }
+
+
+def _posture(centers: Array, more: Message) -> Message:
+    """Return a trajectory_msgs/JointTrajectory of one point, for centres of fingertips (4, 3)."""
+    point = {"positions": centers.ravel().tolist(), **more}
+    return {"joint_names": list(JOINTS), "points": [point]}
+
+
+def _pose(place: Array) -> Message:
+    """Return a geometry_msgs/Pose that is not turned."""
+    return {"position": _xyz(place), "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+
+
+def _xyz(vector: Array) -> Message:
+    x, y, z = vector.tolist()
+    return {"x": x, "y": y, "z": z}
+
+
+def yaml_text(body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> str:
+    """Return the text of a YAML file; equal grasps give equal text."""
+    try:
+        yaml: Any = importlib.import_module("yaml")
+    except ImportError as error:
+        raise InputError(
+            "writing YAML needs PyYAML: run pip install 'graspproof[moveit]' ('.[moveit]' in a "
+            "checkout), or take another format"
+        ) from error
+    document = {
+        "graspable_object": graspable_object(body, grasps),
+        "fingertips": [_fingertips(placed) for placed in grasps],
+    }
+    # meshes make long files, for which PyYAML has a compiled writer on most machines
+    dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+    return HEAD + yaml.dump(
+        document, Dumper=dumper, sort_keys=False, width=WIDTH, default_flow_style=None,
+        allow_unicode=True,
+    )  # fmt: skip
+
+
+def _fingertips(placed: PlacedGrasp) -> Mapping[str, object]:
+    ways = placed.rods[:, :3, 2].tolist()
+    return {
+        **placed.figures,
+        "fingertip_radius_m": placed.tip_radius,
+        "contacts": [
+            {
+                "position_m": contact.position.tolist(),
+                "normal": contact.normal.tolist(),
+                "approach_direction": way,
+            }
+            for contact, way in zip(placed.grasp.contacts, ways, strict=True)
+        ],
+    }
+
+
+def glb(body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> bytes:
+    """Return the bytes of a GLB file; equal grasps give equal bytes."""
+    trimesh: Any = importlib.import_module("trimesh")
+    scene = trimesh.Scene()
+    scene.geometry["object"] = _painted(trimesh, body.to_trimesh(), colours.GLASS)
+    for place, placed in enumerate(grasps):
+        _add_grasp(trimesh, scene, f"grasp_{place}", placed)
+    return scene.export(file_type="glb")
+
+
+def _add_grasp(trimesh: Any, scene: Any, name: str, placed: PlacedGrasp) -> None:
+    here = np.eye(4)
+    here[:3, 3] = placed.offset
+    scene.graph.update(name, matrix=here, metadata=dict(placed.figures))
+    scene.graph.update(f"{name}_object", name, matrix=np.eye(4), geometry="object")
+    for finger, (contact, rod) in enumerate(zip(placed.contacts, placed.rods, strict=True)):
+        tip, bar = _shapes(trimesh, scene, placed, finger)
+        named = f"{name}_finger_{finger}"
+        told = {"position_m": contact[:3, 3], "normal": contact[:3, 2]}
+        scene.graph.update(named, name, matrix=contact, geometry=tip, metadata=told)
+        scene.graph.update(f"{named}_rod", name, matrix=rod, geometry=bar)
+
+
+def _shapes(trimesh: Any, scene: Any, placed: PlacedGrasp, finger: int) -> tuple[str, str]:
+    """Make the shapes of a finger, unless an earlier grasp has the same; return their names."""
+    radius, length = placed.tip_radius, placed.rod_length
+    tip, bar = f"tip_{finger}_{radius!r}", f"rod_{finger}_{radius!r}_{length!r}"
+    if tip not in scene.geometry:
+        ball = trimesh.creation.uv_sphere(radius=radius, count=[SECTIONS // 2, SECTIONS])
+        ball.apply_translation([0.0, 0.0, -radius])  # it touches the origin of the contact's frame
+        scene.geometry[tip] = _painted(trimesh, ball, colours.FINGERS[finger])
+    if bar not in scene.geometry:
+        segment = [[0.0, 0.0, -length], [0.0, 0.0, 0.0]]
+        made = trimesh.creation.cylinder(radius=radius, segment=segment, sections=SECTIONS)
+        scene.geometry[bar] = _painted(trimesh, made, colours.FINGERS[finger])
+    return tip, bar
+
+
+def _painted(trimesh: Any, mesh: Any, colour: str) -> Any:
+    material = trimesh.visual.material.PBRMaterial(
+        name=colour,
+        baseColorFactor=[*colours.rgb(colour), 1.0],
+        metallicFactor=0.0,
+        roughnessFactor=ROUGHNESS,
+    )
+    mesh.visual = trimesh.visual.TextureVisuals(material=material)
+    return mesh
+
+
+def export_grasps(
+    plan: Plan, path: str | Path, to: GraspFormat, *, fingertip_radius_m: float | None = None
+) -> Path:
+    """Write the grasps of a plan for another program, as one file; equal plans give equal bytes.
+
+    `moveit` is YAML with the fields of ROS messages, which needs the extra of that name, and `gltf`
+    a binary glTF scene; docs/exports.md describes them.
+
+    Args:
+        plan: A plan, as `gc.plan` or `gc.load_grasps` returns it; a slice or what `plan.filter`
+            gives has fewer grasps.
+        path: Path of the file; missing folders are made. It ends in yaml or yml, or in glb.
+        to: The format.
+        fingertip_radius_m: Radius of the fingertips, at most that of the object [m]; None takes
+            the planned one, or a tenth of the object's radius, or less where that does not fit.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: A value is refused, the plan has no grasp, or the package that the format needs
+            is not installed.
+        OSError: The file cannot be written.
+    """
+    instance(plan, Plan, "plan", "gc.plan makes plans")
+    path = path_of(path, "path")
+    one_of(to, get_args(GraspFormat), "to")
+    if path.suffix.lower() not in ENDINGS[to]:
+        wanted = " or ".join(ENDINGS[to])
+        raise InputError(f"path must end in {wanted} for the format {to}, got {path.name[-40:]!r}")
+    if fingertip_radius_m is not None:
+        number(fingertip_radius_m, "fingertip_radius_m", least=SMALLEST, most=plan.body.radius,
+               where=", the object's radius in m")  # fmt: skip
+    if not plan.grasps:
+        raise InputError("plan: expected at least one grasp to export, found none")
+    placed = placed_grasps(plan, fingertip_radius_m)
+    if to == "moveit":
+        return write_text(path, yaml_text(plan.body, placed))
+    return write_parts(path, [glb(plan.body, placed)])

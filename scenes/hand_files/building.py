@@ -1,0 +1,286 @@
+"""Puts a hand together of what a model file says, with MuJoCo.
+
+Fingers that have their first links in common get chains of their own: the first finger keeps the
+links, and the others get copies without shapes and masses, whose joints follow those of the first
+finger, so that all move as one link.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.hands.collisions import overlapping_pairs
+from grasp_core.hands.couplings import Coupling
+from grasp_core.hands.hand import PALM, Fingertip, Hand, HandFinger, Joint, Link, LinkShape
+from grasp_core.hands.kinematics import rotation_about
+from scenes.hand_files.couplings import Followers, followers
+from scenes.hand_files.fingers import Chains, TipBall, chains, frames, tip_ball
+from scenes.hand_files.model import HandModel, compiled_hand
+from scenes.hand_files.model_text import model_text
+
+AS_BOXES = "shapes other than boxes, capsules and spheres are taken as their boxes"
+CLOSE_BY = 2
+"""Number of joints between links that may be built into each other, at most."""
+FULL_TURN = np.pi
+"""Largest angle of a joint for which the file states no range [rad]."""
+
+
+def hand_from_file(path: Path, fingertips: tuple[str, ...]) -> Hand:
+    """Make the hand that a file describes."""
+    read, name = model_text(path), str(path)
+    model = compiled_hand(read, name)
+    found = chains(model, fingertips, name)
+    placed = frames(model, found)
+    balls = _balls(model, found, placed, name)
+    shapes = _shapes(model, found, placed, balls)
+    coupled = followers(model, found, name)
+    fingers = [
+        HandFinger(tip.name, _links(model, found, placed, shapes, chain, coupled.ranges), ball)
+        for tip, chain, (ball, _) in zip(found.tips, found.joints, balls, strict=True)
+    ]
+    own = own_chains(fingers, _couplings(model, coupled))
+    palm = tuple(shapes.get(-1, ()))
+    hand = Hand(
+        path.stem, palm, own.fingers, (f"{path.name}; {AS_BOXES}",),
+        f"{path.name}; None where it states none",
+        couplings=own.couplings,
+        notes=(
+            *read.notes, *model.notes, *coupled.notes, *own.notes, *_tips_elsewhere(model, found)
+        ),
+    )  # fmt: skip
+    middle = overlapping_pairs(hand, 0.5 * hand.ranges.sum(axis=1))
+    pairs = _excluded(model, found) | (middle & _close_by(hand, own.originals))
+    return replace(hand, ignored_pairs=tuple(sorted(pairs)))
+
+
+def _tips_elsewhere(model: HandModel, found: Chains) -> tuple[str, ...]:
+    """Say which fingertips are bodies without shapes of their own."""
+    names = [
+        tip.name for tip in found.tips
+        if tip.name not in (model.body_names[tip.body], *model.geom_names, *model.site_names)
+    ]  # fmt: skip
+    if not names:
+        return ()
+    return (f"fingertips without shapes are the nearest shape of their link: {', '.join(names)}",)
+
+
+def _couplings(model: HandModel, coupled: Followers) -> tuple[Coupling, ...]:
+    return tuple(
+        Coupling(_joint_name(model, joint), _joint_name(model, line.root), line.ratio, line.offset)
+        for joint, line in sorted(coupled.lines.items())
+    )
+
+
+def _close_by(hand: Hand, originals: dict[str, str]) -> set[tuple[str, str]]:
+    """Return the names of links that overlap where they are built into each other.
+
+    They are two joints apart at most, in one finger or from the palm. Links of different fingers
+    that meet in the middle of their ranges are not: fingers that close meet there.
+    """
+    pairs = set[tuple[str, str]]()
+    for finger in hand.fingers:
+        chain = [PALM, *(originals.get(link.name, link.name) for link in finger.links)]
+        for apart in range(1, CLOSE_BY + 1):
+            pairs |= {(min(p), max(p)) for p in zip(chain, chain[apart:], strict=False)}
+    return pairs
+
+
+def _balls(
+    model: HandModel, found: Chains, frames: dict[int, tuple[Array, Array]], name: str
+) -> list[tuple[Fingertip, TipBall]]:
+    """Find the fingertips' balls, in the frames of the last links."""
+    balls = list[tuple[Fingertip, TipBall]]()
+    for tip, chain in zip(found.tips, found.joints, strict=True):
+        R, p = model.rotations[tip.body], model.positions[tip.body]
+        turned, origin = frames[chain[-1]]
+        ball = tip_ball(model, tip, R.T @ (origin - p), name)
+        center = turned.T @ (p + R @ ball.center - origin)
+        corners = None if ball.corners is None else (p + ball.corners @ R.T - origin) @ turned
+        balls.append((Fingertip(center, ball.radius, corners, ball.rounding), ball))
+    return balls
+
+
+def _shapes(
+    model: HandModel, found: Chains, frames: dict[int, tuple[Array, Array]],
+    balls: list[tuple[Fingertip, TipBall]],
+) -> dict[int, list[LinkShape]]:  # fmt: skip
+    """Collect the shapes that collide, by the joint that moves them, in the links' frames."""
+    covers = {
+        tip.geom: ball.cover
+        for tip, (_, ball) in zip(found.tips, balls, strict=True)
+        if tip.geom is not None and ball.cover is not None
+    }
+    shapes: dict[int, list[LinkShape]] = {}
+    for g in sorted(range(len(model.geom_kinds)), key=covers.__contains__):  # covers come last
+        body = int(model.raw.geom_bodyid[g])
+        owner, kind = found.owners[body], model.geom_kinds[g]
+        named = any(tip.geom == g for tip in found.tips)
+        if owner not in frames or kind in {"plane", "hfield"}:
+            continue
+        if not (model.geom_bits[g].any() or named):
+            continue
+        shape = covers.get(g) or _shape(model, g)
+        turned, origin = frames[owner]
+        R, p = model.rotations[body], model.positions[body]
+        shapes.setdefault(owner, []).append(
+            LinkShape(
+                turned.T @ (p + R @ shape.position - origin),
+                _squared(turned.T @ R @ shape.rotation),
+                shape.half_sizes, shape.radius,
+            )
+        )  # fmt: skip
+    return shapes
+
+
+def _squared(R: Array) -> Array:
+    """Return the rotation nearest to a matrix that is one but for rounding."""
+    U, _, Vt = np.linalg.svd(R)
+    return U @ Vt
+
+
+def _shape(model: HandModel, g: int) -> LinkShape:
+    """Return a geom's shape in the frame of its body."""
+    kind, size, R = model.geom_kinds[g], model.raw.geom_size[g], _squared(model.geom_rotations[g])
+    if kind in {"sphere", "capsule"}:
+        half = np.array([0.0, 0.0, size[1] if kind == "capsule" else 0.0])
+        return LinkShape(model.raw.geom_pos[g], R, half, float(size[0]))
+    box = model.raw.geom_aabb[g]
+    return LinkShape(model.raw.geom_pos[g] + R @ box[:3], R, box[3:], 0.0)
+
+
+def _links(
+    model: HandModel, found: Chains, frames: dict[int, tuple[Array, Array]],
+    shapes: dict[int, list[LinkShape]], chain: tuple[int, ...],
+    ranges: dict[int, tuple[float, float]],
+) -> tuple[Link, ...]:  # fmt: skip
+    """Make the links of a finger."""
+    links, before = list[Link](), -1
+    for joint in chain:
+        turned, origin = frames[joint]
+        old, start = frames[before]
+        mass, center = _mass(model, found, joint, turned, origin)
+        low, high = model.joint_ranges[joint].tolist()
+        ends = ranges.get(joint, (low, high))
+        links.append(
+            Link(
+                _link_name(model, joint),
+                _joint(model, joint, old.T @ (origin - start), old.T @ turned, ends),
+                tuple(shapes.get(joint, ())),
+                mass,
+                center,
+            )
+        )
+        before = joint
+    return tuple(links)
+
+
+def _link_name(model: HandModel, joint: int) -> str:
+    """Name a link: like its body, or like its joint where the body has several or no name."""
+    body = int(model.raw.jnt_bodyid[joint])
+    shared = int((model.raw.jnt_bodyid == body).sum()) > 1
+    name = model.joint_names[joint] if shared else model.body_names[body]
+    return name if name and name != PALM else f"link{joint}"
+
+
+def _joint_name(model: HandModel, joint: int) -> str:
+    return model.joint_names[joint] or f"joint{joint}"
+
+
+def _joint(
+    model: HandModel, joint: int, position: Array, rotation: Array, ends: tuple[float, float]
+) -> Joint:
+    """Make a joint whose angle zero is the file's zero, not the pose in which the file draws it."""
+    axis = model.raw.jnt_axis[joint]
+    low, high = np.where(np.isnan(ends), (-FULL_TURN, FULL_TURN), ends).tolist()
+    # the frames are those at the reference angle; the same axis turns them to the angle zero
+    back = rotation_about(axis / np.linalg.norm(axis), -float(model.references[joint]))
+    torque = float(model.torques[joint])
+    return Joint(
+        _joint_name(model, joint), position, _squared(rotation @ back),
+        axis / np.linalg.norm(axis), low, high, None if np.isnan(torque) else torque,
+    )  # fmt: skip
+
+
+def _mass(
+    model: HandModel, found: Chains, joint: int, turned: Array, origin: Array
+) -> tuple[float, Array]:
+    """Sum the masses of the bodies that a joint moves, and find their middle in its frame."""
+    bodies = [b for b, owner in enumerate(found.owners) if owner == joint]
+    masses = model.raw.body_mass[bodies]
+    total = float(masses.sum())
+    if total == 0.0:
+        return 0.0, np.zeros(3)
+    places = model.positions[bodies] + np.einsum(
+        "bij,bj->bi", model.rotations[bodies], model.raw.body_ipos[bodies]
+    )
+    return total, turned.T @ (masses @ places / total - origin)
+
+
+def _excluded(model: HandModel, found: Chains) -> set[tuple[str, str]]:
+    """Return the names of links that the file lets overlap."""
+    pairs = set[tuple[str, str]]()
+    for both in model.raw.exclude_signature.tolist():
+        owners = found.owners[int(both) >> 16], found.owners[int(both) & 0xFFFF]
+        if min(owners) >= -1 and owners[0] != owners[1]:
+            named = [PALM if j < 0 else _link_name(model, j) for j in owners]
+            pairs.add((min(named), max(named)))
+    links = sorted({owner for owner in found.owners if owner >= -1})
+    for one, other in combinations(links, 2):
+        if not _may_meet(model, found, one, other):
+            named = [PALM if j < 0 else _link_name(model, j) for j in (one, other)]
+            pairs.add((min(named), max(named)))
+    return pairs
+
+
+def _may_meet(model: HandModel, found: Chains, one: int, other: int) -> bool:
+    """Return whether the bits of any two geoms of two links let them collide."""
+    bits = [
+        model.geom_bits[[found.owners[b] == joint for b in model.raw.geom_bodyid.tolist()]]
+        for joint in (one, other)
+    ]
+    first, second = bits[0][:, None], bits[1][None]
+    return bool(((first[..., 0] & second[..., 1]) | (second[..., 0] & first[..., 1])).any())
+
+
+@dataclass(frozen=True, slots=True)
+class OwnChains:
+    """Fingers with chains of their own."""
+
+    fingers: tuple[HandFinger, ...]
+    couplings: tuple[Coupling, ...]
+    """Couplings that were given, and those of the copies."""
+    originals: dict[str, str]
+    """For the name of each copy, the name of the link that it moves with."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Say which links fingers have in common."""
+        shared = sorted(set(self.originals.values()))
+        return (f"links that fingers have in common: {', '.join(shared)}",) if shared else ()
+
+
+def own_chains(fingers: Sequence[HandFinger], couplings: tuple[Coupling, ...]) -> OwnChains:
+    """Replace links that occur in several fingers by copies in all but the first of them."""
+    leaders = {each.joint: each for each in couplings}
+    seen, originals, kept = set[str](), dict[str, str](), list[HandFinger]()
+    added = list[Coupling]()
+    for finger in fingers:
+        links = list[Link]()
+        for link in finger.links:
+            if link.name not in seen:
+                links.append(link)
+                continue
+            name, joint = (f"{each} of {finger.name}" for each in (link.name, link.joint.name))
+            own = leaders.get(link.joint.name, Coupling(joint, link.joint.name, 1.0))
+            added.append(replace(own, joint=joint))
+            originals[name] = link.name
+            links.append(
+                Link(name, replace(link.joint, name=joint), (), 0.0, np.zeros(3))
+            )  # fmt: skip
+        seen |= {link.name for link in finger.links}
+        kept.append(replace(finger, links=tuple(links)))
+    return OwnChains(tuple(kept), (*couplings, *added), originals)

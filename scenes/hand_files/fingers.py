@@ -1,0 +1,234 @@
+"""Finds the palm, the fingers and the fingertips of a compiled model from the fingertips' names.
+
+The palm is the last body that all fingertips hang on. Each body below it belongs to the link of the
+nearest joint on the way to a fingertip; what hangs on no such way, and what is above the palm,
+stays where the model's reference pose has it, fixed to the link or palm that carries it.
+
+A fingertip that is a site or a sphere is the ball itself. A capsule gives the ball at the end that
+is farther from the last joint. Any other geom is a block: a mesh the hull of its corners, anything
+else its box. A block has sharp edges, so that its corners are given a rounding, by which it is
+larger all around. The ball that stands for it lies in its box, at the end that is farther from the
+last joint.
+"""
+
+import importlib
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import shown
+from grasp_core.errors import InputError
+from grasp_core.hands.collisions import beyond_hull
+from grasp_core.hands.hand import SAME, LinkShape
+from scenes.hand_files.model import HandModel, mesh_points
+
+WORLD = 0
+ACROSS = {0: (1, 2), 1: (0, 2), 2: (0, 1)}
+SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
+ROUNDING = 1e-4
+"""Least rounding of a block [m]."""
+MOST_WAYS = 180
+"""Number of directions in which the corners of a mesh are taken that has more of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tip:
+    """What a name of a fingertip stands for."""
+
+    name: str
+    body: int
+    geom: int | None
+    """Its geom; None for a site."""
+    site: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Chains:
+    """Joints of fingers, and to which link each body is fixed."""
+
+    palm: int
+    """The palm's body."""
+    tips: tuple[Tip, ...]
+    joints: tuple[tuple[int, ...], ...]
+    """For each finger its joints, from the palm outwards; fingers may have the first ones in
+    common."""
+    owners: tuple[int, ...]
+    """For each body, the joint that moves it, -1 for the palm's, -2 where it is no part of it."""
+
+
+def chains(model: HandModel, fingertips: tuple[str, ...], name: str) -> Chains:
+    """Find the palm and the fingers."""
+    tips = tuple(_tip(model, each, name) for each in fingertips)
+    paths = [path_of_body(model, tip.body) for tip in tips]
+    shared = 0
+    while all(len(p) > shared for p in paths) and len({p[shared] for p in paths}) == 1:
+        shared += 1
+    palm = paths[0][shared - 1]
+    found = [tuple(_joints_of(model, body) for body in p[shared:]) for p in paths]
+    joints = tuple(tuple(j for part in parts for j in part) for parts in found)
+    for tip, chain in zip(tips, joints, strict=True):
+        if not chain:
+            raise InputError(
+                f"{name}: no joint moves {tip.name} against the others; name one fingertip for "
+                "each finger"
+            )
+        for joint in chain:
+            if model.joint_kinds[joint] != "hinge":
+                raise InputError(
+                    f"{name}: joint {model.joint_names[joint]} of the finger to {tip.name} must be "
+                    f"a hinge, got {model.joint_kinds[joint]}"
+                )
+    for tip, chain in zip(tips, joints, strict=True):
+        if sum(chain[-1] in other for other in joints) > 1:
+            raise InputError(
+                f"{name}: fingers may share some joints, but must end with one of their own; "
+                f"{model.joint_names[chain[-1]]} moves {tip.name} and another fingertip"
+            )
+    return Chains(palm, tips, joints, _owners(model, palm, {j for each in joints for j in each}))
+
+
+def _tip(model: HandModel, name: str, file: str) -> Tip:
+    """Find what a name stands for: a site, else a geom, else a body."""
+    if name and name in model.site_names:
+        site = model.site_names.index(name)
+        return Tip(name, int(model.raw.site_bodyid[site]), None, site)
+    if name and name in model.geom_names:
+        geom = model.geom_names.index(name)
+        return Tip(name, int(model.raw.geom_bodyid[geom]), geom, None)
+    if name and name in model.body_names:
+        body = model.body_names.index(name)
+        own = [g for g in _solid(model) if model.raw.geom_bodyid[g] == body]
+        balls = [g for g in own if model.geom_kinds[g] in {"sphere", "capsule"}]
+        geom = (balls or own)[-1] if own else _nearest(model, body, name, file)
+        return Tip(name, int(model.raw.geom_bodyid[geom]), geom, None)
+    known = [each for each in (*model.site_names, *model.geom_names, *model.body_names) if each]
+    raise InputError(
+        f"{file}: there is no site, geom or body {shown(name)}; fingertips are named by these, "
+        f"such as {', '.join(known[-12:])}"
+    )
+
+
+def _nearest(model: HandModel, body: int, name: str, file: str) -> int:
+    """Return the geom of a link whose box is nearest to a body of the link that has no geom."""
+    links = _owners(model, WORLD, set(range(len(model.raw.jnt_bodyid))))
+    own = [g for g in _solid(model) if links[int(model.raw.geom_bodyid[g])] == links[body]]
+    if not own:
+        raise InputError(
+            f"{file}: fingertip {shown(name)} and the link that it is on have no shape; give it "
+            "one, such as a sphere of the fingertip's radius"
+        )
+
+    def away(g: int) -> float:
+        R, p = model.rotations[model.raw.geom_bodyid[g]], model.positions[model.raw.geom_bodyid[g]]
+        local = R.T @ (model.positions[body] - p) - model.raw.geom_pos[g]
+        off = np.abs(model.geom_rotations[g].T @ local - model.raw.geom_aabb[g, :3])
+        return float(np.linalg.norm(np.maximum(off - model.raw.geom_aabb[g, 3:], 0.0)))
+
+    return min(own, key=away)
+
+
+def _solid(model: HandModel) -> list[int]:
+    """Return the geoms that collide with anything."""
+    return [
+        g for g, bits in enumerate(model.geom_bits)
+        if bits.any() and model.geom_kinds[g] not in {"plane", "hfield"}
+    ]  # fmt: skip
+
+
+def path_of_body(model: HandModel, body: int) -> list[int]:
+    """Return the bodies from the world to one."""
+    path = [body]
+    while path[-1] != WORLD:
+        path.append(int(model.raw.body_parentid[path[-1]]))
+    return path[::-1]
+
+
+def _joints_of(model: HandModel, body: int) -> tuple[int, ...]:
+    return tuple(int(j) for j in np.flatnonzero(model.raw.jnt_bodyid == body))
+
+
+def _owners(model: HandModel, palm: int, used: set[int]) -> tuple[int, ...]:
+    """Find which joint of a finger moves each body."""
+    found = list[int]()
+    for body in range(len(model.raw.body_parentid)):
+        moving = [j for b in path_of_body(model, body) for j in _joints_of(model, b) if j in used]
+        apart = body == WORLD and palm != WORLD  # the floor is no part of a hand
+        found.append(-2 if apart else moving[-1] if moving else -1)
+    return tuple(found)
+
+
+def frames(model: HandModel, found: Chains) -> dict[int, tuple[Array, Array]]:
+    """Return rotation and position of each link's frame in the world at the reference angles.
+
+    A link's frame stands on its joint's axis, turned like the joint's body; that of -1 is the
+    palm's body.
+    """
+    placed = {-1: (model.rotations[found.palm], model.positions[found.palm])}
+    for joint in (joint for chain in found.joints for joint in chain):
+        body = int(model.raw.jnt_bodyid[joint])
+        R = model.rotations[body]
+        placed[joint] = R, model.positions[body] + R @ model.raw.jnt_pos[joint]
+    return placed
+
+
+@dataclass(frozen=True, slots=True)
+class TipBall:
+    """A fingertip in the frame of its body: its ball, and its block if it is one."""
+
+    center: Array
+    radius: float
+    corners: Array | None = None
+    """Corners of the block, (m, 3) [m]; None for a ball."""
+    rounding: float = 0.0
+    cover: LinkShape | None = None
+    """Box that covers the block, in place of its geom; None to keep the geom."""
+
+
+def tip_ball(model: HandModel, tip: Tip, joint: Array, name: str) -> TipBall:
+    """Find the ball of a fingertip."""
+    if tip.site is not None:
+        radius = float(model.raw.site_size[tip.site, 0])
+        if radius <= 0.0:
+            raise InputError(f"{name}: site {tip.name} must have a size, the ball's radius")
+        return TipBall(model.raw.site_pos[tip.site], radius, None)
+    geom = int(tip.geom or 0)
+    R, kind = model.geom_rotations[geom], model.geom_kinds[geom]
+    if kind == "sphere":
+        return TipBall(model.raw.geom_pos[geom], float(model.raw.geom_size[geom, 0]), None)
+    middle = model.raw.geom_pos[geom] + R @ model.raw.geom_aabb[geom, :3]
+    half = model.raw.geom_aabb[geom, 3:].copy()
+    if kind == "capsule":
+        axis, radius = 2, float(model.raw.geom_size[geom, 0])
+    else:
+        axis = int(np.argmax(np.abs(R.T @ (middle - joint))))
+        radius = float(half[list(ACROSS[axis])].min())
+        half[axis] = max(half[axis], radius)
+    sign = 1.0 if R[:, axis] @ (middle - joint) >= 0.0 else -1.0
+    center = middle + sign * (half[axis] - radius) * R[:, axis]
+    if kind == "capsule":
+        return TipBall(center, radius, None)
+    corners, rounding = _corners(model, geom)
+    low, high = corners.min(axis=0) - rounding, corners.max(axis=0) + rounding
+    cover = LinkShape(
+        model.raw.geom_pos[geom] + R @ (0.5 * (low + high)), R, 0.5 * (high - low) + SAME, 0.0
+    )
+    return TipBall(
+        center, radius, model.raw.geom_pos[geom] + corners @ R.T, rounding, cover
+    )  # fmt: skip
+
+
+def _corners(model: HandModel, geom: int) -> tuple[Array, float]:
+    """Return corners in a geom's frame, (m, 3), whose hull, less a rounding, holds the geom."""
+    box, points = model.raw.geom_aabb[geom], mesh_points(model, geom)
+    if len(points) == 0:
+        return box[:3] + SIGNS * box[3:], ROUNDING
+    spatial: Any = importlib.import_module("scipy.spatial")
+    points = points[spatial.ConvexHull(points, qhull_options="QJ Pp").vertices]
+    if len(points) <= MOST_WAYS:
+        return points, ROUNDING
+    ways = np.random.default_rng(0).normal(size=(MOST_WAYS, 3))
+    kept = points[np.unique(np.argmax(points @ ways.T, axis=0))]
+    return kept, ROUNDING + max(beyond_hull(kept, points))

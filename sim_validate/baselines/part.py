@@ -1,0 +1,423 @@
+"""Carries grasps over to their part as it is now, if its mesh file has changed since planning.
+
+What is tested is the part on the disk, not the one that the file of grasps remembers, so that a
+change does not pass unnoticed. The file counts as unchanged if its bytes are those that were
+planned from, or if it gives the same solid in some unit: comments, line ends and the order of
+vertices do not count. Grasps keep their ids, so that each is compared with its own entry of the
+baseline. Whoever wants every change to be refused says so.
+
+Faces are called by their numbers on the planned part, because ids of grasps are made of these.
+"""
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any, cast
+
+from grasp_core.checked import BOUNDS, number, one_of, positive, switch
+from grasp_core.errors import InputError, MeshError
+from grasp_core.files.json_text import settings_of, shown
+from grasp_core.files.text_files import read_bytes
+from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
+from grasp_core.records.grasps_json import RECORDED, SavedGrasps
+from grasp_core.transferring.changed_part import (
+    fitting_lengths,
+    fitting_unit,
+    load_changed_part,
+)
+from grasp_core.transferring.face_changes import (
+    FaceChange,
+    added_faces,
+    changes_in_words,
+    face_changes,
+)
+from grasp_core.transferring.like_faces import ANGLE_DEG, Likeness, check_planar, likeness
+from grasp_core.transferring.transfer import Transfer, transfer
+from sim_validate.baselines.baseline import Baseline, RecordedPart, recorded_part
+
+NOTE, FAIL = "note", "fail"
+TABLE = "changed_part"
+"""Name of the table of `IfChanged` in a `*.grasps.toml` file."""
+
+
+@dataclass(frozen=True, slots=True)
+class IfChanged:
+    """What to do if a part has changed since its grasps were planned.
+
+    Raises:
+        InputError: A field is out of range.
+    """
+
+    refuse: bool = False
+    """Whether a changed part is refused; otherwise grasps are carried over to it."""
+    missing: str = NOTE
+    """What a missing mesh file means: `note` tests the mesh in the file of grasps and says so,
+    `fail` refuses that."""
+    unit: str | None = None
+    """Unit of length of the mesh file; None for the one in which the part is about as large as it
+    was."""
+    scale: float | None = None
+    """Factor on the coordinates of the mesh file, besides its unit; None for that of the baseline,
+    or 1 without one."""
+    distance_m: float | None = None
+    """Largest distance by which a contact may move [m]; None for a twentieth of the part's radius.
+    """
+    angle_deg: float = ANGLE_DEG
+    """Largest angle between the normals of a face before and after [deg]."""
+
+    def __post_init__(self) -> None:
+        switch(self.refuse, "refuse")
+        one_of(self.missing, (NOTE, FAIL), "missing")
+        if self.unit is not None:
+            one_of(self.unit, UNITS_M, "unit")
+        if self.scale is not None:
+            positive(self.scale, "scale")
+        if self.distance_m is not None:
+            number(self.distance_m, "distance_m", least=0.0)
+        number(self.angle_deg, "angle_deg", **BOUNDS["changed_by_deg"])
+
+    def with_scale(self, recorded: float | None) -> "IfChanged":
+        """Return these settings with the scale that a baseline holds, if none is given."""
+        return replace(self, scale=recorded) if self.scale is None else self
+
+
+CARRY = IfChanged()
+KNOWN = tuple(each.name for each in fields(IfChanged))
+
+
+def if_changed(table: object) -> IfChanged:
+    """Read the table `[changed_part]` of a `*.grasps.toml` file, or the same given by a marker."""
+    if not isinstance(table, Mapping):
+        raise InputError(f"{TABLE}: expected a table of settings, got {shown(table)}")
+    given = {**cast("Mapping[str, Any]", table)}
+    for name in given:
+        if name not in KNOWN:
+            raise InputError(
+                f"{TABLE}: no setting is named {shown(name)}; choose from {', '.join(KNOWN)}"
+            )
+    return settings_of(IfChanged, given, [TABLE])
+
+
+@dataclass(frozen=True, slots=True)
+class Moves:
+    """How the faces of a part moved between two of its shapes."""
+
+    faces: tuple[FaceChange, ...] = ()
+    """What became of each face of the earlier shape; none if both shapes are the same."""
+    added: tuple[int, ...] = ()
+    """Faces of the later shape that succeed no earlier one."""
+    numbers: Mapping[int, int] | None = None
+    """Numbers on the planned part of the earlier shape's faces; None if that is the planned part.
+    """
+    since: str = ""
+    """Since when, such as ` since its baseline was written`; empty for planning."""
+
+    @property
+    def in_words(self) -> str:
+        """Say in one line which faces moved and by how much."""
+        return changes_in_words(self.faces, self.added, self.numbers)
+
+    def touched(self, faces: Iterable[int]) -> str:
+        """Say which of some faces moved, such as `face 3, which moved`; empty if none did."""
+        wanted = {*faces}
+        names = (
+            change.old if self.numbers is None else self.numbers.get(change.old)
+            for change in self.faces
+            if change.moved
+        )
+        moved = sorted(name for name in names if name in wanted)
+        many = "face" if len(moved) == 1 else "faces"
+        return f"{many} {', '.join(map(str, moved))}, which moved" if moved else ""
+
+
+def moves_since_baseline(
+    then: Polyhedron, planned: Polyhedron, now: Polyhedron, rule: Likeness
+) -> Moves:
+    """Compare a part with what it was when its baseline was written."""
+    numbers = {
+        change.new: change.old
+        for change in face_changes(planned, then, rule)
+        if change.new is not None
+    }
+    found = face_changes(then, now, rule)
+    return Moves(found, added_faces(found, now), numbers, " since its baseline was written")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """The mesh file that grasps were planned from, if it was found."""
+
+    file: Path | None = None
+    """Path of the mesh file; None if it was not found, or the grasps come from no file."""
+    note: str = ""
+    """A sentence that says the mesh file was not found; empty otherwise."""
+    changed: bool = False
+    """Whether the file holds another solid than the one that was planned on."""
+    unit: str = ""
+    """Unit in which a file of other bytes holds the same solid; empty where that does not matter.
+    """
+
+
+def source_of(
+    saved: SavedGrasps,
+    grasps: Path,
+    folders: Iterable[Path],
+    named: Path | None = None,
+    scale: float | None = None,
+) -> Source:
+    """Find the mesh file that grasps were planned from.
+
+    Of several files with the object's name, an unchanged one is taken, or else the first.
+    """
+    body = saved.body
+    if body.source_sha256 == body.content_sha256:
+        if named is not None:
+            raise InputError(
+                f"{grasps}: these grasps were not planned from a mesh file, so not from {named}; "
+                "leave `object` out, or plan from the file"
+            )
+        return Source()
+    found = [named] if named is not None else _beside(body.name, [grasps.parent, *folders])
+    for path in found:
+        if hashlib.sha256(read_bytes(path)).hexdigest() == body.source_sha256:
+            return Source(file=path)  # the body was read from these very bytes, whatever their unit
+        if (unit := fitting_exactly(path, body, scale)) is not None:
+            return Source(file=path, unit=unit)
+    if found:
+        return Source(file=found[0], changed=True)
+    return Source(
+        note=f"{grasps}: the mesh that it holds was tested; the file it was planned from, "
+        f"{body.name!r} with some ending, is not beside it (`object` in a *.grasps.toml says where)"
+    )
+
+
+def _beside(name: str, folders: Iterable[Path]) -> list[Path]:
+    """List mesh files with a given name, sorted within each folder that can be read."""
+    found = list[Path]()
+    for folder in {folder.resolve(): folder for folder in folders}.values():
+        with suppress(OSError):
+            found += (path for path in sorted(folder.iterdir()) if path.stem == name)
+    return [path for path in found if path.suffix.lower().lstrip(".") in FORMATS and path.is_file()]
+
+
+def fitting_exactly(path: Path, body: Polyhedron, scale: float | None) -> str | None:
+    """Return the unit in which a file holds the very solid of a body; None if it does in none."""
+    faces = "planar" if body.patches is None else "patches"
+    for unit in UNITS_M:
+        with suppress(MeshError):  # in another unit it may be too large for a solid
+            read = load_polyhedron(
+                path, unit=unit, scale=scale or 1.0, faces=faces, patches=body.patches,
+                limits=RECORDED,
+            )  # fmt: skip
+            if read.content_sha256 == body.content_sha256:
+                return unit
+    return None
+
+
+class ChangedPartError(InputError):
+    """Error for a mesh file that is refused because it has changed, is missing or is curved."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Present:
+    """The grasps of a file on their part as it is now."""
+
+    saved: SavedGrasps
+    """The grasps that can be tested: those of the file, or what became of them on the changed part,
+    with their old ids."""
+    source: Source = field(default_factory=Source)
+    carried: Transfer | None = None
+    """How they were carried over; None where the part is as it was."""
+    unit: str = ""
+    """Unit of length of the changed part's file; empty where the part is as it was."""
+    asked: IfChanged = CARRY
+    """What to do if the part has changed."""
+    recorded_unit: str | None = None
+    """Unit of the mesh file when the baseline was written; None if that is not known."""
+    since: Moves | None = None
+    """How faces moved since the baseline was written on a changed part; None where they are
+    compared with those of the planned part."""
+
+    @property
+    def planned(self) -> Polyhedron:
+        """Return the part that the grasps were planned on."""
+        return self.saved.body if self.carried is None else self.carried.old
+
+    @property
+    def recorded(self) -> RecordedPart | None:
+        """Return what a baseline must keep of the part; None where it is the planned one."""
+        return None if self.carried is None else recorded_part(self.carried.old, self.carried.new)
+
+    @property
+    def gone(self) -> dict[str, str]:
+        """Return why grasps of the file do not exist on the changed part, by id."""
+        found = () if self.carried is None else self.carried.grasps
+        return {each.old.id: each.reason for each in found if each.grasp is None}
+
+    @property
+    def change(self) -> str:
+        """Say which faces moved and by how much; empty where the part is as it was."""
+        if self.source.file is None or not (self.moves.faces or self.rescaled):
+            return ""
+        said = [self.rescaled, self.moves.in_words if self.moves.faces else "no face moved"]
+        return f"{self.source.file} has changed{self.moves.since}: {'; '.join(filter(None, said))}"
+
+    @property
+    def rescaled(self) -> str:
+        """Say that the mesh file is in another unit than the baseline's; empty if it is not."""
+        unit = self.unit or self.source.unit
+        if not (self.recorded_unit and unit) or self.asked.unit or unit == self.recorded_unit:
+            return ""
+        times = UNITS_M[self.recorded_unit] / UNITS_M[unit]
+        return (
+            f"its numbers are {times:.4g} times what they were, so it is taken to be in {unit} now "
+            f"and no longer in {self.recorded_unit} (if it is not, say `unit`)"
+        )
+
+    @property
+    def scale(self) -> float:
+        """Return the factor on the coordinates of the mesh file, besides its unit."""
+        return self.asked.scale or 1.0
+
+    @property
+    def file_lengths(self) -> tuple[str | None, float | None]:
+        """Find the unit and the scale of a mesh file with planar faces, for a baseline.
+
+        Without a file they are None, and so is a scale of 1. A file that fits in no unit was read
+        with a scale that nobody says here: then it is taken to be in metres, times a scale.
+        """
+        file, scale = self.source.file, self.scale
+        if file is None or self.saved.body.patches is not None:
+            return None, None
+        unit = self.unit or self.source.unit or fitting_exactly(file, self.planned, scale)
+        if unit is None:
+            unit, scale = fitting_lengths(file, self.planned, RECORDED)
+        return unit, None if scale == 1.0 else scale
+
+    @property
+    def moves(self) -> Moves:
+        """Return how faces moved, since the baseline where it tells, or else since planning."""
+        if self.since is not None:
+            return self.since
+        return Moves() if self.carried is None else Moves(self.carried.faces, self.carried.added)
+
+    @property
+    def note(self) -> str:
+        """Say what readers must know about the mesh that is tested; empty if nothing."""
+        if not self.change:
+            return self.source.note
+        carried = "" if self.carried is None else "; its grasps were carried over to it"
+        return self.change + carried
+
+    @property
+    def mesh(self) -> Source:
+        """Return the mesh file, with what readers must know about it."""
+        return replace(self.source, note=self.note)
+
+    def id_on_part(self, name: str) -> str | None:
+        """Return the id that a grasp of the file has on the changed part; None if it is gone."""
+        found = () if self.carried is None else self.carried.grasps
+        return next((each.grasp.id for each in found if each.old.id == name and each.grasp), None)
+
+    def planned_faces(self, name: str) -> tuple[int, ...]:
+        """Return the faces of the planned part that a grasp of the file touches."""
+        grasps = self.saved.grasps if self.carried is None else [e.old for e in self.carried.grasps]
+        return next((grasp.faces for grasp in grasps if grasp.id == name), ())
+
+    def first(self, limit: int | None) -> "Present":
+        """Return only the first grasps of the file, up to a limit."""
+        if self.carried is None:
+            return replace(self, saved=replace(self.saved, grasps=self.saved.grasps[:limit]))
+        kept = self.carried.grasps[:limit]
+        return self._with(replace(self.carried, grasps=kept))
+
+    def only(self, name: str) -> "Present":
+        """Return only the grasp with an id; none if the file has no such grasp."""
+        if self.carried is None:
+            one = tuple(grasp for grasp in self.saved.grasps if grasp.id == name)
+            return replace(self, saved=replace(self.saved, grasps=one))
+        kept = tuple(each for each in self.carried.grasps if each.old.id == name)
+        return self._with(replace(self.carried, grasps=kept))
+
+    def _with(self, carried: Transfer) -> "Present":
+        return replace(self, saved=_tested(self.saved, carried), carried=carried)
+
+    def against(self, before: Baseline) -> "Present":
+        """Measure how faces moved from where they were when a baseline was written.
+
+        If the baseline does not hold the part, it was written on the planned one.
+        """
+        planned, part, now = self.planned, before.part, self.saved.body
+        found = replace(self, recorded_unit=before.unit)
+        if part is None or part.planned_sha256 != planned.content_sha256:
+            return found
+        if now.content_sha256 == before.content_sha256:
+            return replace(found, since=Moves())
+        if self.source.file is None or self.asked.refuse:
+            return found
+        rule = likeness(planned, self.asked.distance_m, self.asked.angle_deg)
+        then = part.body(planned.name, before.content_sha256)
+        return replace(found, since=moves_since_baseline(then, planned, now, rule))
+
+
+def present(saved: SavedGrasps, path: Path, source: Source, asked: IfChanged = CARRY) -> Present:
+    """Carry grasps over to their part as it is now; they stay as they are if it has not changed."""
+    if source.note and asked.missing == FAIL:
+        raise ChangedPartError(
+            f"{path}: the mesh file that its grasps were planned from, {saved.body.name!r} with "
+            f'some ending, is missing, and `missing = "{FAIL}"` refuses to test the mesh that '
+            f"{path.name} holds; put the file back, or say with `object` where it is"
+        )
+    if not source.changed or source.file is None:
+        return Present(saved, source, asked=asked)
+    if asked.refuse:
+        raise ChangedPartError(
+            f"{source.file}: this is not the mesh that {path} was planned on, and `refuse = true` "
+            "makes the grasps of a changed part not comparable. Plan on the part again (graspproof "
+            f"plan {source.file} --out ...) and bless (pytest --grasp-bless), or put the former "
+            "file back; if this is another object's file, name the right one with `object`"
+        )
+    unit, carried = _carried(saved, path, source.file, asked)
+    return Present(_tested(saved, carried), source, carried, unit, asked)
+
+
+def _carried(saved: SavedGrasps, path: Path, file: Path, asked: IfChanged) -> tuple[str, Transfer]:
+    """Read the changed part, in the unit that is returned, and carry the grasps over to it."""
+    try:
+        check_planar(saved.body, "the old part")
+        scale = asked.scale or 1.0
+        unit = asked.unit or fitting_unit(file, saved.body, RECORDED, scale=scale)
+        new = load_changed_part(file, saved.body, unit, RECORDED, scale=scale)
+        return unit, transfer(
+            saved.body, new, saved.grasps, saved.friction, distance=asked.distance_m,
+            angle_deg=asked.angle_deg, finger=saved.finger,
+        )  # fmt: skip
+    except InputError as error:
+        said = str(error).removeprefix(f"{file}: ")
+        raise ChangedPartError(
+            f"{file}: this is not the mesh that {path} was planned on, and its grasps cannot be "
+            f"carried over: {said}"
+        ) from error
+
+
+def _tested(saved: SavedGrasps, carried: Transfer) -> SavedGrasps:
+    """Return the carried grasps with their old ids."""
+    grasps = tuple(
+        replace(each.grasp, id=each.old.id) for each in carried.grasps if each.grasp is not None
+    )
+    return replace(saved, body=carried.new, grasps=grasps)
+
+
+def testable(now: Present, limit: int | None) -> SavedGrasps:
+    """Return the grasps that a new baseline is about."""
+    first = now.first(limit)
+    if first.gone and not first.saved.grasps:
+        name, why = next(iter(first.gone.items()))
+        raise ChangedPartError(
+            f"{now.change}; none of its {len(first.gone)} grasps exists on it, so there is nothing "
+            f"to record ({name}: {why}); plan on it again"
+        )
+    return first.saved

@@ -1,0 +1,229 @@
+"""Reads a `*.grasps.toml` file: which grasps must stay as stable as their baseline says.
+
+The file names the grasps, the baseline and settings.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from grasp_core.errors import InputError, about
+from grasp_core.files.json_text import place, shown
+from grasp_core.records.grasps_json import SavedGrasps
+from sim_validate.baselines.baseline import Baseline, check_writable, read_baseline, write_baseline
+from sim_validate.baselines.check import (
+    Checked,
+    check_one,
+    complete,
+    demanded,
+    measured,
+    seen_from,
+    silent,
+    with_planned_fingers,
+)
+from sim_validate.baselines.part import (
+    CARRY,
+    IfChanged,
+    Present,
+    Source,
+    if_changed,
+    present,
+    source_of,
+    testable,
+)
+from sim_validate.baselines.part import TABLE as CHANGED
+from sim_validate.baselines.settings import How, noise_from_table, of_settings, setup_for
+from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution
+from sim_validate.files.toml_tables import read_tables
+from sim_validate.records.grasps import read_grasps
+from sim_validate.records.wrenches import wrenches_from_file
+from sim_validate.simulation.setup import Agenda, Noise
+
+ENDING = ".grasps.toml"
+KINDS: Mapping[str, type] = {
+    "grasps": str, "object": str, "baseline": str, "strict": bool, "setup": str, "wrenches": str,
+    "limits": str, "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
+    "survives": bool, "execution": dict, "changed_part": dict,
+}  # fmt: skip
+"""Types of the file's settings, by name."""
+WORDS = {str: "text", bool: "true or false", int: "a whole number", dict: "a table"}
+PATHS = ("grasps", "object", "baseline", "setup", "wrenches")
+DIRECT = ("limits", "random_wrenches", "trials", "seed")
+"""Settings of trials that the file gives by the same name as an agenda has."""
+
+
+@dataclass(frozen=True)
+class Suite:
+    """Grasps that must stay as stable as they were; a setting of None is the baseline's."""
+
+    path: Path
+    """Path of the `*.grasps.toml` file itself."""
+    grasps: Path
+    """Path of the grasps.json."""
+    baseline: Path
+    object: Path | None = None
+    """The mesh file that the grasps were planned from; None to search beside them for the object's
+    name."""
+    strict: bool = False
+    """Whether improved grasps fail, too."""
+    setup: Path | None = None
+    """TOML file of simulation settings."""
+    wrenches: Path | None = None
+    """JSON file of wrenches that each grasp must hold in full."""
+    limits: str | None = None
+    """How the largest multiple of each wrench is found in simulation."""
+    random_wrenches: int | None = None
+    trials: int | None = None
+    """Number of repeats with noise."""
+    noise: Noise | None = None
+    seed: int | None = None
+    survives: bool = False
+    """Whether each grasp must survive its execution, whatever the baseline says."""
+    execution: AskedExecution | None = None
+    """How grasps are executed besides."""
+    changed_part: IfChanged = CARRY
+    """What to do if the part has changed since the grasps were planned."""
+
+    @cached_property
+    def saved(self) -> SavedGrasps:
+        """Read the grasps that the suite is about."""
+        return read_grasps(self.grasps)
+
+    @cached_property
+    def source(self) -> Source:
+        """Find the mesh file that the grasps were planned from."""
+        folders = [self.path.parent]
+        return source_of(self.saved, self.grasps, folders, self.object, self.asked.scale)
+
+    @cached_property
+    def asked(self) -> IfChanged:
+        """Return what to do if the part has changed, with the scale of the baseline if it has one.
+
+        A baseline that is refused is no reason to stop here, as it may be about to be replaced.
+        """
+        try:
+            recorded = self.kept.scale
+        except InputError:
+            recorded = None
+        return self.changed_part.with_scale(recorded)
+
+    @cached_property
+    def present(self) -> Present:
+        """Carry the grasps over to their part as it is now."""
+        return present(self.saved, self.grasps, self.source, self.asked)
+
+    @cached_property
+    def compared(self) -> Present:
+        """Return the grasps on their part as it is now, compared with the part of the baseline."""
+        return self.present.against(self.kept)
+
+    @cached_property
+    def kept(self) -> Baseline:
+        """Read the baseline of the suite."""
+        if not self.baseline.is_file():
+            raise InputError(
+                f"{self.baseline}: this baseline does not exist yet; write it with pytest "
+                "--grasp-bless"
+            )
+        return read_baseline(self.baseline)
+
+    @property
+    def ids(self) -> list[str]:
+        """List the ids of all grasps that are in the file or in the baseline."""
+        kept = self.kept if self.baseline.is_file() else None
+        ours = {grasp.id for grasp in self.saved.grasps[: kept and kept.limit]}
+        return sorted(ours if kept is None else ours | {entry.id for entry in kept.entries})
+
+    @property
+    def where(self) -> str:
+        """Path of the file of grasps, relative to the baseline's folder."""
+        return seen_from(self.baseline, self.grasps)
+
+    def tested(self, name: str) -> Checked:
+        """Simulate one grasp again, and compare the result with the baseline."""
+        now, before = self.compared, self.kept
+        done = check_one(before, now, self.where, self._how(before), name)
+        return demanded(done) if self.survives else done
+
+    def bless(self) -> Baseline:
+        """Simulate all grasps and write the results as the new baseline."""
+        now = self.present
+        check_writable(self.baseline)
+        before = self._kept_if_any()
+        how = self._how(before)
+        if before is not None:
+            how = with_planned_fingers(how, before, now.saved)
+        limit = before and before.limit
+        done = measured(testable(now, limit), (self.where, limit), how, 1, silent)
+        found = complete(done, now)
+        write_baseline(self.baseline, found)
+        return found
+
+    def _kept_if_any(self) -> Baseline | None:
+        """Read the baseline that will be overwritten, if it exists."""
+        try:
+            return self.kept if self.baseline.is_file() else None
+        except InputError as error:
+            raise InputError(
+                f"{error}; remove the file, then write a new baseline with pytest --grasp-bless"
+            ) from error
+
+    def _how(self, before: Baseline | None) -> How:
+        """Take the baseline's settings, or the default ones, replaced by those of the file."""
+        if before is None:
+            how = How(setup_for(self.saved, None), Agenda(seed=self.saved.seed))
+        else:
+            how = of_settings(before.settings, str(self.baseline))
+        setup = how.setup if self.setup is None else setup_for(self.saved, self.setup)
+        execution = how.execution if self.execution is None else self.execution
+        if self.survives and execution is None:
+            raise InputError(
+                f"{self.path}: survives: expected a table [{TABLE}] too, with mass_kg or "
+                "density_kg_m3, but the file has none"
+            )
+        given: dict[str, Any] = {name: getattr(self, name) for name in (*DIRECT, "noise")}
+        if self.wrenches is not None:
+            given["wrenches"] = wrenches_from_file(self.wrenches)
+        asked = {name: value for name, value in given.items() if value is not None}
+        with about(self.path):
+            return How(setup, replace(how.agenda, **asked), execution)
+
+
+def suite_from_toml(path: Path) -> Suite:
+    """Read a `*.grasps.toml` file; paths in it are relative to its folder."""
+    return suite_from_tables(read_tables(path), path)
+
+
+def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
+    """Build a suite from the settings of a `*.grasps.toml` file."""
+    _check(given, path)
+    usual = path.name.removesuffix(ENDING) + ".baseline.json"
+    settings: dict[str, Any] = {"baseline": usual, **given}
+    for name in PATHS:
+        if name in settings:
+            settings[name] = path.parent / settings[name]
+    tables = {"noise": noise_from_table, TABLE: asked_execution, CHANGED: if_changed}
+    with about(path):
+        for name, read in tables.items():
+            if name in settings:
+                settings[name] = read(settings[name])
+    return Suite(path=path, **settings)
+
+
+def _check(given: Mapping[str, Any], path: Path) -> None:
+    for name, value in given.items():
+        kind = KINDS.get(name)
+        if kind is None:
+            raise InputError(
+                f"{path}: {place([name])}: no such setting; there are {', '.join(KINDS)}"
+            )
+        if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+            raise InputError(f"{path}: {name}: expected {WORDS[kind]}, got {shown(value)}")
+        if name in PATHS and not str(value).isprintable():
+            raise InputError(f"{path}: {name}: expected the path of a file, got {shown(value)}")
+        if kind is int and value < 0:
+            raise InputError(f"{path}: {name}: expected 0 or more, got {value}")
+    if "grasps" not in given:
+        raise InputError(f"{path}: grasps: expected the path of a grasps.json")

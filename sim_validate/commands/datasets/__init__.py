@@ -1,1 +1,0 @@
-"""Runs the commands that show what datasets hold."""

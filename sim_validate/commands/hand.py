@@ -1,0 +1,144 @@
+"""Runs the command `hand`, which shows what a hand was read as."""
+
+import math
+from typing import Any
+
+from grasp_core.by_value import counted
+from grasp_core.hands.couplings import Coupling
+from grasp_core.hands.hand import Hand, HandFinger
+from grasp_core.hands.named_hands import HANDS
+from scenes.hand_files.loading import load_hand
+from sim_validate.cli import hand_flags
+from sim_validate.cli.console import Reporter
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.records.hand_model import couplings_record
+
+MM = 1e3
+NONE_STATED = "none stated"
+SMALL_RANGE = math.radians(10.0)
+"""Fingers whose joints all turn by less hardly open [rad]."""
+SHAPES_WEIGH = "MuJoCo gives links without inertia in the file that of their shapes at 1,000 kg/m^3"
+IN_DEGREES = """MJCF counts angles in degrees unless it has <compiler angle="radian"/>"""
+
+
+def asked_hand(command: hand_flags.Hand | hand_flags.Reach) -> Hand:
+    """Load the hand that a command names."""
+    names = (name.strip() for name in command.fingertips.split(","))
+    return load_hand(command.hand, [name for name in names if name])
+
+
+def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
+    """Show fingers, joints and fingertips of a hand."""
+    hand = asked_hand(command)
+    reporter.document(hand_facts(hand))
+    fingers = [
+        (f.name, str(len(f.links)), f"{MM * f.tip.radius:.1f}", _kind(f), str(_shapes(f)))
+        for f in hand.fingers
+    ]
+    reporter.table(
+        f"fingers of {hand.name}", ("fingertip", "joints", "radius mm", "kind", "shapes"), fingers
+    )
+    columns = ("joint", "fingertip", "range deg", "torque limit N m")
+    reporter.table("joints, from the palm outwards", columns, _joints(hand))
+    reporter.say(f"The palm has {counted(len(hand.palm), 'shape')} that must touch nothing.")
+    if hand.ignored_pairs:
+        listed = ", ".join(" and ".join(pair) for pair in hand.ignored_pairs)
+        reporter.say(f"Links that may overlap, besides neighbours: {listed}.")
+    if hand.couplings:
+        reporter.say(f"Joints that follow others: {', '.join(map(_follows, hand.couplings))}.")
+    reporter.say(f"Torque limits: {hand.torque_source}.")
+    for line in (_weight(hand), _small_ranges(hand)):
+        if line:
+            reporter.say(line)
+    for note in hand.notes:
+        reporter.say(f"Note: {note}.")
+    for source in hand.sources:
+        reporter.say(f"Source: {source}.")
+    return Exit.GOOD
+
+
+def _weight(hand: Hand) -> str:
+    """Say what the links weigh and where their masses come from; nothing if it is unknown."""
+    masses = [link.mass_kg for link in hand.links]
+    stated = [mass for mass in masses if mass is not None]
+    if len(stated) < len(masses):
+        return "Masses of links: unknown; without them gravity does not load the motors."
+    said = f"The links of the fingers weigh {1e3 * sum(stated):.3g} g together"
+    return said + ("." if hand.name in HANDS else f"; {SHAPES_WEIGH}.")
+
+
+def _small_ranges(hand: Hand) -> str:
+    """Say what may be wrong where no joint turns as far as joints of hands do; else nothing."""
+    joints = hand.joints
+    if any(joint.highest - joint.lowest >= SMALL_RANGE for joint in joints):
+        return ""
+    degrees = math.degrees(SMALL_RANGE)
+    return f"Every joint turns by less than {degrees:g} degrees: {IN_DEGREES}."
+
+
+def _kind(finger: HandFinger) -> str:
+    """Say what a fingertip is: a block has a ball only in simulation."""
+    return "ball" if finger.tip.corners is None else f"block of {len(finger.tip.corners)} corners"
+
+
+def _shapes(finger: HandFinger) -> int:
+    return sum(len(link.shapes) for link in finger.links)
+
+
+def _joints(hand: Hand) -> list[tuple[str, ...]]:
+    """Return the cells of a table with one row for each joint."""
+    links = [(finger, link) for finger in hand.fingers for link in finger.links]
+    return [
+        (
+            link.joint.name,
+            finger.name,
+            f"{math.degrees(lowest):.1f} to {math.degrees(highest):.1f}",
+            _torque(link.joint.torque_limit_n_m),
+        )
+        for (finger, link), (lowest, highest) in zip(links, hand.ranges.tolist(), strict=True)
+    ]
+
+
+def _follows(coupling: Coupling) -> str:
+    """Write a coupling as a formula, angles in degrees."""
+    said = f"{coupling.joint} = {coupling.ratio:g} {coupling.driver}"
+    offset = math.degrees(coupling.offset)
+    return f"{said} {'-' if offset < 0.0 else '+'} {abs(offset):.4g} deg" if offset else said
+
+
+def _torque(limit: float | None) -> str:
+    return NONE_STATED if limit is None else f"{limit:g}"
+
+
+def hand_facts(hand: Hand) -> dict[str, Any]:
+    """Return what a hand was read as, for JSON, with units in the keys."""
+    return {
+        "name": hand.name,
+        "fingers": [
+            {
+                "fingertip": finger.name,
+                "tip_radius_m": finger.tip.radius,
+                "tip_center_m": finger.tip.center.tolist(),
+                "tip_corners": 0 if finger.tip.corners is None else len(finger.tip.corners),
+                "joints": [
+                    {
+                        "name": link.joint.name,
+                        "link": link.name,
+                        "lowest_rad": link.joint.lowest,
+                        "highest_rad": link.joint.highest,
+                        "torque_limit_n_m": link.joint.torque_limit_n_m,
+                        "mass_kg": link.mass_kg,
+                        "shapes": len(link.shapes),
+                    }
+                    for link in finger.links
+                ],
+            }
+            for finger in hand.fingers
+        ],
+        "palm_shapes": len(hand.palm),
+        "may_overlap": [list(pair) for pair in hand.ignored_pairs],
+        "couplings": couplings_record(hand),
+        "notes": list(hand.notes),
+        "torque_source": hand.torque_source,
+        "sources": list(hand.sources),
+    }

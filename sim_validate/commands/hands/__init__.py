@@ -1,1 +1,0 @@
-"""Runs the commands about hands; each module has a command's name."""

@@ -1,0 +1,111 @@
+"""Judges grasps, or hands in them, by published tests, and shows and writes the judgements."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from grasp_core.files.text_files import write_text
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.reach import HandReach
+from grasp_core.records.grasps_json import SavedGrasps
+from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.files.result_folders import JUDGEMENTS, remove_judgements
+from sim_validate.protocols.judgements_json import judgements_summary, judgements_to_json
+from sim_validate.protocols.judging import GraspCase, HandCase, Judgement, judged
+from sim_validate.simulation.setup import Setup
+
+COLUMNS = ("grasp", "test", "theirs", "ours", "margin", "moved mm", "deg")
+TOTALS = ("test", "grasps", "theirs passed", "ours held", "predicted", "theirs as ours")
+
+
+def judge_grasps(
+    saved: SavedGrasps, names: Sequence[str], setup: Setup, *, jobs: int, folder: Path | None,
+    reporter: Reporter,
+) -> tuple[Exit, str]:  # fmt: skip
+    """Judge the grasps of a file by tests with four fingertips.
+
+    Gives the exit code, and the text of judgements.json.
+    """
+    cases = [
+        GraspCase(name, saved.body, grasp, saved.friction, setup)
+        for name in names
+        for grasp in saved.grasps
+    ]
+    return _judged(saved, cases, jobs, folder, reporter)
+
+
+def judge_hands(
+    saved: SavedGrasps, hand: Hand, found: Sequence[HandReach], names: Sequence[str], *,
+    jobs: int, folder: Path | None, reporter: Reporter,
+) -> tuple[Exit, str]:  # fmt: skip
+    """Judge the poses of a hand in the grasps of a file by tests.
+
+    Gives the exit code, and the text of judgements.json.
+    """
+    cases = [
+        HandCase(name, hand, saved.body, each, saved.friction)
+        for name in names
+        for each in found
+        if each.reached
+    ]
+    return _judged(saved, cases, jobs, folder, reporter)
+
+
+def _judged(
+    saved: SavedGrasps, cases: Sequence[GraspCase | HandCase], jobs: int, folder: Path | None,
+    reporter: Reporter,
+) -> tuple[Exit, str]:  # fmt: skip
+    """Judge all cases, and write what is done even if the run is interrupted."""
+    if folder:
+        remove_judgements(folder)
+    done: list[Judgement] = []
+    try:
+        with reporter.progress("judging") as steps:
+            for each in judged(cases, jobs):
+                done.append(each)
+                passed = sum(one.theirs for one in done)
+                steps.update(len(done), len(cases), f"({passed} passed)")
+    finally:
+        complete = len(done) == len(cases)
+        text = judgements_to_json(saved.body, saved.friction, done, complete=complete)
+        if folder and done:
+            path = write_text(folder / JUDGEMENTS, text)
+            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+    show_judgements(done, reporter)
+    return (Exit.GOOD if all(each.good for each in done) else Exit.NEGATIVE), text
+
+
+def show_judgements(judgements: Sequence[Judgement], reporter: Reporter) -> None:
+    """Show their verdicts, ours and the predicted margins, and how often they agree."""
+    if not judgements:
+        return
+    rows = [_row(each) for each in judgements[:TABLE_ROWS]]
+    reporter.table("judged by published tests", COLUMNS, rows)
+    say_cut(len(judgements), reporter)
+    totals = [
+        (name, *map(str, counts.values()))
+        for name, counts in judgements_summary(judgements).items()
+    ]
+    reporter.table("in all", TOTALS, totals)
+    for each in judgements[:TABLE_ROWS]:
+        for told in _surprises(each):
+            reporter.warn(f"{each.grasp}: {each.protocol.name}: {told}")
+
+
+def _row(each: Judgement) -> tuple[str, ...]:
+    moved = max((run.displacement_m for run in each.runs), default=0.0)
+    turned = max((run.turn_deg for run in each.runs), default=0.0)
+    margin = "no load" if math.isinf(each.ours.margin) else f"{each.ours.margin:.3g}"
+    theirs = "passed" if each.theirs else "failed"
+    return (
+        each.grasp, each.protocol.name, theirs, "held" if each.ours.held else "not held", margin,
+        f"{1e3 * moved:.2g}", f"{turned:.2g}",
+    )  # fmt: skip
+
+
+def _surprises(each: Judgement) -> list[str]:
+    """Return why a test was not passed, and why our trials did not hold."""
+    failed = [run for run in each.runs if not run.passed]
+    found = [] if each.theirs or not failed else [f"run {failed[0].number}: {failed[0].reason}"]
+    return found if each.ours.held else [*found, f"ours: {each.ours.reason}"]

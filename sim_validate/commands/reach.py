@@ -1,0 +1,356 @@
+"""Runs the command `reach`, which looks for poses in which a hand stands in grasps.
+
+Where it is asked to, the hand then holds test wrenches and executes the grasps in simulation, and
+poses are written as records of DexGraspBench.
+"""
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from grasp_core.by_value import counted
+from grasp_core.errors import InputError, SolverError
+from grasp_core.execution.carried_mass import HandPayload
+from grasp_core.files.text_files import write_text
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand_motors import hand_payload
+from grasp_core.hands.reach import HandReach, uncoupled
+from grasp_core.objects.polyhedron import Polyhedron, is_convex
+from grasp_core.records.grasps_json import SavedGrasps
+from sim_validate.cli import hand_flags
+from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.cli.flag_bounds import FlagsError
+from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
+from sim_validate.commands.hand import asked_hand
+from sim_validate.commands.judging import judge_hands
+from sim_validate.dexgraspbench import dex_record, write_dex_object, write_dex_record
+from sim_validate.execution.verdict import Execution, held_controls_in_words, loss_in_words
+from sim_validate.files.result_folders import REACHES, alone_in, remove_reaches
+from sim_validate.hands.execute_hand import (
+    ExecutedHand,
+    HandJob,
+    executed_by_hands,
+    hand_execution_settings,
+    held_by_hands,
+)
+from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict
+from sim_validate.parallel.compiling import REACHING, compile_loops, must_compile
+from sim_validate.parallel.reaching import ReachJob, reached
+from sim_validate.records.grasps import grasp_with_id
+from sim_validate.records.reaches import AskedRecord, HandTrials, reaches_summary, reaches_to_json
+from sim_validate.reports.run_folder import GRASPS
+
+ABSENT = "-"
+GIVEN = "given on the command line"
+PAYLOAD = "payload kg"
+HELD_COLUMNS = ("grasp", "weakest wrench N", "held", "controls let go")
+EXECUTED_COLUMNS = ("grasp", "survived", "least predicted loss", PAYLOAD, "controls let go")
+
+
+def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
+    """Look for a pose of a hand in each grasp of a file, and write what was found."""
+    hand = with_motors(asked_hand(command), command)
+    saved = saved_grasps(command.grasps, reporter)
+    if saved is None:
+        return Exit.NONE
+    if command.grasp is not None:
+        saved = replace(saved, grasps=(grasp_with_id(command.grasps, saved, command.grasp),))
+    chosen = chosen_grasps(saved, friction=command.friction, seed=None, limit=command.limit)
+    with alone_in(command.out):
+        found, tried, text = _reach(command, hand, chosen, reporter)
+        _show(hand, found, tried.payloads, reporter)
+        if command.dexgraspbench is not None:
+            write_records(command.dexgraspbench, hand, chosen.body, found, reporter)
+        judged = Exit.GOOD
+        if command.protocol:
+            judged, text = judge_hands(
+                chosen, hand, found, command.protocol, jobs=command.jobs,
+                folder=command.out, reporter=reporter,
+            )  # fmt: skip
+    reporter.text(text)
+    show_simulated(tried.verdicts, reporter)
+    show_executed(tried.executions, reporter)
+    if any(each.reached for each in found):
+        say_where_to_look(command, reporter)
+    results = (*tried.verdicts.values(), *tried.executions.values())
+    good = all(each.reached for each in found) and all(each.good for each in results)
+    return judged if good else Exit.NEGATIVE
+
+
+def _reach(
+    command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, reporter: Reporter
+) -> tuple[list[HandReach], HandTrials, str]:
+    """Look for poses, try them, and write what is done even if the run is interrupted."""
+    if command.out is not None:
+        remove_reaches(command.out)
+    jobs = [
+        ReachJob(
+            hand, saved.body, grasp, saved.friction, command.seed, not command.contacts_only,
+            command.table, command.clearance_m, command.starts,
+        )
+        for grasp in saved.grasps
+    ]  # fmt: skip
+    asked: AskedRecord = {
+        "regions": not command.contacts_only,
+        "table_down": command.table,
+        "clearance_m": command.clearance_m,
+        "starts": command.starts,
+        "seed": command.seed,
+    }
+    if command.mass_kg is not None:
+        asked["execution"] = asdict(hand_execution_settings(command.mass_kg).used)
+    found: list[HandReach] = []
+    tried = HandTrials()
+    if jobs and must_compile(REACHING, command.jobs):
+        reporter.say("compiling inner loops once, which takes a minute or two")
+        compile_loops(REACHING)
+    try:
+        with reporter.progress("reaching") as steps:
+            for each in reached(jobs, command.jobs):
+                found.append(each)
+                good = sum(one.reached for one in found)
+                steps.update(len(found), len(jobs), f"({good} reached)")
+        tried.payloads.update(carried(hand, saved, found))
+        simulated(command, hand, saved, found, reporter, tried.verdicts)
+        executed(command, hand, saved, found, reporter, tried.executions)
+    finally:
+        complete = len(found) == len(jobs) and _all_tried(command, found, tried)
+        text = reaches_to_json(
+            hand, saved.body, saved.friction, asked, found, complete=complete,
+            grasps=saved.grasps, tried=tried,
+        )  # fmt: skip
+        if command.out is not None and found:
+            path = write_text(command.out / REACHES, text)
+            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+    return found, tried, text
+
+
+def _all_tried(command: hand_flags.Reach, found: Sequence[HandReach], tried: HandTrials) -> bool:
+    """Return whether all that was asked for was done in each grasp that is reached."""
+    reached = sum(each.reached for each in found)
+    held = len(tried.verdicts) == reached or not tries_ours(command)
+    return held and (len(tried.executions) == reached or command.mass_kg is None)
+
+
+def _show(
+    hand: Hand, found: Sequence[HandReach], payloads: Mapping[str, HandPayload], reporter: Reporter
+) -> None:
+    shown = found[:TABLE_ROWS]
+    columns = ("grasp", "reached", "fingers", "starts", "opens", "straight way in")
+    rows = [_row(hand, each) for each in shown]
+    if payloads:
+        columns = (*columns, PAYLOAD)
+        masses = (payloads.get(each.grasp) for each in shown)
+        cells = (ABSENT if mass is None else f"{mass.lower:.3g}" for mass in masses)
+        rows = [(*row, cell) for row, cell in zip(rows, cells, strict=True)]
+    reporter.table(f"grasps with the hand {hand.name}", columns, rows)
+    say_cut(len(found), reporter)
+    say_what_it_means(payloads, reporter)
+    counts = reaches_summary(found, complete=True)
+    said = f"{counts['reached']} of {counts['grasps']} grasps were reached"
+    if counts["collision"] + counts["limit"] + counts["not_found"]:
+        said += (
+            f"; of the others {counts['collision']} met a collision, {counts['limit']} a joint's "
+            f"limit, and for {counts['not_found']} no pose was found; more --starts may find some"
+        )
+    reporter.say(said)
+    if unclosed := counts["no_closure"]:
+        reporter.say(
+            f"{unclosed} have no {len(hand.fingers)} contacts that are in force closure alone, "
+            "which is proved; more friction may help, and other grasps"
+        )
+    for each in shown:
+        if not each.reached:
+            reporter.warn(f"{each.grasp}: {each.reason}: {each.explanation}")
+
+
+def say_where_to_look(command: hand_flags.Reach, reporter: Reporter) -> None:
+    """Say which command draws the hand in the grasps, where their file is beside the poses."""
+    out = command.out
+    if out is None or not (out / GRASPS).is_file() or not command.grasps.samefile(out / GRASPS):
+        reporter.say(
+            f"give the folder of {GRASPS} as --out to have the hand drawn by `graspproof report`"
+        )
+        return
+    reporter.say(f"see the hand in the grasps: graspproof report {shlex.quote(str(out))}")
+
+
+def _row(hand: Hand, each: HandReach) -> tuple[str, ...]:
+    if each.fingers is None:
+        return (each.grasp, "no", ABSENT, str(each.starts), ABSENT, ABSENT)
+    names = " ".join(hand.fingers[int(finger)].name for finger in each.fingers)
+    yes = ("yes" if value is not None else "no" for value in (each.pregrasp, each.approach))
+    return (each.grasp, "yes", names, str(each.starts), *yes)
+
+
+def carried(hand: Hand, saved: SavedGrasps, found: Sequence[HandReach]) -> dict[str, HandPayload]:
+    """Find the largest mass in any orientation, by the ids of the grasps that are reached.
+
+    Gives nothing for a hand whose motors or links are not known well enough, and none for grasps in
+    which motors cannot carry their links.
+    """
+    unknown = any(link.mass_kg is None or link.center_of_mass is None for link in hand.links)
+    if unknown or any(joint.torque_limit_n_m is None for joint in hand.free_joints):
+        return {}
+    each = ((reach.grasp, _payload(hand, saved, reach)) for reach in found if reach.reached)
+    return {grasp: payload for grasp, payload in each if payload is not None}
+
+
+def _payload(hand: Hand, saved: SavedGrasps, reach: HandReach) -> HandPayload | None:
+    try:
+        return hand_payload(hand, saved.body, reach, saved.friction, max_push_n=MOST_PUSH_N)
+    except (InputError, SolverError):  # a figure beside the poses, which are there without it
+        return None
+
+
+def say_what_it_means(payloads: Mapping[str, HandPayload], reporter: Reporter) -> None:
+    """Say what the column of the table about poses is."""
+    if payloads:
+        reporter.say(
+            f"{PAYLOAD}: the largest mass that the motors hold whichever way the hand is turned, "
+            "their links included, with forces chosen anew for each orientation"
+        )
+
+
+def with_motors(hand: Hand, command: hand_flags.Reach) -> Hand:
+    """Return the hand with the torque limits that the command gives."""
+    if command.torque_limit_n_m is not None:
+        hand = hand.with_torque_limits(command.torque_limit_n_m, GIVEN)
+    if command.protocol and not command.simulate:
+        raise FlagsError(
+            "--protocol judges a hand in simulation: give --simulate too, or leave --protocol out"
+        )
+    missing = [joint.name for joint in hand.joints if joint.torque_limit_n_m is None]
+    asked = "--simulate" if command.simulate else "--mass-kg"
+    if command.simulate or command.mass_kg is not None:
+        uncoupled(hand, asked)
+    if (command.simulate or command.mass_kg is not None) and missing:
+        raise InputError(
+            f"{asked} needs a torque limit for each joint, but {hand.name} has none for "
+            f"{missing[0]}; give one for all joints with --torque-limit-n-m, or each in the hand's "
+            "file (actuatorfrcrange of its joint)"
+        )
+    return hand
+
+
+def tries_ours(command: hand_flags.Reach) -> bool:
+    """Return whether the hand goes through our own trials, not through those of other tools."""
+    return command.simulate and not command.protocol
+
+
+def simulated(
+    command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, found: Sequence[HandReach],
+    reporter: Reporter, verdicts: dict[str, HandVerdict],
+) -> None:  # fmt: skip
+    """Test the hand in each grasp that it reaches, and enter verdicts by the ids of the grasps.
+
+    What is entered stays there if the run is interrupted.
+    """
+    if not tries_ours(command):
+        return
+    jobs = [HandJob(hand, saved.body, each, saved.friction) for each in found if each.reached]
+    with reporter.progress("simulating") as steps:
+        for verdict in held_by_hands(jobs, command.jobs):
+            verdicts[verdict.grasp] = verdict
+            good = sum(each.good for each in verdicts.values())
+            steps.update(len(verdicts), len(jobs), f"({good} held)")
+
+
+def show_simulated(verdicts: Mapping[str, HandVerdict], reporter: Reporter) -> None:
+    """Show what the hand held, the strongest grasp first."""
+    if not verdicts:
+        return
+    ranked = sorted(verdicts.values(), key=lambda verdict: -verdict.weakest_n)
+    rows = [_held_row(verdict) for verdict in ranked[:TABLE_ROWS]]
+    reporter.table("what the hand holds with its motors, the strongest first", HELD_COLUMNS, rows)
+    say_cut(len(ranked), reporter)
+    held = sum(verdict.held for verdict in ranked)
+    controls = [control for verdict in ranked for control in verdict.controls]
+    let_go = sum(control.let_go for control in controls)
+    reporter.say(
+        f"{held} of {len(ranked)} hands held all wrenches, at 80 % of what they resist; "
+        f"{let_go} of {len(controls)} negative controls were let go (all should)"
+    )
+    for verdict in ranked:
+        for sentence in verdict.mismatches:
+            reporter.warn(f"{verdict.grasp}: {sentence}")
+
+
+def _held_row(verdict: HandVerdict) -> tuple[str, ...]:
+    held = "yes" if verdict.held else f"{len(verdict.failures)} of {len(verdict.wrenches)} not"
+    let_go = sum(control.let_go for control in verdict.controls)
+    controls = f"{let_go} of {len(verdict.controls)}"
+    return verdict.grasp, f"{verdict.weakest_n:.3g}", held, controls
+
+
+def executed(
+    command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, found: Sequence[HandReach],
+    reporter: Reporter, results: dict[str, ExecutedHand],
+) -> None:  # fmt: skip
+    """Execute each grasp that the hand reaches, and enter what is found by the ids of the grasps.
+
+    What is entered stays there if the run is interrupted.
+    """
+    if command.mass_kg is None:
+        return
+    settings = hand_execution_settings(command.mass_kg)
+    jobs = [
+        HandJob(hand, saved.body, each, saved.friction, settings) for each in found if each.reached
+    ]
+    with reporter.progress("executing") as steps:
+        for each in executed_by_hands(jobs, command.jobs):
+            results[each.grasp] = each
+            kept = sum(one.survived for one in results.values())
+            steps.update(len(results), len(jobs), f"({kept} survived)")
+
+
+def show_executed(results: Mapping[str, ExecutedHand], reporter: Reporter) -> None:
+    """Show how the executions ended, those that are farthest from a loss first."""
+    if not results:
+        return
+    ranked = sorted(results.values(), key=lambda each: -each.least_predicted_loss)
+    rows = [_executed_row(each.grasp, each.execution) for each in ranked[:TABLE_ROWS]]
+    reporter.table("grasps executed with the hand", EXECUTED_COLUMNS, rows)
+    say_cut(len(ranked), reporter)
+    survived = sum(each.survived for each in ranked)
+    reporter.say(f"{survived} of {len(ranked)} grasps survived every trial with the hand")
+    for each in ranked:
+        if each.execution is None:
+            reporter.warn(f"{each.grasp}: {each.refused}")
+            continue
+        for sentence in held_controls_in_words(each.execution):
+            reporter.warn(f"{each.grasp}: {sentence}")
+        if each.enough is not None:
+            reporter.warn(f"{each.grasp}: {loss_in_words(each.execution)}")
+
+
+def _executed_row(grasp: str, found: Execution | None) -> tuple[str, ...]:
+    if found is None:
+        return grasp, "not tried", ABSENT, ABSENT, ABSENT
+    kept = sum(trial.survived for trial in found.trials)
+    let_go = sum(control.let_go for control in found.controls)
+    return (
+        grasp, f"{kept} of {len(found.trials)}", f"{found.least_predicted_loss:.3g}",
+        f"{found.payload_kg:.3g}", f"{let_go} of {len(found.controls)}",
+    )  # fmt: skip
+
+
+def write_records(
+    folder: Path, hand: Hand, body: Polyhedron, found: Sequence[HandReach], reporter: Reporter
+) -> None:
+    """Write a record for each grasp that is reached, and the object if it is convex."""
+    place = folder / "object"
+    if is_convex(body):
+        write_dex_object(body, place)
+    else:
+        reporter.warn(
+            f"{body.name} is not convex: let MeshProcess write {place} from its mesh, as "
+            "DexGraspBench simulates convex pieces"
+        )
+    reached = [each for each in found if each.reached]
+    for each in reached:
+        record = dex_record(hand, each, str(place.resolve()))
+        write_dex_record(record, folder / "graspdata" / f"{each.grasp}.npy")
+    reporter.say(f"wrote {counted(len(reached), 'record')} of DexGraspBench to {folder}")

@@ -1,0 +1,223 @@
+"""Builds a dataset in a folder; work finished by an earlier, interrupted build is not repeated.
+
+Rows are sorted by object, then by their table's key, so the files do not depend on when, where or
+in which run each unit was computed. Only the rows of one object, and rows that wait to be written,
+are in memory. The manifest, which lists all files, is written last; then the staging folder is
+removed.
+"""
+
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+
+from grasp_core.errors import InputError
+from grasp_core.files.text_files import read_text, write_text
+from grasp_core.provenance import arithmetic
+from sim_validate.datasets.card import CARD, card_text
+from sim_validate.datasets.config import DatasetConfig, config_to_toml
+from sim_validate.datasets.given_contacts import given_text
+from sim_validate.datasets.manifest import (
+    MANIFEST,
+    SCHEMA,
+    LeftOut,
+    Listed,
+    Manifest,
+    left_out_text,
+    listed,
+    read_manifest,
+    write_manifest,
+)
+from sim_validate.datasets.parquet import TableFiles, pyarrow
+from sim_validate.datasets.staging import Finished, Staging
+from sim_validate.datasets.tables import Name
+from sim_validate.datasets.units import WorkUnit, provenance, units_of, units_sha256
+from sim_validate.datasets.workers import Engine, Limits, drive
+from sim_validate.files.paths import path_inside
+from sim_validate.files.result_folders import alone_in
+from sim_validate.simulation.gate import require_faithful
+from sim_validate.simulation.setup import Setup
+
+DATA = "data"
+TWIN = "the same object as"
+"""First words of the reason why an object with the same mesh as another has no rows."""
+CONTACTS = "contacts.json"
+"""Name of the file with the given contacts, if there are any; its normals point into the object."""
+CONFIG, QUARANTINE = "config.toml", "quarantine.jsonl"
+EXTRAS = ("meshes", "scenes")
+"""Folders of the files that units make besides their rows."""
+OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)
+"""Names of all files and folders that the folder of a dataset may hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class Built:
+    """The result of a build: how many units of work and rows the dataset has."""
+
+    units: int
+    made: int
+    """Number of units of work that were computed in this run."""
+    quarantined: int
+    rows: dict[Name, int]
+
+
+def build(
+    config: DatasetConfig,
+    folder: Path,
+    engine: Engine,
+    report: Callable[[int, int], None],
+    limits: Limits | None = None,
+) -> Built:
+    """Build a dataset, or resume an interrupted build.
+
+    Takes `report` (finished, total).
+    """
+    pyarrow()  # before any work, so that a missing library is named at once
+    units = units_of(config)
+    _refuse_sources_inside(units, config, folder)
+    with alone_in(folder):
+        _refuse_others(folder, config)
+        staging = Staging(folder.resolve() / "staging")
+        if (folder / MANIFEST).is_file():
+            staging.remove()
+            return _as_built(folder, units)
+        write_text(folder / CONFIG, config_to_toml(config))
+        staging.clear_unfinished()
+        left = [unit for unit in units if not staging.done(unit)]
+        for unit in left:
+            staging.forget(unit)
+        for friction in config.frictions if left else ():
+            # a gate that fails at one object's size only leaves that object out
+            require_faithful(Setup(), friction)
+        drive(left, staging, engine, report, limits)
+        _finish(config, units, staging, folder)
+        return _as_built(folder, units, len(left))
+
+
+def _refuse_sources_inside(units: Sequence[WorkUnit], config: DatasetConfig, folder: Path) -> None:
+    """Refuse an output folder that holds the meshes or contacts that the dataset is made of."""
+    sources = [unit.path for unit in units if unit.path is not None]
+    sources += [Path(config.contacts).resolve()] if config.contacts else []
+    for path in sources:
+        if path.is_relative_to(folder.resolve()):
+            raise InputError(
+                f"{path}: this input lies in the output folder {folder}; give another --out"
+            )
+
+
+def _refuse_others(folder: Path, config: DatasetConfig) -> None:
+    """Refuse a folder with other files, and remove half-written files of a killed build."""
+    stated = folder / CONFIG
+    own = OWN if stated.is_file() else ()
+    half_written = tuple(f".{name}." for name in OWN)
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith(half_written):
+            path.unlink()
+        elif path.name not in own:
+            raise InputError(
+                f"{path}: this file is not part of the dataset to write; give an empty or new "
+                "folder as --out"
+            )
+    if stated.is_file() and read_text(stated) != config_to_toml(config):
+        raise InputError(
+            f"{folder}: the folder holds a dataset made with other settings (see its {CONFIG}); "
+            "give another --out, or the same settings to resume that dataset"
+        )
+
+
+def _as_built(folder: Path, units: Sequence[WorkUnit], made: int = 0) -> Built:
+    """Describe a finished dataset, after a check that it is the one asked for."""
+    manifest = read_manifest(folder)
+    if manifest.units_sha256 != units_sha256(units):
+        raise InputError(
+            f"{folder}: this dataset is finished, but its meshes, contacts or package versions "
+            "have changed since then; give another --out to make it again"
+        )
+    for each in manifest.files:
+        path = path_inside(folder, each.path)
+        if not path.is_file() or path.stat().st_size != each.bytes:
+            raise InputError(
+                f"{path}: this file of a finished dataset is missing or damaged (see `dataset "
+                "verify`); give another --out to make it again"
+            )
+    return Built(len(units), made, manifest.quarantined, manifest.rows())
+
+
+def _finish(
+    config: DatasetConfig, units: Sequence[WorkUnit], staging: Staging, folder: Path
+) -> None:
+    """Write the rows of all units into tables, list all files, and remove the staging folder."""
+    for name in (DATA, *EXTRAS):
+        shutil.rmtree(folder / name, ignore_errors=True)
+    good, quarantined = _sorted_out(units, staging)
+    tables = _write_tables(config, good, staging, folder)
+    for each in good:
+        staging.copy_files(each.unit, folder)
+    given = {each.id: each for unit in units for each in unit.given}
+    if given:
+        in_order = [given[name] for name in sorted(given)]
+        write_text(folder / CONTACTS, given_text(in_order))
+    others = [
+        write_text(folder / CONFIG, config_to_toml(config)),
+        write_text(folder / QUARANTINE, left_out_text(quarantined)),
+        *([folder / CONTACTS] if given else []),
+        *(path for name in EXTRAS for path in sorted((folder / name).glob("*"))),
+    ]
+    manifest = Manifest(
+        config_sha256=config.sha256,
+        versions=dict(provenance()),
+        arithmetic=arithmetic(),
+        units=len(units),
+        units_sha256=units_sha256(units),
+        quarantined=len(quarantined),
+        executed=config.execution is not None,
+        groups=config.groups,
+        files=(*tables, *(listed(folder, path) for path in others)),
+    )
+    card = write_text(folder / CARD, card_text(config, manifest))
+    write_manifest(folder, replace(manifest, files=(*manifest.files, listed(folder, card))))
+    staging.remove()
+
+
+def _sorted_out(
+    units: Sequence[WorkUnit], staging: Staging
+) -> tuple[list[Finished], list[LeftOut]]:
+    """List units with rows of their own, sorted by object, and the reasons why others have none."""
+    good, quarantined = list[Finished](), list[LeftOut]()
+    first: dict[tuple[str, float], str] = {}
+    for unit in sorted(units, key=lambda each: (each.object, each.friction)):
+        found = staging.result(unit)
+        if isinstance(found, Finished):
+            other = first.setdefault((found.object_id, unit.friction), unit.object)
+            if other == unit.object:
+                good.append(found)
+                continue
+            found = f"{TWIN} {other}"
+        quarantined.append(
+            LeftOut(
+                object=unit.object,
+                source_sha256=unit.source_sha256,
+                friction=unit.friction,
+                given=[each.id for each in unit.given],
+                reason=found,
+            )
+        )
+    return sorted(good, key=lambda each: (each.object_id, each.unit.friction)), quarantined
+
+
+def _write_tables(
+    config: DatasetConfig, good: Sequence[Finished], staging: Staging, folder: Path
+) -> list[Listed]:
+    about = {"schema": str(SCHEMA), "config_sha256": config.sha256}
+    with TableFiles(folder / DATA, about, config.tables) as files:
+        for _, same in groupby(good, key=lambda each: each.object_id):
+            of_object = list(same)
+            for name in config.tables:
+                chosen = of_object[:1] if name == "objects" else of_object
+                paths = [staging.table(each.unit, name) for each in chosen]
+                files.add(name, of_object[0].split, paths)
+        return [
+            replace(listed(folder, path), table=name, split=split, rows=rows)
+            for name, split, path, rows in files.close()
+        ]

@@ -1,0 +1,168 @@
+"""Exports grasps of a dataset as Isaac grasp files, version 1.0: one per object and friction.
+
+The format describes a gripper by a pose and the positions of joints, so the four fingertips are
+taken as one gripper: `fingerI_x`, `fingerI_y` and `fingerI_z` slide fingertip I along the axes of
+the gripper's frame; with all three at zero, the fingertip's centre is at the frame's origin. The
+gripper's frame is parallel to the object's, which is that of the mesh in metres, and its origin is
+the mean of the contacts. All fingertips of a file have the radius that fits all of its grasps; the
+centre of a fingertip lies one radius outside of its contact. Contact sets that are not in force
+closure are left out.
+
+Source:
+    NVIDIA, "Isaac Grasp File", nvidia-isaac-ros.github.io/concepts/manipulation/isaac_grasp.html.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.errors import InputError
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact
+from scenes.fingertips import FingerSettings, fitting_radius
+from scenes.layout import arrange
+from sim_validate.datasets.config import quoted
+from sim_validate.datasets.meshes import mesh_path, stored_body
+from sim_validate.datasets.open_dataset import Row, Selection, select
+from sim_validate.datasets.parquet import pyarrow
+from sim_validate.datasets.rows import GIVEN
+from sim_validate.datasets.tables import SHORT, Name, SplitName
+from sim_validate.files.writing import whole_folder, write_lines
+
+AXES = "xyz"
+HEAD = """\
+# {source} at friction {friction:.12g}: grasps by four spherical fingertips of radius {radius!r} m.
+# Object frame: that of {mesh}
+# of the dataset, in metres. Gripper frame: turned like it, its origin midway between the contacts.
+# Joints fingerI_x, fingerI_y, fingerI_z [m] slide the centre of fingertip I along the gripper's
+# axes, from its origin where they are zero.
+# cspace_position: touching; pregrasp_cspace_position: moved back along the contacts' normals.
+# confidence: 1.0 if the object was held in every simulated trial, else 0.0.
+"""
+UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
+GRASPS = ("grasp", GIVEN)
+"""Labels of rows that are grasps, not negative controls."""
+LONGEST = 150
+"""Largest number of characters in a file's name; every file system allows more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """The result of an export."""
+
+    files: int
+    rows: dict[Name, int]
+    """Number of objects and of grasps that were written."""
+
+
+def export(
+    folder: Path, out: Path, split: SplitName | None, report: Callable[[int, int], None]
+) -> Exported:
+    """Write the grasps of a dataset; the same dataset gives the same bytes.
+
+    Takes `report` (written, total).
+    """
+    pyarrow()  # before any work, so that a missing library is named at once
+    chosen = select(folder, split)
+    if out.resolve().is_relative_to(folder.resolve()):
+        raise InputError(
+            f"{out}: this folder is inside the dataset to export; give an --out outside of it"
+        )
+    with whole_folder(out) as place:
+        rows = _write(chosen, place, report)
+        files = sum(1 for _ in place.iterdir())
+    return Exported(files, rows)
+
+
+def _write(chosen: Selection, folder: Path, report: Callable[[int, int], None]) -> dict[Name, int]:
+    """Write one file for the grasps of each object at each friction."""
+    facts, total = chosen.facts(), chosen.counts()["objects"]
+    objects = grasps = 0
+    for object_id, body, rows in _grasped_objects(chosen):
+        of_object = sorted(rows, key=lambda row: row["friction"])
+        for friction, same in groupby(of_object, key=lambda row: row["friction"]):
+            path = _new_path(folder, f"{object_id[:SHORT]}-{friction}-{body.name}")
+            write_lines(path, _lines(object_id, body, list(same), facts))
+        objects += 1
+        grasps += len(rows)
+        report(objects, total)
+    return {"objects": objects, "grasps": grasps}
+
+
+def _grasped_objects(chosen: Selection) -> Iterator[tuple[str, Polyhedron, list[Row]]]:
+    """Yield the id of each object that has grasps, the object, and their rows."""
+    names = {row["object_id"]: row["source_name"] for row in chosen.rows("objects")}
+    faces = chosen.config().faces
+    planned = (
+        row for row in chosen.rows("grasps") if row["label"] in GRASPS and row["force_closed"]
+    )
+    for object_id, rows in groupby(planned, key=lambda row: row["object_id"]):
+        if object_id not in names:
+            raise InputError(
+                f"{chosen.folder}: the object {object_id} has grasps, but its row is missing in "
+                "the table of objects; see `graspproof dataset verify`"
+            )
+        yield object_id, stored_body(chosen.folder, object_id, names[object_id], faces), list(rows)
+
+
+def _new_path(folder: Path, name: str) -> Path:
+    """Make a path for a file with a given name, whatever characters the name has."""
+    path = folder / f"{UNSAFE.sub('_', name).lstrip('.')[:LONGEST]}.yaml"
+    if path.exists():
+        raise InputError(
+            f"{name}: two grasps would get the same file name, {path.name}; rename one of them"
+        )
+    return path
+
+
+def _lines(
+    object_id: str, body: Polyhedron, rows: Sequence[Row], facts: Mapping[str, str]
+) -> Iterator[str]:
+    """Yield the lines of a file about some grasps of an object, all at one friction."""
+    radius = min(fitting_radius(body, *_places(row)) for row in rows)
+    source, mesh = quoted(body.name), mesh_path(Path(), object_id).as_posix()
+    friction = rows[0]["friction"]
+    yield HEAD.format(source=source, friction=friction, radius=radius, mesh=quoted(mesh))
+    yield from (f"# {name}: {quoted(text)}\n" for name, text in facts.items())
+    yield "format: isaac_grasp\nformat_version: 1.0\n\n"
+    yield f'object_frame: {source}\ngripper_frame: "four_fingertips"\n\ngrasps:\n'
+    for row in rows:
+        points, normals = _places(row)
+        contacts = tuple(map(Contact, points, normals))
+        layout = arrange(body, contacts, friction, FingerSettings(radius_m=radius))
+        origin = points.mean(axis=0)
+        touching = points - radius * normals - origin
+        yield f"  {quoted(row['name'])}:\n"
+        yield f"    confidence: {yaml_number(float(row['held']))}\n"
+        yield f"    position: {_list(origin)}\n"
+        yield f"    orientation: {{w: 1.0, xyz: {_list(np.zeros(3))}}}\n"
+        yield "    cspace_position:\n"
+        yield from _joint_lines(touching)
+        yield "    pregrasp_cspace_position:\n"
+        yield from _joint_lines(touching + layout.approach)
+
+
+def _places(row: Row) -> tuple[Array, Array]:
+    """Return positions (4, 3) [m] and normals (4, 3) of a grasp's contacts."""
+    return np.array(row["contact_points_m"]), np.array(row["contact_normals"])
+
+
+def _joint_lines(places: Array) -> Iterator[str]:
+    for finger, place in enumerate(places.tolist()):
+        for axis, value in zip(AXES, place, strict=True):
+            yield f"      finger{finger}_{axis}: {yaml_number(value)}\n"
+
+
+def _list(values: Array) -> str:
+    return f"[{', '.join(map(yaml_number, values.tolist()))}]"
+
+
+def yaml_number(value: float) -> str:
+    """Write a number for YAML 1.1, which takes one with an exponent and no point for text."""
+    text = repr(value)
+    return text if "." in text else text.replace("e", ".0e")

@@ -1,0 +1,323 @@
+"""Varies a grasp: its friction near the critical one, its contacts out of their regions, its mass.
+
+Varied grasps are natural negatives, and natural positives beside them: nothing but the analysis and
+the simulation tells which of them hold. Friction is drawn below, near and above the critical one.
+Contacts move on their faces along a random direction, beyond where the region ends in it, so that
+the region promises nothing any more. The mass is drawn around the one at which the object is
+predicted to be lost. All draws depend on the seed and the grasp's name alone.
+"""
+
+import hashlib
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.closure.contacts import contacts_sha256
+from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.errors import (
+    InputError,
+    NoForcesError,
+    SolverError,
+    UndecidedError,
+    UnfaithfulError,
+)
+from grasp_core.geometry.polygons import plane_frame
+from grasp_core.objects.on_faces import within
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.given_contacts import Seated, grasp_of, seat
+from grasp_core.values import FINGERS, Contact, ContactRegion, Grasp, four
+from sim_validate.datasets.config import CONTROLS, Learning
+from sim_validate.datasets.figures import Executed, executed_by
+from sim_validate.execution.execute import execute
+from sim_validate.execution.settings import AskedExecution, ExecutionSettings
+from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.simulation.gate import Gate
+from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.validation.controls import (
+    LEAST_FRICTION,
+    Control,
+    ControlVerdict,
+    negative_controls,
+    try_control,
+)
+from sim_validate.validation.validation import tested, validate
+from sim_validate.validation.verdict import Verdict
+
+RATIOS = {
+    "friction_below": (0.6, 0.9),
+    "friction_near": (0.95, 1.05),
+    "friction_above": (1.1, 5.0),
+    "mass_near": (0.6, 1.6),
+}
+"""Least and largest ratio of a varied friction or mass to the one at which the verdict changes.
+Between them every logarithm of a ratio is as likely."""
+DIGITS = 4
+"""Significant digits of a varied friction or mass, which tables then show as they are."""
+TRIES = 32
+"""Number of random ways in which a contact is moved until it stays on its face."""
+PAST = (0.05, 1.0)
+"""How far past its region's end a contact moves, over the way to there or `LEAST_WAY`."""
+UNMOVED = (None,) * FINGERS
+"""What is known of the regions' ends where no contact moved."""
+LEAST_WAY = 0.1
+"""Least way that a contact's move is measured by, in object radii: regions may be points."""
+VARIED = "varied"
+"""Label of rows that are made from a grasp and may hold or not."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Variant:
+    """A varied grasp, with the proof that it is in force closure or that it is not."""
+
+    name: str
+    """Kind and number, which no other variant of the grasp has."""
+    kind: str
+    seated: Seated
+    """The contacts and their object."""
+    friction: float
+    proved: Grasp | ClosureCertificate
+    displaced_m: Array
+    """Distance by which each contact was moved, (4,) [m]."""
+    exits_m: tuple[float | None, ...]
+    """How far each region reaches along the move of its contact [m]; None where none moved."""
+    critical_friction: float | None
+    """Smallest friction with force closure; None where there is none, or it is not known."""
+    mass_kg: float | None = None
+    """Mass of the object in the execution; None for the mass of the settings [kg]."""
+    mass_ratio: float | None = None
+
+    @property
+    def friction_ratio(self) -> float | None:
+        """The friction over the critical one; None where that is not known."""
+        return ratio_of(self.friction, self.critical_friction)
+
+
+def ratio_of(friction: float, critical: float | None) -> float | None:
+    """Return the ratio of a friction to a critical one, if that is known and above zero."""
+    return friction / critical if critical else None
+
+
+def variants(
+    body: Polyhedron, grasp: Grasp, friction: float, asked: Learning, seed: int
+) -> Iterator[Variant]:
+    """Yield the varied grasps that are asked for, as far as they exist and can be decided."""
+    for kind in ("friction_below", "friction_near", "friction_above"):
+        for number in range(getattr(asked, kind)):
+            ratio = _ratio(kind, draws(seed, grasp.id, kind, number))
+            varied = _short(ratio * grasp.critical_friction)
+            if LEAST_FRICTION <= varied <= LARGEST_FRICTION:
+                at = Seated(body, grasp.faces, grasp.contacts, 0.0)
+                yield from _decided(kind, number, at, varied, np.zeros(FINGERS), UNMOVED)
+    for number in range(asked.moved_out):
+        yield from _moved(body, grasp, friction, number, draws(seed, grasp.id, "moved_out", number))
+
+
+def with_mass(variant: Variant, lost_kg: float, rng: np.random.Generator) -> Variant | None:
+    """Return a variant with a mass near the one at which the object is predicted to be lost.
+
+    Takes `lost_kg` [kg]. Gives the variant; None if that mass is zero or infinite.
+    """
+    mass_kg = _short(_ratio("mass_near", rng) * lost_kg)
+    if not 0.0 < mass_kg < math.inf:
+        return None
+    return replace(variant, mass_kg=mass_kg, mass_ratio=mass_kg / lost_kg)
+
+
+def unmoved(body: Polyhedron, grasp: Grasp, friction: float, number: int) -> Variant:
+    """Return a grasp as it is, of which only the mass is to be varied."""
+    at = Seated(body, grasp.faces, grasp.contacts, 0.0)
+    kind = "mass_near"
+    return Variant(
+        f"{kind}-{number}", kind, at, friction, grasp, np.zeros(FINGERS), UNMOVED,
+        grasp.critical_friction,
+    )  # fmt: skip
+
+
+def draws(seed: int, grasp: str, kind: str, number: int) -> np.random.Generator:
+    """Return the generator of one varied grasp's draws."""
+    digest = hashlib.sha256(f"{seed} {grasp} {kind} {number}".encode()).digest()
+    return np.random.default_rng(int.from_bytes(digest[:16], "big"))
+
+
+def region_exit(region: ContactRegion, contact: Contact, way: Array) -> float:
+    """Return how far a region reaches from its contact along a unit vector in its plane [m]."""
+    corners = region.polygon
+    if len(corners) < 3:  # noqa: PLR2004 - a point or a line has no inside
+        return 0.0
+    edges = np.roll(corners, -1, axis=0) - corners
+    outward = np.cross(edges, contact.normal)
+    sizes = np.linalg.norm(outward, axis=1)
+    outward = outward[sizes > 0.0] / sizes[sizes > 0.0, None]
+    middle = corners.mean(axis=0)
+    outward *= np.sign(np.einsum("ki,ki->k", outward, corners[sizes > 0.0] - middle))[:, None]
+    gaps = np.einsum("ki,ki->k", outward, corners[sizes > 0.0] - contact.position)
+    speeds = outward @ way
+    reached = gaps[speeds > 0.0] / speeds[speeds > 0.0]
+    return max(0.0, float(reached.min(initial=math.inf)))
+
+
+def _moved(
+    body: Polyhedron, grasp: Grasp, friction: float, number: int, rng: np.random.Generator
+) -> Iterator[Variant]:
+    """Yield the grasp with one to four contacts out of their regions, if they stay on faces."""
+    chosen = rng.permutation(FINGERS)[: int(rng.integers(1, FINGERS + 1))]
+    contacts = list(grasp.contacts)
+    exits: list[float | None] = [None] * FINGERS
+    for finger in chosen.tolist():
+        found = _past(body, grasp, finger, rng)
+        if found is not None:
+            contacts[finger], exits[finger] = found
+    if all(each is None for each in exits):
+        return
+    try:
+        at = Seated(body, grasp.faces, four(contacts), 0.0)
+        if body.patches is not None:  # the surface departs from the plane of its patch
+            points = [contact.position for contact in contacts]
+            at = seat(body, points, [contact.normal for contact in contacts])
+    except InputError:
+        return
+    moved = np.array([contact.position for contact in at.contacts]) - grasp.positions
+    yield from _decided(
+        "moved_out", number, at, friction, np.linalg.norm(moved, axis=1), tuple(exits)
+    )
+
+
+def _past(
+    body: Polyhedron, grasp: Grasp, finger: int, rng: np.random.Generator
+) -> tuple[Contact, float] | None:
+    """Move a contact past its region's end on its face; return how far the region reached, too."""
+    contact, face = grasp.contacts[finger], body.faces[grasp.faces[finger]]
+    frame = plane_frame(contact.normal)
+    for _ in range(TRIES):
+        turn = rng.uniform(0.0, 2.0 * math.pi)
+        way = frame @ np.array([math.cos(turn), math.sin(turn)])
+        reached = region_exit(grasp.regions[finger], contact, way)
+        more = rng.uniform(*PAST) * max(reached, LEAST_WAY * body.radius)
+        point = contact.position + (reached + more) * way
+        if any(within(point, piece, face.normal, 0.0) for piece in face.pieces):
+            return Contact(point, contact.normal), reached
+    return None
+
+
+def _decided(
+    kind: str, number: int, at: Seated, friction: float, displaced_m: Array,
+    exits_m: tuple[float | None, ...],
+) -> Iterator[Variant]:  # fmt: skip
+    """Yield a variant with its proof, unless rounding does not let closure be decided."""
+    name = f"{kind}-{number}"
+    try:
+        proved = grasp_of(at, friction, name)
+        critical = critical_friction(list(at.contacts))
+    except (UndecidedError, SolverError):
+        return
+    known = critical if math.isfinite(critical) else None
+    yield Variant(name, kind, at, friction, proved, displaced_m, exits_m, known)
+
+
+def _ratio(kind: str, rng: np.random.Generator) -> float:
+    least, most = RATIOS[kind]
+    return math.exp(rng.uniform(math.log(least), math.log(most)))
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.{DIGITS - 1}e}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tried:
+    """A varied grasp with its trials and its execution."""
+
+    variant: Variant
+    verdict: Verdict | ControlVerdict
+    executed: Executed
+
+
+def validated_with(
+    body: Polyhedron, grasp: Grasp, friction: float, agenda: Agenda, asked: Learning | None
+) -> Verdict:
+    """Test a grasp in simulation, with as many synthetic negative controls as are asked for."""
+    most = CONTROLS if asked is None else asked.synthetic
+    if most == CONTROLS:
+        return validate(body, grasp, friction, agenda=agenda)
+    verdict = validate(body, grasp, friction, agenda=replace(agenda, controls=False))
+    found = list[Control]()
+    if most:
+        found += negative_controls(body, grasp, friction, agenda.seed)
+    order = draws(agenda.seed, grasp.id, "synthetic", 0).permutation(len(found))
+    kept = [found[int(place)] for place in np.sort(order[:most])]
+    controls = tuple(try_control(body, each, agenda, Setup()) for each in kept)
+    return replace(verdict, controls=controls, agenda=agenda)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Varying:
+    """How the grasps of one unit of work are varied and tried."""
+
+    asked: Learning
+    friction: float
+    agenda: Agenda
+    execution: AskedExecution | None
+
+    def of(
+        self, body: Polyhedron, grasp: Grasp, verdict: Verdict, executed: Executed
+    ) -> Iterator[Tried]:
+        """Yield the varied grasps made from a grasp, with their trials."""
+        for each in variants(body, grasp, self.friction, self.asked, self.agenda.seed):
+            try:
+                yield Tried(each, self._verdict(each, verdict.gate), self._executed(each))
+            except InputError:  # fingertips find no room
+                continue
+        yield from self._heavier(body, grasp, verdict, executed)
+
+    def _heavier(
+        self, body: Polyhedron, grasp: Grasp, verdict: Verdict, executed: Executed
+    ) -> Iterator[Tried]:
+        """Yield the grasp with other masses; its other trials are the same."""
+        if not isinstance(executed, ExecutedGrasp) or executed.execution is None:
+            return
+        lost_kg = executed.least_predicted_loss * executed.execution.mass_kg
+        alone = replace(verdict, controls=())
+        for number in range(self.asked.mass_near):
+            rng = draws(self.agenda.seed, grasp.id, "mass_near", number)
+            each = with_mass(unmoved(body, grasp, self.friction, number), lost_kg, rng)
+            if each is not None:
+                yield Tried(each, alone, self._executed(each))
+
+    def _verdict(self, variant: Variant, gate: Gate) -> Verdict | ControlVerdict:
+        seated, friction = variant.seated, variant.friction
+        if isinstance(variant.proved, Grasp):
+            agenda = replace(self.agenda, controls=False, critical_friction=False)
+            return tested(seated.body, variant.proved, friction, gate, agenda, Setup())
+        control = Control(VARIED, seated.contacts, friction, variant.proved)
+        return try_control(seated.body, control, self.agenda, Setup())
+
+    def _executed(self, variant: Variant) -> Executed:
+        """Execute the contacts if that is asked for, in force closure or not."""
+        if self.execution is None:
+            return None
+        try:
+            settings = self.execution.settings_for(variant.seated.body)
+            if variant.mass_kg is not None:
+                settings = replace(settings, mass_kg=variant.mass_kg)
+            return executed_by(partial(_executed_with, variant), settings, self.asked.seeds)
+        except (InputError, UnfaithfulError) as error:
+            # a varied mass or friction may be beyond what the simulator is faithful for
+            return str(error)
+
+
+def _executed_with(variant: Variant, settings: ExecutionSettings) -> ExecutedGrasp:
+    """Execute the contacts of a variant; contacts without a squeeze are a result with a reason."""
+    contacts = variant.seated.contacts
+    found, reason = None, None
+    try:
+        found = execute(variant.seated.body, contacts, variant.friction, settings, enough=False)
+    except NoForcesError as error:
+        reason = str(error)
+    family = variant.proved.family if isinstance(variant.proved, Grasp) else ""
+    return ExecutedGrasp(variant.name, family, contacts_sha256(contacts), found, reason)

@@ -1,0 +1,301 @@
+"""Checks whether a dataset is as its manifest says, and computes a sample of it again.
+
+With the same packages and code, on processors that round alike, every cell of the sample must be
+the same. Otherwise each family must have as many grasps as before, and grasps that come out with
+the same contacts must have the same verdict and critical friction.
+"""
+
+import hashlib
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from grasp_core.errors import GraspError, InputError
+from grasp_core.files.json_text import shown
+from grasp_core.files.text_files import read_text
+from grasp_core.provenance import arithmetic
+from sim_validate.datasets.build import CONFIG, CONTACTS, QUARANTINE, TWIN
+from sim_validate.datasets.config import config_from_toml
+from sim_validate.datasets.given_contacts import read_given
+from sim_validate.datasets.make_unit import made_of
+from sim_validate.datasets.manifest import (
+    MANIFEST,
+    Listed,
+    Manifest,
+    listed,
+    read_left_out,
+    read_manifest,
+)
+from sim_validate.datasets.meshes import stored_body
+from sim_validate.datasets.open_dataset import ObjectRows, Row, Selection, by_object
+from sim_validate.datasets.parquet import as_read, pyarrow
+from sim_validate.datasets.tables import KEYS, Name, Tables, id_beginning
+from sim_validate.datasets.units import WorkUnit, provenance
+from sim_validate.datasets.verify_rows import object_faults
+from sim_validate.execution.verdict import may_slip
+from sim_validate.files.paths import path_inside
+
+OTHER_ROUNDING = 1e-6
+"""Relative difference that numbers may have when other packages or processors round them."""
+MOST_NAMED = 20
+"""Largest number of faults that are listed for one object at one friction."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Which part of a dataset to compute again."""
+
+    share: float
+    """Share of all objects at frictions that is computed again, at least one of them."""
+    seed: int = 0
+    """Seed of the random choice."""
+
+
+def verify(folder: Path, sample: Sample | None = None) -> list[str]:
+    """List what is wrong with a dataset, one line each; an empty list means that all is well.
+
+    Checked are hashes, sizes and page checksums of all files; counts, keys and references of rows;
+    for each contact set its normals, its closure (proved again), and that its trials agree with its
+    row; for each execution what its squeeze carries (proved again), and that its trials agree with
+    the row; and for a sample, whether planning and simulating again gives the same rows.
+    """
+    pyarrow()  # before any work, so that a missing library is named at once
+    manifest = read_manifest(folder)
+    if faults := list(_file_faults(folder, manifest.files)):
+        return faults
+    faults: list[str] = []
+    try:
+        faults += _manifest_faults(folder, manifest)
+        faults += _content_faults(folder, manifest)
+        if sample is not None and not faults:
+            faults += _sample_faults(folder, manifest, sample)
+    except InputError as error:
+        faults.append(str(error))
+    except (TypeError, KeyError, ValueError) as error:  # a cell is null that must not be
+        faults.append(f"data: a row is not as this version writes rows ({shown(str(error))})")
+    return faults
+
+
+def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
+    """Yield sentences on what is wrong with rows and meshes, one object at a time."""
+    config = config_from_toml(folder / CONFIG)
+    for each in manifest.files:
+        if each.table and not Path(each.path).name.startswith(f"{each.split}-"):
+            yield (
+                f"{each.path}: the manifest lists this file under the split {each.split}, unlike "
+                "its name"
+            )
+    for split in sorted({each.split for each in manifest.files if each.split is not None}):
+        for rows in by_object(Selection(folder, manifest, split)):
+            yield from object_faults(folder, config, split, rows)
+
+
+def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
+    names = {each.path for each in files}
+    there = {
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != MANIFEST
+    }
+    # staged files no longer matter
+    there = {name for name in there if not name.startswith("staging/")}
+    yield from (
+        f"{path}: this file is not listed in the manifest" for path in sorted(there - names)
+    )
+    for each in files:
+        if each.path not in there:
+            yield f"{each.path}: this file is listed in the manifest, but missing"
+            continue
+        try:
+            found = listed(folder, path_inside(folder, each.path))
+        except InputError as error:
+            yield str(error)
+            continue
+        if found.bytes != each.bytes:
+            yield (
+                f"{each.path}: the file has {found.bytes} bytes, but the manifest lists "
+                f"{each.bytes}"
+            )
+        elif found.sha256 != each.sha256:
+            yield f"{each.path}: the file differs from what was written (its sha256 differs)"
+
+
+def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
+    """Check that the manifest agrees with the files that it lists."""
+    config = config_from_toml(folder / CONFIG)
+    if config.sha256 != manifest.config_sha256:
+        yield f"{CONFIG}: the file is not the configuration that the manifest names"
+    if manifest.groups != config.groups:
+        yield f"{MANIFEST}: `groups` is {manifest.groups}, unlike {CONFIG}"
+    if manifest.executed != (config.execution is not None):
+        yield f"{MANIFEST}: `executed` is {manifest.executed}, unlike {CONFIG}"
+    lines = len(read_left_out(folder / QUARANTINE))
+    if lines != manifest.quarantined:
+        yield (
+            f"{QUARANTINE}: the file has {lines} lines, but the manifest says "
+            f"{manifest.quarantined}"
+        )
+
+
+def _sample_faults(folder: Path, manifest: Manifest, sample: Sample) -> Iterator[str]:
+    """Compute a sample of a dataset again, and yield a sentence about each difference."""
+    redoing = _Redoing(folder, manifest)
+    everything = Selection(folder, manifest, None)
+    units = [
+        (row["object_id"], friction)
+        for row in everything.rows("objects")
+        for friction in redoing.frictions(row)
+    ]
+    chosen = {*drawn(sorted(units), sample)}
+    splits = sorted({each.split for each in manifest.files if each.split is not None})
+    for split in splits:
+        for rows in by_object(Selection(folder, manifest, split)):
+            for row in rows["objects"]:
+                yield from redoing.faults(row, rows, chosen)
+
+
+class _Redoing:
+    """Computes parts of a dataset again."""
+
+    def __init__(self, folder: Path, manifest: Manifest) -> None:
+        self._folder = folder
+        self._config = config_from_toml(folder / CONFIG)
+        same = (dict(provenance()), arithmetic())
+        self._exact = (manifest.versions, manifest.arithmetic) == same
+        self._given = read_given(folder / CONTACTS) if self._config.contacts else ()
+        self._left_out: dict[tuple[str, float], set[str]] = {}
+        """Given grasps without rows, by source and friction; none where grasps are planned."""
+        for each in read_left_out(folder / QUARANTINE):
+            if not each.reason.startswith(TWIN):
+                gone = self._left_out.setdefault((each.source_sha256, each.friction), set())
+                gone.update(each.given)
+
+    def frictions(self, row: Mapping[str, Any]) -> list[float]:
+        """List the frictions at which an object has rows, perhaps without a grasp."""
+        return [f for f in self._config.frictions if not self._all_left_out(row, f)]
+
+    def faults(
+        self, row: Mapping[str, Any], rows: ObjectRows, chosen: Set[tuple[str, float]]
+    ) -> Iterator[str]:
+        """Yield sentences on what is wrong with an object at the chosen frictions."""
+        for friction in self._config.frictions:
+            stored = _of_unit(rows, row["object_id"], friction)
+            where = f"{row['source_name']} at friction {friction}"
+            if self._all_left_out(row, friction):
+                if stored["grasps"]:
+                    yield f"{where}: {QUARANTINE} lists this object as left out, but it has rows"
+            elif (row["object_id"], friction) in chosen:
+                found = islice(self._unit_faults(row, friction, stored), MOST_NAMED)
+                yield from (f"{where}: {fault}" for fault in found)
+
+    def _all_left_out(self, row: Mapping[str, Any], friction: float) -> bool:
+        gone = self._left_out.get((row["source_sha256"], friction))
+        return gone is not None and len(gone) == len(self._given)
+
+    def _unit_faults(
+        self, row: Mapping[str, Any], friction: float, stored: ObjectRows
+    ) -> Iterator[str]:
+        name, source = row["source_name"], row["source_sha256"]
+        gone = self._left_out.get((source, friction), set())
+        given = tuple(each for each in self._given if each.id not in gone)
+        try:
+            body = stored_body(self._folder, row["object_id"], name, self._config.faces)
+            made = made_of(WorkUnit(name, None, source, friction, self._config, given), body)
+        except GraspError as error:
+            yield f"the grasps cannot be computed again ({error})"
+            return
+        tables = self._config.tables
+        now: ObjectRows = {each: as_read(each, made.rows[each], tables) for each in tables}
+        if not self._exact:
+            yield from _loose_differences(stored, now)
+            return
+        for table in tables:
+            yield from _differences(table, tables, stored[table], now[table])
+        for path, text in made.files.items():
+            if read_text(self._folder / path) != text:
+                yield f"{path}: the file differs from what is computed again"
+
+
+def drawn(units: Sequence[tuple[str, float]], sample: Sample) -> list[tuple[str, float]]:
+    """Choose units at random, in an order that only the seed decides."""
+
+    def place(unit: tuple[str, float]) -> bytes:
+        return hashlib.sha256(f"{sample.seed} {unit}".encode()).digest()
+
+    return sorted(units, key=place)[: math.ceil(sample.share * len(units))]
+
+
+def _of_unit(rows: ObjectRows, object_id: str, friction: float) -> ObjectRows:
+    beginning = id_beginning(object_id, friction)
+    return {
+        name: [
+            row
+            for row in of_table
+            if (row["object_id"] == object_id if name == "objects"
+                else row["grasp_id"].startswith(beginning))
+        ]
+        for name, of_table in rows.items()
+    }  # fmt: skip
+
+
+def _differences(
+    name: Name, tables: Tables, stored: Sequence[Row], made: Sequence[Row]
+) -> Iterator[str]:
+    """Yield sentences on cells that differ, and on rows that only one side has."""
+    before = {tuple(row[key] for key in KEYS[name]): row for row in stored}
+    after = {tuple(row[key] for key in KEYS[name]): row for row in made}
+    yield from (
+        f"{name}: {key[-1]} has a row, but is not computed again"
+        for key in before.keys() - after.keys()
+    )
+    yield from (
+        f"{name}: {key[-1]} is computed again, but has no row"
+        for key in after.keys() - before.keys()
+    )
+    for key in before.keys() & after.keys():
+        for column in tables[name]:
+            one, other = before[key][column.name], after[key][column.name]
+            if one != other:
+                yield f"{name}: {key}: {column.name} is {one}, but {other} when computed again"
+
+
+def _loose_differences(stored: ObjectRows, made: ObjectRows) -> Iterator[str]:
+    """Yield differences beyond rounding, which may choose other, equally good grasps."""
+    before = {row["grasp_id"]: row for row in stored["grasps"] if row["control_of"] is None}
+    after = {row["grasp_id"]: row for row in made["grasps"] if row["control_of"] is None}
+    counts = [Counter(row["family"] for row in rows.values()) for rows in (before, after)]
+    if counts[0] != counts[1]:
+        yield f"grasps: {dict(counts[0])} by family, but {dict(counts[1])} when computed again"
+    for name in sorted(before.keys() & after.keys()):
+        one, other = before[name], after[name]
+        points = [np.array(row["contact_points_m"], dtype=np.float64) for row in (one, other)]
+        if not np.allclose(*points, rtol=OTHER_ROUNDING, atol=0.0):
+            continue  # the best contacts are not unique
+        if one["held"] != other["held"] or one["force_closed"] != other["force_closed"]:
+            yield (
+                f"grasps: {name}: outcome is {one['outcome']}, but {other['outcome']} when "
+                "computed again"
+            )
+        if said := loose_difference(one, other):
+            yield f"grasps: {name}: {said}"
+        frictions = [float(row["critical_friction"] or 0.0) for row in (one, other)]
+        if not np.isclose(*frictions, rtol=OTHER_ROUNDING, atol=0.0):
+            yield f"grasps: {name}: critical friction {frictions[0]}, done again {frictions[1]}"
+
+
+def loose_difference(one: Row, other: Row) -> str:
+    """Say how survival differs where numbers were rounded otherwise; empty if it does not.
+
+    A grasp whose contacts slip may be kept or lost by a hair, so it does not count.
+    """
+    slips = [row.get("predicted_first_slip") for row in (one, other)]
+    survived = [row.get("survived") for row in (one, other)]
+    if survived[0] == survived[1] or any(map(may_slip, slips)):
+        return ""
+    return f"survived is {survived[0]}, but {survived[1]} when executed again"

@@ -1,0 +1,500 @@
+"""Checks the simulator on cases with known answers before any grasp is executed.
+
+A box between four fingers moves as is known in closed form. With the pushes N, stiffness k,
+friction mu, masses m of the box and m_t of a fingertip, and radius rho of the fingertips:
+
+* a weight along z makes the box slip at 4 mu N, and so does the weight together with an upward
+  acceleration a of the palm, at m (g + a) = 4 mu N;
+* four fingers that all push along x let the box slip at 4 mu N in any direction across x;
+* a load F along any axis moves the box by F / (4 k) against the palm, as the four springs are as
+  stiff in all directions, and a palm in uniform motion changes neither this motion nor the forces;
+* a load F that comes and goes suddenly leaves F - m x'' to the contacts, with the step response of
+  a mass M = m + 4 m_t on 4 k and its dampers, and contacts that stick do not creep;
+* the box rings along an axis with K = 4 k and M = m + 4 m_t, and about z with
+
+      K = 2 k (a^2 + b^2) - 2 N (a - rho) - 2 N (b - rho),   M = I_z + 2 m_t (a^2 + b^2),  (1)
+
+  about x with K = 2 k b^2 - 2 N (b - rho) and M = I_x + 2 m_t b^2, and about y as about x with a
+  for b. The damper of each spring has c / k in proportion, so C = c / k times the part of K without
+  N, and the frequency is sqrt(K / M - (C / 2 M)^2).
+
+A box that nothing holds falls by g t^2 / 2, and a knock with impulse J and moment L about its axis
+z gives it the velocity J / m and the rate of turning L / I_z. A table under the box carries m g
+until the fingers lift the box, and nothing afterwards.
+
+Steps must be short enough where contacts open and close. A blow along x with a little more force
+than that of all four pushes takes the box off the fingers behind it and lets it slide along the
+others; springs and contacts bring it back. There is no closed form, so the motion is compared with
+that in steps that are `SHORTER` times as short as usual.
+
+Fingertips must meet the faces of objects as they are, on their convex solids. A fingertip is put on
+the middle of each flat piece of the surface, of a box (one solid) and of an object that is not
+convex (flat pyramids). Its contact must have the normal and the depth of the face. Then all push
+with the same pressure, a force p A n on a piece of area A: such forces balance on any closed
+surface, so each contact must carry its own.
+"""
+
+import importlib
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import SMALLEST
+from grasp_core.errors import UnfaithfulError
+from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.provenance import versions
+from grasp_core.values import Contact
+from scenes.execution.held import TOUCH, HeldLayout, HeldSettings
+from scenes.execution.held_mjcf import AWAY, SAMPLE_S, held_physics
+from scenes.fingertips import fitting_radius
+from scenes.physics import PhysicsSettings
+from sim_validate.execution import paths
+from sim_validate.execution.bench import HeldBench, HeldMotion
+from sim_validate.execution.held_case import (
+    DOWN,
+    FINGERS,
+    SETTLE_S,
+    SLOW,
+    TOLERANCE,
+    WEIGHT,
+    HeldCase,
+    known,
+    near,
+)
+from sim_validate.execution.paths import Drive, Table, idle
+from sim_validate.execution.slips import SLID, outcome, seen, slides
+from sim_validate.simulation.gate import DEPTH, DEPTH_ERROR, NORMAL_ERROR, Gate
+from sim_validate.simulation.known_cases import Check
+
+
+def require_faithful_execution(
+    layout: HeldLayout, physics: PhysicsSettings, hand: HeldSettings, push_n: float
+) -> None:
+    """Check the simulator on known cases, and refuse settings under which a check fails."""
+    for case in cases_of(layout, physics, hand, push_n):
+        failed = [check for check in measured_case(case).checks if not check.passed]
+        if failed:
+            raise UnfaithfulError(
+                "the simulator is not faithful with these settings, so no grasp is executed; these "
+                f"checks failed: {'; '.join(str(check) for check in failed)}"
+            )
+
+
+def cases_of(
+    layout: HeldLayout, physics: PhysicsSettings, hand: HeldSettings, push_n: float
+) -> tuple[HeldCase, ...]:
+    """Return the case to check for each friction of a scene, with numbers of two digits.
+
+    Gravity points down the box's free axis, whatever its direction in the scene.
+    """
+    upright = replace(physics, gravity=tuple(WEIGHT.tolist()))
+    return tuple(
+        HeldCase(
+            mass_kg=_rounded(layout.mass_kg),
+            stiffness_n_per_m=_rounded(layout.stiffest),
+            push_n=_rounded(push_n),
+            friction=friction,
+            radius_m=_rounded(layout.radius_m),
+            tip_radius_m=_rounded(float(layout.tip_radius_m.max())),
+            tip_mass_kg=_rounded(hand.tip_mass_kg),
+            damping_ratio=_rounded(hand.damping_ratio),
+            physics=upright,
+        )
+        for friction in sorted({_rounded(each) for each in layout.friction.tolist()})
+    )
+
+
+@lru_cache(maxsize=256)
+def measured_case(case: HeldCase) -> Gate:
+    """Check the simulator on all known cases, once per process for the same settings."""
+    checks = (*held_box(case), *free_box(case), struck_box(case), *surfaces(case))
+    return Gate(checks, versions()["mujoco"])
+
+
+def _rounded(value: float) -> float:
+    """Round to two digits, so that objects that are nearly alike share one measurement."""
+    return float(f"{value:.1e}")
+
+
+WINDOW = 0.03
+"""Loads from which and to which a ramp is slow, from the load of slip, relative to it. Loads change
+once per sample and the box follows within one, so this divided by the samples of half a rise is the
+error of a load of slip: a fifth of a percent."""
+OBLIQUE = math.radians(30.0)
+"""Angle from z of a weight across contacts whose cones may have edges."""
+RING_DAMPING = 0.01
+"""Damping ratio of the ring, lowered so that it lasts."""
+KNOCKED = 0.05
+"""Amplitude of each of the six rings, relative to the springs' displacement by the push (times
+friction where that is below one)."""
+PERIODS = 2.0
+"""Time for which a ring is watched, in periods of its slowest axis."""
+RADIANS = 0.8
+"""Angle of a ring between two of the points that its frequency is taken from, at most [rad]."""
+RISING = 0.5
+"""Part of the load of slip that is the palm's acceleration, where it rises."""
+SPEED_M_PER_S = 1.0
+"""Speed of a palm in uniform motion, which must change nothing."""
+CREEP = 0.2
+"""Largest creep of contacts that stick in the longest trial, over what counts as slipped."""
+JUMP, JUMP_SHARE = 6, 0.4
+"""Samples for which a sudden load stays, and its size relative to a light one: forces overshoot to
+twice a jump at most."""
+SPARE = 8
+"""Samples of a ring beyond its periods."""
+SETTLED = 8.0
+"""Time that a held load stays before it is measured, in the damper's own times c / k."""
+
+
+def held_box(case: HeldCase) -> tuple[Check, ...]:
+    """Check the load of slip, the deflection, the frequencies, and a palm in uniform motion."""
+    bench = HeldBench(case.held_box())
+    _, start = bench.settled(paths.closing(SETTLE_S))
+    ramps = [_ramp(case, 0.0), _ramp(case, RISING)]
+    still = _held_load(case)
+    moving = replace(still, velocity=SPEED_M_PER_S * np.array([0.6, 0.8, 0.0]))
+    sudden = _sudden_load(case)
+    motions = bench.run([*ramps, still, moving, sudden], start)
+    layout, friction = bench.scene.layout, bench.scene.layout.friction
+    slips = [
+        known(motion, (1.0 + WINDOW) * outcome(motion, layout, drive, friction).first_slip)
+        for motion, drive in zip(motions[:2], ramps, strict=True)
+    ]
+    rest, uniform = (seen(motion, layout) for motion in motions[2:4])
+    spring = case.light_n / (FINGERS * case.stiffness_n_per_m)
+    gone = rest.moved[-_period(case) :].mean(axis=0) / spring
+    apart = float(np.abs(uniform.moved - rest.moved).max()) / spring
+    pulled = float(np.abs(uniform.forces - rest.forces).max()) / case.light_n
+    return (
+        near("weight at which a held box slips, over 4 mu N", slips[0]),
+        _oblique(case),
+        near("m (g + a) at which a held box slips in a palm that rises, over 4 mu N", slips[1]),
+        *(near(f"deflection along {axis}, over load / 4 k", known(motions[2], ratio))
+          for axis, ratio in zip("xyz", gone.tolist(), strict=True)),
+        Check("motion that uniform motion of the palm adds, over the deflection",
+              known(motions[3], apart), 0.0, TOLERANCE),
+        Check("contact force that uniform motion of the palm adds, over the load",
+              known(motions[3], pulled), 0.0, TOLERANCE),
+        _creep(case, motions[2], layout),
+        _jumps(case, motions[4], layout),
+        *_rings(case.lightly_damped(RING_DAMPING)),
+    )  # fmt: skip
+
+
+def _oblique(case: HeldCase) -> Check:
+    """Let a box weigh obliquely on fingers that all push along x, and check when it slips."""
+    bench = HeldBench(case.clamped_box())
+    _, start = bench.settled(paths.closing(SETTLE_S))
+    drive = _ramp(case, 0.0, np.array([0.0, math.sin(OBLIQUE), -math.cos(OBLIQUE)]))
+    (motion,) = bench.run([drive], start)
+    found = outcome(motion, bench.scene.layout, drive, bench.scene.layout.friction)
+    name = "weight at which a box slips obliquely across its contacts, over 4 mu N"
+    return near(name, known(motion, (1.0 + WINDOW) * found.first_slip))
+
+
+def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> Drive:
+    """Return the drive in which a weight grows past slip, a part of it as the palm's rise."""
+    low = (1.0 - WINDOW) / (1.0 + WINDOW)
+    last = case.rise_of(0.5 * SLOW)
+    share = np.concatenate([low * case.rise, low + (1.0 - low) * last])
+    whole = (1.0 + WINDOW) * case.slip_n / case.mass_kg * share[:, None] * way
+    drive = replace(idle(len(share)), gravity=(1.0 - rising) * whole, shares=share)
+    accelerations = np.hstack([-rising * whole, np.zeros((len(share), 3))])
+    return replace(drive, accelerations=accelerations)
+
+
+def _held_load(case: HeldCase) -> Drive:
+    """Return the drive in which a light load along each axis grows, and stays."""
+    lag = SETTLED * 2.0 * case.damping_ratio / case.frequency
+    share = np.concatenate([case.rise, np.ones(paths.samples(lag) + _period(case))])
+    wrenches = case.light_n * share[:, None] * np.repeat([1.0, 0.0], 3)
+    return replace(idle(len(share)), wrenches=wrenches, shares=share)
+
+
+def _creep(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
+    """Check how far contacts that stick creep in the time of the longest trial."""
+    last = _period(case)
+    slid = slides(seen(motion, layout), layout)
+    speed = float(np.abs(slid[-1] - slid[-last]).max()) / ((last - 1) * SAMPLE_S)
+    longest = len(paths.turned_weight(case.frequency)) * SAMPLE_S
+    far = speed * longest / (SLID * case.radius_m)
+    name = "creep of contacts that stick in a whole trial, over what counts as slipped"
+    return Check(name, known(motion, far), 0.0, CREEP)
+
+
+def _sudden_load(case: HeldCase) -> Drive:
+    """Return the drive in which a load along x is there at once, and suddenly gone."""
+    wrenches = np.zeros((2 * JUMP, 6))
+    wrenches[:JUMP, 0] = JUMP_SHARE * case.light_n
+    return replace(idle(2 * JUMP), wrenches=wrenches)
+
+
+def _jumps(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
+    """Check the contact forces while a load comes and goes suddenly, sample by sample.
+
+    The simulator may be one step of h late: after each jump x'' changes by (1 + 2 zeta) w h of the
+    jump in a step.
+    """
+    load, w, zeta = JUMP_SHARE * case.light_n, case.frequency, case.damping_ratio
+    share = case.mass_kg / case.moving_kg
+    linalg: Any = importlib.import_module("scipy.linalg")
+    # x'' follows the same equation as x, from F / M and -2 zeta w F / M on
+    step = linalg.expm(SAMPLE_S * np.array([[0.0, 1.0], [-w * w, -2.0 * zeta * w]]))
+    state, accelerations = np.array([1.0, -2.0 * zeta * w]), list[float]()
+    for sample in range(2 * JUMP):
+        if sample == JUMP:
+            state = state - [1.0, -2.0 * zeta * w]
+        state = step @ state
+        accelerations.append(float(state[0]))
+    applied = np.repeat([1.0, 0.0], JUMP)
+    right = load * (applied - share * np.array(accelerations))
+    carried = -np.einsum("kj,nkj->n", layout.axes[:, 0], motion.forces)
+    off = float(np.abs(carried - right).max()) / load
+    late = (1.0 + 2.0 * zeta) * w * held_physics(layout).timestep * share
+    name = "error of contact forces while a load comes and goes suddenly, over the load"
+    return Check(name, known(motion, off), 0.0, late)
+
+
+def _period(case: HeldCase) -> int:
+    """Return the samples of one period of the box along an axis, two at least."""
+    return max(2, paths.samples(2.0 * math.pi / case.frequency))
+
+
+def _rings(case: HeldCase) -> list[Check]:
+    """Knock the box along and about all axes at once, and check how fast each of them rings."""
+    scene = case.held_box()
+    _, start = HeldBench(scene).settled(paths.closing(SETTLE_S))
+    stiff, mass, damper = _modes(case, np.diag(scene.layout.inertia_kg_m2))
+    undamped = np.sqrt(stiff / mass)
+    bench = HeldBench(scene, sample_s=min(SAMPLE_S, RADIANS / float(undamped.max())))
+    a, b, _ = case.halves
+    amplitude = KNOCKED * min(case.friction, 1.0) * case.push / case.stiffness_n_per_m
+    sizes = amplitude / np.array([1.0, 1.0, 1.0, b, a, a + b])
+    count = round(PERIODS * 2.0 * math.pi / float(undamped.min()) / bench.sample_s) + SPARE
+    wrenches = np.zeros((count, 6))
+    wrenches[0] = mass * undamped * sizes / bench.sample_s
+    (motion,) = bench.run([replace(idle(count), wrenches=wrenches)], start)
+    view = seen(motion, scene.layout)
+    turns = 0.5 * (view.turned - view.turned.transpose(0, 2, 1))
+    rung = np.hstack([view.moved, turns[:, [2, 0, 1], [1, 2, 0]]])[1:]
+    names = [f"{word} {axis}" for word in ("along", "about") for axis in "xyz"]
+    rates = np.sqrt(stiff / mass - (0.5 * damper / mass) ** 2)
+    return [
+        near(
+            f"frequency of a ring {name}, over that of mass and springs",
+            known(motion, ring_frequency(points, rate, bench.sample_s) / rate),
+        )
+        for name, points, rate in zip(names, rung.T, rates.tolist(), strict=True)
+    ]
+
+
+def _modes(case: HeldCase, inertia: Array) -> Array:
+    """Return stiffness, mass and damping along and about x, y and z by (1), (3, 6)."""
+    a, b, _ = case.halves
+    k, push, rho = case.stiffness_n_per_m, case.push, case.tip_radius_m
+    damper = 2.0 * case.damping_ratio / math.sqrt(k * FINGERS / case.moving_kg)
+    squares = np.array([b * b, a * a, a * a + b * b])
+    geometric = 2.0 * push * np.array([b - rho, a - rho, a + b - 2.0 * rho])
+    springs = k * np.array([4.0, 4.0, 4.0, *(2.0 * squares)])
+    mass = np.array([*[case.moving_kg] * 3, *(inertia + 2.0 * case.tip_mass_kg * squares)])
+    return np.stack([springs - np.concatenate([np.zeros(3), geometric]), mass, damper * springs])
+
+
+def ring_frequency(points: Array, about: float, sample_s: float) -> float:
+    """Return the frequency of a decaying ring about an unknown middle [rad/s].
+
+    Points at equal times t obey x_2 = p x_1 - q x_0 + r with p = 2 sqrt(q) cos(w t).
+
+    Takes `points` (n,); `about` [rad/s]; `sample_s` [s].
+    """
+    stride = max(1, int(RADIANS / (about * sample_s)))
+    first, second, third = points[: -2 * stride], points[stride:-stride], points[2 * stride :]
+    scale = float(np.abs(points).max())
+    if not 0.0 < scale < math.inf:
+        return math.nan
+    rows = np.column_stack([second, -first, np.full(len(first), scale)]) / scale
+    (p, q, _), *_ = np.linalg.lstsq(rows, third / scale, rcond=None)
+    if not q > 0.0 or abs(p) > 2.0 * math.sqrt(q):
+        return math.nan
+    return math.acos(0.5 * p / math.sqrt(q)) / (stride * sample_s)
+
+
+FALL_S = 0.4
+"""Time of the fall: steps of h make it h / FALL_S longer, a third of a percent at 1.25 ms [s]."""
+FLIGHT_S = 0.2
+"""Time in which the box flies after a knock [s]."""
+KNOCK_RAD_PER_S = 2.0
+"""Rate of turning after a knock: the box turns by less than half a radian in its flight."""
+APART = 2.0
+"""Distance of the fingers from their contacts, in radii of the box."""
+RAISED = 4.0
+"""Height of the lift, relative to the way by which the springs give under the weight."""
+
+
+def free_box(case: HeldCase) -> tuple[Check, ...]:
+    """Check the fall, the velocities after a knock, and what a table carries."""
+    bench = HeldBench(case.held_box())
+    fall, knock = bench.run([_fall(case, bench), _knock(case, bench)])
+    steps = round(FALL_S / SAMPLE_S)
+    fallen = float(fall.moved[-1] @ DOWN) / (0.5 * GRAVITY_M_PER_S2 * (steps * SAMPLE_S) ** 2)
+    time = (len(knock.moved) - 2) * SAMPLE_S
+    speed = float(knock.moved[-1, 0] - knock.moved[1, 0]) / time
+    turns = 2.0 * np.arctan2(knock.turned[:, 3], knock.turned[:, 0])
+    rate = float(turns[-1] - turns[1]) / time
+    return (
+        near("fall of a box that nothing holds, over g t^2 / 2", known(fall, fallen)),
+        near("velocity after a knock, over J / m", known(knock, speed / _speed(case))),
+        near("rate of turning after a knock, over L / I", known(knock, rate / KNOCK_RAD_PER_S)),
+        *_lifted(case, bench),
+    )
+
+
+def _apart(case: HeldCase, bench: HeldBench, drive: Drive) -> Drive:
+    """Take the fingers and the table away from the box; the table faces it from above."""
+    layout = bench.scene.layout
+    back = -APART * case.radius_m * layout.frames[:, :, 0]
+    reached = np.einsum("kij,ki->kj", layout.axes, back)
+    above = Table(-AWAY * case.radius_m * DOWN, DOWN)
+    return replace(drive, grasping=np.zeros(len(drive)), reached=reached, table=above)
+
+
+def _fall(case: HeldCase, bench: HeldBench) -> Drive:
+    count = round(FALL_S / SAMPLE_S)
+    return _apart(case, bench, replace(idle(count), gravity=np.tile(WEIGHT, (count, 1))))
+
+
+def _knock(case: HeldCase, bench: HeldBench) -> Drive:
+    count = round(FLIGHT_S / SAMPLE_S)
+    wrenches = np.zeros((count, 6))
+    wrenches[0, 0] = case.mass_kg * _speed(case) / SAMPLE_S
+    wrenches[0, 5] = bench.scene.layout.inertia_kg_m2[2, 2] * KNOCK_RAD_PER_S / SAMPLE_S
+    return _apart(case, bench, replace(idle(count), wrenches=wrenches))
+
+
+def _lifted(case: HeldCase, bench: HeldBench) -> tuple[Check, Check]:
+    """Lift the box off a table, with a weight that its springs carry lightly."""
+    weight = min(case.mass_kg * GRAVITY_M_PER_S2, case.light_n)
+    height = RAISED * weight / (FINGERS * case.stiffness_n_per_m)
+    drive, begun = paths.lift(-DOWN, height, SAMPLE_S * len(case.rise))
+    share = weight / (case.mass_kg * GRAVITY_M_PER_S2)
+    table = Table(case.halves[2] * DOWN, -DOWN)
+    (motion,) = bench.run([replace(drive, gravity=share * drive.gravity, table=table)])
+    still = paths.samples(0.5 * paths.REST_S)
+    carried = -(motion.table @ DOWN) / weight
+    before = float(carried[begun - still : begun].mean())
+    after = float(np.abs(carried[-still:]).max())
+    return (
+        near("weight that a table carries before a lift, over m g", known(motion, before)),
+        Check("weight that a table carries after a lift, over m g",
+              known(motion, after if math.isfinite(after) else math.nan), 0.0, 0.01),
+    )  # fmt: skip
+
+
+def _speed(case: HeldCase) -> float:
+    """Return the speed after a knock: it takes the box by one radius, not as far as the fingers."""
+    return case.radius_m / FLIGHT_S
+
+
+BLOW = 1.2
+"""Largest force of the blow, relative to the pushes of all fingers."""
+WATCHED = 1.0
+"""Time for which the box is watched, in periods of its motion along an axis."""
+LEAST_WATCHED = 8
+"""Least number of samples for which it is watched."""
+SHORTER = 4
+"""How much shorter the steps are that it is compared with."""
+CHANGED = 0.25
+"""Largest difference, over the largest displacement: steps of the usual length differ by 0.02 to
+0.1, in a few cases by 0.2; steps twice as long by 0.27 for boxes of some grams, four times as long
+by 0.4 and more."""
+
+
+def struck_box(case: HeldCase) -> Check:
+    """Check how much short steps change the motion of a box that is struck off its fingers."""
+    scene = case.held_box()
+    usual = HeldBench(scene)
+    step_s = held_physics(scene.layout).timestep / SHORTER
+    motions = [_struck(case, bench) for bench in (usual, HeldBench(scene, step_s=step_s))]
+    here, there = (seen(motion, scene.layout).moved for motion in motions)
+    changed = float(np.abs(here - there).max()) / max(float(np.abs(there).max()), SMALLEST)
+    name = "motion of a box struck off its fingers that short steps change, over the largest"
+    faulty = any(motion.faults for motion in motions)
+    return Check(name, math.nan if faulty else changed, 0.0, CHANGED)
+
+
+def _struck(case: HeldCase, bench: HeldBench) -> HeldMotion:
+    _, start = bench.settled(paths.closing(SETTLE_S))
+    (motion,) = bench.run([_blow(case)], start)
+    return motion
+
+
+def _blow(case: HeldCase) -> Drive:
+    """Return the drive of half a sine of force along x, as long as a knock, and what follows."""
+    strike = paths.samples(paths.STRIKE_S)
+    after = max(LEAST_WATCHED, paths.samples(WATCHED * 2.0 * np.pi / case.frequency))
+    wrenches = np.zeros((strike + after, 6))
+    shape = np.sin(np.pi * (np.arange(strike) + 0.5) / strike)
+    wrenches[:strike, 0] = BLOW * FINGERS * case.push * shape
+    return replace(idle(len(wrenches)), wrenches=wrenches)
+
+
+NAMES = ("box", "l-bracket")
+
+
+def surfaces(case: HeldCase) -> tuple[Check, ...]:
+    """Check normals, depths and forces of fingertips on each face of two objects."""
+    return tuple(check for name in NAMES for check in _on_faces(case, name))
+
+
+def _on_faces(case: HeldCase, name: str) -> tuple[Check, ...]:
+    body = case.scaled(name)
+    middles, normals, areas = _pieces(body)
+    pushes = case.push * areas / areas.max()
+    contacts = [Contact(*each) for each in zip(middles, normals, strict=True)]
+    radius = min(case.tip_radius_m, fitting_radius(body, middles, normals))
+    scene = case.scene(body, contacts, pushes[:, None] * normals, radius)
+    bench = HeldBench(scene)
+    into = DEPTH * case.radius_m * normals
+    reached = np.einsum("kij,ki->kj", scene.layout.axes, into)
+    found, depths = bench.touched(reached)
+    turned = np.arctan2(
+        np.linalg.norm(np.cross(found, normals), axis=1), np.einsum("ki,ki->k", found, normals)
+    )
+    off = np.abs(depths / ((DEPTH + TOUCH) * case.radius_m) - 1.0)
+    motion, _ = bench.settled(paths.closing(SETTLE_S))
+    forces = np.einsum("kij,kj->ki", scene.layout.axes, motion.forces[-1])
+    missed = np.linalg.norm(forces - pushes[:, None] * normals, axis=1) / pushes
+    # the maxima are NaN if one number is
+    return (
+        Check(f"angle between a contact's normal and its face's, on a {name}",
+              float(np.max(turned)), 0.0, NORMAL_ERROR),
+        Check(f"error of a contact's depth, relative to it, on a {name}",
+              float(np.max(off)), 0.0, DEPTH_ERROR),
+        Check(f"error of a contact's force under even pressure, on a {name}",
+              known(motion, float(np.max(missed))), 0.0, TOLERANCE),
+    )  # fmt: skip
+
+
+def _pieces(body: Polyhedron) -> tuple[Array, Array, Array]:
+    """Return the centroid, inward normal and area of each flat piece of a polyhedron."""
+    pieces = [(piece, face.normal) for face in body.faces for piece in face.pieces]
+    middles, areas = zip(*(_centroid(piece) for piece, _ in pieces), strict=True)
+    return np.array(middles), np.array([normal for _, normal in pieces]), np.array(areas)
+
+
+def _centroid(corners: Array) -> tuple[Array, float]:
+    """Return the centroid and the area of a convex polygon."""
+    triangles = np.array(_fan(corners))
+    crosses = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    areas = 0.5 * np.linalg.norm(crosses, axis=1)
+    return areas @ triangles.mean(axis=1) / areas.sum(), float(areas.sum())
+
+
+def _fan(corners: Array) -> Sequence[tuple[Array, Array, Array]]:
+    return [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]

@@ -1,0 +1,249 @@
+"""Runs a published test in simulation: what is told and applied, sample by sample, and each look.
+
+A palm that moves is a palm at rest with an object that is pulled back: at the mass m and the
+inertia J, the palm's acceleration a and its angular acceleration b act as
+
+    force = -m a,   torque = -J b                                                        (1)
+
+in the frame of the palm. Accelerations are second differences of the path over one sample, so a
+start at full speed takes one sample. Light fingertips are left out, and so is what a turn at
+constant speed does to an object whose centre is not on its axis.
+"""
+
+# pyright: basic, reportAttributeAccessIssue=false
+# MuJoCo ships no types for its core; plain arrays and numbers leave this module.
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from scenes.silent_mujoco import unlogged
+from scenes.tested import TestedScene
+from sim_validate.protocols.published import Passing, PublishedProtocol, Run, Step
+from sim_validate.simulation.bench import batch, compiled, faults, mujoco, step
+from sim_validate.simulation.traces import rotation_angles
+
+CHUNK = 10
+"""Simulation steps per sample: DexGraspBench moves its commands every ten steps."""
+FREE = 7
+"""Coordinates of the object's free joint, which come first."""
+AT_REST = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+"""Pose of the object where it is planned to be, from which displacement and turn count."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Timeline:
+    """What is told to the servos and acts on the object in each of the n samples of a run."""
+
+    commands: Array
+    """Commands of the servos, (n, u) [m or rad], as in `TestedScene`."""
+    wrenches: Array
+    """Force and torque on the object, along the world's axes, (n, 6) [N, N m]."""
+    looks: tuple[int, ...]
+    """Samples after which the object is looked at."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """The object in each of the n samples of a run, and which fingers touch it at each look."""
+
+    poses: Array
+    """Position of the object's centre of mass and its orientation (w, x, y, z), (n, 7)."""
+    touching: tuple[frozenset[int], ...]
+    """For each look, the fingers that touch the object."""
+    fault: str
+    """What went wrong in the simulator; empty if nothing did."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunVerdict:
+    """How one run of a published test ended."""
+
+    number: int
+    """Number of the run in the test, from 0."""
+    passed: bool
+    reason: str
+    """Why it did not pass; empty if it did."""
+    displacement_m: float
+    """Largest displacement at a look, up to the first that did not pass [m]."""
+    turn_deg: float
+    """Largest turn at a look, likewise [deg]."""
+    fingers: int
+    """Least number of fingers that touched the object at a look, likewise."""
+
+
+def their_verdict(
+    protocol: PublishedProtocol, scene: TestedScene, threads: int = 1
+) -> tuple[RunVerdict, ...]:
+    """Simulate all runs of a test and judge each."""
+    runs = [timeline(protocol, scene, run) for run in protocol.runs]
+    began = scene.opened if protocol.close_s else scene.shut
+    motions = TestBench(scene, threads).run(runs, began)
+    return tuple(
+        judged_run(number, motion, run, protocol.passing)
+        for number, (motion, run) in enumerate(zip(motions, runs, strict=True))
+    )
+
+
+def timeline(protocol: PublishedProtocol, scene: TestedScene, run: Run) -> Timeline:
+    """Lay out one run: closing, squeezing, then its steps."""
+    sample_s = CHUNK * scene.physics.timestep
+    closing = _closing(protocol, scene, sample_s)
+    counts = [_samples(step.seconds, sample_s) for step in run]
+    begins = np.cumsum([len(closing), *counts])[:-1].tolist()
+    looks = [
+        look
+        for first, count, step in zip(begins, counts, run, strict=True)
+        for look in _looks(first, count, step, sample_s)
+    ]
+    n = len(closing) + sum(counts)
+    wrenches = np.zeros((n, 6))
+    wrenches[len(closing) :] = _wrenches(run, counts, scene, sample_s)
+    wrenches = (wrenches.reshape(n, 2, 3) @ scene.axes.T).reshape(n, 6)
+    held = np.broadcast_to(scene.squeezing, (sum(counts), len(scene.squeezing)))
+    return Timeline(np.vstack([closing, held]), wrenches, tuple(looks))
+
+
+def _samples(seconds: float, sample_s: float) -> int:
+    return max(1, round(seconds / sample_s))
+
+
+def _closing(protocol: PublishedProtocol, scene: TestedScene, sample_s: float) -> Array:
+    """Return commands from open to touching, then to squeezing, at equal steps, (n, u)."""
+    parts = [np.zeros((0, len(scene.shut)))]
+    for seconds, begin, end in (
+        (protocol.close_s, scene.opened, scene.shut),
+        (protocol.squeeze_s, scene.shut, scene.squeezing),
+    ):
+        if seconds:
+            parts.append(np.linspace(begin, end, _samples(seconds, sample_s) + 1)[1:])
+    return np.vstack(parts)
+
+
+def _looks(first: int, count: int, step: Step, sample_s: float) -> list[int]:
+    every = count if step.look_s is None else _samples(step.look_s, sample_s)
+    last = first + count - 1
+    return sorted({*range(first + every - 1, last + 1, every), last})
+
+
+def _wrenches(run: Run, counts: list[int], scene: TestedScene, sample_s: float) -> Array:
+    """Return forces of the steps with what the palm's motion adds: (1), (n, 6)."""
+    forces, paths, angles = list[Array](), [np.zeros((1, 3))], [np.zeros(1)]
+    for part, count in zip(run, counts, strict=True):
+        time = np.arange(1, count + 1) / count
+        forces.append(np.tile(part.force(scene.mass_kg), (count, 1)))
+        wave = np.sin(2.0 * np.pi * time)
+        path = time[:, None] * np.array(part.line_m) + wave[:, None] * np.array(part.wave_m)
+        paths.append(paths[-1][-1] + path)
+        angles.append(angles[-1][-1] + time * np.radians(part.turn_deg))
+    found = np.zeros((sum(counts), 6))
+    found[:, :3] = np.vstack(forces) - scene.mass_kg * _acceleration(np.vstack(paths), sample_s)
+    turning = _acceleration(np.concatenate(angles)[:, None], sample_s)
+    found[:, 3:] = -turning * (scene.axes.T @ scene.inertia_kg_m2 @ scene.axes)[:, 2]
+    return found
+
+
+def _acceleration(path: Array, sample_s: float) -> Array:
+    """Return second differences of a path that begins at rest, (n, d), one per sample."""
+    speeds = np.diff(path, axis=0) / sample_s
+    before = np.vstack([np.zeros((1, path.shape[1])), speeds[:-1]])
+    return (speeds - before) / sample_s
+
+
+class TestBench:
+    """A compiled scene on which the runs of a test are simulated together."""
+
+    __test__ = False  # no class of tests, whatever its name begins with
+
+    def __init__(self, scene: TestedScene, threads: int = 1) -> None:
+        """Compile a scene."""
+        self.scene, self.threads = scene, threads
+        self.model = compiled(scene.xml)
+        self.data = mujoco.MjData(self.model)
+        self.body = self.model.body("object").id
+        self.fingers = {
+            self.model.body(name).id: finger
+            for finger, names in enumerate(scene.fingers)
+            for name in names
+        }
+
+    def run(self, runs: Sequence[Timeline], began: Array) -> tuple[Motion, ...]:
+        """Simulate runs, all from the same fingers, `began` (u,)."""
+        count = len(runs)
+        trials = batch.Batch(self.model, max(count, 2), self.threads)
+        trials.reset(np.arange(count), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        joints = trials.bind("qpos")
+        joints[:count, :FREE], joints[:count, FREE:] = AT_REST, began
+        poses = np.zeros((count, max(len(each.commands) for each in runs), FREE))
+        touching: list[list[frozenset[int]]] = [[] for _ in runs]
+        errors = self._stepped(trials, runs, poses, touching)
+        return tuple(
+            Motion(
+                poses[place, : len(each.commands)], tuple(touching[place]),
+                next(iter(faults(trials, place, errors.get(place, ""))), ""),
+            )
+            for place, each in enumerate(runs)
+        )  # fmt: skip
+
+    def _stepped(
+        self, trials: "batch.Batch", runs: Sequence[Timeline], poses: Array,
+        touching: list[list[frozenset[int]]],
+    ) -> dict[int, str]:  # fmt: skip
+        commands, applied = trials.bind("ctrl"), trials.bind("xfrc_applied")
+        told = (trials.bind("mocap_pos"), trials.bind("mocap_quat")) if self.model.nmocap else ()
+        joints = trials.bind("qpos")
+        lengths = np.array([len(each.commands) for each in runs])
+        errors: dict[int, str] = {}
+        with unlogged():
+            for sample in range(poses.shape[1]):
+                going = np.flatnonzero(lengths > sample)
+                for place in going.tolist():
+                    now = runs[place].commands[sample]
+                    commands[place] = now[FREE:] if told else now
+                    for part, values in zip(told, np.split(now[:FREE], [3]), strict=False):
+                        part[place, 0] = values
+                    applied[place, self.body] = runs[place].wrenches[sample]
+                step(trials, errors, CHUNK, going)
+                poses[going, sample] = joints[going, :FREE]
+                for place in going.tolist():
+                    if sample in runs[place].looks:
+                        touching[place].append(self._touching(trials.state[place]))
+        return errors
+
+    def _touching(self, state: Array) -> frozenset[int]:
+        """Find the fingers that touch the object in a state."""
+        if not np.isfinite(state).all():
+            return frozenset()
+        signature = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+        mujoco.mj_setState(self.model, self.data, state, signature)
+        mujoco.mj_forward(self.model, self.data)
+        bodies = self.model.geom_bodyid[self.data.contact.geom]
+        met = bodies[(bodies == self.body).any(axis=1)].ravel().tolist()
+        return frozenset(self.fingers[body] for body in met if body in self.fingers)
+
+
+def judged_run(number: int, motion: Motion, run: Timeline, passing: Passing) -> RunVerdict:
+    """Judge one run at its looks, up to the first that does not pass."""
+    moved, turned, seen, reason = 0.0, 0.0, list[int](), motion.fault
+    for sample, fingers in zip(run.looks, map(len, motion.touching), strict=True):
+        if reason:
+            break
+        pose = motion.poses[sample]
+        shift = float(np.linalg.norm(pose[:3] - AT_REST[:3]))
+        turn = float(np.degrees(rotation_angles(pose[None, 3:], AT_REST[None, 3:])[0]))
+        moved, turned = max(moved, shift), max(turned, turn)
+        seen.append(fingers)
+        reason = _why(shift, turn, fingers, passing)
+    return RunVerdict(number, not reason, reason, moved, turned, min(seen, default=0))
+
+
+def _why(shift_m: float, turn_deg: float, fingers: int, passing: Passing) -> str:
+    if not shift_m < passing.most_m:
+        return f"the object moved by {1e3 * shift_m:.3g} mm, and {1e3 * passing.most_m:g} is enough"
+    if not turn_deg < passing.most_deg:
+        return f"the object turned by {turn_deg:.3g} deg, and {passing.most_deg:g} is enough"
+    if fingers < passing.fingers:
+        return f"{fingers} fingers touched the object, and {passing.fingers} must"
+    return ""

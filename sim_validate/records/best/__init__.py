@@ -1,1 +1,0 @@
-"""What does the file of a search for the best grasp hold?"""

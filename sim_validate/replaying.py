@@ -1,0 +1,381 @@
+"""Simulates one trial of a recorded verdict again, of a `verdicts.json` or of a row of a dataset.
+
+Trials of a scene do not influence each other, so one by itself moves as it did among the others.
+It is simulated twice: until its answer is known, for the verdict as it was recorded, and to the
+protocol's full length, to be looked at.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from grasp_core.closure.contacts import contacts_sha256, stacked
+from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.errors import InputError
+from grasp_core.files.text_files import read_text
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.given_contacts import seat
+from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.values import Contact, Grasp
+from scenes.fingertips import clashes
+from scenes.mjcf import Scene
+from sim_validate.baselines.settings import noise_from_table
+from sim_validate.datasets.manifest import MANIFEST
+from sim_validate.datasets.meshes import stored_body
+from sim_validate.datasets.open_dataset import select
+from sim_validate.datasets.rows import GIVEN, NOT_TRIED
+from sim_validate.datasets.varied import VARIED
+from sim_validate.records.grasps import NAMED, grasp_with_id, read_grasps, some
+from sim_validate.records.setup_toml import OF_USERS, setup_from_tables
+from sim_validate.records.verdicts import verdicts_of
+from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.loads import PlannedLoad, planned_loads
+from sim_validate.simulation.rig import Rig, Watched, squeezed
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.setup import (
+    AXIS_NAMES,
+    RANDOM,
+    WEAKEST,
+    Agenda,
+    NamedWrench,
+    Noise,
+    Setup,
+)
+from sim_validate.simulation.traces import HoldVerdict, Outcome, invalid_start, judge
+from sim_validate.validation.controls import Control, control_case, negative_controls
+from sim_validate.validation.noise import OPEN, disturbed_in, for_repeats, noisy_case
+
+GRASPS, VERDICTS = "grasps.json", "verdicts.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """Which contact set of a file is to be simulated again."""
+
+    grasp: str | None = None
+    """Id of the grasp; None if the file has only one."""
+    control: str | None = None
+    """Name of a negative control (contacts that must fail) made from the grasp."""
+    trial: int | None = None
+    """Number of a repeat with noise; None for the trials without noise."""
+    grasps: Path | None = None
+    """Path of the `grasps.json` that verdicts are about, if it is not beside them."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recorded:
+    """A contact set of a file, and how its trials ended: a grasp, negative control, or repeat."""
+
+    name: str
+    body: Polyhedron
+    contacts: tuple[Contact, ...]
+    friction: float
+    setup: Setup
+    agenda: Agenda
+    """Which trials were run, with the noise that was drawn."""
+    control: str | None = None
+    """Name of the negative control (contacts that must fail); None for a grasp."""
+    grasp: Grasp | None = None
+    """The planned grasp that has these contacts; None if it is not known."""
+    trial: int | None = None
+    """Number of the repeat with noise; None for trials without noise."""
+    outcomes: Mapping[str, str] = field(default_factory=dict[str, str])
+    """How trials ended, by name of the wrench."""
+    others: str | None = None
+    """How all trials that `outcomes` does not name ended; None if the file does not say."""
+
+    def outcome_of(self, wrench: str) -> str | None:
+        """Look up how the trial of a wrench ended; None if the file does not say."""
+        return self.outcomes.get(wrench, self.others)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Replayed:
+    """The motion and outcome of one trial that was simulated again."""
+
+    name: str
+    """Name of the wrench that is applied."""
+    load: Load
+    predicted_limit: float | None
+    """Largest multiple of the wrench that is resisted, according to the analysis. It is None for
+    contacts without force closure, whose loads nothing resists."""
+    required_friction: float | None
+    """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
+    friction: float
+    hold: HoldVerdict
+    """The verdict on the trial, which ends when its answer is known."""
+    watched: Watched
+    """The motion of the trial to its full length."""
+    scene: Scene
+
+
+def recorded_in(source: Path, wanted: Wanted) -> Recorded:
+    """Read a contact set from a `verdicts.json`, the folder of a run, or a dataset."""
+    if wanted.trial is not None and wanted.control is not None:
+        raise InputError(
+            "--trial chooses a repeat of the grasp with noise, --control a negative control: "
+            "give only one of them"
+        )
+    if source.is_dir() and (source / MANIFEST).is_file():
+        return _of_dataset(source, wanted)
+    path = source / VERDICTS if source.is_dir() else source
+    try:
+        record = verdicts_of(read_text(path))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    saved = _grasps_behind(wanted.grasps or path.parent / GRASPS, record)
+    verdicts = {each["id"]: each for each in record["verdicts"]}
+    grasp = grasp_with_id(path, saved, wanted.grasp)
+    if grasp.id not in verdicts:
+        raise InputError(
+            f"{path}: no verdict on the grasp {grasp.id}; the file has verdicts on {some(verdicts)}"
+        )
+    return of_verdict(path, saved, verdicts[grasp.id], replace(wanted, grasp=grasp.id))
+
+
+def _grasps_behind(path: Path, record: Mapping[str, Any]) -> SavedGrasps:
+    """Read the grasps that verdicts are about, at the friction that they were tested at."""
+    if not path.is_file():
+        raise InputError(
+            f"{path}: this file of grasps is missing; say with --grasps where the file is"
+        )
+    saved = read_grasps(path)
+    if saved.body.content_sha256 != record["object"]["content_sha256"]:
+        raise InputError(
+            f"{path}: these grasps are on another object than the results to replay; give the "
+            "right --grasps"
+        )
+    return replace(saved, friction=record["friction"])
+
+
+def of_verdict(
+    path: Path, saved: SavedGrasps, verdict: Mapping[str, Any], wanted: Wanted
+) -> Recorded:
+    """Read a contact set, and how its trials ended, from the verdict on one grasp."""
+    grasp = grasp_with_id(path, saved, wanted.grasp)
+    if contacts_sha256(grasp.contacts) != verdict["contacts_sha256"]:
+        raise InputError(
+            f"{path}: the contacts of {grasp.id} have changed since these results were recorded; "
+            "record them again"
+        )
+    setup, agenda = _asked(path, verdict)
+    found = Recorded(
+        grasp.id, saved.body, grasp.contacts, saved.friction, setup, agenda,
+        grasp=grasp, trial=wanted.trial,
+    )  # fmt: skip
+    if wanted.trial is not None:
+        return _in_trial(path, found, verdict, wanted.trial)
+    tried = verdict
+    if wanted.control is not None:
+        found = _with_control(path, found, grasp, wanted.control)
+        tried = verdict["controls"][wanted.control]
+    return replace(found, outcomes={each["name"]: each["outcome"] for each in tried["wrenches"]})
+
+
+def _asked(path: Path, verdict: Mapping[str, Any]) -> tuple[Setup, Agenda]:
+    """Rebuild the settings and the choice of trials that a verdict was made with."""
+    settings = verdict["settings"]
+    tables = {name: settings[name] for name in OF_USERS}
+    setup = setup_from_tables(tables, Setup(surface=settings["surface"]), str(path))
+    count = settings["random_wrenches"]
+    ours = {*AXIS_NAMES, WEAKEST, *(RANDOM.format(place) for place in range(count))}
+    repeats = verdict.get("robustness")
+    agenda = Agenda(
+        random_wrenches=count,
+        wrenches=tuple(
+            NamedWrench(each["name"], each["wrench"])
+            for each in verdict["wrenches"]
+            if each["name"] not in ours
+        ),
+        noise=Noise() if repeats is None else noise_from_table(repeats["noise"]),
+        seed=settings["seed"],
+    )
+    return setup, agenda
+
+
+def _in_trial(path: Path, found: Recorded, verdict: Mapping[str, Any], trial: int) -> Recorded:
+    """Choose a repeat with noise."""
+    found = replace(found, name=f"{found.name} in trial {trial}")
+    nothing: Mapping[str, Any] = {"trials": 0, "not_held": []}
+    repeats: Mapping[str, Any] = verdict.get("robustness") or nothing
+    if trial >= (trials := repeats["trials"]):
+        said = f"choose from 0 to {trials - 1}" if trials else "it was recorded without --trials"
+        raise InputError(f"{path}: the file has no repeat with noise numbered {trial}; {said}")
+    for each in repeats["not_held"]:
+        if each["trial"] == trial:
+            return replace(found, outcomes={each["wrench"]: each["outcome"]})
+    return replace(found, others=Outcome.HELD.value)
+
+
+def _with_control(path: Path, found: Recorded, grasp: Grasp, name: str) -> Recorded:
+    """Make a negative control of a grasp again."""
+    setup, body = found.setup, found.body
+    exact = replace(grasp, critical_friction=critical_friction(grasp, torsion_m=setup.torsion_m))
+    made = negative_controls(body, exact, found.friction, found.agenda.seed, setup.torsion_m)
+    control = next((each for each in made if each.name == name), None)
+    if control is None:
+        raise InputError(
+            f"{path}: grasp {grasp.id} has no negative control {name!r}; choose from "
+            f"{some(each.name for each in made)}"
+        )
+    return replace(
+        found, name=f"{grasp.id}:{name}", contacts=control.contacts, friction=control.friction,
+        control=name, grasp=None,
+    )  # fmt: skip
+
+
+def _of_dataset(folder: Path, wanted: Wanted) -> Recorded:
+    """Read a grasp or a negative control from the tables of a dataset."""
+    chosen = select(folder)
+    if wanted.grasp is None or wanted.trial is not None or wanted.grasps is not None:
+        raise InputError(
+            f"{folder} is a dataset: name a grasp with --grasp GRASP_ID, and give neither --trial "
+            "nor --grasps"
+        )
+    name = wanted.grasp if wanted.control is None else f"{wanted.grasp}:{wanted.control}"
+    row = next((row for row in chosen.rows("grasps") if row["grasp_id"] == name), None)
+    if row is None or row["outcome"] == NOT_TRIED:
+        there = some(row["grasp_id"] for row in islice(chosen.rows("grasps"), NAMED))
+        raise InputError(
+            f"{folder}: no simulated grasp is named {name}; the dataset has {there}, ..."
+        )
+    config = chosen.config()
+    contacts = [
+        Contact(point, normal)
+        for point, normal in zip(row["contact_points_m"], row["contact_normals"], strict=True)
+        if point[0] is not None
+    ]
+    object_id = row["object_id"]
+    objects = (each for each in chosen.rows("objects") if each["object_id"] == object_id)
+    source = next((each["source_name"] for each in objects), object_id)
+    body = stored_body(folder, object_id, source, config.faces)
+    if row["label"] in (GIVEN, VARIED):  # on curved surfaces given contacts have faces of their own
+        body = seat(body, row["contact_points_m"], row["contact_normals"]).body
+    return Recorded(
+        name=name,
+        body=body,
+        contacts=tuple(contacts),
+        friction=row["friction"],
+        setup=Setup(),
+        agenda=Agenda(random_wrenches=config.random_wrenches, seed=config.seed),
+        control=None if row["force_closed"] else str(row["label"]),
+        outcomes={
+            each["name"]: each["outcome"]
+            for each in chosen.rows("trials")
+            if each["grasp_id"] == name
+        },
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Held:
+    """A load that can be simulated again, and how it is applied."""
+
+    load: Load
+    predicted_limit: float | None
+    required_friction: float | None
+    settling: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Case:
+    """Contacts squeezed by their fingers, and the loads that can be applied to them."""
+
+    rig: Rig
+    loads: Mapping[str, _Held]
+    overlap: tuple[str, ...] = ()
+
+
+def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
+    """Simulate one trial of a recorded contact set again."""
+    case = _case(recorded)
+    usual = next((name for name, end in recorded.outcomes.items() if end != "held"), None)
+    if usual is None:  # the wrench that is hardest to hold
+        limits = {name: held.predicted_limit or 0.0 for name, held in case.loads.items()}
+        named = recorded.trial is None and WEAKEST in limits
+        usual = WEAKEST if named else min(limits, key=lambda name: limits[name])
+    name = wrench or usual
+    if name not in case.loads:
+        known = ", ".join(case.loads)
+        raise InputError(f"{recorded.name}: no wrench is named {name!r}; choose from {known}")
+    held, rig = case.loads[name], case.rig
+    watched = rig.watch(held.load, held.settling)
+    scene = rig.bench.scene
+    (ended,) = rig.hold([held.load], None if held.settling is None else [held.settling])
+    hold = judge(ended, scene.layout, recorded.setup.hold)
+    return Replayed(
+        name=name,
+        load=held.load,
+        predicted_limit=held.predicted_limit,
+        required_friction=held.required_friction,
+        friction=rig.friction,
+        hold=invalid_start(hold, case.overlap) if case.overlap else hold,
+        watched=watched,
+        scene=scene,
+    )
+
+
+def _case(recorded: Recorded) -> _Case:
+    body, setup = recorded.body, recorded.setup
+    if recorded.control is not None:
+        return _opened(body, recorded.control, recorded.contacts, recorded.friction, setup)
+    scene = setup.scene(body, recorded.grasp or recorded.contacts, recorded.friction)
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    rig = squeezed(bench, setup, scene.layout.squeeze_forces, recorded.friction)
+    contacts, friction = recorded.contacts, recorded.friction
+    planned = planned_loads(body, contacts, friction, rig.idle, recorded.agenda, setup)
+    if recorded.trial is not None and recorded.grasp is not None:
+        return _noisy(recorded, recorded.grasp, recorded.trial, planned, scene)
+    return _Case(rig, _as_planned(planned), _overlap(body, contacts, scene))
+
+
+def _noisy(
+    recorded: Recorded, grasp: Grasp, trial: int, planned: Sequence[PlannedLoad], scene: Scene
+) -> _Case:
+    body, setup = recorded.body, for_repeats(recorded.setup, scene)
+    case = disturbed_in(body, grasp, recorded.friction, recorded.agenda, trial)
+    if case.missed:
+        raise InputError(
+            f"{recorded.name}: this repeat has no trial to simulate, because noise made finger "
+            f"{case.missed[0]} miss its face"
+        )
+    if not force_closure(*stacked(case.contacts), case.friction, torsion_m=setup.torsion_m).closed:
+        return _opened(body, OPEN, case.contacts, case.friction, setup)
+    loads = [(each.name, each.load.wrench) for each in planned]
+    rig, heavy = noisy_case(body, case, loads, setup)
+    return _Case(rig, _as_planned(heavy), _overlap(body, case.landed, rig.bench.scene))
+
+
+def _opened(
+    body: Polyhedron, name: str, contacts: tuple[Contact, ...], friction: float, setup: Setup
+) -> _Case:
+    """Prepare contacts without force closure as a negative control."""
+    certificate = force_closure(*stacked(contacts), friction, torsion_m=setup.torsion_m)
+    if certificate.closed:
+        raise InputError(
+            f"{name}: expected contacts without force closure, but these are force-closed at "
+            f"friction {friction}"
+        )
+    control = Control(name, contacts, friction, certificate)
+    rig, loads = control_case(body, control, setup)
+    return _Case(
+        rig,
+        {
+            each.name: _Held(each.load, None, each.required_friction, each.settling)
+            for each in loads
+        },
+    )
+
+
+def _as_planned(planned: Sequence[PlannedLoad]) -> dict[str, _Held]:
+    return {
+        each.name: _Held(each.load, each.predicted_limit, each.required_friction)
+        for each in planned
+    }
+
+
+def _overlap(body: Polyhedron, contacts: Sequence[Contact], scene: Scene) -> tuple[str, ...]:
+    return clashes(body, *stacked(contacts), scene.layout.drive.radius_m)

@@ -1,0 +1,170 @@
+"""Checks the simulator on cases with known answers before any grasp is simulated.
+
+It is checked with the settings, friction and object size in force: on cases from statics
+(`known_cases`), and, where fingertips touch the mesh itself, for the normals and depths with which
+they touch its faces. If a check fails, no grasp is simulated, and no verdict on the mesh counts.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grasp_core.errors import UnfaithfulError
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.provenance import versions
+from grasp_core.values import Contact
+from sim_validate.simulation.bench import first_touch
+from sim_validate.simulation.known_cases import Case, Check, known_answers
+from sim_validate.simulation.setup import Setup
+
+DEPTH = 1e-4
+"""Depth to which rigid fingertips are put into the faces, in object radii. It is a thousand times
+the rounding of a vertex coordinate, which meshes hold in single precision."""
+NORMAL_ERROR = 1e-4
+"""Largest angle between the normal of a contact and the normal of its face [rad]; the angle acts
+like that much additional friction."""
+DEPTH_ERROR = 0.1
+"""Largest relative error of a contact's depth: vertices may be three hundredths of it off their
+faces."""
+MANY_FACED, FINGERS = "random-100-1", 20
+"""An example mesh with many faces, and how many fingertips touch it at a time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """The contact between fingertips and a mesh that differs most from the mesh's faces.
+
+    The errors are NaN where a fingertip has no contact, or several.
+    """
+
+    finger: int
+    normal_error_rad: float
+    depth_error: float
+    """Error of the contact's depth, relative to the right depth."""
+
+    @property
+    def right(self) -> bool:
+        """Whether the errors of normal and depth are within their limits."""
+        return self.normal_error_rad <= NORMAL_ERROR and self.depth_error <= DEPTH_ERROR
+
+
+def worst_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> Touch:
+    """Put fingertips a little into a mesh and find the contact that differs most from its face."""
+    rigid = replace(setup, fingers=replace(setup.fingers, drive="rigid", indentation=0.0))
+    size = rigid.scene(body, contacts, 1.0).layout.grasp_size_m
+    depth = DEPTH * body.radius
+    fingers = replace(rigid.fingers, indentation=depth / size)
+    normals, depths = first_touch(replace(rigid, fingers=fingers).scene(body, contacts, 1.0))
+    faces = np.array([contact.normal for contact in contacts])
+    turned = np.arctan2(
+        np.linalg.norm(np.cross(normals, faces), axis=1), np.einsum("ki,ki->k", normals, faces)
+    )
+    off = np.abs(depths / depth - 1.0)
+    errors = np.nan_to_num(np.maximum(turned / NORMAL_ERROR, off / DEPTH_ERROR), nan=np.inf)
+    finger = int(np.argmax(errors))
+    return Touch(finger, float(turned[finger]), float(off[finger]))
+
+
+def require_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> None:
+    """Check that fingertips touch a mesh as its faces lie, where no pads are put between."""
+    if setup.surface != "mesh":
+        return
+    worst = worst_touch(body, contacts, setup)
+    if not worst.right:
+        raise UnfaithfulError(
+            f"in simulation, fingertip {worst.finger} does not touch the mesh as planned: the "
+            f"contact normal is off by {worst.normal_error_rad:.3g} rad (at most "
+            f"{NORMAL_ERROR:g} is allowed), the depth by a share of {worst.depth_error:.3g} (at "
+            f"most {DEPTH_ERROR:g}; nan means no contact); use --surface pads, or raise "
+            "ccd_iterations in the settings of the physics"
+        )
+
+
+def mesh_touches(case: Case) -> tuple[Check, Check]:
+    """Check how fingertips touch the faces of a mesh with many faces."""
+    body = case.body(MANY_FACED)
+    contacts = [Contact(face.centroid, face.normal) for face in body.faces]
+    groups = [contacts[start : start + FINGERS] for start in range(0, len(contacts), FINGERS)]
+    touches = [worst_touch(body, group, case.setup) for group in groups]
+    # the maximum is NaN if one angle is
+    turned = np.max([touch.normal_error_rad for touch in touches])
+    deep = np.max([touch.depth_error for touch in touches])
+    return (
+        Check("angle between a contact's normal and its face's", float(turned), 0.0, NORMAL_ERROR),
+        Check("error of a contact's depth, relative to it", float(deep), 0.0, DEPTH_ERROR),
+    )
+
+
+USUAL_FRICTION, USUAL_RADIUS_M = 0.5, 0.07
+MOST_KNOWN = 256
+"""Number of settings whose results are kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """The results of checking the simulator on cases with known answers."""
+
+    checks: tuple[Check, ...]
+    mujoco: str
+    """Version of MuJoCo that was checked."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether all checks passed."""
+        return all(check.passed for check in self.checks)
+
+
+_KNOWN: dict[Case, Gate] = {}
+"""Results of the settings that were measured last."""
+
+
+def require_faithful(
+    setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
+) -> Gate:
+    """Check the simulator on known cases, and refuse settings under which a check fails."""
+    gate = measured_gate(setup, friction, radius_m)
+    if not gate.passed:
+        failed = "; ".join(str(check) for check in gate.checks if not check.passed)
+        raise UnfaithfulError(
+            "the simulator is not faithful with these settings, so no grasp is certified; these "
+            f"checks failed: {failed}"
+        )
+    return gate
+
+
+def measured_gate(
+    setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
+) -> Gate:
+    """Check the simulator on known cases, once per process for the same settings."""
+    case = _case(setup, friction, radius_m)
+    return _KNOWN.get(case) or _kept(case, _measured(case))
+
+
+def remember_gate(gate: Gate, setup: Setup, friction: float, radius_m: float) -> None:
+    """Take over what `measured_gate` returned in the process that started this one."""
+    _kept(_case(setup, friction, radius_m), gate)
+
+
+def _case(setup: Setup, friction: float, radius_m: float) -> Case:
+    # Two digits of the radius let objects of nearly the same size share one measurement.
+    fingers = replace(setup.fingers, radius_m=None, approach=None)
+    setup = replace(setup, fingers=fingers, threads=1, timeout_s=math.inf)
+    return Case(setup, friction, float(f"{radius_m:.1e}"))
+
+
+def _kept(case: Case, gate: Gate) -> Gate:
+    _KNOWN[case] = gate
+    if len(_KNOWN) > MOST_KNOWN:
+        del _KNOWN[next(iter(_KNOWN))]
+    return gate
+
+
+def _measured(case: Case) -> Gate:
+    pads = replace(case, setup=replace(case.setup, surface="pads"))  # controls are always on pads
+    checks = known_answers(pads)
+    if case.setup.surface == "mesh":
+        meshes = (*mesh_touches(case), *known_answers(case))
+        checks += tuple(replace(check, name=f"on a mesh: {check.name}") for check in meshes)
+    return Gate(checks, versions()["mujoco"])

@@ -1,0 +1,98 @@
+"""Bounds on discs by compiled programs, against the programs of the constructions."""
+
+import math
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS
+from grasp_core.families.disc_bounds import KERNELS, AttemptBounds
+from grasp_core.families.kernel_tables import Attempts
+from grasp_core.families.placements import Placement
+from grasp_core.objects.face_pieces import face_shapes
+from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
+from grasp_core.planning.quadruples import all_blocks
+from grasp_core.solvers.lp import RESIDUAL
+from grasp_core.values import ForceCone
+from scenes.example_objects import example_object
+from tests.grasp_core.curved import curved_body
+from tests.marks import MORE
+
+BODIES = {
+    "random": lambda: example_object("random-14-1"),
+    "with angles": lambda: example_object("l-bracket"),
+    "curved": curved_body,
+}
+NONE = np.empty((0, 4), dtype=np.int64)
+
+
+def attempts(body, kind, order, count=60):
+    """Faces in finger order, axes and half-angles of some quadruples of a body."""
+    cones = PlannedCones(body, face_shapes(body), math.atan(0.5), tilted=True)
+    _, make = all_blocks(cones, len(body.faces), NONE)
+    wide = make(0)
+    found = wide.coned(slice(None))
+    usable = np.flatnonzero(found.half_angles[:, kind] > LEAST_SPAN_ANGLE)
+    some = np.random.default_rng(0).permutation(usable)[:count]
+    order = list(order)
+    axes = found.axes[some, kind][:, order]
+    return Attempts(found.faces[some][:, order], axes, found.half_angles[some, kind])
+
+
+def by_constructions(shapes, construction, attempts):
+    """Merits of the constructions' own placements, or bounds where they find none, (a,)."""
+    bounds = []
+    for faces, axes, half_angle in zip(*attempts, strict=True):
+        cones = [ForceCone(axis, float(half_angle)) for axis in axes]
+        found = construction.place([shapes[face].hull for face in faces], cones, LEAST_RADIUS)
+        bounds.append(found.merit if isinstance(found, Placement) else found.bound)
+    return np.array(bounds) + RESIDUAL
+
+
+@pytest.mark.parametrize("family", KERNELS)
+@pytest.mark.parametrize("name", BODIES)
+def test_bounds_are_the_merits_that_the_constructions_reach(name, family):
+    body = BODIES[name]()
+    construction, discs = CONSTRUCTIONS[family], AttemptBounds(face_shapes(body))
+    seen = np.zeros(2, dtype=int)
+    for kind in (NORMAL, TILTED):
+        for order in construction.orders:
+            some = attempts(body, kind, order)
+            quick = discs.of(construction, some, LEAST_RADIUS)
+            slow = by_constructions(discs.shapes, construction, some)
+            held = slow > LEAST_RADIUS
+            np.testing.assert_allclose(quick[held], slow[held], atol=2e-8)
+            assert (quick[~held] <= LEAST_RADIUS + 2e-8).all()
+            seen += (held.sum(), (~held).sum())
+    assert seen[0] >= 30
+    assert seen.sum() >= 50
+
+
+def test_with_a_larger_least_radius_bounds_above_it_stay_and_others_stay_below():
+    body = example_object("random-14-1")
+    discs = AttemptBounds(face_shapes(body))
+    for family in KERNELS:
+        some = attempts(body, TILTED, (0, 1, 2, 3), 200)
+        every = discs.of(CONSTRUCTIONS[family], some, -np.inf)
+        least = float(np.median(every))
+        few = discs.of(CONSTRUCTIONS[family], some, least)
+        larger = every > least + 1e-6
+        assert larger.sum() >= 50
+        np.testing.assert_allclose(few[larger], every[larger], atol=1e-9)
+        assert (few[~larger] <= least + 2e-6).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "friction"), [("tetrahedron", 0.4), pytest.param("wedge", 0.3, marks=MORE)]
+)
+def test_a_plan_without_these_bounds_is_the_same(monkeypatch, name, friction):
+    body = example_object(name)
+    quick = gc.plan(body, friction, limit=12).grasps
+    monkeypatch.setattr(AttemptBounds, "of", lambda *args: np.full(len(args[2].faces), np.inf))
+    slow = gc.plan(body, friction, limit=12).grasps
+    assert len(quick) >= 3
+    assert [grasp.id for grasp in slow] == [grasp.id for grasp in quick]
+    for one, other in zip(quick, slow, strict=True):
+        assert one.radius == pytest.approx(other.radius, abs=1e-8 * body.radius)

@@ -1,0 +1,135 @@
+"""Best-first search: what a limit keeps is the best of everything, whatever kind of object."""
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.errors import SolverError
+from grasp_core.families import placements
+from grasp_core.families.constructions import CONSTRUCTIONS
+from grasp_core.families.disc_bounds import AttemptBounds
+from grasp_core.families.placing import ManyPlacements
+from grasp_core.planning import family_search as promising_module
+from grasp_core.planning.family_search import SAME_MERIT, BestFirst
+from grasp_core.planning.methods import prepared
+from grasp_core.planning.planned_cones import PlannedCones
+from grasp_core.planning.quadruples import all_blocks
+from grasp_core.planning.request import PlanRequest
+from grasp_core.planning.result import Tally
+from scenes.example_objects import example_object
+from tests.grasp_core.curved import curved_body
+from tests.marks import MORE
+
+CASES = {
+    "convex": (lambda: example_object("random-12-1"), {"friction": 0.4}),
+    "symmetric": (lambda: example_object("chamfered-box"), {"friction": 0.3}),
+    "with angles": (lambda: example_object("l-bracket"), {"friction": 0.5}),
+    "the paper's cones": (lambda: example_object("random-14-1"), {"cones": "normal"}),
+    "two on one face": (lambda: example_object("prism"), {"share_faces": 0.01}),
+    "clear of edges": (lambda: example_object("wedge"), {"clearance": 0.002}),
+    "within reach": (lambda: example_object("wedge"), {"finger": gc.Finger(0.004, 0.03)}),
+    "curved": (curved_body, {"friction": 0.5}),
+}
+
+
+def radii(body, options, family, limit):
+    plan = gc.plan(body, **{"friction": 0.3, **options}, families=family, limit=limit)
+    return [grasp.radius / body.radius for grasp in plan.grasps]
+
+
+def families(name):
+    """Each kind of object with one family in turn, and with the other one as one more case."""
+    own, other = (
+        ("concurrent", "pencil") if list(CASES).index(name) % 2 else ("pencil", "concurrent")
+    )
+    return [(name, own), pytest.param(name, other, marks=MORE)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "family"), [case for name in CASES for case in families(name)])
+def test_a_limit_keeps_the_largest_discs_of_all(name, family):
+    make, options = CASES[name]
+    body = make()
+    every = sorted(radii(body, options, family, None), reverse=True)
+    assert len(every) >= 2
+    for limit in (1, 3, 8):
+        best = radii(body, options, family, limit)
+        np.testing.assert_allclose(best, every[:limit], rtol=2.0 * SAME_MERIT)
+
+
+def test_cones_that_are_tilted_late_are_not_missed(monkeypatch):
+    """In chunks so small that many are looked at only when something is worth having."""
+    body = example_object("random-10-1")
+    every = sorted(radii(body, {"friction": 0.4}, "pencil", None), reverse=True)
+    assert len(every) >= 60
+    for name, size in (("LARGEST_CHUNK", 40), ("SMALLEST_TILT", 10), ("SMALLEST_CHUNK", 5)):
+        monkeypatch.setattr(promising_module, name, size)
+    for limit in (2, 50):
+        best = radii(body, {"friction": 0.4}, "pencil", limit)
+        np.testing.assert_allclose(best, every[:limit], rtol=2.0 * SAME_MERIT)
+
+
+def opened(body, family, least):
+    """Quadruples as they are handed out, and blocks that were made."""
+    request = PlanRequest(0.4, (family,), None, "tilted")
+    on, _ = prepared(body, request)
+    cones = PlannedCones(on.body, on.shapes, request.theta, tilted=True)
+    (rooms, blocks), made = all_blocks(cones, len(on.faces), on.shared), []
+
+    def make(place):
+        made.append(place)
+        return blocks(place)
+
+    search = BestFirst(CONSTRUCTIONS[family], AttemptBounds(on.shapes), Tally())
+    return search.over((rooms, make), range(len(rooms)), lambda _: least[0]), made
+
+
+def bound(attempts):
+    return max(attempt.bounds[0] for attempt in attempts)
+
+
+def faces(attempts):
+    (found,) = {tuple(sorted(attempt.faces)) for attempt in attempts}
+    return found
+
+
+@pytest.mark.parametrize(
+    ("name", "family"),
+    [
+        ("random-30-1", "concurrent"),
+        *(pytest.param("random-40-1", f, marks=MORE) for f in ("concurrent", "pencil")),
+    ],
+)
+def test_quadruples_come_in_the_order_of_their_bounds_and_only_as_asked_for(name, family):
+    body, least = example_object(name), [1e-3]
+    quadruples, made = opened(body, family, least)
+    first = [next(quadruples) for _ in range(12)]
+    bounds = [bound(each) for each in first]
+    assert (np.diff(bounds) <= 1e-7).all()
+    assert len({faces(each) for each in first}) == len(first)
+    every, all_made = opened(body, family, least)
+    rest = {faces(each): bound(each) for each in every}
+    assert len(made) < len(all_made)
+    assert sorted(rest.values(), reverse=True)[:12] == pytest.approx(bounds, abs=1e-7)
+    least[0] = bounds[-1]  # nothing more is worth having
+    assert next(quadruples, None) is None
+
+
+def test_a_program_that_fails_leaves_its_attempt_to_the_search(monkeypatch):
+    """Every attempt comes to its whole programs, some of which have no answer here."""
+    body, calls, solve = example_object("random-10-1"), [], placements.maximize_above
+
+    def sometimes(program, cutoff):
+        calls.append(program)
+        if len(calls) % 10 == 0:
+            raise SolverError("a program's answer failed its check")
+        return solve(program, cutoff)
+
+    expected = gc.plan(body, 0.4, families="concurrent", limit=5).grasps
+    monkeypatch.setattr(ManyPlacements, "of", lambda _, __, asked: [None] * len(asked))
+    monkeypatch.setattr(AttemptBounds, "of", lambda *args: np.full(len(args[2].faces), np.inf))
+    monkeypatch.setattr(placements, "maximize_above", sometimes)
+    plan = gc.plan(body, 0.4, families="concurrent", limit=5)
+    assert len(calls) >= 20
+    assert len(plan.grasps) == 5
+    assert {grasp.id for grasp in plan.grasps} & {grasp.id for grasp in expected}

@@ -1,0 +1,390 @@
+import dataclasses
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+import trimesh
+
+import grasp_core as gc
+import sim_validate
+from grasp_core.processes import local_processes
+from scenes.example_objects import example_object
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.datasets import build as build_module
+from sim_validate.datasets import parquet
+from sim_validate.datasets.build import build
+from sim_validate.datasets.config import DatasetConfig, config_from_toml
+from sim_validate.datasets.units import units_of
+from sim_validate.datasets.verify import Sample, verify
+from sim_validate.datasets.workers import Limits
+from sim_validate.main import main
+from tests.marks import more
+from tests.sim_validate.datasets.engines import Here, WorkerEndedError, contents, silent
+from tests.sim_validate.datasets.learned import rows_of
+from tests.sim_validate.datasets.pair import CONFIG, all_rows
+
+pytest.importorskip("pyarrow")
+ROOT = Path(__file__).parents[3]
+
+
+class KilledError(BaseException):
+    """Stands for the end of the process."""
+
+
+def test_a_dataset_holds_every_object_at_every_friction(dataset):
+    assert verify(dataset) == []
+    grasps = [row for row in all_rows(dataset, "grasps") if row["label"] == "grasp"]
+    names = {row["object_id"]: row["source_name"] for row in all_rows(dataset, "objects")}
+    assert sorted(names.values()) == ["tetrahedron", "wedge"]
+    assert {(names[row["object_id"]], row["friction"]) for row in grasps} == {
+        (name, friction) for name in CONFIG.objects for friction in CONFIG.frictions
+    }
+    assert all(row["held"] for row in grasps)
+    assert not (dataset / "staging").exists()
+
+
+def test_its_tables_are_the_same_bytes_in_another_order(dataset, tmp_path):
+    """And on processes: see `test_clusters` and the tests of the command."""
+    turned = dataclasses.replace(CONFIG, objects=CONFIG.objects[::-1])
+    built = build(turned, tmp_path / "other", Here(), silent)
+    assert built.made == 4
+    before, after = contents(dataset), contents(tmp_path / "other")
+    tables = {path for path in before if path.startswith("data/")}
+    assert len(tables) >= 3
+    assert tables == {path for path in after if path.startswith("data/")}
+
+
+def test_mesh_files_have_the_scale_that_is_asked_for(tmp_path):
+    """The configuration keeps it; built-in objects have none."""
+    body = example_object("tetrahedron")
+    mesh, out = tmp_path / "mesh.obj", tmp_path / "ds"
+    trimesh.Trimesh(2e3 * body.vertices, body.triangles).export(mesh)
+    line = ["dataset", "build", str(mesh), "wedge", "--limit", "1", "--family", "concurrent"]
+    lengths = ["--unit", "mm", "--scale", "0.5"]
+    assert main([*line, *lengths, "--jobs", "1", "--out", str(out), "-q"]) == Exit.GOOD
+    rows = {row["source_name"]: row for row in rows_of(out, "objects")}
+    assert rows["mesh.obj"]["radius_m"] == pytest.approx(body.radius, rel=1e-6)
+    assert rows["wedge"]["object_id"] == example_object("wedge").content_sha256
+    assert config_from_toml(out / "config.toml").scale == 0.5
+    assert verify(out) == []
+
+
+@pytest.mark.parametrize("killed_at", [0, 3, *more(1, 2)])
+def test_a_killed_build_goes_on_where_it_was(dataset, tmp_path, killed_at):
+    folder = tmp_path / "ds"
+
+    def die(_):
+        if len(engine.submitted) == killed_at + 1:
+            raise KilledError
+
+    engine = Here(die)
+    with pytest.raises(KilledError):
+        build(CONFIG, folder, engine, silent)
+    with pytest.raises(gc.InputError, match="expected a finished dataset"):
+        verify(folder)
+    again = Here()
+    built = build(CONFIG, folder, again, silent)
+    assert len(again.submitted) == built.made == 4 - killed_at
+    assert contents(folder) == contents(dataset)
+
+
+def test_what_a_killed_worker_left_is_removed_and_damaged_units_are_done_again(dataset, tmp_path):
+    folder = tmp_path / "ds"
+
+    def die(_):
+        if len(engine.submitted) == 4:
+            raise KilledError
+
+    engine = Here(die)
+    with pytest.raises(KilledError):
+        build(CONFIG, folder, engine, silent)
+    (folder / "staging" / ".halfway").mkdir()
+    shard = next((folder / "staging").glob("*/trials.parquet"))
+    shard.write_bytes(shard.read_bytes()[:-8])
+    again = Here()
+    build(CONFIG, folder, again, silent)
+    assert len(again.submitted) == 2
+    assert contents(folder) == contents(dataset)
+
+
+def test_a_finished_dataset_is_left_alone(copy):
+    before, engine = contents(copy), Here()
+    built = build(CONFIG, copy, engine, silent)
+    assert not engine.submitted
+    assert built.rows["objects"] == 2
+    assert contents(copy) == before
+
+
+def test_a_bad_object_is_quarantined_with_its_reason_and_the_others_are_there(tmp_path):
+    bad, twin = tmp_path / "open.stl", tmp_path / "twin.stl"
+    box = trimesh.creation.box(extents=(0.04, 0.05, 0.06))
+    trimesh.Trimesh(box.vertices, box.faces[:-2]).export(bad)
+    body = gc.Polyhedron.from_mesh(box.vertices, box.faces)
+    trimesh.Trimesh(body.vertices, body.triangles).export(twin)
+    shutil.copy(twin, tmp_path / "again.stl")
+    config = dataclasses.replace(
+        CONFIG, objects=(str(bad), str(twin), str(tmp_path / "again.stl")), frictions=(0.5,)
+    )
+    built = build(config, tmp_path / "ds", Here(), silent)
+    assert (built.units, built.quarantined, built.rows["objects"]) == (3, 2, 1)
+    lines = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
+    reasons = {json.loads(line)["object"]: json.loads(line)["reason"] for line in lines}
+    assert "the same object as" in reasons[str(twin)]
+    assert reasons[str(bad)].startswith("GP-MESH-OPEN")
+    assert verify(tmp_path / "ds") == []
+
+
+def test_a_unit_that_ends_its_worker_is_tried_again_alone_then_quarantined(tmp_path):
+    ends = {0.4: 1, 0.5: 9}
+
+    def crash(unit):
+        if unit.object == "wedge" and ends[unit.friction]:
+            ends[unit.friction] -= 1
+            raise WorkerEndedError
+
+    engine = Here(crash)
+    built = build(CONFIG, tmp_path / "ds", engine, silent)
+    assert built.quarantined == 1
+    assert len(engine.submitted) == 6
+    (line,) = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
+    assert json.loads(line)["friction"] == 0.5
+    assert json.loads(line)["reason"] == "its worker ended, twice"
+
+
+def test_a_unit_that_never_ends_is_given_up(tmp_path):
+    config = dataclasses.replace(CONFIG, objects=("tetrahedron",), frictions=(0.5,))
+    with local_processes(1) as engine:
+        built = build(config, tmp_path / "ds", engine, silent, Limits(1e-3))
+    assert built.quarantined == 1
+    assert "took too long, twice" in (tmp_path / "ds" / "quarantine.jsonl").read_text()
+
+
+def test_without_pyarrow_nothing_is_begun_and_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(gc.InputError, match=r"graspproof\[dataset\]"):
+        build(CONFIG, tmp_path / "ds", Here(), silent)
+    assert not (tmp_path / "ds").exists()
+    with pytest.raises(gc.InputError, match=r"graspproof\[dataset\]"):
+        verify(tmp_path / "ds")
+
+
+def test_an_unfaithful_simulator_ends_a_build_before_it_begins(tmp_path, monkeypatch):
+    def fail(*_):
+        raise gc.UnfaithfulError("the simulator is off")
+
+    monkeypatch.setattr(build_module, "require_faithful", fail)
+    engine = Here()
+    with pytest.raises(gc.UnfaithfulError):
+        build(CONFIG, tmp_path / "ds", engine, silent)
+    assert not engine.submitted
+
+
+def test_two_builds_do_not_work_in_one_folder(tmp_path):
+    def another(_):
+        with pytest.raises(gc.InputError, match="another command is writing to it"):
+            build(CONFIG, tmp_path / "ds", Here(), silent)
+        tried.append(1)
+
+    tried = []
+    build(CONFIG, tmp_path / "ds", Here(another), silent)
+    assert len(tried) == 4
+
+
+def test_folders_of_something_else_are_refused(copy, tmp_path):
+    with pytest.raises(gc.InputError, match="made with other settings"):
+        build(dataclasses.replace(CONFIG, limit=3), copy, Here(), silent)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.tex").write_text("all my work")
+    with pytest.raises(gc.InputError, match=r"thesis\.tex: this file is not part of the dataset"):
+        build(CONFIG, tmp_path / "mine", Here(), silent)
+    with pytest.raises(gc.InputError, match="expected a finished dataset"):
+        verify(tmp_path / "mine")
+
+
+@pytest.mark.parametrize("name", ["meshes/part.obj", "README.md", "data/x", "manifest.json"])
+def test_what_a_dataset_would_overwrite_in_a_folder_of_another_is_refused(tmp_path, name):
+    path = tmp_path / "mine" / name
+    path.parent.mkdir(parents=True)
+    path.write_text("mine")
+    with pytest.raises(gc.InputError, match="not part of the dataset"):
+        build(CONFIG, tmp_path / "mine", Here(), silent)
+    assert path.read_text() == "mine"
+
+
+def test_meshes_inside_the_folder_are_refused(tmp_path):
+    path = tmp_path / "ds" / "meshes" / "box.stl"
+    path.parent.mkdir(parents=True)
+    trimesh.creation.box(extents=(0.04, 0.05, 0.06)).export(path)
+    config = dataclasses.replace(CONFIG, objects=(str(path),))
+    with pytest.raises(gc.InputError, match="lies in the output folder"):
+        build(config, tmp_path / "ds", Here(), silent)
+    assert path.is_file()
+
+
+def test_a_finished_dataset_of_a_mesh_that_has_changed_is_refused(tmp_path):
+    path = tmp_path / "box.stl"
+    trimesh.creation.box(extents=(0.04, 0.05, 0.06)).export(path)
+    config = dataclasses.replace(CONFIG, objects=(str(path),), frictions=(0.5,))
+    build(config, tmp_path / "ds", Here(), silent)
+    assert build(config, tmp_path / "ds", Here(), silent).made == 0
+    trimesh.creation.box(extents=(0.04, 0.05, 0.07)).export(path)
+    with pytest.raises(gc.InputError, match="have changed since"):
+        build(config, tmp_path / "ds", Here(), silent)
+
+
+def test_a_finished_dataset_that_is_damaged_is_not_taken_for_one(copy):
+    path = next(copy.glob("meshes/*.obj"))
+    path.write_text(path.read_text() + "#")
+    with pytest.raises(gc.InputError, match="missing or damaged"):
+        build(CONFIG, copy, Here(), silent)
+    path.unlink()
+    with pytest.raises(gc.InputError, match="missing or damaged"):
+        build(CONFIG, copy, Here(), silent)
+
+
+def test_a_folder_that_cannot_be_made_is_said(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(gc.InputError, match=r"file: exists and is not a folder"):
+        build(CONFIG, tmp_path / "file", Here(), silent)
+
+
+def test_a_dataset_without_any_grasp_is_one(tmp_path):
+    config = DatasetConfig(objects=("wedge",), frictions=(0.1,), families=("regulus",),
+                           cones="normal")  # fmt: skip
+    built = build(config, tmp_path / "ds", Here(), silent)
+    assert built.rows == {"objects": 1, "grasps": 0, "trials": 0}
+    assert verify(tmp_path / "ds", Sample(1.0)) == []
+    grasps = sim_validate.load_dataset(tmp_path / "ds")["grasps"]
+    assert grasps["contact_points_m"].shape == (0, 4, 3)
+
+
+def test_what_was_half_written_is_removed(dataset, tmp_path):
+    folder = tmp_path / "ds"
+    folder.mkdir()
+    (folder / ".config.toml.x7y").write_text("objects")
+    (folder / ".manifest.json.x7y").write_text("{")
+    build(CONFIG, folder, Here(), silent)
+    assert contents(folder) == contents(dataset)
+    (folder / "staging" / "old").mkdir(parents=True)
+    assert verify(folder) == []
+    build(CONFIG, folder, Here(), silent)
+    assert not (folder / "staging").exists()
+
+
+STRUCK = """
+import os, pathlib, shutil, sys
+from sim_validate.datasets.build import build
+from tests.sim_validate.datasets.engines import Here, silent
+from tests.sim_validate.datasets.pair import CONFIG
+
+def counted(plain):
+    def call(*args, **kwargs):
+        global left
+        if left == 0:
+            os._exit(9)
+        left -= 1
+        return plain(*args, **kwargs)
+    return call
+
+staged, folder = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+build(CONFIG, shutil.copytree(staged, folder / "whole"), Here(), silent)  # loads all that it needs
+for left in range(200):
+    at = shutil.copytree(staged, folder / str(left))
+    if (child := os.fork()) == 0:
+        pathlib.Path.replace = counted(pathlib.Path.replace)
+        pathlib.Path.rename = counted(pathlib.Path.rename)
+        os.replace, os.unlink = counted(os.replace), counted(os.unlink)
+        build(CONFIG, at, Here(), silent)
+        os._exit(0)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    print(code)
+    if code != 9:
+        break
+"""
+
+
+@pytest.mark.slow
+def test_a_build_killed_at_any_step_of_its_end_goes_on(dataset, tmp_path):
+    """Each step in a process of its own, forked from one that has built it once."""
+    staged = tmp_path / "staged"
+
+    def die(*_):
+        raise KilledError
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(build_module, "_finish", die)
+        with pytest.raises(KilledError):
+            build(CONFIG, staged, Here(), silent)
+    command = [sys.executable, "-c", STRUCK, str(staged), str(tmp_path)]
+    ran = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, check=True)
+    *killed, last = map(int, ran.stdout.split())
+    assert (set(killed), last) == ({9}, 0)
+    assert len(killed) >= 10
+    for step in range(len(killed) + 1):
+        folder = tmp_path / str(step)
+        build(CONFIG, folder, Here(), silent)
+        assert contents(folder) == contents(dataset), step
+
+
+def test_scenes_are_written_on_request(dataset, tmp_path):
+    config = dataclasses.replace(CONFIG, scenes=True, objects=("tetrahedron",), frictions=(0.5,))
+    build(config, tmp_path / "ds", Here(), silent)
+    assert verify(tmp_path / "ds", Sample(1.0)) == []
+    rows = [row for row in all_rows(tmp_path / "ds", "grasps") if row["label"] == "grasp"]
+    scenes = {path.stem: path for path in (tmp_path / "ds" / "scenes").iterdir()}
+    assert rows
+    assert sorted(scenes) == sorted(row["grasp_id"] for row in rows)
+    for path in scenes.values():
+        assert mujoco.MjModel.from_xml_string(path.read_text()).ngeom > 4
+    assert not (dataset / "scenes").exists()
+
+
+def test_many_rows_take_several_files(dataset, tmp_path, monkeypatch):
+    monkeypatch.setattr(parquet, "GROUP_ROWS", 5)
+    monkeypatch.setattr(parquet, "FILE_ROWS", 12)
+    build(CONFIG, tmp_path / "ds", Here(), silent)
+    assert verify(tmp_path / "ds") == []
+    files = sorted((tmp_path / "ds" / "data" / "trials").glob("*.parquet"))
+    assert len(files) > len(list((dataset / "data" / "trials").glob("*.parquet")))
+    for name in ("objects", "grasps", "trials"):
+        assert all_rows(tmp_path / "ds", name) == all_rows(dataset, name)
+
+
+def test_a_dataset_is_loaded_as_arrays(dataset):
+    tables = sim_validate.load_dataset(dataset)
+    grasps = tables["grasps"]
+    rows = all_rows(dataset, "grasps")
+    count = len(rows)
+    assert {len(column) for column in grasps.values()} == {count}
+    assert grasps["contact_points_m"].shape == (count, 4, 3)
+    assert grasps["contact_points_m"].dtype == np.float64
+    for row, points, family in zip(rows, grasps["contact_points_m"], grasps["family"], strict=True):
+        there = row["contacts"]
+        np.testing.assert_array_equal(points[:there], row["contact_points_m"][:there])
+        assert np.isnan(points[row["contacts"] :]).all()
+        assert family == row["family"]
+    names = ("train", "validation", "test")
+    with pytest.warns(UserWarning, match="the split .* has no objects"):
+        parts = [sim_validate.load_dataset(dataset, part) for part in names]
+    assert sum(len(part["trials"]["trial"]) for part in parts) == len(tables["trials"]["trial"])
+    with pytest.raises(gc.InputError, match="split must be one of"):
+        sim_validate.load_dataset(dataset, "training")
+
+
+def test_units_are_the_same_wherever_they_are_made(tmp_path):
+    code = (
+        "from tests.sim_validate.datasets.pair import CONFIG\n"
+        "from sim_validate.datasets.units import units_of\n"
+        "print(*(unit.id for unit in units_of(CONFIG)))"
+    )
+    there = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONHASHSEED": "1"}
+    command = [sys.executable, "-c", code]
+    ran = subprocess.run(command, cwd=tmp_path, env=there, stdout=subprocess.PIPE, check=True)
+    assert ran.stdout.decode().split() == [unit.id for unit in units_of(CONFIG)]
+    assert len(set(ran.stdout.split())) == 4

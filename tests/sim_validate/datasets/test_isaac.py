@@ -1,0 +1,291 @@
+"""Isaac grasp files, read back by an independent reader, are compared with the dataset."""
+
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+import trimesh
+
+import grasp_core as gc
+import sim_validate
+from grasp_core.geometry.nearest_points import nearest_on_surface
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.datasets import isaac
+from sim_validate.datasets.build import build
+from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.isaac import export, yaml_number
+from sim_validate.datasets.open_dataset import select
+from sim_validate.datasets.tables import SPLITS, SplitName
+from sim_validate.files.writing import whole_folder
+from sim_validate.main import main
+from tests.sim_validate.datasets.engines import Here, silent
+from tests.sim_validate.datasets.forging import forged
+
+ROOT = Path(__file__).parents[3]
+
+pytest.importorskip("pyarrow")
+ODD_NAME = "=cmd|' \"\u00e9\n.stl"
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    """Two built-in objects in different splits, and a file with a name that means harm."""
+    folder = tmp_path_factory.mktemp("made")
+    box = trimesh.creation.box(extents=(0.04, 0.05, 0.06))
+    (folder / ODD_NAME).write_bytes(trimesh.exchange.stl.export_stl(box))
+    config = DatasetConfig(
+        objects=("tetrahedron", "wedge", str(folder / ODD_NAME)),
+        frictions=(0.4, 0.5),
+        families=("concurrent",),
+        limit=1,
+        seed=5,
+        license="CC-BY-4.0",
+    )
+    built = build(config, folder / "ds", Here(), silent)
+    assert (built.units, built.quarantined) == (6, 0)
+    return folder / "ds"
+
+
+@pytest.fixture
+def copy(dataset, tmp_path):
+    return shutil.copytree(dataset, tmp_path / "copy")
+
+
+def hashes(folder):
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.iterdir()}
+
+
+def planned(dataset):
+    """The grasps that are no controls, by their names."""
+    grasps = sim_validate.load_dataset(dataset)["grasps"]
+    chosen = np.flatnonzero(grasps["label"] == "grasp")
+    return {grasps["grasp_id"][i]: {name: grasps[name][i] for name in grasps} for i in chosen}
+
+
+def tips(grasp, posture):
+    """Centres of fingertips in the object's frame, (4, 3)."""
+    assert grasp["orientation"] == {"w": 1.0, "xyz": [0.0, 0.0, 0.0]}
+    joints = grasp[posture]
+    assert list(joints) == [f"finger{i}_{axis}" for i in range(4) for axis in "xyz"]
+    assert all(isinstance(value, float) for value in joints.values())
+    return np.array(grasp["position"]) + np.reshape(list(joints.values()), (4, 3))
+
+
+def test_isaac_files_touch_where_the_tables_say_and_come_from_outside(dataset, tmp_path):
+    """A tip's centre is a sum of three lengths below a metre: some 1e-16 of rounding."""
+    yaml = pytest.importorskip("yaml")
+    export(dataset, tmp_path / "out", None, silent)
+    stored, compared = planned(dataset), 0
+    bodies = {}
+    for path in (tmp_path / "out").iterdir():
+        text = path.read_text(encoding="utf-8")
+        file = yaml.safe_load(text)
+        assert list(file) == ["format", "format_version", "object_frame", "gripper_frame", "grasps"]
+        assert (file["format"], file["format_version"]) == ("isaac_grasp", 1.0)
+        radius = float(re.search(r"radius ([^ ]+) m", text).group(1))
+        short, friction = path.name.split("-")[:2]
+        for name, grasp in file["grasps"].items():
+            row = stored.pop(f"{short}-{friction}-{name}")
+            assert row["friction"] == float(friction)
+            assert set(grasp) == {
+                "confidence", "position", "orientation", "cspace_position",
+                "pregrasp_cspace_position",
+            }  # fmt: skip
+            assert grasp["confidence"] == float(row["held"])
+            mesh = dataset / "meshes" / f"{row['object_id']}.obj"
+            body = bodies.setdefault(mesh, gc.load_polyhedron(mesh))
+            touch = tips(grasp, "cspace_position")
+            np.testing.assert_allclose(
+                touch + radius * row["contact_normals"], row["contact_points_m"], atol=1e-15, rtol=0
+            )
+            away = tips(grasp, "pregrasp_cspace_position")
+            for centers, least in ((touch, radius * (1 - 1e-6)), (away, 1.2 * radius)):
+                nearest = nearest_on_surface(body.vertices, body.triangles, centers)
+                assert (np.linalg.norm(nearest - centers, axis=1) >= least).all()
+            compared += 1
+    assert not stored
+    assert compared == 6
+
+
+def test_a_grasp_that_slipped_has_no_confidence(copy, tmp_path):
+    yaml = pytest.importorskip("yaml")
+
+    def slip(rows):
+        for row in rows:
+            row["held"] = False
+
+    forged(copy, "grasps", slip)
+    export(copy, tmp_path / "out", None, silent)
+    found = [
+        grasp["confidence"]
+        for path in (tmp_path / "out").iterdir()
+        for grasp in yaml.safe_load(path.read_text(encoding="utf-8"))["grasps"].values()
+    ]
+    assert found.count(0.0) >= 2
+    assert len(found) == 6
+
+
+@pytest.mark.parametrize("value", [1e-05, -1e-300, 1e22, 0.1, -0.0, 1.5e-7, 123456.0])
+def test_numbers_are_numbers_in_yaml(value):
+    yaml = pytest.importorskip("yaml")
+    found = yaml.safe_load(yaml_number(value))
+    assert isinstance(found, float)
+    assert found == value
+
+
+def test_the_same_bytes_come_again_and_with_the_splits_together_all_grasps(dataset, tmp_path):
+    whole = export(dataset, tmp_path / "one", None, silent)
+    assert whole.rows == {"objects": 3, "grasps": 6}
+    assert export(dataset, tmp_path / "again", None, silent) == whole
+    assert whole.files == len(hashes(tmp_path / "one"))
+    assert hashes(tmp_path / "one") == hashes(tmp_path / "again")
+    parts = [export(dataset, tmp_path / split, split, silent).rows for split in get_args(SplitName)]
+    assert {name: sum(part[name] for part in parts) for name in whole.rows} == whole.rows
+    assert sum(part["grasps"] > 0 for part in parts) >= 2
+    labels = sim_validate.load_dataset(dataset)["grasps"]["label"]
+    assert (labels != "grasp").sum() > whole.rows["grasps"]  # of which none is exported
+
+
+NAMES = (
+    "../../etc/passwd",
+    ".hidden",
+    "a/b\\c",
+    "..",
+    "x" * 400,
+    'a: [b]\n"c": !!python/object',
+    "",
+)
+
+
+@pytest.mark.parametrize("text", [*NAMES, "\x7f\u2028\U0001f600"])
+def test_names_of_objects_are_harmless_in_names_of_files_and_in_yaml(copy, tmp_path, text):
+    yaml = pytest.importorskip("yaml")
+    forged(copy, "objects", lambda rows: rows[0].update(source_name=text))
+    export(copy, tmp_path / "deep" / "out", None, silent)
+    paths = list((tmp_path / "deep" / "out").iterdir())
+    assert len(paths) == 6
+    assert all(re.fullmatch(r"[0-9a-f]{16}-[\w.-]{1,140}\.yaml", path.name) for path in paths)
+    assert sorted(p.name for p in (tmp_path / "deep").iterdir()) == ["out"]
+    frames = [yaml.safe_load(path.read_text(encoding="utf-8"))["object_frame"] for path in paths]
+    assert frames.count(text) == 2
+
+
+def test_two_objects_are_not_written_to_one_file(copy, tmp_path):
+    """Hashes of two objects that begin alike have never been found, so that one is made up."""
+    made = next(isaac._grasped_objects(select(copy)))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(isaac, "_grasped_objects", lambda _: iter([made, made]))
+        with pytest.raises(gc.InputError, match="the same file name"):
+            export(copy, tmp_path / "out", None, silent)
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_there_already_is_left_alone(dataset, tmp_path):
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / "thesis.tex").write_text("all my work")
+    for out in (mine, mine / "thesis.tex"):
+        with pytest.raises(gc.InputError, match="not an empty folder"):
+            export(dataset, out, None, silent)
+    with pytest.raises(gc.InputError, match="inside the dataset to export"):
+        export(dataset, dataset / "exports", None, silent)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+    assert (mine / "thesis.tex").read_text() == "all my work"
+    assert not (dataset / "exports").exists()
+    (tmp_path / "empty").mkdir()
+    assert export(dataset, tmp_path / "empty", None, silent).files == 6
+
+
+def test_a_damaged_dataset_is_refused_and_leaves_nothing(copy, tmp_path):
+    kept = {path: path.read_text() for path in (copy / "meshes").iterdir()}
+    for path, text in kept.items():
+        path.write_text(text.replace("v ", "v 0.001 0 0\nv ", 1))
+    with pytest.raises(gc.InputError, match="another object"):
+        export(copy, tmp_path / "out", None, silent)
+    for path, text in kept.items():
+        path.write_text(text)
+    (listed,) = [
+        each for each in json.loads((copy / "manifest.json").read_text())["files"]
+        if each.get("table") == "objects" and each["split"] == "train"
+    ]  # fmt: skip
+    text = (copy / "manifest.json").read_text()
+    wrong = text.replace(f'"rows": {listed["rows"]},', f'"rows": {listed["rows"] + 1},')
+    (copy / "manifest.json").write_text(wrong)
+    with pytest.raises(gc.InputError, match="rows, but the manifest lists"):
+        export(copy, tmp_path / "out", None, silent)
+    for path in copy.glob("data/grasps/*.parquet"):
+        data = bytearray(path.read_bytes())
+        data[len(data) // 3] ^= 1
+        path.write_bytes(bytes(data))
+    with pytest.raises(gc.InputError):
+        export(copy, tmp_path / "out", None, silent)
+    (copy / "manifest.json").unlink()
+    with pytest.raises(gc.InputError, match="expected a finished dataset"):
+        export(copy, tmp_path / "out", None, silent)
+    assert [path.name for path in tmp_path.iterdir()] == ["copy"]
+
+
+def test_a_folder_appears_whole_or_not_at_all(tmp_path):
+    def stop_halfway():
+        with whole_folder(tmp_path / "out") as place:
+            (place / "half").write_text("a")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stop_halfway()
+    assert not list(tmp_path.iterdir())
+    with whole_folder(tmp_path / "deep" / "out") as place:
+        (place / "all").write_text("a")
+        assert not (tmp_path / "deep" / "out").exists()
+    assert (tmp_path / "deep" / "out" / "all").read_text() == "a"
+
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from sim_validate.files.writing import whole_folder
+with whole_folder(Path(sys.argv[1])) as place:
+    (place / "half").write_text("a")
+    os._exit(9)
+"""
+
+
+def test_what_a_killed_writer_of_a_folder_left_goes_when_it_is_written_again(tmp_path):
+    subprocess.run([sys.executable, "-c", KILLED, tmp_path / "out"], cwd=ROOT, check=False)
+    (left,) = tmp_path.iterdir()
+    with whole_folder(tmp_path / "out") as other:
+        assert not left.exists()
+        with whole_folder(tmp_path / "out"):  # another command; the first one is still at work
+            assert other.is_dir()
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_what_is_not_installed_is_named_with_its_extra(dataset, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(gc.InputError, match=r"graspproof\[dataset\]"):
+        export(dataset, tmp_path / "out", None, silent)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_says_what_it_wrote(dataset, tmp_path, capsys):
+    command = ["dataset", "export", str(dataset)]
+    out = tmp_path / "out"
+    assert main([*command, "--to", "isaac", "--out", str(out), "--json"]) == Exit.GOOD
+    assert json.loads(capsys.readouterr().out) == {
+        "dataset": str(dataset), "to": "isaac", "split": None, "out": str(out), "files": 6,
+        "rows": {"objects": 3, "grasps": 6},
+    }  # fmt: skip
+    assert main([*command, "--out", str(out)]) == Exit.INPUT
+    assert "not an empty folder" in capsys.readouterr().err
+    assert main([*command, "--to", "pickle", "--out", str(tmp_path / "x")]) == Exit.USAGE
+    assert main([*command, "--out", str(tmp_path / "x"), "--split", "all"]) == Exit.USAGE
+    assert main(["dataset", "export", str(tmp_path), "--out", "x"]) == Exit.INPUT
+    assert not (tmp_path / "x").exists()
+    assert set(get_args(SplitName)) == {name for name, _ in SPLITS}

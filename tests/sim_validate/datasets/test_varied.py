@@ -1,0 +1,216 @@
+"""Varied grasps are what their kinds say, and forged ones are named."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.errors import UnfaithfulError
+from grasp_core.values import Contact, ContactRegion
+from scenes.example_objects import example_object
+from sim_validate.datasets import varied as varied_grasps
+from sim_validate.datasets.build import build
+from sim_validate.datasets.config import (
+    OF_GRASPS,
+    DatasetConfig,
+    Learning,
+    config_from_toml,
+    config_to_toml,
+)
+from sim_validate.datasets.figures import execution_cells
+from sim_validate.datasets.varied import RATIOS, Varying, region_exit, variants
+from sim_validate.datasets.verify import Sample, verify
+from sim_validate.simulation.setup import Agenda
+from sim_validate.validation.validation import validate
+from tests.sim_validate.datasets.engines import Here, contents, silent
+from tests.sim_validate.datasets.forging import forged
+from tests.sim_validate.datasets.learned import BODIES, LEARNED, rows_of
+
+WEDGE = example_object("wedge")
+
+
+@pytest.fixture(scope="module")
+def by_id(learned):
+    return {row["grasp_id"]: row for row in rows_of(learned, "grasps")}
+
+
+def varied(by_id, kind):
+    found = [row for row in by_id.values() if row["kind"] == kind]
+    assert found
+    return found
+
+
+def test_every_kind_that_is_asked_for_has_rows(by_id):
+    kinds = Counter(row["kind"] for row in by_id.values())
+    assert kinds["planned"] == len(LEARNED.objects)
+    assert set(kinds) >= set(OF_GRASPS)
+    synthetic = [row for row in by_id.values() if row["control_of"] is not None]
+    assert len(synthetic) == len(LEARNED.objects) * LEARNED.learning.synthetic
+    assert all(row["kind"] == row["label"] for row in synthetic)
+
+
+def test_frictions_are_below_near_and_above_the_critical_one_of_the_contacts(by_id):
+    for kind in ("friction_below", "friction_near", "friction_above"):
+        for row in varied(by_id, kind):
+            critical = gc.critical_friction(row["contact_points_m"], row["contact_normals"])
+            assert row["friction_ratio"] == pytest.approx(row["friction"] / critical, rel=1e-6)
+            least, most = RATIOS[kind]
+            assert least - 1e-3 <= row["friction_ratio"] <= most + 1e-3
+            assert row["force_closed"] == (row["friction"] > critical)
+            assert row["contact_points_m"] == by_id[row["made_from"]]["contact_points_m"]
+
+
+def test_moved_contacts_are_out_of_the_regions_of_a_plan_and_on_its_faces(by_id):
+    plans = {
+        name: gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps[0]
+        for name, body in BODIES.items()
+    }
+    moved = 0
+    for row in varied(by_id, "moved_out"):
+        grasp = plans[row["object_id"]]
+        points = np.array(row["contact_points_m"])
+        assert row["displaced_m"] == pytest.approx(
+            np.linalg.norm(points - grasp.positions, axis=1), abs=1e-15
+        )
+        for finger in np.flatnonzero(row["displaced_m"]):
+            way = points[finger] - grasp.positions[finger]
+            way /= np.linalg.norm(way)
+            exit_m = region_exit(grasp.regions[finger], grasp.contacts[finger], way)
+            assert row["region_exit_m"][finger] == pytest.approx(exit_m, rel=1e-6)
+            assert row["displaced_m"][finger] > exit_m
+            moved += 1
+    assert moved >= 2
+
+
+def test_masses_are_near_the_one_that_is_predicted_to_be_lost(by_id, learned):
+    losses = {row["grasp_id"]: row for row in rows_of(learned, "executions")}
+    for row in varied(by_id, "mass_near"):
+        source = by_id[row["made_from"]]
+        assert row["contact_points_m"] == source["contact_points_m"]
+        least, most = RATIOS["mass_near"]
+        assert least <= row["mass_ratio"] <= most
+        assert row["grasp_id"] in losses
+        assert row["mass_kg"] > 0.0
+
+
+def test_natural_negatives_are_closed_and_lose_their_object(by_id):
+    assert any(
+        row["force_closed"] and row["survived"] is False and row["kind"] in OF_GRASPS
+        for row in by_id.values()
+    )
+    assert any(row["survived"] and row["kind"] in OF_GRASPS for row in by_id.values())
+
+
+def test_a_whole_dataset_has_no_fault_and_comes_out_the_same_again(learned):
+    assert verify(learned, Sample(1.0)) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "cells", "message"),
+    [
+        ("planned", {"kind": "given"}, "kind is given, but planned by label"),
+        ("friction_near", {"made_from": "x"}, "named in made_from, has no row"),
+        ("friction_near", {"friction_ratio": 2.0}, "friction_ratio is 2.0, but from the contacts"),
+        ("friction_near", {"kind": "friction_above"}, "is none of the kind friction_above"),
+        ("moved_out", {"displaced_m": [0.0] * 4}, "displaced_m is not the distance"),
+        ("moved_out", {"region_exit_m": [1.0] * 4}, "is still in its region"),
+    ],
+)
+def test_forged_kinds_are_named(spoiled, kind, cells, message):
+    def change(rows):
+        next(row for row in rows if row["kind"] == kind).update(cells)
+
+    forged(spoiled, "grasps", change)
+    assert any(message in fault for fault in verify(spoiled))
+
+
+def test_a_build_that_is_cut_off_ends_with_the_same_bytes(learned, tmp_path):
+    class CutOffError(Exception):
+        pass
+
+    seen = []
+
+    def cut(unit):
+        seen.append(unit)
+        if len(seen) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        build(LEARNED, tmp_path / "ds", Here(cut), silent)
+    assert build(LEARNED, tmp_path / "ds", Here(), silent).made == 1
+    assert contents(tmp_path / "ds") == contents(learned)
+
+
+def test_settings_read_back_from_their_text(tmp_path):
+    path = tmp_path / "c.toml"
+    path.write_text(config_to_toml(LEARNED), encoding="utf-8")
+    assert config_from_toml(path) == LEARNED
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[learning]\nmoved_in = 1", "no setting is named"),
+        ("[learning]\nsynthetic = 6", "synthetic must be a whole number from 0 to 5"),
+        ("[learning]\nmoved_out = -1", "moved_out must be a whole number"),
+        ("[learning]\nmass_near = 1", "only executed grasps have a mass"),
+        ("learning = 1", "expected a table"),
+    ],
+)
+def test_settings_out_of_range_are_refused(tmp_path, text, message):
+    path = tmp_path / "c.toml"
+    path.write_text(f'objects = ["wedge"]\n{text}\n', encoding="utf-8")
+    with pytest.raises(gc.InputError, match=message):
+        config_from_toml(path)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"figures": ("beauty",)}, "figures must be"),
+        ({"seeds": (1, 1)}, "seeds: expected different items"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(settings, message):
+    with pytest.raises(gc.InputError, match=message):
+        DatasetConfig(objects=("wedge",), learning=Learning(**settings))
+
+
+def test_draws_depend_on_the_seed_and_not_on_what_else_is_asked_for():
+    (grasp,) = gc.plan(WEDGE, 0.5, families=("concurrent",), limit=1).grasps
+    alone = list(variants(WEDGE, grasp, 0.5, Learning(moved_out=1), 0))
+    many = list(variants(WEDGE, grasp, 0.5, Learning(friction_near=3, moved_out=2), 0))
+    other = list(variants(WEDGE, grasp, 0.5, Learning(moved_out=1), 1))
+    first = next(each for each in many if each.name == "moved_out-0")
+    assert len(alone) == len(other) == 1
+    assert np.array_equal(alone[0].displaced_m, first.displaced_m)
+    assert not np.array_equal(alone[0].displaced_m, other[0].displaced_m)
+
+
+def test_a_varied_grasp_beyond_the_simulator_leaves_the_others(monkeypatch):
+    """The row says why its survival is not known."""
+
+    def unfaithful(*_, **__):
+        raise UnfaithfulError("the simulator is not faithful here")
+
+    (grasp,) = gc.plan(WEDGE, 0.5, families=("concurrent",), limit=1).grasps
+    varying = Varying(Learning(moved_out=1), 0.5, Agenda(), LEARNED.execution)
+    verdict = validate(WEDGE, grasp, 0.5, agenda=Agenda(controls=False))
+    monkeypatch.setattr(varied_grasps, "execute", unfaithful)
+    (tried,) = varying.of(WEDGE, grasp, verdict, None)
+    assert tried.executed == "the simulator is not faithful here"
+    assert execution_cells(tried.executed)["executed"] is False
+    assert "survived" not in execution_cells(tried.executed)
+
+
+def test_a_square_region_ends_at_its_side():
+    """Half the side straight ahead, and the root of two times that on the diagonal."""
+    corners = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
+    square = ContactRegion("cone", corners, 1.0)
+    contact = Contact(np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    assert region_exit(square, contact, np.array([1.0, 0.0, 0.0])) == pytest.approx(1.0, abs=1e-12)
+    diagonal = np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0)
+    assert region_exit(square, contact, diagonal) == pytest.approx(np.sqrt(2.0), abs=1e-12)
+    point = ContactRegion("point", corners[:1], 0.0)
+    assert region_exit(point, contact, diagonal) == 0.0

@@ -1,0 +1,279 @@
+"""What is wrong with a dataset is named: files, rows, and what comes out otherwise."""
+
+import dataclasses
+import hashlib
+import json
+import shutil
+
+import numpy as np
+import pytest
+import trimesh
+
+import grasp_core as gc
+from scenes.example_objects import example_object
+from sim_validate.datasets.build import build
+from sim_validate.datasets.manifest import listed, read_manifest, write_manifest
+from sim_validate.datasets.meshes import mesh_text
+from sim_validate.datasets.open_dataset import load_dataset
+from sim_validate.datasets.verify import Sample, drawn, verify
+from tests.sim_validate.datasets.engines import Here, contents, silent
+from tests.sim_validate.datasets.forging import forged
+from tests.sim_validate.datasets.pair import CONFIG, all_rows
+
+pytest.importorskip("pyarrow")
+
+
+def test_one_byte_changed_in_any_file_is_named(dataset, tmp_path):
+    files = [path for path in contents(dataset) if path != "manifest.json"]
+    assert len(files) >= 5
+    for path in files:
+        spoiled = shutil.copytree(dataset, tmp_path / "spoiled")
+        data = bytearray((spoiled / path).read_bytes())
+        if data:
+            data[len(data) // 2] ^= 1
+        else:
+            data += b"x"
+        (spoiled / path).write_bytes(bytes(data))
+        assert any(path in fault for fault in verify(spoiled))
+        (spoiled / path).unlink()
+        assert f"{path}: this file is listed in the manifest, but missing" in verify(spoiled)
+        shutil.rmtree(spoiled)
+
+
+def untried(rows):
+    rows[0].update(label="given", outcome="not_tried", held=None, trials=0)
+
+
+def leaning(rows):
+    """A normal that is not the surface's, with the margin it gives."""
+    row = rows[0]
+    normal = np.array(row["contact_normals"][0]) + np.array([0.1, 0.0, 0.05])
+    row["contact_normals"][0] = (normal / np.linalg.norm(normal)).tolist()
+    points, normals = row["contact_points_m"], row["contact_normals"]
+    row["closure_margin"] = gc.force_closure(points, normals, row["friction"]).margin
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("grasps", lambda rows: rows[0].update(closure_margin=0.9), "closure margin"),
+        (
+            "grasps",
+            lambda rows: rows[0]["contact_normals"][0].__setitem__(0, 2.0),
+            "not a unit vector",
+        ),
+        ("grasps", lambda rows: rows[0].update(held=not rows[0]["held"]), "table of trials"),
+        ("grasps", lambda rows: rows[0].update(object_id="0" * 64), "object is missing"),
+        ("grasps", lambda rows: rows[0].update(force_closed=False), "force_closed is"),
+        (
+            "grasps",
+            lambda rows: rows[0]["contact_points_m"].__setitem__(0, [1.0, 0.0, 0.0]),
+            "not on the object",
+        ),
+        ("grasps", untried, "claims results, although"),
+        ("grasps", lambda rows: rows[0].update(trials=0), "table of trials"),
+        ("grasps", lambda rows: rows[0].update(friction=-1.0), "not among those of config"),
+        ("grasps", lambda rows: rows[0].update(label="given", friction=-1.0), "cannot be computed"),
+        ("grasps", lambda rows: rows[0].update(contacts=0), "lacks its contacts"),
+        ("grasps", lambda rows: rows[0].update(closure_margin=None), "lacks its contacts"),
+        ("grasps", lambda rows: rows[0].update(outcome="slipped"), "is 'slipped'"),
+        ("grasps", leaning, "not with its normals"),
+        ("grasps", lambda rows: rows[0].update(split="validation"), "rows of another split"),
+        ("trials", lambda rows: rows.pop(), "table of trials"),
+        ("trials", lambda rows: rows[0].update(grasp_id="nobody"), "nobody has no row"),
+        ("trials", lambda rows: rows[0].update(outcome="slipped"), "table of trials"),
+    ],
+)
+def test_rows_that_contradict_each_other_are_named(copy, name, change, message):
+    forged(copy, name, len)
+    assert verify(copy) == []
+    forged(copy, name, change)
+    assert any(message in fault for fault in verify(copy))
+
+
+def test_all_of_it_comes_out_again(dataset):
+    assert verify(dataset, Sample(1.0)) == []
+
+
+def test_a_dataset_of_tiny_triangles_verifies(tmp_path):
+    """A fine mesh of an object of 3 mm, turned: areas of 5e-9 square metres."""
+    solid = example_object("tetrahedron")
+    points, corners = solid.vertices, solid.triangles
+    for _ in range(4):
+        points, corners = trimesh.remesh.subdivide(points, corners)
+    turn = trimesh.transformations.rotation_matrix(1.0, [1.0, 2.0, 3.0])[:3, :3]
+    points = 1.5e-3 / solid.radius * points @ turn
+    mesh = tmp_path / "tiny.obj"
+    mesh.write_text(mesh_text(gc.Polyhedron.from_mesh(points, corners)))
+    config = dataclasses.replace(CONFIG, objects=(str(mesh),), frictions=(0.5,))
+    built = build(config, tmp_path / "ds", Here(), silent)
+    assert built.rows["objects"] == 1
+    assert built.rows["grasps"] >= 2
+    assert verify(tmp_path / "ds") == []
+
+
+def shifted(rows, column):
+    row = next(row for row in rows if row[column])
+    row[column] *= 1.0 + 1e-4
+
+
+def test_what_comes_out_otherwise_is_named(copy):
+    """Five changes in one dataset, each of which is named."""
+    changes = [
+        ("objects", lambda rows: shifted(rows, "volume_m3"), "volume_m3 is"),
+        ("grasps", lambda rows: shifted(rows, "ferrari_canny_lower_n"), "ferrari_canny_lower_n is"),
+        ("grasps", lambda rows: rows[-1].update(family="pencil"), "family is pencil"),
+        ("trials", lambda rows: rows[-1].update(name="gravity"), "name is gravity"),
+        ("trials", lambda rows: shifted(rows, "displacement_m"), "displacement_m is"),
+    ]
+    for name, change, _ in changes:
+        forged(copy, name, change)
+    assert verify(copy) == []
+    faults = verify(copy, Sample(1.0))
+    for _, _, message in changes:
+        assert any(message in fault for fault in faults), message
+
+
+@pytest.mark.parametrize("change", [{"arithmetic": "another"}, {"versions": {"mujoco": "3.0.0"}}])
+def test_with_other_rounding_verdicts_and_critical_frictions_count(copy, change):
+    write_manifest(copy, dataclasses.replace(read_manifest(copy), **change))
+    forged(copy, "trials", lambda rows: shifted(rows, "displacement_m"))
+    forged(copy, "grasps", lambda rows: shifted(rows, "ferrari_canny_lower_n"))
+    assert verify(copy, Sample(1.0)) == []
+    forged(copy, "grasps", lambda rows: shifted(rows, "critical_friction"))
+    faults = verify(copy, Sample(1.0))
+    assert any("critical friction" in fault for fault in faults), faults
+
+
+def test_a_grasp_that_was_left_out_is_named(copy):
+    (first, *_) = all_rows(copy, "grasps")
+    gone = first["grasp_id"]
+
+    def kept(row):
+        return gone not in (row["grasp_id"], row.get("control_of")) and not row[
+            "grasp_id"
+        ].startswith(f"{gone}:")
+
+    for name in ("grasps", "trials"):
+        forged(copy, name, lambda rows: rows.__setitem__(slice(None), list(filter(kept, rows))))
+    assert verify(copy) == []
+    assert any(gone in fault and "has no row" in fault for fault in verify(copy, Sample(1.0)))
+
+
+def test_objects_of_the_same_file_name_are_told_apart(tmp_path):
+    for folder, sides in (("a", (0.04, 0.05, 0.06)), ("b", (0.04, 0.05, 0.07))):
+        (tmp_path / folder).mkdir()
+        trimesh.creation.box(extents=sides).export(tmp_path / folder / "model.obj")
+    bad = tmp_path / "b" / "model.obj"
+    bad.write_text(bad.read_text().rpartition("f ")[0])
+    paths = (str(tmp_path / "a" / "model.obj"), str(bad))
+    config = dataclasses.replace(CONFIG, objects=paths, frictions=(0.5,))
+    built = build(config, tmp_path / "ds", Here(), silent)
+    assert built.quarantined == 1
+    assert verify(tmp_path / "ds", Sample(1.0)) == []
+    forged(tmp_path / "ds", "trials", lambda rows: shifted(rows, "displacement_m"))
+    assert any("displacement_m" in fault for fault in verify(tmp_path / "ds", Sample(1.0)))
+
+
+def test_what_is_quarantined_has_no_rows(copy):
+    (row, *_) = all_rows(copy, "objects")
+    line = {"object": "x", "source_sha256": row["source_sha256"], "given": [], "reason": "no"}
+    lines = [json.dumps(line | {"friction": friction}) for friction in CONFIG.frictions]
+    path = copy / "quarantine.jsonl"
+    path.write_text("\n".join(lines) + "\n")
+    manifest = read_manifest(copy)
+    kept = [each for each in manifest.files if each.path != path.name]
+    files = (*kept, listed(copy, path))
+    write_manifest(copy, dataclasses.replace(manifest, files=files, quarantined=2))
+    assert sum("left out, but it has rows" in fault for fault in verify(copy, Sample(1.0))) == 2
+
+
+def test_settings_that_are_not_the_manifests_are_named(copy):
+    path = copy / "config.toml"
+    path.write_text(path.read_text().replace("limit = 2", "limit = 3"))
+    manifest = read_manifest(copy)
+    kept = [each for each in manifest.files if each.path != path.name]
+    files = (*kept, listed(copy, path))
+    write_manifest(copy, dataclasses.replace(manifest, files=files))
+    assert any("not the configuration" in fault for fault in verify(copy))
+
+
+def test_a_larger_sample_holds_a_smaller_one():
+    units = [(f"{i:064x}", 0.5) for i in range(100)]
+    some, more = drawn(units, Sample(0.1, seed=3)), drawn(units, Sample(0.25, seed=3))
+    assert (len(some), len(more)) == (10, 25)
+    assert more[:10] == some
+    assert drawn(units, Sample(0.1, seed=4)) != some
+    assert len(drawn(units, Sample(0.001))) == 1
+
+
+def rewritten(folder, change):
+    """The manifest's text with a change."""
+    path = folder / "manifest.json"
+    record = json.loads(path.read_text())
+    change(record)
+    path.write_text(json.dumps(record))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda r: r["files"][0].update(path="../x"), r"files\[0\].path: expected a relative path"),
+        (lambda r: r["files"][0].update(path="/etc/passwd"), r"files\[0\].path: expected a rel"),
+        (lambda r: r["files"][0].update(rows=-1), r"files\[0\].rows: expected at least 0, got -1"),
+        (lambda r: r.update(schema=3), "schema: expected 2, got 3: a newer graspproof wrote"),
+        (lambda r: r["files"].append(r["files"][0]), "expected every path only once"),
+        (lambda r: r.update(units="4"), 'units: expected a whole number, got "4"'),
+        (lambda r: r.update(taste=1), "taste: unknown key; known keys are config_sha256"),
+        (lambda r: r.pop("files"), "files: missing"),
+    ],
+)
+def test_a_manifest_that_is_none_is_refused_by_field(copy, change, words):
+    rewritten(copy, change)
+    with pytest.raises(gc.InputError, match=rf"manifest\.json: .*{words}"):
+        verify(copy)
+    with pytest.raises(gc.InputError, match=words):
+        load_dataset(copy)
+
+
+def test_links_out_of_a_dataset_are_not_followed(copy, tmp_path):
+    path = next(copy.glob("data/grasps/*.parquet"))
+    path.rename(tmp_path / "elsewhere")
+    path.symlink_to(tmp_path / "elsewhere")
+    assert any("leads out of" in fault for fault in verify(copy))
+    with pytest.raises(gc.InputError, match="leads out of"):
+        load_dataset(copy)
+
+
+def test_nothing_is_loaded_where_any_byte_is_another(copy):
+    path = next(copy.glob("data/trials/*.parquet"))
+    whole = path.read_bytes()
+    spoiled = [whole[:-1], whole[: len(whole) // 2], b"", whole + b"x"]
+    spoiled += [whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :]
+                for at in range(4, len(whole), len(whole) // 9)]  # fmt: skip
+    for data in spoiled:
+        path.write_bytes(data)
+        with pytest.raises(gc.InputError, match=rf"{path.name}: .* differs from what"):
+            load_dataset(copy)
+    path.unlink()
+    with pytest.raises(gc.InputError, match=rf"{path.name}: .* is missing"):
+        load_dataset(copy)
+
+
+def test_a_line_of_the_quarantine_that_is_none_is_named(copy):
+    path = copy / "quarantine.jsonl"
+    path.write_text('{"object": 3}\n')
+    data = path.read_bytes()
+    rewritten(copy, lambda r: next(each for each in r["files"] if each["path"] == path.name).update(
+        bytes=len(data), sha256=hashlib.sha256(data).hexdigest()))  # fmt: skip
+    (fault,) = verify(copy)
+    assert "quarantine.jsonl: line 1: object: expected text, got 3" in fault
+
+
+def empty_cells(rows):
+    rows[0].update(friction=None, contacts=None, outcome=None)
+
+
+def test_cells_that_must_not_be_null_are_a_fault_not_a_crash(copy):
+    forged(copy, "grasps", empty_cells)
+    assert any("grasps" in fault or "a row is not" in fault for fault in verify(copy))

@@ -1,0 +1,195 @@
+import dataclasses
+import errno
+import itertools
+import os
+import shutil
+import subprocess
+import time
+
+import pytest
+import trimesh
+
+from grasp_core.processes import local_processes
+from sim_validate.datasets import workers
+from sim_validate.datasets.build import build
+from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.staging import Staging
+from sim_validate.datasets.units import WorkerError, provenance, units_of
+from sim_validate.datasets.workers import Limits, Task, do_task, drive
+from tests.patience import HANGING_S
+from tests.sim_validate.datasets.engines import Here, silent
+
+pytest.importorskip("pyarrow")
+CONFIG = DatasetConfig(objects=("tetrahedron",), families=("concurrent",), limit=1)
+LIMITS = Limits(timeout_s=HANGING_S)
+
+
+@pytest.fixture
+def staging(tmp_path):
+    made = Staging(tmp_path / "staging")
+    made.clear_unfinished()
+    return made
+
+
+def task(staging, work, limits=LIMITS):
+    return Task(units_of(CONFIG)[0], staging, dict(provenance()), limits, work)
+
+
+def note_memory(unit, staging):
+    import resource
+
+    most = resource.getrlimit(resource.RLIMIT_AS)[0]
+    staging.quarantine(unit, "limited" if 0 < most < 2**40 else "unlimited")
+
+
+def limit_twice(limits):
+    """The limits of memory that are in force in this process, where a unit may take a lot more."""
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_AS, limits)
+    with workers._memory_kept(2**40):
+        return resource.getrlimit(resource.RLIMIT_AS)
+
+
+def sleep(*_):
+    while True:
+        time.sleep(60.0)
+
+
+def burn(*_):
+    sum(itertools.repeat(1))  # one call that never gives the interpreter back
+
+
+@pytest.mark.parametrize("name", ["mujoco", "numpy", "code_sha256", "python"])
+def test_a_worker_with_another_version_refuses_and_the_run_ends(tmp_path, monkeypatch, name):
+    other = dict(provenance()) | {name: "0.0.1"}
+    asked_first = iter([other])
+    monkeypatch.setattr(workers, "provenance", lambda: next(asked_first, provenance()))
+    with pytest.raises(WorkerError, match=rf"version of {name}: .* instead of 0\.0\.1"):
+        build(CONFIG, tmp_path / "ds", Here(), silent)
+    monkeypatch.undo()
+    assert build(CONFIG, tmp_path / "ds", Here(), silent).made == 1
+
+
+def test_a_worker_that_does_not_see_the_folder_says_so(tmp_path):
+    with pytest.raises(WorkerError, match="file system that all processes share"):
+        do_task(task(Staging(tmp_path / "elsewhere"), sleep))
+
+
+def test_rows_that_do_not_arrive_end_the_run(staging):
+    class Elsewhere(Here):
+        def submit(self, function, given):
+            return super().submit(function, dataclasses.replace(given, work=lambda *_: None))
+
+    with pytest.raises(WorkerError, match="rows that do not appear"):
+        drive(units_of(CONFIG), staging, Elsewhere(), silent)
+
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO)
+
+
+@pytest.mark.parametrize("code", FULL)
+def test_a_full_disk_ends_the_run_and_later_it_goes_on(tmp_path, code):
+    config = dataclasses.replace(CONFIG, frictions=(0.4, 0.5))
+
+    def full(_):
+        if len(engine.submitted) == 2:
+            raise OSError(code, os.strerror(code))
+
+    engine = Here(full)
+    with pytest.raises(OSError, match=os.strerror(code)) as raised:
+        build(config, tmp_path / "ds", engine, silent)
+    assert raised.value.errno == code
+    again = Here()
+    assert build(config, tmp_path / "ds", again, silent).made == 1
+    assert len(again.submitted) == 1
+
+
+def test_a_worker_that_cannot_begin_ends_the_run(tmp_path):
+    def lack(_):
+        raise ModuleNotFoundError("No module named 'sim_validate'")
+
+    with pytest.raises(WorkerError, match=r"units of work .ModuleNotFoundError: No module"):
+        build(CONFIG, tmp_path / "ds", Here(lack), silent)
+    assert build(CONFIG, tmp_path / "ds", Here(), silent).quarantined == 0
+
+
+def test_a_worker_that_does_not_see_a_mesh_ends_the_run(tmp_path):
+    path = tmp_path / "box.stl"
+    trimesh.creation.box(extents=(0.04, 0.05, 0.06)).export(path)
+    config = dataclasses.replace(CONFIG, objects=(str(path),))
+
+    def hide(_):
+        path.rename(tmp_path / "aside")
+
+    with pytest.raises(WorkerError, match="cannot find this mesh"):
+        build(config, tmp_path / "ds", Here(hide), silent)
+    (tmp_path / "aside").rename(path)
+
+    def change(_):
+        path.write_bytes(path.read_bytes() + b" ")
+
+    with pytest.raises(WorkerError, match="has changed since the build began"):
+        build(config, tmp_path / "ds", Here(change), silent)
+    assert not (tmp_path / "ds" / "manifest.json").exists()
+
+
+def test_a_fault_of_ours_with_one_object_does_not_stop_the_others(tmp_path, monkeypatch):
+    config = dataclasses.replace(CONFIG, objects=("tetrahedron", "wedge"))
+    plain = workers.made_of
+
+    def faulty(unit, body):
+        if unit.object == "wedge":
+            raise ZeroDivisionError("a bug")
+        return plain(unit, body)
+
+    monkeypatch.setattr(workers, "made_of", faulty)
+    built = build(config, tmp_path / "ds", Here(), silent)
+    assert (built.quarantined, built.rows["objects"]) == (1, 1)
+    left_out = (tmp_path / "ds" / "quarantine.jsonl").read_text()
+    assert "internal error: ZeroDivisionError: a bug" in left_out
+
+
+def test_memory_is_limited_while_a_unit_is_done_and_a_process_that_never_ends_is_ended(staging):
+    """One process, which is limited for one unit and not for the next, and those after it."""
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    given = task(staging, note_memory, Limits(600.0, 2**30))
+    with local_processes(1) as engine:
+        engine.submit(do_task, given).result()
+        assert staging.result(given.unit) == "limited"
+        staging.forget(given.unit)
+        engine.submit(do_task, task(staging, note_memory)).result()
+        assert staging.result(given.unit) == "unlimited"
+        for never in (sleep, burn):
+            failed = engine.submit(do_task, task(staging, never, Limits(0.5))).exception(HANGING_S)
+            assert failed is not None
+        staging.forget(given.unit)
+        engine.submit(do_task, task(staging, note_memory)).result()
+        lower = (3 * 2**30, 4 * 2**30)
+        assert engine.submit(limit_twice, lower).result() == lower
+    assert staging.result(given.unit) == "unlimited"
+    assert resource.getrlimit(resource.RLIMIT_AS) == before
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can mount a small file system")
+def test_on_a_small_file_system_nothing_is_lost(tmp_path):
+    small = tmp_path / "small"
+    small.mkdir()
+    mount, unmount = shutil.which("mount"), shutil.which("umount")
+    options = ["-t", "tmpfs", "-o", "size=48k", "tmpfs", str(small)]
+    if mount is None or unmount is None:
+        pytest.skip("nothing to mount with")
+    if subprocess.run([mount, *options], capture_output=True, check=False).returncode:
+        pytest.skip("mounting is not allowed here")
+    try:
+        with pytest.raises(OSError, match="No space") as raised:
+            build(CONFIG, small / "ds", Here(), silent)
+        assert raised.value.errno == errno.ENOSPC
+        assert not (small / "ds" / "manifest.json").exists()
+        subprocess.run([mount, "-o", "remount,size=8m", str(small)], check=True)
+        assert build(CONFIG, small / "ds", Here(), silent).quarantined == 0
+    finally:
+        subprocess.run([unmount, str(small)], check=True)

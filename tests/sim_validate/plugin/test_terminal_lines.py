@@ -1,0 +1,36 @@
+"""What the terminal says at the end of a run, for lines that are written down here."""
+
+from sim_validate.pytest_plugin import MOST_TOLD, sections
+
+NOTE = "part.obj has changed: face 3 moved"
+
+
+def line(told="", wrote="", note=""):
+    return {"told": told, "wrote": wrote, "mesh_note": note}
+
+
+def test_grasps_stand_below_the_part_that_they_were_tested_on():
+    lines = [line("b same", note=NOTE), line("a same", note=NOTE), line(note="z.obj: not found")]
+    assert sections(lines) == [
+        ("meshes of grasps", [NOTE, "  a same", "  b same", "z.obj: not found"])
+    ]
+
+
+def test_better_grasps_on_an_unchanged_part_and_baselines_have_sections_of_their_own():
+    lines = [line("a better"), line(wrote="wrote x: 2 of 2 grasps held"),
+             line(wrote="wrote x: 2 of 2 grasps held")]  # fmt: skip
+    assert sections(lines) == [
+        ("grasps that are better", ["a better"]),
+        ("baselines of grasps", ["wrote x: 2 of 2 grasps held"]),
+    ]
+
+
+def test_a_quiet_run_says_nothing():
+    assert sections([line(), line()]) == []
+
+
+def test_a_long_list_is_cut():
+    lines = [line(f"{number:03d} same", note=NOTE) for number in range(MOST_TOLD + 3)]
+    ((_, texts),) = sections(lines)
+    assert len(texts) == 1 + MOST_TOLD + 1
+    assert texts[-1] == "  and 3 more; --junitxml FILE lists all"
