@@ -11,8 +11,8 @@ COPY . /source
 RUN pip install --no-cache-dir -c /source/.ci/constraints.txt '/source[dataset]'
 
 USER graspproof
-# one run keeps the compiled loops in the image, so that no container compiles them again
-RUN cd /tmp && graspproof run wedge --limit 2 --out /tmp/first -q && rm -r /tmp/first
+# keeps the compiled loops in the image, so that no container compiles them again
+RUN graspproof doctor --compile -q
 
 WORKDIR /work
 ENTRYPOINT ["graspproof"]

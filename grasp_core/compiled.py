@@ -7,21 +7,46 @@ that asks for it; what fails the check goes to a solver such as HiGHS or Clarabe
 say where to search are not checked: spanning quadruples, tilted cones, and bounds on discs, whose
 multipliers are checked in compiled code. Tests compare these with reference implementations.
 
-Compiled code is kept on disk by `kept_loops`, in a folder of the user that other environments with
-the same texts find again.
+Numba keeps compiled code beside the file that a function says it comes from, and looks only at that
+file. A new environment would compile everything again, and a change of one kernel would not be seen
+by others that call it. So each kernel's text is copied into a folder of the user, under a name with
+a hash of that text, of the texts it takes functions and constants from, and of the versions of what
+compiles them, and its functions say that they come from the copy. Constants that a kernel takes
+from a module that is no kernel must be literals there, as what that module itself imports is not
+looked at. Numba itself looks at the processor.
 """
 
+import hashlib
 import importlib
-from collections.abc import Callable, Mapping
+import importlib.util
+import os
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cache
-from typing import Any, Literal, TypeVar, cast
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal, TypeVar
 
 from grasp_core.errors import InputError
-from grasp_core.kept_loops import NUMBA_FAILS, keep
 
-_AWAITED: dict[str, Callable[[], object]] = {}
-"""Functions that return when a kernel is compiled elsewhere, by the kernel's name."""
 Loop = TypeVar("Loop", bound=Callable[..., Any])
+
+NUMBA_FAILS = (ImportError, RuntimeError, OSError, ValueError)
+"""What numba raises when it is imported with settings that it refuses, or cannot be."""
+OWN = "graspproof"
+"""Name of the folder for compiled code in the user's cache folder."""
+DIGITS = 16
+"""Number of digits of the hash in a copy's name."""
+IMPORTED = re.compile(r"^from ((?:grasp_core|scenes)(?:\.\w+)+) import", re.MULTILINE)
+"""Pattern of the imports in a kernel's text."""
+COMPILERS = ("numba", "llvmlite")
+"""Packages that compile."""
+KERNEL = "_kernel"
+"""Ending of the names of kernels, whose own imports count too."""
 
 
 def loop(
@@ -33,26 +58,22 @@ def loop(
     module, every process compiles the function again.
     """
     numba: Any = importlib.import_module("numba")
+    # what Python runs stays where debuggers look for it, and numba keeps no unoptimized code
+    keeps = not numba.config.DISABLE_JIT and int(numba.config.OPT) > 0
 
     def declared(function: Loop) -> Loop:
-        made = numba.njit(function, error_model=division, nogil=beside)
-        keep(made, function)
-        return cast("Loop", made)
+        code = function.__code__
+        copy = copy_of(function.__module__, code.co_filename) if keeps else None
+        if copy is not None:
+            function.__code__ = code.replace(co_filename=str(copy))
+        return numba.njit(function, error_model=division, nogil=beside, cache=copy is not None)
 
     return declared
-
-
-def wait_for(kernels: Mapping[str, Callable[[], object]]) -> None:
-    """Make the first use of kernels wait, as for another process that compiles them."""
-    _AWAITED.clear()
-    _AWAITED.update(kernels)
 
 
 @cache
 def compiled(name: str) -> Any:
     """Load a kernel module."""
-    if wait := _AWAITED.pop(name, None):
-        wait()
     try:
         return importlib.import_module(name)
     except NUMBA_FAILS as error:
@@ -73,3 +94,71 @@ def state_of(function: Any) -> Literal["kept", "not kept", "interpreted"]:
     if not hasattr(function, "stats"):
         return "interpreted"
     return "kept" if function.stats.cache_path else "not kept"
+
+
+def is_kept(module: str) -> bool:
+    """Return whether loops of a kernel are kept already, or cannot be kept or compiled at all."""
+    found = importlib.util.find_spec(module)
+    try:
+        copy = None if found is None else copy_of(module, str(found.origin))
+    except NUMBA_FAILS:  # whoever needs the kernel is told so
+        return True
+    if copy is None:
+        return True
+    # below the copy's folder, or beside it where NUMBA_CACHE_DIR is set
+    folder = copy.parent
+    return any(folder.parent.glob(f"{folder.name}*/**/{copy.stem}.*.nbi"))
+
+
+@cache
+def copy_of(module: str, path: str) -> Path | None:
+    """Copy a module's text to where its compiled code is kept; None if nothing can be written."""
+    name = f"{module}-{_stamp(module, Path(path))}.py"
+    for folder in folders(Path(path)):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            # made even where a copy is there, to see that numba can write
+            with tempfile.TemporaryDirectory(dir=folder) as own:
+                if not (folder / name).exists():
+                    written = shutil.copyfile(path, Path(own) / name)
+                    written.replace(folder / name)
+        except OSError:
+            continue
+        return folder / name
+    return None
+
+
+def folders(path: Path) -> Iterator[Path]:
+    """Yield folders that may keep compiled loops, best first.
+
+    They are in the one that `NUMBA_CACHE_DIR` names, in the user's cache folder, and `__pycache__`
+    beside the module.
+    """
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        yield Path(chosen).absolute() / OWN
+    users = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    with suppress(RuntimeError):  # there may be no home
+        users = users if users.is_absolute() else Path.home() / ".cache"
+    if users.is_absolute():
+        yield users / OWN
+    yield path.parent / "__pycache__"
+
+
+def _stamp(module: str, path: Path) -> str:
+    """Hash the texts of a module and of those it takes from, and the versions that matter."""
+    texts, ahead = {module: path.read_text(encoding="utf-8")}, [module]
+    while ahead:
+        for name in IMPORTED.findall(texts[ahead.pop()]):
+            if name not in texts:
+                texts[name] = _text(name)
+                if name.endswith(KERNEL):
+                    ahead.append(name)
+    parts = (*sorted(texts.items()), sys.implementation.cache_tag, *map(version, COMPILERS))
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:DIGITS]
+
+
+@cache
+def _text(module: str) -> str:
+    """Read a module's text; of the modules, only the folders above it are imported."""
+    found = importlib.util.find_spec(module)
+    return Path(str(found and found.origin)).read_text(encoding="utf-8")

@@ -1,12 +1,19 @@
 """What holds for all tests: no clock decides, files stay together, and kernels compile once."""
 
-import fcntl
 import gc
-import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+ROOT = Path(__file__).parents[1]
+COMPILE = """
+from sim_validate.parallel.compiling import EVERYTHING, compile_loops, must_compile
+if must_compile(EVERYTHING, jobs=2):
+    compile_loops(EVERYTHING)
+"""
 settings.register_profile(
     "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
@@ -14,11 +21,9 @@ settings.load_profile("any machine")
 
 
 def pytest_configure(config):
-    """Let only one worker compile at a time; the others then find the kernel in the cache."""
-    if hasattr(config, "workerinput"):
-        from numba.core import event
-
-        event.register("numba:compiler_lock", one_compiles(event.Listener))
+    """Compile all kernels in two processes before several workers would each compile them."""
+    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+        subprocess.run([sys.executable, "-c", COMPILE], cwd=ROOT, check=True)
 
 
 def pytest_collection_finish():
@@ -36,22 +41,3 @@ def pytest_xdist_make_scheduler(config, log):
     from xdist.scheduler import LoadFileScheduling
 
     return LoadFileScheduling(config, log) if config.getvalue("dist") == "load" else None
-
-
-def one_compiles(listener):
-    """What numba tells before and after it compiles; this file is the lock of all workers."""
-
-    class OneCompiles(listener):
-        def __init__(self):
-            self.lock, self.depth = os.open(__file__, os.O_RDONLY), 0
-
-        def on_start(self, _):
-            self.depth += 1
-            fcntl.flock(self.lock, fcntl.LOCK_EX)
-
-        def on_end(self, _):
-            self.depth -= 1
-            if self.depth == 0:
-                fcntl.flock(self.lock, fcntl.LOCK_UN)
-
-    return OneCompiles()

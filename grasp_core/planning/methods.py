@@ -12,19 +12,20 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Certified
 from grasp_core.planning.family_search import MethodSearch, search_construction
-from grasp_core.planning.parts.batches import search_free
-from grasp_core.planning.parts.everything import (
+from grasp_core.planning.parts import (
+    Elsewhere,
+    Object,
     blocks_of,
     each_found,
+    in_standard_order,
     search_batches,
     search_blocks,
+    search_free,
     search_undecided,
 )
-from grasp_core.planning.parts.tasks import Object, in_standard_order
 from grasp_core.planning.reach import Finger, Reach, reach
 from grasp_core.planning.request import FAMILIES, METHODS, PlanRequest
 from grasp_core.planning.result import Outcomes
-from grasp_core.processes.workers import Workers
 from grasp_core.values import FINGERS, FaceQuadruple, Family, Method
 
 Progress: TypeAlias = Callable[[int, int, int], None]
@@ -54,13 +55,13 @@ def run(
     request: PlanRequest,
     searches: Searches,
     progress: Progress | None,
-    workers: Workers | None = None,
+    elsewhere: Elsewhere | None = None,
 ) -> Iterator[Certified]:
     """Yield each certified grasp in the order of the searches, on the standard object."""
     total, found = len(searches) * on.quadruples, 0
     work = Object(on, request)
     everything = request.searched is None
-    steps = _every_step(work, searches, workers) if everything else _limited(work, searches)
+    steps = _every_step(work, searches, elsewhere) if everything else _limited(work, searches)
     for done, grasps in steps:
         found += len(grasps)
         if progress is not None:
@@ -71,13 +72,13 @@ def run(
 
 
 def _every_step(
-    work: Object, searches: Searches, workers: Workers | None
+    work: Object, searches: Searches, elsewhere: Elsewhere | None
 ) -> Iterator[tuple[int, list[Certified]]]:
     """Yield, for each quadruple tried, how many are finished at least, and all its grasps."""
     on, dealt_with = work.on, 0
     families: list[Family] = [family for family in FAMILIES if family in searches]
     parts = {family: blocks_of(work, family) for family in families}
-    found = each_found(work, chain.from_iterable(parts.values()), workers)
+    found = each_found(work, chain.from_iterable(parts.values()), elsewhere)
     for family in families:
         search = searches[family]
         steps = search_blocks(islice(found, len(parts[family])), search)
@@ -86,11 +87,11 @@ def _every_step(
         dealt_with += on.quadruples
     if "free" in searches:
         search, held = searches["free"], _held(searches)
-        steps = search_batches(work, search, held, workers)
+        steps = search_batches(work, search, held, elsewhere)
         yield from enumerate(_timed(steps, search), start=dealt_with + 1)
         _prune("free", search, on.quadruples)
         if work.request.complete:
-            for grasps in _timed(search_undecided(work, search, workers), search):
+            for grasps in _timed(search_undecided(work, search, elsewhere), search):
                 yield dealt_with + on.quadruples, grasps
 
 

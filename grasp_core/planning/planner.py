@@ -24,14 +24,12 @@ from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.as_given import absence_as_given, as_given, faces_as_given
 from grasp_core.planning.certify import to_grasp, to_grasps
 from grasp_core.planning.methods import Progress, Searches, outcomes, prepared, run, unreached
-from grasp_core.planning.parts.everything import worth_starting
-from grasp_core.planning.parts.tasks import finder
+from grasp_core.planning.parts import finding_elsewhere
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.request import METHODS, ConeKind, PlanRequest, RankBy, check_request
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.planning.selection import chosen
-from grasp_core.processes.workers import working
 from grasp_core.values import Grasp, Method
 
 
@@ -101,10 +99,9 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     check_request(body, request)
     if progress is not None:
         function(progress, "progress")
-    count = worth_starting(body, request, whole(jobs, "jobs", least=1))
-    with working(count, finder, body, request) as workers:
+    with finding_elsewhere(body, request, whole(jobs, "jobs", least=1)) as elsewhere:
         on, searches = prepared(body, request)
-        for _ in run(on, request, searches, progress, workers):
+        for _ in run(on, request, searches, progress, elsewhere):
             pass
     return _planned(body, request, on, searches)
 

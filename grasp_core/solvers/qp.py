@@ -1,11 +1,12 @@
-"""Solves quadratic programs with ProxQP, exactly on the constraints that are active.
+"""Solves strictly convex quadratic programs by qpsolvers, exactly on the active constraints.
 
     minimise x'Px/2 + q'x  subject to  G x <= h,  A x = b,  lower <= x <= upper.                 (1)
 
-ProxQP calls some feasible programs of contact forces infeasible, so it is asked for the closest
-feasible point, and its status is not read: whoever asks checks the answer. It stops anywhere within
-its tolerance, at a point that depends on where its numbers lie in memory. The conditions of
-optimality on the active constraints E x = e are linear equations with one answer,
+ProxQP, the usual solver, calls some feasible programs of contact forces infeasible, so it is asked
+for the closest feasible point, and no solver's status is read: whoever asks checks the answer. A
+solver stops anywhere within its tolerance, at a point that depends on where its numbers lie in
+memory. The conditions of optimality on the active constraints E x = e are linear equations with one
+answer,
 
     [P E'; E 0] (x, u) = (-q, e),                                                                (2)
 
@@ -13,6 +14,7 @@ and that answer is returned where it is feasible and as good.
 """
 
 import importlib
+import warnings
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -20,15 +22,16 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.checked import one_of
 from grasp_core.errors import SolverError
 
-REQUESTED = 1e-8
-"""Absolute tolerance that ProxQP is asked for."""
-MAX_ITERATIONS = 300
-"""Largest number of iterations of ProxQP: feasible programs of forces take about twenty; infeasible
-ones would go on for minutes."""
+PROXQP = "proxqp"
+"""Name of the usual solver."""
+OPTIONS = {PROXQP: {"eps_abs": 1e-8, "max_iter": 300}}
+"""Options of solvers: absolute tolerance, and most iterations, as feasible programs of forces
+take about twenty while infeasible ones would go on for minutes."""
 ACTIVE = (1e-6, 1e-5, 1e-7, 1e-8)
-"""Slacks below which a constraint may count as active; they are tried in turn."""
+"""Slacks below which a constraint may count as active; the one with the least error is taken."""
 EXACT = 1e-6
 """Error up to which the solution of (2) is accepted, in its equations, the constraints or the
 objective: a hundred times the accuracy asked of ProxQP."""
@@ -55,25 +58,26 @@ class QuadraticProgram:
     upper: Array
     """Upper bounds of x, (n,); infinity where there is no bound."""
 
-    def rows(self) -> tuple[Array, Array]:
-        """Return C and d of all inequalities C x <= d, including the bounds."""
-        below, above = np.isfinite(self.lower), np.isfinite(self.upper)
-        unit = np.eye(len(self.q))
-        C = np.vstack([self.G, unit[above], -unit[below]])
-        return C, np.concatenate([self.h, self.upper[above], -self.lower[below]])
+
+def check_solver(name: str) -> None:
+    """Refuse a solver that qpsolvers does not know or that is not installed."""
+    if name != PROXQP:  # which is not loaded for this
+        one_of(name, _qpsolvers().available_solvers, "solver")
 
 
-def minimize(program: QuadraticProgram) -> Array | None:
-    """Solve a quadratic program, (n,); None where ProxQP returns no numbers."""
-    solver = _qpsolvers()
+def minimize(program: QuadraticProgram, solver: str = PROXQP) -> Array | None:
+    """Solve a quadratic program, (n,); None where the solver returns no numbers."""
+    qpsolvers = _qpsolvers()
     equations = (program.A, program.b) if len(program.b) else (None, None)
-    asked = solver.Problem(
+    asked = qpsolvers.Problem(
         program.P, program.q, program.G, program.h, *equations, lb=program.lower, ub=program.upper
     )
-    answer = solver.solve_problem(
-        asked, solver="proxqp", eps_abs=REQUESTED, max_iter=MAX_ITERATIONS,
-        primal_infeasibility_solving=bool(len(program.b)),
-    )  # fmt: skip
+    options = dict(OPTIONS.get(solver, {}))
+    if solver == PROXQP:
+        options["primal_infeasibility_solving"] = bool(len(program.b))
+    with warnings.catch_warnings():  # that a solver wants sparse matrices
+        warnings.simplefilter("ignore", qpsolvers.warnings.SparseConversionWarning)
+        answer = qpsolvers.solve_problem(asked, solver=solver, **options)
     if answer.x is None or not np.isfinite(answer.x).all():
         return None
     return _polished(program, np.asarray(answer.x, dtype=np.float64))
@@ -82,7 +86,11 @@ def minimize(program: QuadraticProgram) -> Array | None:
 def _polished(program: QuadraticProgram, x: Array) -> Array:
     """Solve (2) for the constraints active at x; return x itself if that is no better."""
     P, q, A, b = program.P, program.q, program.A, program.b
-    C, d = program.rows()
+    below, above = np.isfinite(program.lower), np.isfinite(program.upper)
+    unit = np.eye(len(q))
+    C = np.vstack([program.G, unit[above], -unit[below]])
+    d = np.concatenate([program.h, program.upper[above], -program.lower[below]])
+    best, least = x, EXACT
     for slack in ACTIVE:
         active = d - C @ x < slack
         E, e = np.vstack([A, C[active]]), np.concatenate([b, d[active]])
@@ -93,15 +101,16 @@ def _polished(program: QuadraticProgram, x: Array) -> Array:
         unmet = float(np.abs(conditions @ solved - targets).max())
         outside = float((C @ exact - d).max())
         worse = float(0.5 * (exact @ P @ exact - x @ P @ x) + q @ (exact - x))
-        if max(unmet, outside, worse) < EXACT:
-            return exact
-    return x
+        error = max(unmet, outside, worse)
+        if error < least:
+            best, least = exact, error
+    return best
 
 
 @cache
 def _qpsolvers() -> Any:
     module: Any = importlib.import_module("qpsolvers")
-    if "proxqp" not in module.available_solvers:
+    if PROXQP not in module.available_solvers:
         raise SolverError(
             "ProxQP cannot be loaded; it needs the package proxsuite and the system library "
             "libgomp (on Debian: apt-get install libgomp1)"

@@ -264,6 +264,8 @@ class Objects:
 class Doctor:
     """Check this installation: versions, solvers and simulator."""
 
+    compile: bool = False
+    """Compile all inner loops first, on two cores if there are two, as for an image."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 

@@ -61,7 +61,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "inspect mug.obj --scale 0.00026824",
     ),
     "objects": ("objects",),
-    "doctor": ("doctor",),
+    "doctor": ("doctor", "doctor --compile"),
     "view": (
         "view DIR/grasps.json --grasp c-0-1-2-7",
         "view DIR/grasps.json --picture grasp.png --page grasp.html --clip grasp.webp",

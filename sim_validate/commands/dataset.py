@@ -8,6 +8,7 @@ from typing import Any
 from grasp_core.errors import InputError
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.planning.request import METHODS
+from grasp_core.processes import local_processes
 from sim_validate.cli import dataset_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
@@ -20,7 +21,6 @@ from sim_validate.datasets.open_dataset import splits_in_words
 from sim_validate.datasets.verify import Sample, verify
 from sim_validate.datasets.workers import Engine, Limits
 from sim_validate.parallel.clusters import dask_workers, ray_workers
-from sim_validate.parallel.processes import local_processes
 
 FRICTION = 0.5
 """Friction coefficient for planning and simulation if no flag gives one."""

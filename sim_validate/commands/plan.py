@@ -28,7 +28,7 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.flag_bounds import FlagsError
 from sim_validate.commands.asked.objects import asked_finger, object_to_plan
 from sim_validate.files.result_folders import alone_in, remove_results
-from sim_validate.parallel.compiling import compiled_beside
+from sim_validate.parallel.compiling import PLANNING, compile_loops, must_compile
 
 if TYPE_CHECKING:
     from grasp_core.optimizing.best.result import BestGrasp
@@ -43,7 +43,10 @@ def plan_object(
     body: Polyhedron, planning: flag_groups.Planning, jobs: int, reporter: Reporter
 ) -> Plan:
     """Plan the grasps of an object and, if asked for, improve them."""
-    with reporter.progress("planning") as steps, compiled_beside(jobs) as left:
+    if must_compile(PLANNING, jobs):
+        reporter.say("compiling inner loops once, which takes a minute of one core")
+        compile_loops(PLANNING)
+    with reporter.progress("planning") as steps:
         found = plan(
             body,
             planning.friction,
@@ -59,7 +62,7 @@ def plan_object(
             clearance=planning.edge_clearance_m,
             share_faces=planning.share_faces_m,
             progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
-            jobs=left,
+            jobs=jobs,
         )
     if planning.optimize and found.grasps:
         from sim_validate.parallel.improving import improved

@@ -36,7 +36,7 @@ from sim_validate.hands.execute_hand import (
     held_by_hands,
 )
 from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict
-from sim_validate.parallel.compiling_hands import compile_for_hands, must_compile
+from sim_validate.parallel.compiling import REACHING, compile_loops, must_compile
 from sim_validate.parallel.reaching import ReachJob, reached
 from sim_validate.records.grasps import grasp_with_id
 from sim_validate.records.reaches import AskedRecord, HandTrials, reaches_summary, reaches_to_json
@@ -103,9 +103,9 @@ def _reach(
         asked["execution"] = asdict(hand_execution_settings(command.mass_kg).used)
     found: list[HandReach] = []
     tried = HandTrials()
-    if jobs and must_compile():
+    if jobs and must_compile(REACHING, command.jobs):
         reporter.say("compiling inner loops once, which takes a minute or two")
-        compile_for_hands(hand, saved.body, command.seed, command.jobs)
+        compile_loops(REACHING)
     try:
         with reporter.progress("reaching") as steps:
             for each in reached(jobs, command.jobs):

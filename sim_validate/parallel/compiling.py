@@ -1,92 +1,148 @@
-"""Compiles half of the inner loops in another process, while this one plans.
+"""Compiles inner loops before they are needed, in two processes at once.
 
-Compiling everything takes half a minute of one core, once. The planner's search begins with other
-loops than the proofs of its grasps, and comes to the last family at the end. So the first use after
-an installation compiles on two cores.
+Compiling all that a plan needs takes a minute of one core, once, and what reaches with a hand half
+a minute more. Each call here uses some kernels on a small example, so that their loops are kept;
+two processes that make different calls compile different loops, but for a few that both need.
 """
 
-from collections.abc import Callable, Generator, Mapping
-from concurrent.futures import Future
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from concurrent.futures import wait
+from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.compiled import wait_for
-from grasp_core.kept_loops import is_kept
+from grasp_core.compiled import is_kept
 from grasp_core.planning.planner import plan
+from grasp_core.processes import local_processes
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.nearest_point import least_distance
+from grasp_core.values import Family
 from scenes.example_objects import example_object
-from sim_validate.parallel.processes import local_processes
 
 OUTWARD = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 """Outward directions of a tetrahedron's faces, (4, 3); a third of each is its face's middle [m]."""
+CONTACTS = OUTWARD / 3.0, -OUTWARD / np.sqrt(3.0)
 FRICTION = 0.5
-Call: TypeAlias = Callable[[Array, Array], object]
-Calls: TypeAlias = Mapping[str, Call]
-"""For each kernel a function that compiles it, given four contacts and their normals."""
+Calls: TypeAlias = Sequence[Callable[[], object]]
 
 
-def _closure(points: Array, normals: Array) -> None:
-    force_closure(points, normals, FRICTION)
-    critical_friction(points, normals)
+@dataclass(frozen=True, slots=True)
+class Loops:
+    """Kernels, and the calls that compile them, in two halves that take equally long."""
+
+    kernels: Sequence[str]
+    """Some kernels whose loops are kept once all calls were made, without package and ending."""
+    here: Calls
+    beside: Calls
+    """Calls for another process."""
 
 
-def _last_family(_points: Array, _normals: Array) -> None:
-    plan(example_object("tetrahedron"), FRICTION, families=("regulus",), limit=1)
+def _nearest() -> None:
+    least_distance(CONTACTS[0][:3], -np.ones((1, 3)))
 
 
-def _nearest(points: Array, _normals: Array) -> None:
-    least_distance(points[:3], -np.ones((1, 3)))
+def _closure() -> None:
+    force_closure(*CONTACTS, FRICTION)
+    critical_friction(*CONTACTS)
 
 
-def _quality(points: Array, normals: Array) -> None:
-    ferrari_canny(points, normals, FRICTION, torque_scale=1.0)
+def _quality() -> None:
+    ferrari_canny(*CONTACTS, FRICTION, torque_scale=1.0)
 
 
-BESIDE: Calls = {
-    "grasp_core.solvers.nearest_point_kernel": _nearest,
-    "grasp_core.closure.critical_friction_kernel": _closure,
-    "grasp_core.quality.ferrari_canny_kernel": _quality,
-    "grasp_core.families.regulus_kernel": _last_family,
-}
-"""For each kernel to compile beside a plan, in the order in which the plan and the pages after it
-need them, a call that compiles it."""
+def _planned(*families: Family) -> None:
+    plan(example_object("tetrahedron"), FRICTION, families=families)
 
 
-@contextmanager
-def compiled_beside(jobs: int, calls: Calls | None = None) -> Generator[int]:
-    """Compile loops in another process during a `with` block, if they are not kept.
+def _regions() -> None:
+    from grasp_core.regions.certify_regions import certify_regions
 
-    The first use of such a loop in the block waits until that process has compiled it.
+    body = example_object("tetrahedron")
+    certify_regions(body, plan(body, FRICTION, limit=1).grasps[0], FRICTION)
 
-    Gives the number of processes that the block may use: one while loops are compiled, as others
-    would compile the same loops.
+
+def _best() -> None:
+    from grasp_core.optimizing.best.best_grasp import best_grasp
+
+    best_grasp(example_object("tetrahedron"), FRICTION, gap=0.5).verify()
+
+
+def _clearance() -> None:
+    from scenes.execution.surface import Surface
+
+    body = example_object("tetrahedron")
+    corners = body.vertices[body.triangles]
+    Surface(corners, body.radius).clear_depth(corners[0], body.normals[0], body.radius)
+
+
+def _hand_checks() -> None:
+    from grasp_core.hands.first_use import compile_checks
+    from grasp_core.hands.named_hands import load_hand
+
+    compile_checks(load_hand("allegro"), example_object("tetrahedron"), 0)
+
+
+def _hand_posing() -> None:
+    from grasp_core.hands.first_use import compile_posing
+    from grasp_core.hands.named_hands import load_hand
+
+    compile_posing(load_hand("allegro"), example_object("tetrahedron"))
+
+
+def _hand_reach() -> None:
+    from grasp_core.hands.named_hands import load_hand
+    from grasp_core.hands.reach import reach_with
+
+    body = example_object("tetrahedron")
+    grasp = plan(body, FRICTION, limit=1).grasps[0]
+    reach_with(load_hand("allegro"), body, grasp, FRICTION, table_down=(0.0, 0.0, -1.0))
+
+
+PLANNING = Loops(
+    ("families.discs", "families.regulus", "closure.critical_friction",
+     "quality.ferrari_canny"),
+    (partial(_planned, "concurrent", "pencil"),),
+    # first what the other half needs late
+    (_nearest, _closure, partial(_planned, "regulus"), _quality),
+)  # fmt: skip
+"""What compiles the loops that plans need."""
+REACHING = Loops(
+    ("hands.collisions", "hands.pose"), (_hand_checks,), (_hand_posing,)
+)  # fmt: skip
+"""What compiles the loops that put hands to contacts."""
+EVERYTHING = Loops(
+    (*PLANNING.kernels, *REACHING.kernels, "regions.cover", "optimizing.best.search"),
+    (*PLANNING.here, _hand_checks, _hand_posing, _hand_reach, _regions, _clearance),
+    (*PLANNING.beside, _best),
+)
+"""What compiles all loops that there are."""
+
+
+def must_compile(loops: Loops, jobs: int) -> bool:
+    """Return whether some of the loops are not kept yet, and two processes may compile them.
+
+    With one job, loops are compiled where they are needed, and no others.
     """
-    wanted = BESIDE if calls is None else calls
-    missing = {name: call for name, call in wanted.items() if jobs > 1 and not is_kept(name)}
-    if not missing:
-        yield jobs
+    kept = (is_kept(f"grasp_core.{name}_kernel") for name in loops.kernels)
+    return jobs > 1 and not all(kept)
+
+
+def compile_loops(loops: Loops, jobs: int = 2) -> None:
+    """Compile loops, or load what is kept, in this process and in another."""
+    if jobs < 2:  # noqa: PLR2004 - this process and another
+        for call in (*loops.here, *loops.beside):
+            call()
         return
     with local_processes(1) as other:
-        ready = {name: other.submit(_compile, call) for name, call in missing.items()}
-        wait_for({name: partial(_wait, future) for name, future in ready.items()})
-        try:
-            yield 1
-        finally:
-            wait_for({})  # what the process has written is whole, so that it may end at any time
+        calls = [other.submit(_made, call) for call in loops.beside]
+        for call in loops.here:
+            call()
+        wait(calls)  # where the other process fails, loops are compiled when they are needed
 
 
-def _wait(ready: "Future[None]") -> None:
-    """Wait until a kernel is compiled; where the other process fails, this one compiles it."""
-    with suppress(Exception):
-        ready.result()
-
-
-def _compile(call: Call) -> None:
-    call(OUTWARD / 3.0, -OUTWARD / np.sqrt(3.0))
+def _made(call: Callable[[], object]) -> None:
+    call()

@@ -4,19 +4,17 @@ Results do not depend on the number of processes: a unit sees only its own argum
 """
 
 import os
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+import pickle
+from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 from pathlib import Path
-from threading import Lock
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
-from grasp_core.processes.messages import unpacked
-from grasp_core.processes.process import Process
-from grasp_core.processes.workers import working
+from grasp_core.processes import local_processes
 
 Unit = TypeVar("Unit")
 Result = TypeVar("Result")
+Value = TypeVar("Value")
 
 SHARE = Path("/sys/fs/cgroup/cpu.max")
 """The Linux file that limits a container's processor time: microseconds of use per period."""
@@ -25,6 +23,8 @@ START_S = 1.0
 UNITS_PER_PROCESS = 8
 """Number of simulated grasps for which a process is better than threads of the simulator: its start
 takes as long as eight validations."""
+KEPT = 4
+"""Number of shared values that a process keeps."""
 
 
 def available_cores() -> int:
@@ -51,94 +51,33 @@ def each(
     start takes.
     """
     others = min(jobs, len(units)) - 1
-    with working(others, _itself, function, patience_s=START_S) as workers:
-        if workers is None:
-            yield from map(function, units)
-        else:
-            yield from workers.in_order(units, function, ahead=len(units))
+    if others < 1:
+        yield from map(function, units)
+        return
+    with local_processes(others, START_S) as workers:
+        yield from workers.in_order(function, units, ahead=len(units))
 
 
-def _itself(function: Callable[[Unit], Result]) -> Callable[[Unit], Result]:
-    return function
+class Shared(Generic[Value]):
+    """A hashable value that arrives in another process as the one that arrived there before.
+
+    Otherwise each unit would bring its own copy of, say, an object, and what is kept for that
+    object from one unit to the next would be computed again for each copy.
+    """
+
+    def __init__(self, value: Value) -> None:
+        self.value = value
+
+    def __reduce__(self) -> tuple[Callable[[bytes], "Shared[Any]"], tuple[bytes]]:
+        """Pickle the value by itself, so that equal bytes tell that it is the same."""
+        return _arrived, (_packed(self.value),)
 
 
-class ProcessEndedError(Exception):
-    """A process has ended while it did a task."""
+@lru_cache(maxsize=KEPT)
+def _packed(value: object) -> bytes:
+    return pickle.dumps(value)
 
 
-class Processes:
-    """Processes of this machine, each of which computes one task at a time."""
-
-    ended = ("ProcessEndedError",)
-
-    def __init__(self, workers: int) -> None:
-        self.workers = workers
-        self._threads = ThreadPoolExecutor(workers)
-        self._lock, self._closed = Lock(), False
-        self._running, self._idle = set[Process](), list[Process]()
-
-    def submit(self, function: Callable[[Unit], Result], unit: Unit, /) -> "Future[Result]":
-        """Call a function in a process; the future fails if that process dies."""
-        return self._threads.submit(self._call, function, unit)
-
-    def _call(self, function: Callable[[Unit], Result], unit: Unit) -> Result:
-        process = self._free()
-        try:
-            answer = process.ask((function, unit))
-        except (EOFError, OSError) as error:
-            self._end(process)
-            raise ProcessEndedError("a process has ended while it did a task") from error
-        except Exception:  # the task cannot be sent
-            self._end(process)
-            raise
-        with self._lock:
-            self._idle.append(process)
-        result, error = unpacked(answer)
-        if error is not None:
-            raise error
-        return result
-
-    def _free(self) -> Process:
-        with self._lock:
-            if self._closed:
-                raise ProcessEndedError("the processes are closed")
-            if self._idle:
-                return self._idle.pop()
-            process = Process(_calling)
-            self._running.add(process)
-            return process
-
-    def _end(self, process: Process) -> None:
-        process.end()
-        process.close()
-        with self._lock:
-            self._running.discard(process)
-
-    def close(self) -> None:
-        """End the processes, whatever they do."""
-        with self._lock:
-            self._closed = True
-            for process in self._running:
-                process.end()
-        self._threads.shutdown(cancel_futures=True)
-        for process in list(self._running):
-            self._end(process)
-
-
-def _calling() -> Callable[[tuple[Callable[[Any], Any], Any]], Any]:
-    return _called
-
-
-def _called(task: tuple[Callable[[Any], Any], Any]) -> Any:
-    function, unit = task
-    return function(unit)
-
-
-@contextmanager
-def local_processes(workers: int) -> Generator[Processes]:
-    """Start processes on this machine, and stop them at the end, whatever they do."""
-    started = Processes(workers)
-    try:
-        yield started
-    finally:
-        started.close()
+@lru_cache(maxsize=KEPT)
+def _arrived(data: bytes) -> Shared[Any]:
+    return Shared(pickle.loads(data))  # noqa: S301 - the process that started this one packed it

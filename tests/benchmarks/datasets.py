@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 
 import sim_validate
+from grasp_core.processes import local_processes
 from scenes.example_objects import example_names
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
@@ -23,7 +24,6 @@ from sim_validate.datasets.parquet import parquet_bytes
 from sim_validate.datasets.units import body_of, units_of
 from sim_validate.datasets.verify import Sample, verify
 from sim_validate.datasets.workers import Limits
-from sim_validate.parallel.processes import local_processes
 
 FRICTIONS = (0.3, 0.5)
 PROFILED = 3

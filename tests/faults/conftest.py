@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from grasp_core.kept_loops import folder_for
+from grasp_core.compiled import copy_of
 from tests.patience import HANGING_S
 
 ROOT = Path(__file__).parent.parent.parent
 KERNEL = "grasp_core.solvers.lp_kernel"
-KEPT = folder_for(KERNEL, str(ROOT / "grasp_core" / "solvers" / "lp_kernel.py")).parent
+KEPT = copy_of(KERNEL, str(ROOT / "grasp_core" / "solvers" / "lp_kernel.py")).parent
 """Where the loops are kept that other tests compile, so that a new home need not compile them."""
 CLI = [sys.executable, "-c", "from sim_validate.main import run_and_exit; run_and_exit()"]
 

@@ -20,7 +20,7 @@ RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]
 NOWHERE = "/proc/nowhere"
 NO_HOME = {"HOME": NOWHERE, "XDG_CONFIG_HOME": NOWHERE, "XDG_CACHE_HOME": NOWHERE}
 SURROUNDINGS = {
-    "no home": {**NO_HOME, "NUMBA_CACHE_DIR": str(KEPT)},
+    "no home": {**NO_HOME, "XDG_CACHE_HOME": str(KEPT.parent)},
     "no threads": {"OMP_NUM_THREADS": "many"},
     "no temporary folder": {"TMPDIR": NOWHERE},
     "no locale": {"LC_ALL": "xx_XX", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"},
@@ -44,8 +44,8 @@ def test_surroundings_change_no_byte(usual, graspproof, tmp_path):
 
 
 NO_FOLDER = """
-from grasp_core import kept_loops
-kept_loops.folders = lambda _: ()
+import grasp_core.compiled
+grasp_core.compiled.folders = lambda _: ()
 """
 """A folder is found wherever tests can run, so that the list of folders is emptied."""
 CLOSED = """
@@ -108,14 +108,15 @@ def test_a_stream_that_is_closed_does_not_stop_the_work(redirected, tmp_path):
 
 
 def test_a_working_folder_that_is_gone_matters_only_to_paths_in_it(tmp_path, monkeypatch, capsys):
-    """Also where processes are started: to compile what is not kept, and for `--jobs`."""
+    """Also where processes are started; numba cannot compile there, so all is kept before."""
+    plan = ["plan", "tetrahedron", "--family", "concurrent", "-q"]
+    assert main([*plan, "--regions", "--out", str(tmp_path / "kept")]) == 0
     monkeypatch.setattr(compiling, "is_kept", lambda _: False)
     monkeypatch.setattr(engines, "START_S", 0.0, raising=False)
     gone = tmp_path / "gone"
     gone.mkdir()
     monkeypatch.chdir(gone)
     gone.rmdir()
-    plan = ["plan", "tetrahedron", "--family", "concurrent", "-q"]
     assert main([*plan, "--jobs", "2", "--out", str(tmp_path / "a")]) == 0
     regions = ["regions", str(tmp_path / "a" / "grasps.json"), "--limit", "9", "-q"]
     assert main([*regions, "--jobs", "2", "--out", str(tmp_path / "c")]) == 0

@@ -26,7 +26,7 @@ CHANGING = (
     "os.remove", "os.rename", "os.mkdir", "os.rmdir", "os.link", "os.symlink", "os.chmod",
     "os.chown", "os.truncate", "os.utime", "shutil.rmtree", "shutil.move", "shutil.copyfile",
 )  # fmt: skip
-OURS = ("grasp_core.processes.worker", "frames.py")
+OURS = ("grasp_core.processes", "frames.py")
 LIBRARIES_ASK = ("def get_version(library_handle)",)
 """GLFW's Python package for its version, the first time."""
 
@@ -49,7 +49,7 @@ class Witness:
         environment = {
             **os.environ, "AUDITED_BY": str(self.pipe), "HOME": str(self.folder / "home"),
             "TMPDIR": str(self.folder / "scratch"), "PYTHONPATH": f"{AUDITING}:{ROOT}",
-            "NUMBA_CACHE_DIR": str(KEPT),
+            "XDG_CACHE_HOME": str(KEPT.parent),
         }  # fmt: skip
         command = [
             sys.executable,

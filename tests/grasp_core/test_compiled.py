@@ -1,14 +1,34 @@
 """How inner loops are declared, kept, and loaded where numba is as it should be, and where not."""
 
+import os
+import shutil
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from grasp_core.compiled import compiled, loop, state_of
+from grasp_core.compiled import compiled, copy_of, folders, loop, state_of
 from grasp_core.errors import InputError
 from sim_validate.commands.doctor import LOOPS
 
+ROOT = Path(__file__).parents[2]
 KERNEL = "grasp_core.solvers.lp_kernel"
+CALLER, CALLED = "grasp_core.cones.tilting_kernel", "grasp_core.geometry.vectors_kernel"
+NOWHERE = "/proc/nowhere"
+SCRIPT = f"""
+import numpy as np
+from grasp_core.compiled import compiled, is_kept
+cross = compiled("{CALLED}").cross
+cross(np.zeros(3), np.zeros(3), np.zeros(3))
+print(sum(cross.stats.cache_hits.values()), is_kept("{CALLED}"))
+print(compiled("{CALLER}").half_angles.py_func.__code__.co_filename)
+"""
+UNKEPT = """
+import numpy as np
+from grasp_core.solvers.nearest_point import least_distance
+print(least_distance(np.eye(3), -np.ones((1, 3))))
+"""
 
 
 def half(x):
@@ -28,7 +48,7 @@ def test_a_kernel_is_loaded_compiled_and_kept():
 
 
 def test_without_a_folder_a_loop_is_compiled_but_not_kept(monkeypatch):
-    monkeypatch.setattr("grasp_core.kept_loops.folder_for", lambda *_: None)
+    monkeypatch.setattr("grasp_core.compiled.copy_of", lambda *_: None)
     declared = loop()(half)
     assert declared(3.0) == 1.5
     assert len(declared.signatures) == 1
@@ -69,3 +89,86 @@ def test_a_numba_that_cannot_be_loaded_is_named_with_what_to_do(monkeypatch, err
 def test_a_kernel_that_does_not_exist_is_no_fault_of_numba():
     with pytest.raises(ModuleNotFoundError, match="no_kernel"):
         compiled.__wrapped__("grasp_core.solvers.no_kernel")
+
+
+def said_in(folder, script, **settings):
+    """What a script says that finds the package in a folder."""
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=folder, capture_output=True, text=True, check=True,
+        env={**os.environ, "PYTHONPATH": str(folder), **settings},
+    )  # fmt: skip
+    assert done.stderr == ""
+    return done.stdout.split()
+
+
+@pytest.fixture(scope="module")
+def copies(tmp_path_factory):
+    """Two folders with the same package, as two environments have it."""
+    folder = tmp_path_factory.mktemp("environments")
+    for name in ("one", "two"):
+        shutil.copytree(
+            ROOT / "grasp_core", folder / name / "grasp_core",
+            ignore=shutil.ignore_patterns("__pycache__"), copy_function=shutil.copyfile,
+        )  # fmt: skip
+    return folder
+
+
+@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME"])
+def test_another_environment_finds_what_one_has_compiled(variable, copies, tmp_path):
+    there = {"NUMBA_CACHE_DIR": "", variable: str(tmp_path)}
+    hits, kept, path = said_in(copies / "one", SCRIPT, **there)
+    assert (hits, kept) == ("0", "True")
+    assert Path(path).is_relative_to(tmp_path / "graspproof")
+    assert said_in(copies / "two", SCRIPT, **there) == ["1", "True", path]
+
+
+def test_a_change_of_what_a_kernel_calls_has_both_compiled_again(copies, tmp_path):
+    there = {"NUMBA_CACHE_DIR": str(tmp_path)}
+    *_, path = said_in(copies / "one", SCRIPT, **there)
+    text = copies / "two" / (CALLED.replace(".", "/") + ".py")
+    before = text.read_text()
+    text.write_text(before.replace("\n\n\n", "\n\n\nCHANGED = True\n\n\n", 1))
+    try:
+        hits, _, other = said_in(copies / "two", SCRIPT, **there)
+    finally:
+        text.write_text(before)
+    assert hits == "0"
+    assert Path(other).name != Path(path).name
+    assert Path(other).name.startswith(f"{CALLER}-")
+
+
+def test_without_optimization_code_runs_without_a_word(tmp_path):
+    """Numba keeps no such code, as it holds addresses of its process."""
+    there = {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_OPT": "0"}
+    assert said_in(ROOT, UNKEPT, **there) == ["[[-1.", "-1.", "-1.]]"]
+
+
+@pytest.mark.parametrize("home", [NOWHERE, "/proc"])
+def test_without_a_home_code_is_kept_beside_the_module(home, monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", home)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", NOWHERE)
+    module = tmp_path / "own_kernel.py"
+    module.write_text("ONE = 1\n")
+    found = copy_of.__wrapped__("own_kernel", str(module))
+    assert found is not None
+    assert found.parent == tmp_path / "__pycache__"
+    assert found.read_text() == module.read_text()
+    assert [path.name for path in found.parent.iterdir()] == [found.name]
+
+
+def test_where_nothing_can_be_written_nothing_is_kept(monkeypatch, tmp_path):
+    module = tmp_path / "own_kernel.py"
+    module.write_text("ONE = 1\n")
+    nowhere = [Path(NOWHERE), Path("/dev/null")]
+    monkeypatch.setattr("grasp_core.compiled.folders", lambda _: nowhere)
+    assert copy_of.__wrapped__("own_kernel", str(module)) is None
+
+
+def test_the_chosen_folder_comes_first_and_the_users_before_the_module(monkeypatch, tmp_path):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "chosen"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert list(folders(Path("/a/b_kernel.py"))) == [
+        tmp_path / "chosen" / "graspproof", tmp_path / "cache" / "graspproof",
+        Path("/a/__pycache__"),
+    ]  # fmt: skip

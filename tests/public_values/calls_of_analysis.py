@@ -90,6 +90,7 @@ CALLS = [
         "friction": each_of(FRICTION, "zero"),
         "wrench": array(WRENCH),
         "objective": WORD,
+        "solver": WORD,
         "normal_force": SEVERAL | {
             "one": (1.0,), "three": (0.0, 1.0, 2.0), "turned": (2.0, 1.0), "equal": (1.0, 1.0),
             "negative": (-1.0, 1.0), "not a number": (float("nan"), 1.0), "text": ("a", 1.0),

@@ -7,7 +7,7 @@ import numpy as np
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.forces.even_forces import even_forces
+from grasp_core.forces.contact_forces import even_forces
 from tests.public_values.bad_values import (
     AT_LEAST_ONE,
     FRICTION,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import grasp_core as gc
 from grasp_core.closure.contacts import normal_and_tangential
-from grasp_core.forces.even_forces import even_forces
+from grasp_core.forces.contact_forces import even_forces
 
 CUBE = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
 

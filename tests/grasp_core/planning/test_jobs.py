@@ -2,6 +2,7 @@
 
 import io
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -9,10 +10,9 @@ import sys
 import pytest
 
 import grasp_core as gc
-from grasp_core.planning import methods
-from grasp_core.planning.parts import everything
-from grasp_core.planning.parts.tasks import Block, Object, finder
-from grasp_core.processes.messages import receive, send, unpacked
+from grasp_core.planning import methods, parts
+from grasp_core.planning.parts import Block, Object, found_elsewhere
+from grasp_core.processes import receive, send, unpacked
 from scenes.example_objects import example_object
 from tests.marks import MORE
 from tests.patience import HANGING_S
@@ -63,7 +63,7 @@ def bits(plan):
     ],
 )
 def test_any_number_of_processes_gives_the_same_plan(what, numbers, monkeypatch):
-    monkeypatch.setattr(everything, "QUADRUPLES_PER_PROCESS", 1)
+    monkeypatch.setattr(parts, "QUADRUPLES_PER_PROCESS", 1)
     name, keywords = PLANS[what]
     body = example_object(name)
     one = gc.plan(body, **keywords, jobs=1)
@@ -84,13 +84,13 @@ def test_parts_that_another_process_finds_are_the_same(name, monkeypatch):
         return unpacked(receive(pipe))
 
     def elsewhere(work, parts, _):
-        find = finder(*sent((body, work.request)))
+        given = pickle.dumps((body, work.request))
         for part in parts:
             seen.append(part)
-            yield sent(find(sent(part)))
+            yield sent(found_elsewhere(given, sent(part)))
 
     here = gc.plan(body, 0.3)
-    for module in (methods, everything):
+    for module in (methods, parts):
         monkeypatch.setattr(module, "each_found", elsewhere)
     assert bits(gc.plan(body, 0.3)) == bits(here)
     assert {type(part).__name__ for part in seen} == {"Block", "Batch"}
@@ -105,7 +105,7 @@ def test_a_number_of_processes_that_is_none_is_refused(jobs):
 
 
 def test_an_error_of_a_part_reaches_the_caller_with_its_own_type(monkeypatch):
-    monkeypatch.setattr(everything, "QUADRUPLES_PER_PROCESS", 1)
+    monkeypatch.setattr(parts, "QUADRUPLES_PER_PROCESS", 1)
 
     def fails(_, part):  # in this process, which takes the first part or one after it
         raise gc.SolverError(f"no answer on {part}")
@@ -117,26 +117,26 @@ def test_an_error_of_a_part_reaches_the_caller_with_its_own_type(monkeypatch):
 
 def test_few_quadruples_and_searches_that_end_early_start_no_process():
     request = methods.PlanRequest(0.5, ("pencil",))
-    assert everything.worth_starting(example_object("box"), request, 8) == 0
+    assert parts.worth_starting(example_object("box"), request, 8) == 0
     large = example_object("random-24-1")
     limited = methods.PlanRequest(0.5, ("pencil",), limit=5)
-    assert everything.worth_starting(large, limited, 8) == 0
-    assert everything.worth_starting(large, request, 1) == 0
-    assert everything.worth_starting(large, request, 8) <= 2
+    assert parts.worth_starting(large, limited, 8) == 0
+    assert parts.worth_starting(large, request, 1) == 0
+    assert parts.worth_starting(large, request, 8) <= 2
 
 
 INTERRUPTED = """
 import signal
 
 import grasp_core as gc
-from grasp_core.planning.parts import everything
+from grasp_core.planning import parts
 from scenes.example_objects import example_object
 
 # a shell starts what runs in its background with interrupts ignored
 signal.signal(signal.SIGINT, signal.default_int_handler)
 # loops are loaded before: where numba calls Python meanwhile, an interrupt is swallowed
 gc.plan(example_object("random-11-1"), 0.3)
-everything.QUADRUPLES_PER_PROCESS = 1
+parts.QUADRUPLES_PER_PROCESS = 1
 seen = []
 def told(*numbers):
     seen or print("planning", flush=True)

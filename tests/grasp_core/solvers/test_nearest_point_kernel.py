@@ -1,4 +1,4 @@
-"""The compiled nearest points beside those by least squares, and what becomes of wrong ones."""
+"""Compiled nearest points by the conditions of optimality, and what becomes of wrong ones."""
 
 from types import SimpleNamespace
 
@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-import grasp_core as gc
 from grasp_core.compiled import compiled
 from grasp_core.solvers import nearest_point as module
 from grasp_core.solvers.nearest_point import least_distance
-from scenes.example_objects import example_object
 
 NEAR = 1e-9
 CLOSE = 1e-10
@@ -43,42 +41,17 @@ def unmet(C, d, x):
     return max(off, -slack.min()) / size
 
 
-def nothing_proved(C, D, _):
-    nothing = np.zeros(len(D), dtype=bool)
-    return np.zeros((len(D), C.shape[1])), nothing, nothing
-
-
-def without_kernel(monkeypatch, run):
-    with monkeypatch.context() as patch:
-        patch.setattr(module, "_by_kernel", nothing_proved)
-        return run()
-
-
-def forbid_least_squares(monkeypatch):
-    def refuse(*_):
-        raise AssertionError("left to least squares")
-
-    monkeypatch.setattr(module, "_by_least_squares", refuse)
-
-
-def test_points_are_nearest_and_those_of_least_squares(monkeypatch):
-    tested, moved, compared = 0, 0, 0
+def test_points_are_nearest():
+    tested, moved = 0, 0
     for C, D, points in polyhedra(240):
-        expected = without_kernel(monkeypatch, lambda C=C, D=D: least_distance(C, D))
-        with monkeypatch.context() as patch:
-            forbid_least_squares(patch)
-            found = least_distance(C, D)
-        for d, x, known, other in zip(D, found, points, expected, strict=True):
+        found = least_distance(C, D)
+        for d, x, known in zip(D, found, points, strict=True):
             assert unmet(C, d, x) <= CLOSE
             assert np.linalg.norm(x) <= np.linalg.norm(known) * (1.0 + NEAR)
-            if not np.isnan(other[0]):
-                np.testing.assert_allclose(x, other, rtol=0.0, atol=NEAR * np.abs(known).max())
-                compared += 1
             moved += x.any()
             tested += 1
     assert tested == 2400
     assert moved >= 2000
-    assert compared >= 2300
 
 
 def test_a_corner_and_an_edge_by_hand():
@@ -89,7 +62,7 @@ def test_a_corner_and_an_edge_by_hand():
     )
 
 
-def test_where_nothing_is_feasible_no_point_is_found(monkeypatch):
+def test_where_nothing_is_feasible_no_point_is_found():
     """Two rows that contradict each other among others, and a row of zeros that cannot hold."""
     rng = np.random.default_rng(6)
     for trial in range(40):
@@ -97,33 +70,9 @@ def test_where_nothing_is_feasible_no_point_is_found(monkeypatch):
         C[1] = 0.0 if trial % 2 else -C[0]
         D = rng.uniform(0.5, 1.0, size=(3, 12))
         D[1, 0], D[1, 1] = -1.0, -0.5
-        expected = without_kernel(monkeypatch, lambda C=C, D=D: least_distance(C, D))
-        with monkeypatch.context() as patch:
-            if trial % 2 == 0:  # a row of zeros contradicts itself, not others
-                forbid_least_squares(patch)
-            found = least_distance(C, D)
+        found = least_distance(C, D)
         assert np.isnan(found[1]).all()
         assert not np.isnan(found[[0, 2]]).any()
-        np.testing.assert_array_equal(np.isnan(found), np.isnan(expected))
-
-
-def test_a_contradiction_that_is_none_is_left_to_least_squares(monkeypatch):
-    """Weights of rows that do not cancel, or only for near points, prove nothing."""
-    tested = 0
-    for C, D, _ in polyhedra(12):
-        expected = without_kernel(monkeypatch, lambda C=C, D=D: least_distance(C, D))
-        for weights in (1.0, 1e6):
-
-            def contradict(X, U, weights=weights):
-                X[:], U[:] = 0.0, weights
-
-            with monkeypatch.context() as patch:
-                patch.setattr(module, "compiled", lambda _, c=contradict: spoiled(c))
-                found = least_distance(C, D)
-            near = NEAR * np.abs(expected).max()
-            np.testing.assert_allclose(found, expected, rtol=0.0, atol=near)
-            tested += len(found)
-    assert tested == 240
 
 
 def test_no_variables_and_no_polyhedra_leave_nothing_to_find():
@@ -153,43 +102,12 @@ def times(factor, which):
     [times(1.0 + 1e-9, 0), times(1.0 + 1e-9, 1), times(0.0, 0), times(0.0, 1), times(-1.0, 1),
      times(np.nan, 0), times(np.nan, 1)],
 )  # fmt: skip
-def test_wrong_answers_are_left_to_least_squares(monkeypatch, change):
-    tested = 0
+def test_wrong_answers_are_not_taken(monkeypatch, change):
     for C, D, _ in polyhedra(12):
-        expected = without_kernel(monkeypatch, lambda C=C, D=D: least_distance(C, D))
+        expected = least_distance(C, D)
         with monkeypatch.context() as patch:
             patch.setattr(module, "compiled", lambda _: spoiled(change))
             found = least_distance(C, D)
-        np.testing.assert_allclose(found, expected, rtol=0.0, atol=NEAR * np.abs(expected).max())
-        tested += len(found)
-    assert tested == 120
-
-
-def test_contact_forces_are_the_same_with_the_kernel_and_without(monkeypatch):
-    rng = np.random.default_rng(9)
-    tested = 0
-    for name in ("wedge", "dodecahedron", "random-20-7"):
-        for grasp in gc.plan(example_object(name), 0.5, limit=5).grasps:
-            resisted = 0.5 * gc.ferrari_canny(grasp, torque_scale=1.0, norm="linf").lower
-            loads = rng.normal(size=(24, 6))
-            loads *= resisted / np.linalg.norm(loads, axis=1, keepdims=True)
-            for limits in ((0.0, np.inf), (0.0, 1.0), (0.01, 5.0)):
-
-                def run(grasp=grasp, loads=loads, limits=limits):
-                    return gc.contact_forces(grasp, None, 0.5, loads, normal_force=limits)
-
-                expected = without_kernel(monkeypatch, run)
-                with monkeypatch.context() as patch:
-                    forbid_least_squares(patch)
-                    found = run()
-                near = NEAR * np.abs(expected).max()
-                np.testing.assert_allclose(found, expected, rtol=0.0, atol=near)
-                tested += len(found)
-    assert tested >= 1000
-
-
-def test_loads_beyond_the_limits_are_refused_all_the_same():
-    grasp = gc.plan(example_object("wedge"), 0.5, limit=1).grasps[0]
-    loads = np.array([[0.01, 0, 0, 0, 0, 0], [100.0, 0, 0, 0, 0, 0]])
-    with pytest.raises(gc.NoForcesError, match="wrench 1, counting from 0"):
-        gc.contact_forces(grasp, None, 0.5, loads, normal_force=(0.0, 1.0))
+        taken = ~np.isnan(found[:, 0])
+        np.testing.assert_allclose(found[taken], expected[taken], rtol=0.0, atol=NEAR)
+        assert not taken[expected.any(axis=1)].any()

@@ -13,6 +13,7 @@ import trimesh
 
 import grasp_core as gc
 import sim_validate
+from grasp_core.processes import local_processes
 from scenes.example_objects import example_object
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets import build as build_module
@@ -23,7 +24,6 @@ from sim_validate.datasets.units import units_of
 from sim_validate.datasets.verify import Sample, verify
 from sim_validate.datasets.workers import Limits
 from sim_validate.main import main
-from sim_validate.parallel.processes import local_processes
 from tests.marks import more
 from tests.sim_validate.datasets.engines import Here, WorkerEndedError, contents, silent
 from tests.sim_validate.datasets.learned import rows_of

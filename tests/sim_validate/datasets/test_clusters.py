@@ -7,6 +7,7 @@ import time
 import pytest
 
 import grasp_core as gc
+from grasp_core.processes import local_processes
 from sim_validate.datasets import workers
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
@@ -14,7 +15,6 @@ from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.units import WorkerError, units_of
 from sim_validate.datasets.workers import Limits, do_unit, drive
 from sim_validate.parallel.clusters import dask_workers, ray_workers
-from sim_validate.parallel.processes import local_processes
 from tests.sim_validate.datasets.engines import Here, contents, silent
 
 pytest.importorskip("pyarrow")

@@ -1,94 +1,63 @@
-"""Inner loops that are not kept yet are compiled beside a plan, once."""
+"""Calls that compile inner loops: what they leave, and when commands make them."""
 
-import os
-import subprocess
-import sys
-from concurrent.futures import Future
-from contextlib import nullcontext
+import re
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
-from grasp_core import compiled as loops
+from grasp_core.compiled import copy_of
+from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands import plan as plan_command
+from sim_validate.main import main
 from sim_validate.parallel import compiling
-from sim_validate.parallel.processes import ProcessEndedError
 
 ROOT = Path(__file__).parents[3]
-FIRST = "grasp_core.solvers.nearest_point_kernel"
-SCRIPT = """
-import sys
-from grasp_core import compiled as loops
-from sim_validate.parallel import compiling
-
-with compiling.compiled_beside(int(sys.argv[1]), {"%s": compiling.BESIDE["%s"]}):
-    compiling.BESIDE["%s"](compiling.OUTWARD, compiling.OUTWARD)
-stats = loops.compiled("%s").solve.stats
-print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
-""".replace("%s", FIRST)
+SELDOM = {"many_chains", "deepest", "tip_point"}
+"""Small loops for fingertips in an object and for many poses, which few commands need."""
 
 
-@pytest.fixture
-def waiting():
-    yield loops
-    loops.wait_for({})
+def loops_that_are_not_kept():
+    """Names of declared loops whose code lies nowhere."""
+    for path in sorted(ROOT.glob("*/**/*_kernel.py")):
+        module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        if module.startswith(("grasp_core", "scenes")):
+            copy = copy_of(module, str(path))
+            files = copy.parent.parent.glob(f"{copy.parent.name}*/**/{copy.stem}.*.nbi")
+            kept = {file.name.removeprefix(f"{copy.stem}.").split("-")[0] for file in files}
+            declared = re.findall(r"^@loop\(.*\)\ndef (\w+)", path.read_text(), re.MULTILINE)
+            yield from set(declared) - kept
 
 
-@pytest.mark.parametrize(
-    ("jobs", "found"), [("2", "1 0"), pytest.param("1", "0 1", marks=pytest.mark.slow)]
-)
-def test_what_another_process_compiles_is_waited_for_and_found(jobs, found, tmp_path):
-    script = tmp_path / "script.py"
-    script.write_text(SCRIPT)
-    environment = {
-        **os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "kept")
-    }  # fmt: skip
-    done = subprocess.run(
-        [sys.executable, str(script), jobs], env=environment, capture_output=True, text=True,
-        check=True,
-    )  # fmt: skip
-    assert (done.stdout.strip(), done.stderr) == (found, "")
+@pytest.mark.slow
+def test_all_loops_are_kept_once_all_are_compiled():
+    compiling.compile_loops(compiling.EVERYTHING)
+    assert set(loops_that_are_not_kept()) <= SELDOM
+    assert not compiling.must_compile(compiling.EVERYTHING, jobs=2)
 
 
-def test_where_all_is_kept_no_process_is_begun(monkeypatch):
-    monkeypatch.setattr(compiling, "is_kept", lambda _: True)
-    monkeypatch.setattr(compiling, "local_processes", lambda _: pytest.fail("a process is begun"))
-    with compiling.compiled_beside(8):
-        pass
+def test_calls_are_made_in_two_processes_or_in_one(tmp_path):
+    """Each call leaves a file; the other process may fail, and the rest is done all the same."""
+    for jobs in (1, 2):
+        folder = tmp_path / str(jobs)
+        folder.mkdir()
+        beside = ((folder / "beside").touch, *((broken,) if jobs > 1 else ()))
+        calls = compiling.Loops((), ((folder / "here").touch,), beside)
+        compiling.compile_loops(calls, jobs)
+        assert {path.name for path in folder.iterdir()} == {"here", "beside"}
 
 
-def test_every_kernel_has_a_call_that_uses_it(waiting):
-    for name, call in compiling.BESIDE.items():
-        asked = []
-        loops.compiled.cache_clear()
-        waiting.wait_for({name: lambda asked=asked: asked.append(1)})
-        call(compiling.OUTWARD / 3.0, -compiling.OUTWARD / 3.0**0.5)
-        assert asked == [1], name
+def broken():
+    raise ValueError("no such loop")
 
 
-def test_the_end_of_the_other_process_ends_the_wait():
-    failed = Future()
-    failed.set_exception(ProcessEndedError())
-    compiling._wait(failed)
-
-
-def test_each_kernel_is_waited_for_alone(monkeypatch):
-    done, waits = [], {}
-    monkeypatch.setattr(compiling, "is_kept", lambda _: False)
-    monkeypatch.setattr(compiling, "wait_for", lambda given: waits.update(given))
-    monkeypatch.setattr(compiling, "local_processes", lambda _: nullcontext(Later(done)))
-    with compiling.compiled_beside(2, {"one": abs, "two": abs}) as jobs:
-        assert jobs == 1
-        waits["one"]()
-        assert done == [0]
-
-
-class Later:
-    """An engine whose tasks are done when their results are asked for, and noted then."""
-
-    def __init__(self, done):
-        self.done, self.count = done, 0
-
-    def submit(self, *_):
-        number, self.count = self.count, self.count + 1
-        return SimpleNamespace(result=lambda: self.done.append(number))
+@pytest.mark.parametrize(("kept", "jobs", "said"), [(False, 2, 1), (True, 2, 0), (False, 1, 0)])
+def test_a_plan_compiles_first_what_is_not_kept_if_two_processes_may(
+    kept, jobs, said, tmp_path, capsys, monkeypatch
+):
+    made = []
+    monkeypatch.setattr(compiling, "is_kept", lambda _: kept)
+    monkeypatch.setattr(plan_command, "compile_loops", made.append)
+    words = ["plan", "tetrahedron", "--limit", "1", "--jobs", str(jobs), "--out", str(tmp_path)]
+    assert main(words) == Exit.GOOD
+    assert made == said * [compiling.PLANNING]
+    assert capsys.readouterr().out.count("compiling inner loops once") == said

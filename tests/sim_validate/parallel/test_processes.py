@@ -1,15 +1,15 @@
 """Units in other processes: few and long ones too, and from any script and folder."""
 
 import os
-import signal
+import pickle
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from sim_validate.parallel.processes import ProcessEndedError, each, local_processes
-from tests.grasp_core.processes.tasks_to_do import meet
+from sim_validate.parallel.processes import Shared, each
+from tests.grasp_core.tasks_to_do import meet
 from tests.patience import HANGING_S
 
 ROOT = Path(__file__).parents[3]
@@ -25,15 +25,10 @@ def test_an_error_in_a_unit_reaches_the_caller():
         list(each(abs, [None] * 20, jobs=2))
 
 
-def met(unit):
-    """Wait for the process that does the other unit; in one process this would never end."""
-    return meet(*unit, None)
-
-
 @pytest.mark.timeout(HANGING_S)
 def test_two_long_units_are_done_at_the_same_time(tmp_path):
     one, other = str(tmp_path / "one"), str(tmp_path / "other")
-    assert len(set(each(met, [(one, other), (other, one)], jobs=2))) == 2
+    assert len(set(each(meet, [(one, other), (other, one)], jobs=2))) == 2
 
 
 SCRIPT = """
@@ -62,17 +57,14 @@ def test_a_script_needs_no_guard_and_no_working_folder(tmp_path):
     assert (done.stdout, done.stderr) == ("begun\n3\n", "")
 
 
-@pytest.mark.timeout(HANGING_S)
-def test_an_engine_notices_that_a_process_has_ended_and_starts_another():
-    with local_processes(1) as engine:
-        assert engine.submit(abs, -2).result() == 2
-        (process,) = engine._running
-        with pytest.raises(TypeError):
-            engine.submit(abs, None).result()
-        assert engine._running == {process}
-        process.program.send_signal(signal.SIGKILL)
-        process.program.wait()
-        with pytest.raises(ProcessEndedError):
-            engine.submit(abs, -3).result()
-        assert engine.submit(abs, -4).result() == 4
-    assert not engine._running
+def test_what_was_sent_twice_arrives_as_one():
+    value = frozenset({"a", "b"})
+    first, second = (pickle.loads(pickle.dumps(Shared(value))) for _ in range(2))  # noqa: S301
+    assert first.value == value
+    assert first.value is second.value
+    assert first.value is not value
+
+
+def test_another_value_arrives_as_another():
+    first, second = (pickle.loads(pickle.dumps(Shared(value))) for value in ("a", "b"))  # noqa: S301
+    assert (first.value, second.value) == ("a", "b")

@@ -7,36 +7,33 @@ from pathlib import Path
 from grasp_core.errors import MeshError, MeshRefusal
 
 
-def doing(here):
-    """Make the function that does a task: an action and what it needs.
-
-    Args:
-        here: The process that asks, by its number.
-    """
-    return lambda task: ACTIONS[task[0]](*task[1:], here)
-
-
-def square(number, _):
+def square(number):
     print("what tasks print is no answer")
     return number * number
 
 
-def refuse(_):
+def refuse(_=None):
     raise MeshError(MeshRefusal.OPEN, "close the mesh")
 
 
-def meet(mine, other, _):
+def three_or_refusal(number):
+    return number * number if number != 3 else refuse()
+
+
+def meet(mine_and_other):
     """Wait for the process that does the other task; alone this would never end."""
+    mine, other = mine_and_other
     Path(mine).touch()
     while not Path(other).exists():
         time.sleep(0.01)
     return os.getpid()
 
 
-def meet_and_refuse(mine, other, here):
+def meet_and_refuse(mine_other_and_here):
     """Meet, and refuse in any process but the one that asked."""
-    if meet(mine, other, here) != here:
-        refuse(here)
+    *names, here = mine_other_and_here
+    if meet(names) != here:
+        refuse()
 
 
 def end_elsewhere(here):
@@ -44,12 +41,3 @@ def end_elsewhere(here):
     if os.getpid() != here:
         os._exit(1)
     return "done here"
-
-
-ACTIONS = {
-    "square": square,
-    "refuse": refuse,
-    "meet": meet,
-    "end": end_elsewhere,
-    "refuse elsewhere": meet_and_refuse,
-}

@@ -1,0 +1,310 @@
+"""Other processes of this machine do tasks, with this one or for it; results come in order.
+
+They are no copies of the caller's program, as the processes of the standard library are: a script
+needs no guard against being run again, the folder that it works in may be gone, and the end of one
+process fails the task that it does and no other. A thread for each process starts it, sends it
+tasks through a pipe, one after the other, and waits for answers. A task depends on nothing but
+itself, so it makes no difference who does it. The end of its input ends a process, so that none
+outlives this program.
+"""
+
+import gc
+import os
+import pickle
+import signal
+import struct
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import Future
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Event, Lock, Thread
+from typing import IO, Any, TypeVar
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+LENGTH = struct.Struct("<Q")
+"""How many bytes of a message follow."""
+AHEAD = 8
+"""Number of tasks per process that are handed out before the first of them is done."""
+COLLECTED_AFTER = 50_000
+"""Number of new objects after which a process looks for unused circles of objects: nearly all
+results are freed as soon as they are sent."""
+
+
+class ProcessEndedError(Exception):
+    """A process has ended while it did a task, or could not be given it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Asked:
+    """A task, the function that does it, and the future that gets its result."""
+
+    function: Callable[[Any], Any]
+    task: Any
+    future: "Future[Any]" = field(default_factory=Future[Any])
+
+
+class Processes:
+    """Processes of this machine, each of which does one task at a time; see `local_processes`."""
+
+    ended = ("ProcessEndedError",)
+    """Names of the errors of tasks whose process has ended."""
+
+    def __init__(self, workers: int, patience_s: float = 0.0) -> None:
+        self.workers, self._patience_s = workers, patience_s
+        self._waiting = SimpleQueue[_Asked | None]()
+        self._closed, self._lock = Event(), Lock()
+        self._running = set[_Process]()
+        self._done_here = 0
+        self._threads = list[Thread]()
+        for number in range(workers):
+            thread = Thread(target=self._serve, args=(number,), daemon=True)
+            with suppress(RuntimeError):  # as many as the system allows
+                thread.start()
+                self._threads.append(thread)
+
+    def submit(self, function: Callable[[Task], Result], task: Task, /) -> "Future[Result]":
+        """Call a function in a process; the future fails if that process ends."""
+        return self._ask(function, task).future
+
+    def in_order(
+        self, function: Callable[[Task], Result], tasks: Iterable[Task], *,
+        here: Callable[[Task], Result] | None = None, ahead: int = AHEAD,
+    ) -> Generator[Result]:  # fmt: skip
+        """Yield the result of each task, in their order; this process works with the others.
+
+        It does the tasks of processes that end, too. Takes `here`, a function with the same results
+        for tasks that this process does.
+        """
+        coming, line, mine = iter(tasks), deque[_Asked](), here or function
+        try:
+            while True:
+                more = islice(coming, ahead * (1 + self.workers) - len(line))
+                line.extend(self._ask(function, task) for task in more)
+                if not line:
+                    return
+                first = line.popleft()
+                while not first.future.done() and (other := self._unclaimed()):
+                    _do(mine, other.task, other.future)
+                    self._done_here += 1
+                try:
+                    result = first.future.result()
+                except ProcessEndedError:
+                    result = mine(first.task)
+                yield result
+        finally:
+            while self._unclaimed():
+                pass
+
+    def _ask(self, function: Callable[[Any], Any], task: Any) -> _Asked:
+        asked = _Asked(function, task)
+        self._waiting.put(asked)
+        return asked
+
+    def _unclaimed(self) -> _Asked | None:
+        try:
+            return self._waiting.get_nowait()
+        except Empty:
+            return None
+
+    def _serve(self, number: int) -> None:
+        """Hand tasks to a process, one after the other; a new one takes the place of one that ends.
+
+        With patience, start none unless each process has as many tasks left as this one has done in
+        the time of a start.
+        """
+        if self._patience_s > 0.0:
+            self._closed.wait(self._patience_s)
+            if self._waiting.qsize() < (number + 1) * max(1, self._done_here):
+                return
+        process = None
+        while asked := self._waiting.get():
+            try:
+                process = process or self._started()
+                answer = process.ask((asked.function, asked.task))
+            except Exception as error:  # it ended, or none starts, or the task cannot be sent
+                if process is not None and isinstance(error, EOFError | OSError):
+                    self._end(process)
+                    process = None
+                asked.future.set_exception(ProcessEndedError(f"a process has ended ({error})"))
+                continue
+            _do(_result_of, answer, asked.future)
+
+    def _started(self) -> "_Process":
+        with self._lock:
+            if self._closed.is_set():
+                raise ProcessEndedError("the processes are closed")
+            process = _Process()
+            self._running.add(process)
+            return process
+
+    def _end(self, process: "_Process") -> None:
+        process.end()
+        with self._lock:
+            self._running.discard(process)
+
+    def close(self) -> None:
+        """End the processes, whatever they do; what was not begun is cancelled."""
+        with self._lock:
+            self._closed.set()
+            for process in self._running:
+                process.program.kill()
+        while asked := self._unclaimed():
+            asked.future.cancel()
+        for _ in self._threads:
+            self._waiting.put(None)
+        for thread in self._threads:
+            thread.join()
+        for process in list(self._running):
+            self._end(process)
+
+
+@contextmanager
+def local_processes(workers: int, patience_s: float = 0.0) -> Generator[Processes]:
+    """Have processes do tasks during a `with` block, and end them after it, whatever they do.
+
+    Takes `patience_s`, the time [s] after which the first process starts, if work is left for it.
+    """
+    started = Processes(workers, patience_s)
+    try:
+        yield started
+    finally:
+        started.close()
+
+
+def _do(function: Callable[[Any], Any], task: Any, future: "Future[Any]") -> None:
+    """Call a function on a task, and give the future what comes of it."""
+    try:
+        result = function(task)
+    except Exception as error:
+        future.set_exception(error)
+    else:
+        future.set_result(result)
+
+
+class _Process:
+    """A program of our own, with the pipes to it and from it."""
+
+    def __init__(self) -> None:
+        if getattr(sys, "frozen", False) or not sys.executable:
+            raise OSError("Python is a part of another program, which is not started again")
+        places = [place for place in (path or _working_folder() for path in sys.path) if place]
+        # not -m alone: the current folder must not come before the installed packages
+        self.program = subprocess.Popen(
+            [sys.executable, "-P", "-m", "grasp_core.processes"],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
+        )  # fmt: skip
+
+    def ask(self, task: Any) -> bytes:
+        """Have a task done; return a pickled pair of result and error."""
+        if self.program.stdin is None or self.program.stdout is None:
+            raise OSError("no pipe was opened")
+        send(self.program.stdin, task)
+        return receive(self.program.stdout)
+
+    def end(self) -> None:
+        """End the process, whatever it does; what was not sent is lost."""
+        self.program.kill()
+        self.program.wait()
+        for pipe in (self.program.stdin, self.program.stdout):
+            with suppress(OSError):
+                if pipe is not None:
+                    pipe.close()
+
+
+def _working_folder() -> str:
+    """Return where an empty place for modules is; empty if the folder is gone."""
+    try:
+        return str(Path.cwd())
+    except OSError:
+        return ""
+
+
+def send(pipe: IO[bytes], value: Any) -> None:
+    """Send one value, after its length in bytes; the other process gets a copy.
+
+    Contiguous arrays keep their bits and stay read-only: protocol 5 writes their memory as it is.
+    """
+    message = pickle.dumps(value, protocol=5)
+    pipe.write(LENGTH.pack(len(message)))
+    pipe.write(message)
+    pipe.flush()
+
+
+def receive(pipe: IO[bytes]) -> bytes:
+    """Receive the bytes of one value, for `unpacked`."""
+    (length,) = LENGTH.unpack(_exactly(pipe, LENGTH.size))
+    return _exactly(pipe, length)
+
+
+def _exactly(pipe: IO[bytes], length: int) -> bytes:
+    message = pipe.read(length)
+    if len(message) < length:
+        raise EOFError("the other process has ended")
+    return message
+
+
+def unpacked(message: bytes) -> Any:
+    """Return the value of a message, which came from a process of our own.
+
+    Nearly all objects made here live on: looking for unused ones would take longer than the rest.
+    """
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        return pickle.loads(message)  # noqa: S301 - our own process sent it
+    finally:
+        if collects:
+            gc.enable()
+
+
+def _result_of(answer: bytes) -> Any:
+    """Return a task's result, or raise the error in its place."""
+    result, error = unpacked(answer)
+    if error is not None:
+        raise error
+    return result
+
+
+def main() -> None:
+    """Do the tasks that come through standard input, one after the other, until it ends.
+
+    Errors of a task are answers, too.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt ends it through its parent
+    gc.set_threshold(COLLECTED_AFTER)
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what code prints is no answer
+    messages = SimpleQueue[bytes]()
+    Thread(target=_listen, args=(sys.stdin.buffer, messages), daemon=True).start()
+    try:
+        while True:
+            function, task = unpacked(messages.get())
+            try:
+                answer = (function(task), None)
+            except Exception as error:
+                answer = (None, error)
+            send(answers, answer)
+    finally:
+        os._exit(1)  # Python cannot end in order while a thread reads its input
+
+
+def _listen(pipe: IO[bytes], messages: "SimpleQueue[bytes]") -> None:
+    """Receive messages while tasks are done, and end the process when nobody sends any more."""
+    try:
+        while True:
+            messages.put(receive(pipe))
+    except (EOFError, OSError):
+        os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

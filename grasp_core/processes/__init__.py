@@ -1,1 +1,0 @@
-"""Other processes of this machine that do parts of one computation, with results in order."""
