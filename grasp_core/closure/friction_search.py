@@ -45,7 +45,7 @@ from grasp_core.closure.friction_interval import (
     closing_forces,
     separates,
 )
-from grasp_core.closure.proofs import proves_closure
+from grasp_core.closure.proofs import SMALLEST_NORMAL, proves_closure
 from grasp_core.errors import SolverError
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 
@@ -94,33 +94,23 @@ STALLED = 1e-3
 """Length below which a unit twist whose slow contacts were put to rest is only rounding."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Rounds:
-    """Balanced forces of each round of the search, or the twist with which the rounds end."""
-
-    forces: tuple[Array, ...]
-    """Balanced forces of each round, (k, 3) each; empty unless every positive friction is
-    enough."""
-    twist: Array | None
-    """Twist under which contacts depart along their normals or are at rest, (6,); None where
-    `forces` are given or nothing was found."""
-
-    def at(self, friction: float, normals: Array) -> Array:
-        """Combine the rounds to balanced forces inside the cones of a friction, (k, 3)."""
-        total = self.forces[0]
-        for forces in self.forces[1:]:
-            along, across = normal_and_tangential(total, normals)
-            sizes = np.linalg.norm(forces, axis=1)
-            room, taken = (friction * along - across)[along > 0.0], sizes[along > 0.0]
-            share = STEP_SHARE / (1.0 + friction) * np.min(room / np.maximum(taken, DEPENDENT))
-            total = total + min(float(share), 1.0) * forces
-        return total
+def combined(rounds: list[Array], friction: float, normals: Array) -> Array:
+    """Combine the forces of some rounds to balanced ones inside the cones of a friction, (k, 3)."""
+    total = rounds[0]
+    for forces in rounds[1:]:
+        along, across = normal_and_tangential(total, normals)
+        sizes = np.linalg.norm(forces, axis=1)
+        room, taken = (friction * along - across)[along > 0.0], sizes[along > 0.0]
+        share = STEP_SHARE / (1.0 + friction) * np.min(room / np.maximum(taken, DEPENDENT))
+        total = total + min(float(share), 1.0) * forces
+    return total
 
 
-def rounds(arms: Array, normals: Array) -> Rounds:
+def rounds(arms: Array, normals: Array) -> tuple[list[Array], Array | None]:
     """Find out whether every positive friction is enough for force closure.
 
-    Takes `arms`, `normals` (k, 3).
+    If so, the balanced forces of each round are given; otherwise none, and where one was found a
+    twist, (6,), under which contacts depart along their normals or are at rest.
     """
     maps = grasp_map(arms).reshape(WRENCH, -1, 3)
     pushes = np.einsum("wki,ki->wk", maps, normals)
@@ -133,7 +123,7 @@ def rounds(arms: Array, normals: Array) -> Rounds:
         outside = _complement(held)
         weights = _most_pushes(outside.T @ pushes[:, free])
         if weights is None:
-            return Rounds((), _departing(outside, pushes[:, free]))
+            return [], _departing(outside, pushes[:, free])
         forces = np.zeros_like(arms)
         forces[free] = weights[:, None] * normals[free]
         needed = -pushes[:, free] @ weights
@@ -142,14 +132,11 @@ def rounds(arms: Array, normals: Array) -> Rounds:
         found.append(forces)
         settled[free[weights > 0.0]] = True
     left = _complement(grasp_map(arms))
-    return Rounds((), left[:, 0]) if left.shape[1] else Rounds(tuple(found), None)
+    return ([], left[:, 0]) if left.shape[1] else (found, None)
 
 
 def hopeless_twist(arms: Array, normals: Array) -> Array | None:
-    """Find a twist (6,) that separates at every friction, by (2); None if there is none.
-
-    Takes `arms`, `normals` (k, 3).
-    """
+    """Find a twist (6,) that separates at every friction, by (2); None if there is none."""
     at_rest = _complement(grasp_map(arms))
     if at_rest.shape[1]:
         return at_rest[:, 0]
@@ -166,12 +153,7 @@ def hopeless_twist(arms: Array, normals: Array) -> Array | None:
 
 
 def pushing_forces(arms: Array, normals: Array) -> Array | None:
-    """Find balanced forces (k, 3) that push at every contact; None if there are none.
-
-    Some friction allows such forces.
-
-    Takes `arms`, `normals` (k, 3).
-    """
+    """Find balanced forces that push at every contact, as some friction allows; None if none do."""
     basis = _null_space(grasp_map(arms))
     n = basis.shape[1]
     pushes = np.einsum("kin,ki->kn", basis.reshape(*arms.shape, n), normals)
@@ -234,12 +216,9 @@ def _complement(wrenches: Array) -> Array:
 
 
 def search_interval(points: Array, units: Array) -> FrictionInterval:
-    """Find the interval of the critical friction, as narrow as accuracy or proofs allow.
-
-    Takes `points` (k, 3) [m]; `units` (k, 3).
-    """
+    """Find the interval of the critical friction, as narrow as accuracy or proofs allow."""
     for strict in (False, True):
-        found = _searched(Ends.of(points, units, strict=strict)).interval()
+        found = _searched(Ends(points, units, unit_size(points)[0], strict)).interval()
         if found.verify():
             return found
     return FrictionInterval(0.0, math.inf, points, units, None, None)
@@ -248,7 +227,9 @@ def search_interval(points: Array, units: Array) -> FrictionInterval:
 def _searched(ends: "Ends") -> "Ends":
     arms, units = ends.arms, ends.units
     hopeless = hopeless_twist(arms, units)
-    if hopeless is not None and ends.open_at_all(hopeless):
+    if hopeless is not None:
+        ends.opened(hopeless, math.inf)
+    if ends.lower == math.inf:
         return ends
     _try_little(ends)
     trial = max(FIRST_TRIAL, 2.0 * ends.lower)
@@ -261,7 +242,12 @@ def _searched(ends: "Ends") -> "Ends":
         if ends.lower < trial < ends.upper:
             _try_evened(ends, trial, answer.forces)
         ends.decided(trial)
-        trial = ends.next_trial(trial, answer.margin, _slope(answer, arms, units))
+        # the slope of the margin over mu with respect to the logarithm of mu
+        velocities = answer.twist[:3] + cross(answer.twist[3:], arms)
+        along = np.einsum("ki,ki->k", answer.forces, units)
+        slides = answer.forces - along[:, None] * units
+        slope = float(np.einsum("ki,ki->", velocities, slides))
+        trial = ends.next_trial(trial, answer.margin, slope)
     if ends.forces is None and ends.lower < LARGEST_FRICTION:
         pushing = pushing_forces(arms, units)
         if pushing is not None:
@@ -271,12 +257,12 @@ def _searched(ends: "Ends") -> "Ends":
 
 def _try_little(ends: "Ends") -> None:
     """Look for a proof of closure at very small friction, or else for a first lower end."""
-    little, friction = rounds(ends.arms, ends.units), FRICTIONLESS
-    if little.twist is not None:
-        ends.open(little.twist)
+    (every, twist), friction = rounds(ends.arms, ends.units), FRICTIONLESS
+    if twist is not None:
+        ends.open(twist)
     # friction is doubled: ten times from `FRICTIONLESS` to `LITTLE`
-    while little.forces and friction <= LITTLE and ends.forces is None:
-        ends.close(little.at(friction, ends.units), friction, exactly=True)
+    while every and friction <= LITTLE and ends.forces is None:
+        ends.close(combined(every, friction, ends.units), friction, exactly=True)
         friction *= 2.0
     if ends.forces is None and ends.lower < FRICTIONLESS:
         ends.learn(FRICTIONLESS, _asked(ends.arms, ends.units, FRICTIONLESS))
@@ -320,9 +306,7 @@ class Ends:
     """The proved ends of an interval of friction, and where to try next."""
 
     points: Array
-    """Contact points, (k, 3) [m]."""
     units: Array
-    """Inward unit normals, (k, 3)."""
     arms: Array
     """Arms of the contacts at unit size, (k, 3)."""
     strict: bool = True
@@ -340,11 +324,6 @@ class Ends:
     """
     spread: float = 0.0
     """Distance from `center` at which the next proofs are tried."""
-
-    @classmethod
-    def of(cls, points: Array, units: Array, *, strict: bool = True) -> "Ends":
-        """Start with an interval about which nothing is proved yet."""
-        return cls(points, units, unit_size(points)[0], strict)
 
     @property
     def settled(self) -> bool:
@@ -407,14 +386,10 @@ class Ends:
             still, friction = _put_to_rest(twist / length, self.arms, self.units, slow)
             friction *= 1.0 - SHAVED
             if self.lower < friction < self.upper:
-                self._opened(still, friction)
+                self.opened(still, friction)
 
-    def open_at_all(self, twist: Array) -> bool:
-        """Return whether a twist separates at every friction; then the search ends."""
-        self._opened(twist, math.inf)
-        return self.lower == math.inf
-
-    def _opened(self, twist: Array, friction: float) -> None:
+    def opened(self, twist: Array, friction: float) -> None:
+        """Raise the lower end to a friction, where a twist separates there."""
         twist = at_the_first(twist, self.points)
         easy = not self.strict and friction < math.inf
         if easy or separates(twist, self.points, self.units, friction):
@@ -430,16 +405,15 @@ class Ends:
         if self.lower < root < self.upper and self.trials % HALVING:
             return slightly_past(root, friction, self.lower, self.upper)
         if self.lower > 0.0:
-            return _between(self.lower, self.upper)
+            # in the middle, measured by the cones' half-angles
+            highest = min(self.upper, 4.0 * LARGEST_FRICTION)
+            return math.tan(0.5 * (math.atan(self.lower) + math.atan(highest)))
         self.share *= self.share
         return max(2.0 * self.share * self.upper, FRICTIONLESS)
 
 
 def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tuple[Array, float]:
-    """Put slow contacts to rest under a unit twist.
-
-    Gives the changed twist, and the friction up to which it may separate.
-    """
+    """Put slow contacts to rest under a unit twist, which separates at most up to a friction."""
     rows = grasp_map(arms).T.reshape(-1, 3, WRENCH)
     slowest = np.linalg.norm(rows @ twist, axis=1) <= slow
     resting = rows[slowest].reshape(-1, WRENCH)
@@ -450,7 +424,7 @@ def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tupl
     if not np.linalg.norm(twist) > STALLED:
         return twist, 0.0
     with np.errstate(over="ignore"):  # contacts that hardly slide are separated at any friction
-        ratios = -along / np.maximum(across, np.finfo(np.float64).tiny)
+        ratios = -along / np.maximum(across, SMALLEST_NORMAL)
     return twist, float(ratios.min(initial=2.0 * LARGEST_FRICTION))
 
 
@@ -460,16 +434,3 @@ def slightly_past(root: float, trial: float, lower: float, upper: float) -> floa
     if upper - root > root - lower:
         return root + min(past, 0.5 * (upper - root))
     return root - min(past, 0.5 * (root - lower))
-
-
-def _between(lower: float, upper: float) -> float:
-    """Return the friction in the middle between two, measured by the cones' half-angles."""
-    return math.tan(0.5 * (math.atan(lower) + math.atan(min(upper, 4.0 * LARGEST_FRICTION))))
-
-
-def _slope(answer: Answer, arms: Array, normals: Array) -> float:
-    """Return the slope of the margin over mu with respect to the logarithm of mu."""
-    velocities = answer.twist[:3] + cross(answer.twist[3:], arms)
-    along = np.einsum("ki,ki->k", answer.forces, normals)
-    slides = answer.forces - along[:, None] * normals
-    return float(np.einsum("ki,ki->", velocities, slides))

@@ -192,14 +192,11 @@ def _outside(wrenches: WrenchSet, direction: Array | None) -> FerrariCanny:
     # a degenerate set has support zero across its span; each direction bounds Q by (1)
     trials = [] if direction is None else [direction]
     _, _, right = np.linalg.svd(wrenches.edges() @ wrenches.G.T, full_matrices=False)
-    trials += [_unit(y) for y in (-wrench, facing, right[-1], -right[-1]) if y.any()]
+    others = [y for y in (-wrench, facing, right[-1], -right[-1]) if y.any()]
+    trials += [y / float(np.linalg.norm(y)) for y in others]
     weakest = min(trials, key=lambda y: wrenches.support(y)[0])
     upper = wrenches.support(weakest)[0]
     # resting fingers apply no wrench, which is allowed by linf
     if wrenches.norm == "linf":
         forces, length = np.zeros_like(forces), 0.0
     return FerrariCanny(-length, max(upper, -length), wrenches, weakest, None, forces)
-
-
-def _unit(direction: Array) -> Array:
-    return direction / float(np.linalg.norm(direction))

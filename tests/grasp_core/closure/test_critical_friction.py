@@ -92,17 +92,17 @@ def made_sets(count):
 def test_many_at_once_and_one_by_one_give_intervals_that_overlap(count):
     """Both are as narrow as the accuracy."""
     positions, normals = contact_sets(count)
-    quick = critical._at_once(positions, normals)
+    quick_ones, upper, _, _ = critical._at_once(positions, normals)
     every = gc.critical_frictions(positions, normals)
     width = 1.0 + 1.1 * critical.FRICTION_ACCURACY
     for i, (points, units) in enumerate(zip(positions, normals, strict=True)):
         slow = friction_search.search_interval(points, units)
-        if quick.found[i]:
-            assert every[i] == quick.upper[i]
-            assert slow.lower <= quick.upper[i] <= width * slow.upper
+        if quick_ones[i]:
+            assert every[i] == upper[i]
+            assert slow.lower <= upper[i] <= width * slow.upper
         else:
             assert every[i] == (0.0 if slow.upper <= critical.FRICTIONLESS else slow.upper)
-    assert quick.found.mean() >= 0.6
+    assert quick_ones.mean() >= 0.6
     assert len(every) >= 140
 
 
@@ -113,7 +113,7 @@ def test_what_the_search_finds_proves_both_ends():
     forces, twists, bounds = np.zeros_like(arms), np.zeros((len(arms), 6)), np.zeros((len(arms), 2))
     compiled(critical.KERNEL).search(arms, normals, 5e-8, forces, twists, bounds)
     proved = 0
-    for i in np.flatnonzero(critical._at_once(positions, normals).found):
+    for i in np.flatnonzero(critical._at_once(positions, normals)[0]):
         lower, upper = bounds[i]
         if upper - lower > 5e-8 * lower:
             continue
@@ -171,7 +171,7 @@ def test_what_the_search_gets_wrong_is_made_program_by_program(monkeypatch, spoi
     right = gc.critical_frictions(positions, normals)
     monkeypatch.setattr(kernel, "search", search)
     monkeypatch.setattr(kernel, "deepest", deepest)
-    assert not critical._at_once(positions, normals).found.any()
+    assert not critical._at_once(positions, normals)[0].any()
     np.testing.assert_allclose(
         gc.critical_frictions(positions, normals), right, rtol=1e-7, atol=1e-7
     )
@@ -187,14 +187,14 @@ def test_hopeless_and_frictionless_sets_are_left_to_the_reference():
     found = gc.critical_frictions(positions, normals)
     assert found[:2].tolist() == [0.0, math.inf]
     assert found[2] == gc.critical_friction(TETRA_CENTERS, TETRA_NORMALS) == 0.0
-    assert not critical._at_once(positions, normals).found.any()
+    assert not critical._at_once(positions, normals)[0].any()
 
 
 def nothing_at_once(points, normals):
     """What a compiled search tells that finds no interval."""
     contacts = len(points)
     nothing, found = np.zeros_like(normals), np.zeros(contacts, dtype=bool)
-    return critical._Quick(found, np.zeros(contacts), nothing, np.zeros((contacts, 6)))
+    return found, np.zeros(contacts), nothing, np.zeros((contacts, 6))
 
 
 def test_where_no_program_is_solved_the_upper_end_is_still_one(monkeypatch):
