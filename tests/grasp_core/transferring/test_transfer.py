@@ -11,9 +11,13 @@ import trimesh
 import grasp_core as gc
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
-from grasp_core.transferring.face_changes import added_faces, changes_in_words, face_changes
-from grasp_core.transferring.judging import FRICTION_BAND, QUALITY_BAND, compared
-from grasp_core.transferring.like_faces import likeness
+from grasp_core.transferring.face_changes import (
+    added_faces,
+    changes_in_words,
+    face_changes,
+    likeness,
+)
+from grasp_core.transferring.transfer import FRICTION_BAND, QUALITY_BAND, compared
 from scenes.example_objects import example_object
 from tests.changed_parts import (
     distances,
