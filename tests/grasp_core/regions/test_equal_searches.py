@@ -81,7 +81,7 @@ def test_covers_of_symmetric_contacts_share_all_bits(corners):
     own = None
     for _ in range(TRIALS):
         sites = sites_of(shaken(rng, TETRA_CENTERS), shaken(rng, frames), shaken(rng, ring), radius)
-        found = search_cover(sites, np.eye(6), 5000).cover
+        found, _ = search_cover(sites, np.eye(6), 5000)
         local = np.einsum("kij,mki->mkj", sites.frames, found.forces)
         own = own or (found.codes, local)
         np.testing.assert_array_equal(found.codes, own[0])
