@@ -109,7 +109,8 @@ class CertifiedRegions(ByValue):
         has the object checks that `borders` are parts of its faces.
         """
         with np.errstate(all="ignore"):
-            return self._has_numbers() and self._has_discs() and self._is_open() and self._closes()
+            known = self._has_numbers() and self._has_fitting_scale()
+            return known and self._has_discs() and self._is_open() and self._closes()
 
     def _has_numbers(self) -> bool:
         arrays = all(
@@ -128,10 +129,14 @@ class CertifiedRegions(ByValue):
             and is_a(self.cover, TwistCover)
             and is_number(self.scale, least=SMALLEST)
             and is_number(self.radius, least=0.0)
-            # the unit of length is no longer than contacts in the borders are apart: what may be
-            # `PLACED` off is measured with it; twice as long as it need be, for rounding
-            and self.scale <= 2.0 * float(np.linalg.norm(np.ptp(np.vstack(self.borders), axis=0)))
         )
+
+    def _has_fitting_scale(self) -> bool:
+        """Return whether the unit of length is no longer than contacts in the borders are apart.
+
+        What may be `PLACED` off is measured with it: twice as long as it need be, for rounding.
+        """
+        return self.scale <= 2.0 * float(np.linalg.norm(np.ptp(np.vstack(self.borders), axis=0)))
 
     def _has_discs(self) -> bool:
         farthest = 0.0

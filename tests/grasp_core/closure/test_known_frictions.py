@@ -59,19 +59,6 @@ def test_a_critical_friction_of_zero_is_bracketed_to_a_few_millionths():
     assert max(gc.critical_friction(-normals, normals) for normals in zeros) < 4e-6
 
 
-def test_the_faces_that_an_octahedron_needs_friction_on():
-    """A face with its three neighbours, and the four faces around a vertex."""
-    normals = all_signs(3)
-    for chosen in quadruples(normals):
-        critical = gc.critical_friction(-units(chosen), units(chosen))
-        if any((chosen @ face == 1.0).sum() == 3 for face in chosen):
-            assert critical == pytest.approx(1.0 / math.sqrt(8.0), rel=TOLERANCE)
-        elif (np.abs(chosen.sum(axis=0)) == 4.0).any():
-            assert critical == pytest.approx(1.0 / math.sqrt(2.0), rel=TOLERANCE)
-        else:
-            assert critical < 1e-5
-
-
 def wedge_contacts(length, l, m, s):  # noqa: E741 - the oracle's letters
     """Two contacts on either end of a double-wedge bar."""
     x = length + 1.0 - s

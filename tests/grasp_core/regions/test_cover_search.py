@@ -1,4 +1,4 @@
-"""The search for covers agrees with its reference, and what it finds is so."""
+"""What the search for covers finds is so, and it finds covers where there are some."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,6 @@ import grasp_core.regions.largest_discs as search
 from grasp_core.closure.contacts import contact_frames
 from grasp_core.regions.proof import SLACK
 from grasp_core.regions.sites import Sites
-from tests.grasp_core.regions.reference_cover_search import reference_cover
 from tests.judges import random_rotation
 
 TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
@@ -40,20 +39,6 @@ def perturbed(seed):
     normals = -TETRAHEDRON + 0.15 * rng.normal(size=(4, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return (TETRAHEDRON + 0.1 * rng.normal(size=(4, 3))) @ turn.T, normals @ turn.T
-
-
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize(
-    "kind", [{"radius": 0.12}, {"radius": 0.1, "sides": 7}, {"radius": 0.08, "depth": 0.03}]
-)
-def test_the_compiled_search_cuts_the_cones_of_the_reference(kind, seed):
-    sites = sites_around(*perturbed(seed), **kind)
-    found, _ = search.search_cover(sites, np.eye(6), CONES)
-    expected = reference_cover(sites, np.eye(6), CONES)
-    assert found is not None
-    np.testing.assert_array_equal(found.codes, expected.codes)
-    same = np.isclose(found.forces, expected.forces, atol=1e-6)
-    assert same.mean() > 0.99  # ties between answers are broken by rounding
 
 
 @pytest.mark.parametrize("seed", range(4))
