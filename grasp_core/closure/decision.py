@@ -239,7 +239,7 @@ def sparing_twist(
         if not balanced.any():
             return None
         # a force inside its cone can work along all that its contact feels, so that must be zero
-        twists = null_space(held(rest[balanced]) @ twists, twists)
+        twists = twists @ null_space(held(rest[balanced]) @ twists)
         rest = rest[~balanced]
         if not twists.shape[1]:
             return None
@@ -252,10 +252,9 @@ def sparing_twist(
             return None
 
 
-def null_space(rows: Array, basis: Array) -> Array:
-    """Return a basis of the vectors in the span of `basis` (columns) that `rows` maps to 0."""
+def null_space(rows: Array) -> Array:
+    """Return orthonormal columns that `rows` maps to zero."""
     if not rows.size:
-        return basis
+        return np.eye(rows.shape[1])
     _, values, right = np.linalg.svd(rows)
-    rank = int((values > RANK).sum())
-    return basis @ right[rank:].T
+    return right[int((values > RANK).sum()) :].T

@@ -35,7 +35,7 @@ import numpy as np
 from grasp_core.arrays import Array, cross
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contacts import WRENCH, grasp_map, normal_and_tangential, unit_size
-from grasp_core.closure.decision import Answer, decide, margin_program
+from grasp_core.closure.decision import Answer, decide, margin_program, null_space
 from grasp_core.closure.friction_interval import (
     FRICTIONLESS,
     NEARLY_AT_REST,
@@ -45,20 +45,14 @@ from grasp_core.closure.friction_interval import (
     closing_forces,
     separates,
 )
-from grasp_core.closure.proofs import SMALLEST_NORMAL, proves_closure
+from grasp_core.closure.proofs import RANK, SMALLEST_NORMAL, proves_closure
 from grasp_core.errors import SolverError
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 
-DEPENDENT = 1e-9
-"""Singular values of unit-size wrenches below this value count as zero."""
-SUPPORTED = 0.5
-"""Border between pushes of zero and of one: pushes that can be positive can be one."""
 LARGEST_VARIABLE = 1e4
 """Largest size of a variable of the programs, whose answers are of order one."""
 POSITIVE = 1e-6
 """Optima below this count as zero: a hundred times the residual of a linear program."""
-STEP_SHARE = 0.5
-"""Share of what is left of a cone that the forces of the next round may take."""
 FRICTION_ACCURACY = 5e-8
 """Width of the final interval of a critical friction, relative to its upper end."""
 FIRST_TRIAL = 0.5
@@ -83,15 +77,9 @@ LITTLE = 1e-3
 RESTING = (NEARLY_AT_REST, 1e-7, 1e-5, 1e-3)
 """Speeds below which contacts are put to rest under a unit twist, tried in turn: a solver leaves
 the square root of its accuracy where two contacts carry nearly all force."""
-EVENED = 3
-"""Number of times that a program is solved again in units of the pushes that it found before."""
-FAINTEST = 1e-10
-"""Smallest push, as a share of the largest, that is used as a unit."""
 ADDED, SHAVED = 5e-9, 1e-10
 """Relative allowances for rounding: `ADDED` raises the friction that forces need, `SHAVED` lowers
 the friction up to which a twist separates."""
-STALLED = 1e-3
-"""Length below which a unit twist whose slow contacts were put to rest is only rounding."""
 
 
 def combined(rounds: list[Array], friction: float, normals: Array) -> Array:
@@ -101,7 +89,8 @@ def combined(rounds: list[Array], friction: float, normals: Array) -> Array:
         along, across = normal_and_tangential(total, normals)
         sizes = np.linalg.norm(forces, axis=1)
         room, taken = (friction * along - across)[along > 0.0], sizes[along > 0.0]
-        share = STEP_SHARE / (1.0 + friction) * np.min(room / np.maximum(taken, DEPENDENT))
+        # half of what is left of a cone
+        share = 0.5 / (1.0 + friction) * np.min(room / np.maximum(taken, RANK))
         total = total + min(float(share), 1.0) * forces
     return total
 
@@ -120,31 +109,31 @@ def rounds(arms: Array, normals: Array) -> tuple[list[Array], Array | None]:
         free = np.flatnonzero(~settled)
         held = maps[:, settled].reshape(WRENCH, -1)
         # (1), seen only in the directions of wrenches that the contacts of S cannot apply
-        outside = _complement(held)
+        outside = null_space(held.T)
         weights = _most_pushes(outside.T @ pushes[:, free])
         if weights is None:
             return [], _departing(outside, pushes[:, free])
         forces = np.zeros_like(arms)
         forces[free] = weights[:, None] * normals[free]
         needed = -pushes[:, free] @ weights
-        supporting = np.asarray(np.linalg.lstsq(held, needed, rcond=DEPENDENT)[0], dtype=np.float64)
+        supporting = np.asarray(np.linalg.lstsq(held, needed, rcond=RANK)[0], dtype=np.float64)
         forces[settled] = supporting.reshape(-1, 3)
         found.append(forces)
         settled[free[weights > 0.0]] = True
-    left = _complement(grasp_map(arms))
+    left = null_space(grasp_map(arms).T)
     return ([], left[:, 0]) if left.shape[1] else (found, None)
 
 
 def hopeless_twist(arms: Array, normals: Array) -> Array | None:
     """Find a twist (6,) that separates at every friction, by (2); None if there is none."""
-    at_rest = _complement(grasp_map(arms))
+    at_rest = null_space(grasp_map(arms).T)
     if at_rest.shape[1]:
         return at_rest[:, 0]
     k = len(arms)
     # (2) as a null space: the variables are the twist and the speeds c_i, whose sum is maximised
     departing = np.zeros((k, 3, k))
     departing[np.arange(k), :, np.arange(k)] = normals
-    basis = _null_space(np.hstack([grasp_map(arms).T, departing.reshape(3 * k, k)]))
+    basis = null_space(np.hstack([grasp_map(arms).T, departing.reshape(3 * k, k)]))
     speeds = basis[WRENCH:]
     rows = np.vstack([-speeds, speeds.sum(axis=0), np.eye(basis.shape[1]), -np.eye(basis.shape[1])])
     limits = np.repeat([0.0, 1.0, LARGEST_VARIABLE, LARGEST_VARIABLE], [k, 1, *basis.shape[1:] * 2])
@@ -154,7 +143,7 @@ def hopeless_twist(arms: Array, normals: Array) -> Array | None:
 
 def pushing_forces(arms: Array, normals: Array) -> Array | None:
     """Find balanced forces that push at every contact, as some friction allows; None if none do."""
-    basis = _null_space(grasp_map(arms))
+    basis = null_space(grasp_map(arms))
     n = basis.shape[1]
     pushes = np.einsum("kin,ki->kn", basis.reshape(*arms.shape, n), normals)
     rows = np.vstack([np.hstack([-pushes, np.ones((len(arms), 1))]), np.eye(2 * n, n + 1)])
@@ -166,7 +155,7 @@ def pushing_forces(arms: Array, normals: Array) -> Array | None:
 
 def _most_pushes(rows: Array) -> Array | None:
     """Find weights (n,) >= 0 with rows @ weights = 0, as many of them positive as possible."""
-    basis = _null_space(rows)
+    basis = null_space(rows)
     k, n = basis.shape
     # shares from 0 to 1, each at most its weight: their sum counts the weights that can be positive
     shares = np.eye(k)
@@ -179,11 +168,12 @@ def _most_pushes(rows: Array) -> Array | None:
     )
     if found is None:
         return None
-    return np.where(found[n:] > SUPPORTED, basis @ found[:n], 0.0)
+    # pushes that can be positive can be one
+    return np.where(found[n:] > 0.5, basis @ found[:n], 0.0)  # noqa: PLR2004 - between 0 and 1
 
 
 def _departing(outside: Array, pushes: Array) -> Array | None:
-    """Find the combination of the columns of `outside` that departs most evenly, or None."""
+    """Find the combination of the columns of `outside` that departs most evenly."""
     m, n = outside.shape[1], pushes.shape[1]
     steep = np.hstack([pushes.T @ outside, np.ones((n, 1))])
     box = np.hstack([np.vstack([np.eye(m), -np.eye(m)]), np.zeros((2 * m, 1))])
@@ -200,19 +190,6 @@ def _best(c: Array, A: Array, b: Array) -> Array | None:
     except SolverError:
         return None
     return found.x if isinstance(found, Optimum) and found.value > POSITIVE else None
-
-
-def _null_space(rows: Array) -> Array:
-    """Return orthonormal columns that `rows` maps to zero."""
-    if not rows.size:
-        return np.eye(rows.shape[1])
-    _, values, right = np.linalg.svd(rows)
-    return right[int((values > DEPENDENT).sum()) :].T
-
-
-def _complement(wrenches: Array) -> Array:
-    """Return orthonormal columns that are orthogonal to all of the wrenches (6, n)."""
-    return _null_space(wrenches.T) if wrenches.size else np.eye(WRENCH)
 
 
 def search_interval(points: Array, units: Array) -> FrictionInterval:
@@ -238,7 +215,8 @@ def _searched(ends: "Ends") -> "Ends":
             break
         trial = min(trial, LARGEST_FRICTION)
         answer = _asked(arms, units, trial)
-        ends.learn(trial, answer)
+        ends.close(answer.forces, trial)
+        ends.open(answer.twist)
         if ends.lower < trial < ends.upper:
             _try_evened(ends, trial, answer.forces)
         ends.decided(trial)
@@ -265,7 +243,9 @@ def _try_little(ends: "Ends") -> None:
         ends.close(combined(every, friction, ends.units), friction, exactly=True)
         friction *= 2.0
     if ends.forces is None and ends.lower < FRICTIONLESS:
-        ends.learn(FRICTIONLESS, _asked(ends.arms, ends.units, FRICTIONLESS))
+        answer = _asked(ends.arms, ends.units, FRICTIONLESS)
+        ends.close(answer.forces, FRICTIONLESS)
+        ends.open(answer.twist)
 
 
 def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
@@ -276,9 +256,9 @@ def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
     forces are as deep as others.
     """
     G, alike = grasp_map(ends.arms), np.full(len(ends.arms), friction)
-    for _ in range(EVENED):
+    for _ in range(3):
         pushes, _ = normal_and_tangential(forces, ends.units)
-        pushes = np.maximum(pushes, FAINTEST * np.abs(pushes).max())
+        pushes = np.maximum(pushes, 1e-10 * np.abs(pushes).max())
         if not pushes.min() > 0.0:
             return
         scaled = np.repeat(pushes, 3)
@@ -342,11 +322,6 @@ class Ends:
                 forces = exact
         return FrictionInterval(self.lower, self.upper, *contacts, forces, self.twist)
 
-    def learn(self, friction: float, answer: Answer) -> None:
-        """Move both ends as far as the program's answer at a friction proves."""
-        self.close(answer.forces, friction)
-        self.open(answer.twist)
-
     def decided(self, friction: float) -> None:
         """Look farther away from a friction at which nothing was proved, or give up there."""
         undecided = self.lower < friction < self.upper
@@ -366,16 +341,13 @@ class Ends:
         tried = [needed + share * (friction - needed) for share in PROOF_SHARES]
         for enough in (friction,) if exactly else (*tried, friction):
             enough = max(enough, FRICTIONLESS)
-            below = enough <= friction and enough < self.upper
-            if below and self._closes(forces, enough):
+            if not (enough <= friction and enough < self.upper):
+                continue
+            alike = np.full(len(self.arms), enough)
+            easy = not self.strict and proves_closure(forces, self.arms, self.units, alike)
+            if easy or closes(forces, self.points, self.units, enough):
                 self.upper, self.forces = enough, forces
                 return
-
-    def _closes(self, forces: Array, friction: float) -> bool:
-        alike = np.full(len(self.arms), friction)
-        if not self.strict and proves_closure(forces, self.arms, self.units, alike):
-            return True
-        return closes(forces, self.points, self.units, friction)
 
     def open(self, twist: Array) -> None:
         """Raise the lower end to the friction up to which a twist separates."""
@@ -421,7 +393,7 @@ def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tupl
         for _ in range(2):  # once more for what rounding leaves
             twist = twist - np.linalg.lstsq(resting, resting @ twist, rcond=NEARLY_AT_REST)[0]
     along, across = normal_and_tangential(rows[~slowest] @ twist, normals[~slowest])
-    if not np.linalg.norm(twist) > STALLED:
+    if not np.linalg.norm(twist) > 1e-3:  # noqa: PLR2004 - what is left is only rounding
         return twist, 0.0
     with np.errstate(over="ignore"):  # contacts that hardly slide are separated at any friction
         ratios = -along / np.maximum(across, SMALLEST_NORMAL)

@@ -342,22 +342,24 @@ class TaskLimit(NamedTuple):
 
 def task_limits(wrenches: WrenchSet, measure: Measure) -> list[TaskLimit]:
     """Find the largest multiple of each load of a task that contacts in force closure resist."""
-    return [_limit(wrenches, load) for load in measure.loads]
-
-
-def _limit(wrenches: WrenchSet, load: Array) -> TaskLimit:
-    (k, n), size = (len(wrenches.friction), wrenches.G.shape[1]), float(np.linalg.norm(load))
+    k, n = len(wrenches.friction), wrenches.G.shape[1]
     parts, sides = force_rows(wrenches.friction, 3)
     rows = np.vstack([wrenches.G, parts.sum(axis=0), -parts, sides])
-    A = np.column_stack([rows, np.append(load / size, np.zeros(1 + k + n))])
-    q, b = np.append(np.zeros(n), -1.0), np.zeros(len(A))
+    q, b = np.append(np.zeros(n), -1.0), np.zeros(len(rows))
     b[WRENCH] = 1.0
-    answer = minimize(ConicProgram(q, A, b, WRENCH + 1, k, (3,) * k))
-    multiple = float(answer.x[-1]) / size
-    if not multiple > 0.0:
-        raise SolverError("a load of a task has no resisted multiple although contacts are closed")
-    # the multipliers have z.load = |load|, so that their demand is positive the other way
-    return TaskLimit(multiple, answer.x[:-1], -answer.z[:WRENCH] / size)
+    found = list[TaskLimit]()
+    for load in measure.loads:
+        size = float(np.linalg.norm(load))
+        A = np.column_stack([rows, np.append(load / size, np.zeros(1 + k + n))])
+        answer = minimize(ConicProgram(q, A, b, WRENCH + 1, k, (3,) * k))
+        multiple = float(answer.x[-1]) / size
+        if not multiple > 0.0:
+            raise SolverError(
+                "a load of a task has no resisted multiple although contacts are closed"
+            )
+        # the multipliers have z.load = |load|, so that their demand is positive the other way
+        found.append(TaskLimit(multiple, answer.x[:-1], -answer.z[:WRENCH] / size))
+    return found
 
 
 def _limiting_twist(wrenches: WrenchSet, load: Array) -> Array:

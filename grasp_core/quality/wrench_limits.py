@@ -322,24 +322,18 @@ def limit_of(body: WrenchBody, wrench: Array) -> WrenchLimit:
 
 def attains(body: WrenchBody, found: WrenchLimit) -> bool:
     """Return whether the forces are allowed and balance the limit's multiple of the wrench."""
-    shares = _shares(body, found).reshape(1, -1)
+    shares = np.einsum("kij,ki->kj", body.frames, found.forces) / body.max_normal_force
+    if body.lengths is not None and found.torques is not None:
+        turns = found.torques / body.max_normal_force
+        # a torque that a contact cannot transmit is in no cone
+        lacking = np.where(turns == 0.0, 0.0, np.inf)
+        turns = np.divide(turns, body.lengths, out=lacking, where=body.lengths > 0.0)
+        shares = np.column_stack([shares, turns])
     load = found.limit / body.max_normal_force * body.about_middle(found.wrench)
     torques = body.motors.torques(found.forces)
     # rows of torques are met as all rows of the program are, by shares of the motors' limits
-    balanced = body.holds(shares, load[None], HELD * body.bounded.size)
+    balanced = body.holds(shares.reshape(1, -1), load[None], HELD * body.bounded.size)
     return balanced and body.is_strong_enough(torques[None], HELD * np.maximum(1.0, body.strongest))
-
-
-def _shares(body: WrenchBody, found: WrenchLimit) -> Array:
-    """Return the local forces of a limit over the largest normal force, (k, 3) or (k, 4)."""
-    shares = np.einsum("kij,ki->kj", body.frames, found.forces) / body.max_normal_force
-    if body.lengths is None or found.torques is None:
-        return shares
-    arms, torques = body.lengths, found.torques / body.max_normal_force
-    # a torque that a contact cannot transmit is in no cone
-    lacking = np.where(torques == 0.0, 0.0, np.inf)
-    turns = np.divide(torques, arms, out=lacking, where=arms > 0.0)
-    return np.column_stack([shares, turns])
 
 
 def bounds(body: WrenchBody, found: WrenchLimit) -> bool:

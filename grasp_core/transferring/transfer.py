@@ -232,7 +232,12 @@ class _Judge:
             self._contact(finger, face, contact)
             for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True))
         )
-        lost = [self._loss(each) for each in contacts if each.contact is None]
+        lost = list[str]()
+        for each in (each for each in contacts if each.contact is None):
+            near = f"no face is within {math.degrees(self.rule.angle):.4g} deg of it"
+            if math.isfinite(each.distance):
+                near = f"the nearest face like it is {MM * each.distance:.2f} mm away"
+            lost.append(f"finger {each.finger} has lost face {each.old_face}: {near}")
         if lost:
             return CarriedGrasp(grasp, "gone", "; ".join(lost), contacts, before, None, None)
         name = _free_id(_id_on(grasp, contacts), taken)
@@ -264,14 +269,6 @@ class _Judge:
         if place is None:
             return CarriedContact(finger, face, None, None, near.distance, turn)
         return CarriedContact(finger, face, place.part.face, place.contact, place.distance, turn)
-
-    def _loss(self, found: CarriedContact) -> str:
-        """Say which finger has lost which face, and how far the nearest like face is."""
-        if math.isfinite(found.distance):
-            near = f"the nearest face like it is {MM * found.distance:.2f} mm away"
-        else:
-            near = f"no face is within {math.degrees(self.rule.angle):.4g} deg of it"
-        return f"finger {found.finger} has lost face {found.old_face}: {near}"
 
     def _before(self, grasp: Grasp) -> GraspFigures:
         seated = Seated(self.old, grasp.faces, grasp.contacts, 0.0)

@@ -52,13 +52,6 @@ def test_critical_frictions_at_the_face_centres_of_a_regular_solid(name, expecte
     assert seen == expected
 
 
-def test_a_critical_friction_of_zero_is_bracketed_to_a_few_millionths():
-    """Closure is proved at 2e-6 for each of these contacts."""
-    zeros = [n for n in quadruples(SOLIDS["dodecahedron"]) if cotangent_of_cap(n) < 1e-9]
-    assert all(gc.force_closure(-normals, normals, 2e-6).closed for normals in zeros)
-    assert max(gc.critical_friction(-normals, normals) for normals in zeros) < 4e-6
-
-
 def wedge_contacts(length, l, m, s):  # noqa: E741 - the oracle's letters
     """Two contacts on either end of a double-wedge bar."""
     x = length + 1.0 - s

@@ -230,17 +230,6 @@ def test_contacts_on_edges_and_corners_have_regions_beside_them():
     assert tested >= 4
 
 
-@pytest.mark.parametrize("scale", [5e-4, 10.0])
-def test_small_and_large_objects(scale):
-    body, grasp, proved = found("wedge", "concurrent", cones=500)
-    factor = scale / body.radius
-    sized = gc.Polyhedron.from_mesh(factor * body.vertices, body.triangles, name="sized")
-    (same,) = gc.plan(sized, 0.5, families=("concurrent",), limit=1).grasps
-    again = certify_regions(sized, same, 0.5, max_cones=500)
-    assert same.faces == grasp.faces
-    assert again.radius == pytest.approx(factor * proved.radius, rel=0.02)
-
-
 def test_the_largest_friction_and_one_next_to_the_critical():
     body, grasp, _ = found("wedge", "concurrent", cones=64)
     assert certify_regions(body, grasp, 1e3, max_cones=300).verify()
