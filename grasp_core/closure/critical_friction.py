@@ -150,8 +150,7 @@ def _upper_ends(points: Array, units: Array) -> Array:
 def _at_once(points: Array, normals: Array) -> tuple[NDArray[np.bool_], Array, Array, Array]:
     """Search for narrow intervals in compiled code, and prove both of their ends.
 
-    Gives for which sets one was found; upper ends, (g,); forces that prove closure there,
-    (g, k, 3); and twists at unit size that separate just below, (g, 6).
+    Gives where one was found; upper ends, and forces and twists that prove closure just there.
     """
     arms, _, _ = unit_size(points)
     units = np.array(normals)  # writable, like all that the search is compiled for
@@ -180,9 +179,8 @@ def _at_once(points: Array, normals: Array) -> tuple[NDArray[np.bool_], Array, A
 def _separate(twists: Array, arms: Array, normals: Array, friction: Array) -> NDArray[np.bool_]:
     """Return which twists leave each contact at rest, or departing as steeply as (2) asks.
 
-    Each contact may move by the rounding of its own speed only. A bound on the rounding of the
-    whole twist would accept twists that do not separate, where the margin grows with the square of
-    the friction.
+    Each contact may move by the rounding of its own speed only: that of the whole twist is too much
+    where the margin grows with the square of the friction.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         sizes = np.linalg.norm(twists, axis=1)[:, None]

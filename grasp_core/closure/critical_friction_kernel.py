@@ -110,7 +110,6 @@ def _set_up(arms: Array, normals: Array, axes: Array, rows: Array, mean: Array) 
 
 @loop("numpy")
 def _orthonormal(normal: Array, axes: Array) -> None:
-    """Fill in a unit normal and two tangents as an orthonormal frame, (3, 3)."""
     far = 0
     for j in range(3):
         axes[0, j] = normal[j]
@@ -171,7 +170,6 @@ def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
 
 @loop("numpy")
 def _least_ratio(rows: Array, z: Array, still: float, twist: Array) -> float:
-    """Return the least ratio of leaving to sliding over the contacts that are not at rest."""
     least = MOST_FRICTION
     for i in range(len(rows)):
         if z[i, 0] > still:

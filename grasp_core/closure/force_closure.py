@@ -266,10 +266,9 @@ def force_closure(
 
 
 def closing_margins(positions: Array, normals: Array, friction: float) -> Array:
-    """Compute the margins, (g,), that `force_closure` gives for many sets of contacts.
+    """Compute the margins, (g,), that `force_closure` gives for many closed sets of contacts.
 
-    They are above zero, and as there up to rounding; NaN where compiled code does not prove
-    closure, which tells nothing: `force_closure` decides such contacts.
+    They are NaN where compiled code does not prove closure, which tells nothing.
     """
     closed, margins, _, _ = _decided(positions, normals, friction)
     return np.where(closed, margins, math.nan)

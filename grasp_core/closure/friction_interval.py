@@ -197,10 +197,9 @@ def _balanced(
 
 
 def _eliminated(table: list[list[int]]) -> int:
-    """Solve six equations in whole numbers, rows of (coefficients, right side), in place.
+    """Solve six equations (coefficients, right side) in place by Bareiss's elimination.
 
-    Bareiss's elimination divides without remainder. It gives the determinant up to its sign, which
-    is the last column's denominator; 0 if singular.
+    It divides without remainder, and gives the last column's denominator; 0 if singular.
     """
     before = 1
     for k in range(WRENCH):
@@ -251,17 +250,13 @@ def _solution(rows: list[Exact], right: Exact) -> Exact | None:
 
 
 def _inside(force: list[int], normal: list[int], friction: float) -> bool:
-    """Return whether a force is inside its friction cone, (1)."""
     above, below = friction.as_integer_ratio()
     along, across = _squares(force, normal)
     return _dot(force, normal) > 0 and across * below**2 < above**2 * along
 
 
 def _departs(velocity: Exact, normal: Exact, slope: Fraction | None, rest: Fraction) -> bool:
-    """Return whether a contact departs steeply enough, (2), or its speed is at most `rest`.
-
-    `slope` is the square of the friction; with None, (2) must hold for every friction.
-    """
+    """Return whether a contact departs by (2) with mu^2 = slope, or any if None, or is at rest."""
     if _dot(velocity, velocity) <= rest**2:
         return True
     along, across = _squares(velocity, normal)

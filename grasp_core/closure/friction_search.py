@@ -251,9 +251,8 @@ def _try_little(ends: "Ends") -> None:
 def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
     """Solve the margin program again in units of the pushes of its own answer.
 
-    Near a threshold, some contacts push much less than others. The depth of their forces in the
-    cones is then too small for a solver to tell from zero. In units of their own pushes, these
-    forces are as deep as others.
+    Near a threshold, some contacts push so much less than others that a solver cannot tell their
+    depth from zero. In units of their own pushes, they are as deep.
     """
     G, alike = grasp_map(ends.arms), np.full(len(ends.arms), friction)
     for _ in range(3):

@@ -91,7 +91,6 @@ def least_cone_sum(
 
 @loop("numpy")
 def _values(mean: Array, pair: Array, y: Array) -> tuple[float, float, float]:
-    """Compute the values of the programs (1) and (2), and the sum of s_i.z_i."""
     primal = dual = gap = 0.0
     for i in range(pair.shape[1]):
         primal += pair[0, i, 0]
@@ -147,7 +146,6 @@ def _factor(columns: Array, W: Array, V: Array, R: Array) -> bool:
 
 @loop("numpy")
 def _reflect(V: Array, v: int, X: Array, x: int) -> None:
-    """Apply the v-th reflection to the x-th of some vectors."""
     share = _dot(V, v, X, x)
     for i in range(V.shape[1]):
         for j in range(3):

@@ -145,10 +145,7 @@ class SoftContacts:
         return forces, local[:, 3] * self.reach * self.size
 
     def local(self, forces: Array, torques: Array) -> Array:
-        """Return the local coordinates (k, 4) of forces (k, 3) and torques about normals (k,).
-
-        What a contact cannot transmit is left out.
-        """
+        """Return local coordinates, (k, 4), of what contacts can transmit of forces and torques."""
         parts = np.einsum("kij,ki->kj", self.frames, forces)
         turning = torques / self.size
         spread = np.column_stack([np.ones_like(self.friction), *[self.friction] * 2, self.reach])
@@ -156,10 +153,7 @@ class SoftContacts:
         return np.divide(every, spread, out=np.zeros_like(every), where=spread > 0.0)
 
     def missed(self, forces: Array, torques: Array) -> float:
-        """Compute by how much forces and torques miss balance, at unit size.
-
-        Parts that friction or torsion of zero does not allow count alike.
-        """
+        """Compute by how much forces and torques miss balance and what contacts can transmit."""
         local = self.local(forces, torques)
         kept, turned = self.in_space(local)
         parts = (forces - kept, (torques - turned) / self.size, self.matrix @ local.ravel())

@@ -137,12 +137,7 @@ class WrenchSet(ByValue):
         )
 
     def sound(self) -> bool:
-        """Return whether this is the wrench set of some contacts, up to `SAME_FRAME`.
-
-        The force rows of `G` must be an orthonormal frame for each contact, and the torque rows
-        those of the frame's vectors at one point: then the torque rows times the transposed frame
-        form a skew matrix.
-        """
+        """Return whether this is the wrench set of some contacts, up to `SAME_FRAME`."""
         k = len(self.friction) if is_array(self.friction, None) else 0
         known = is_a(self.norm, str) and self.norm in get_args(Norm)
         if not (known and k and are_frictions(self.friction, k)):
@@ -154,7 +149,8 @@ class WrenchSet(ByValue):
         square = frames @ frames.transpose(0, 2, 1)
         levers = turns @ frames.transpose(0, 2, 1)
         slack = SAME_FRAME * np.maximum(np.abs(levers).max(axis=(1, 2), keepdims=True), 1.0)
-        # G = (F; [x] F) for a frame F at the point x, so that F F' = 1 and G_torque F' = [x]
+        # G = (F; [x] F) for an orthonormal frame F at each contact's point x, so that F F' = 1,
+        # and G_torque F' = [x] is skew
         return (
             bool((np.abs(square - np.eye(3)) <= SAME_FRAME).all())
             and bool((np.abs(levers + levers.transpose(0, 2, 1)) <= slack).all())
@@ -255,11 +251,10 @@ def _are_torques(columns: Array, normals: Array) -> bool:
 
 
 def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
-    """Find the wrench nearest to zero of forces whose normal parts sum to one.
+    """Find forces, whose normal parts sum to one, of the wrench nearest to zero.
 
-    Gives local forces of that wrench, by a program that always has a solution, and the direction
-    from it to zero, (m,): a twist in which no contact has more support than minus the distance. If
-    the distance is positive, the twist separates the contacts' wrenches from zero.
+    The direction from it to zero, (m,), is a twist in which no contact has more support than minus
+    the distance. The program always has a solution.
     """
     m, n = wrenches.G.shape
     k, width = len(wrenches.friction), wrenches.width

@@ -154,7 +154,6 @@ def _begin(G: Array, edges: Array, forces: Array, points: Array) -> float:
 
 @loop()
 def _shift(wrenches: Array, origin: Array, rest: Array) -> float:
-    """Fill in the wrenches relative to an origin; return the largest of their components."""
     largest = 0.0
     for i in range(len(wrenches)):
         for j in range(D):
@@ -177,7 +176,6 @@ def _farthest(rest: Array) -> tuple[int, float]:
 
 @loop()
 def _flatten(rest: Array, chosen: int, length: float) -> None:
-    """Subtract from each row its component along a chosen row."""
     unit = np.empty(D)
     for j in range(D):
         unit[j] = rest[chosen, j] / length

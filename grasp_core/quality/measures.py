@@ -307,8 +307,7 @@ def _without_rests(wrenches: WrenchSet, loads: Array, forces: Array, ball: Ferra
 def _least(wrenches: WrenchSet, measure: Measure, twists: list[Array]) -> tuple[Array, float]:
     """Return the twist, at unit length, that allows the least multiple, and the multiple.
 
-    Forces along the axes are tried as well, so that it is finite. Of twists whose multiples are
-    equal but for the accuracy of programs the first counts, the same on every machine.
+    Forces along the axes make it finite. Of multiples that programs find equal the first counts.
     """
     axes = np.eye(WRENCH)[:3]
     every = _units(np.array([*twists, *axes, *-axes]))

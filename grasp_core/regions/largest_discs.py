@@ -72,9 +72,7 @@ class Grounds:
     """The pieces that contacts may stand on, at unit size, with friction and the effort allowed."""
 
     pieces: tuple[FacePiece, ...]
-    """Convex piece of a face for each contact, with lengths about any common origin."""
     friction: Array
-    """Coulomb coefficient of each contact, (k,)."""
     cones: int
     """Largest number of cones in one proof."""
 
@@ -118,10 +116,9 @@ class Grounds:
         return self.around(ys, polygons, radii)
 
     def axes(self, ys: Array) -> Array:
-        """Choose six twists as rows, (6, 6), that move the contacts at similar speeds.
+        """Choose six twists as rows that move contacts at similar speeds, tangential ones times mu.
 
-        Tangential speeds count in proportion to the friction. With these twists, long objects need
-        no more cones than round ones.
+        With these, long objects need no more cones than round ones.
         """
         motions = list[Array]()
         for (x, y, z), F, mu in zip(self.points(ys), self.frames, self.friction, strict=True):
@@ -136,10 +133,9 @@ class Grounds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proved:
-    """Discs proved to keep force closure, and larger discs that contain a counterexample."""
+    """Discs around `ys` proved to keep force closure, and larger ones with a counterexample."""
 
     ys: Array
-    """Centres of the discs, in plane coordinates, (k, 2)."""
     radius: float
     cover: TwistCover
     limit: float

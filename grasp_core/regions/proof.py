@@ -167,10 +167,7 @@ def power_of(F: Array, twists: Array) -> tuple[Array, Array]:
 
 
 def summed(rays: Array, axes: Array) -> Array:
-    """Return the sum of the lengths that make up each twist, (m, r), for bounds on rounding.
-
-    The twists themselves are shorter where axes nearly cancel each other.
-    """
+    """Return the sum of the lengths that make up each twist, (m, r), also where they cancel."""
     return np.linalg.norm(np.abs(rays) @ np.abs(axes), axis=2)
 
 

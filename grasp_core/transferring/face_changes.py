@@ -267,7 +267,6 @@ def _successor(
 
 
 def _distance(face: Face, point: Array) -> float:
-    """Return the distance of a point from a planar face [m]."""
     feet = (nearest_in(piece, face.normal, point) for piece in face.pieces)
     return min(float(np.linalg.norm(foot - point)) for foot in feet)
 
