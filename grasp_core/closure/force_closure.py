@@ -48,7 +48,7 @@ from grasp_core.arrays import (
     of_order_one,
 )
 from grasp_core.by_value import ByValue, trusted
-from grasp_core.closure import soft_closure, soft_contacts
+from grasp_core.closure import proofs, soft_closure, soft_contacts
 from grasp_core.closure.contacts import (
     contact_arrays,
     contact_frictions,
@@ -59,15 +59,6 @@ from grasp_core.closure.contacts import (
     unit_size,
 )
 from grasp_core.closure.decision import DECIDED, FAR, PRECISE, decide, deepest_forces
-from grasp_core.closure.proofs import (
-    margin_ceiling,
-    margin_ceilings,
-    proved_margin,
-    proved_margins,
-    proves_closure,
-    refutes_closure,
-    without_giants,
-)
 from grasp_core.closure.soft_contacts import SoftContacts, are_torsions, contact_torsions
 from grasp_core.errors import UndecidedError
 from grasp_core.values import Contact, Grasp
@@ -180,7 +171,7 @@ class ClosureCertificate(ByValue):
         if soft is not None:
             ceiling = soft_contacts.margin_ceiling(soft, twist, caution)
         else:
-            ceiling = margin_ceiling(twist, arms, normals, self.friction, caution)
+            ceiling = proofs.margin_ceiling(twist, arms, normals, self.friction, caution)
         return -math.inf if ceiling <= FAR_BELOW else ceiling
 
     def _proved_by(self, forces: Array, arms: Array, normals: Array, caution: float) -> float:
@@ -192,7 +183,7 @@ class ClosureCertificate(ByValue):
         # without friction `proved_margin` sees only normal parts, so slides are checked here
         if (normal_and_tangential(forces, normals)[1][self.friction == 0.0] > SUMMED).any():
             return -math.inf
-        return proved_margin(forces, arms, normals, self.friction, caution)
+        return proofs.proved_margin(forces, arms, normals, self.friction, caution)
 
     def _proved_with_torques(self, contacts: SoftContacts, forces: Array, caution: float) -> float:
         torques = self.torques
@@ -311,15 +302,15 @@ def _decided(
     arms, centers, sizes = unit_size(positions)
     every = np.full(count, friction)
     forces, twists, margins = deepest_forces(arms, normals, every, PRECISE)
-    forces, twists = without_giants(forces, 2), without_giants(twists, 1)
+    forces, twists = proofs.without_giants(forces, 2), proofs.without_giants(twists, 1)
     lower, upper = margins.T
     with np.errstate(invalid="ignore"):  # a search that broke down ends with NaN
         close = np.abs(upper - lower) <= DECIDED * np.maximum(friction, np.abs(lower))
         close &= np.abs(lower) <= FAR * friction
         close &= (np.abs(np.linalg.norm(normals, axis=-1) - 1.0) <= UNIT_SLACK).all(axis=-1)
         closed, separated = close & (lower > DECIDED), close & (upper < -DECIDED)
-    closed &= proves_closure(forces, arms, normals, every[:, None])
-    separated &= refutes_closure(twists, arms, normals, every[:, None])
+    closed &= proofs.proves_closure(forces, arms, normals, every[:, None])
+    separated &= proofs.refutes_closure(twists, arms, normals, every[:, None])
     found = np.full(count, math.nan)
     pushes = np.einsum("gki,gki->g", forces, normals)
     forces = forces / np.where(closed, pushes, 1.0)[:, None, None]
@@ -333,8 +324,8 @@ def _decided(
 
 def _verified_closed(forces: Array, arms: Array, normals: Array, friction: float) -> Array:
     """Return the margins that forces prove, (g,); NaN where `verify` would not accept them."""
-    found = proved_margins(forces, arms, normals, friction, CAUTION)
-    verified = (found > 0.0) & (found <= proved_margins(forces, arms, normals, friction))
+    found = proofs.proved_margins(forces, arms, normals, friction, CAUTION)
+    verified = (found > 0.0) & (found <= proofs.proved_margins(forces, arms, normals, friction))
     wrenches = np.concatenate([forces.sum(axis=1), cross(arms, forces).sum(axis=1)], axis=1)
     pushes = np.einsum("gki,gki->g", forces, normals)
     verified &= np.abs(wrenches).max(axis=1, initial=0.0) <= SUMMED
@@ -347,7 +338,8 @@ def _verified_open(twists: Array, arms: Array, normals: Array, friction: float) 
     found, bound = (
         np.where(ceilings <= FAR_BELOW, -math.inf, ceilings)
         for ceilings in (
-            margin_ceilings(twists, arms, normals, friction, caution) for caution in (CAUTION, 1.0)
+            proofs.margin_ceilings(twists, arms, normals, friction, caution)
+            for caution in (CAUTION, 1.0)
         )
     )
     return np.where((found <= 0.0) & (found >= bound), found, math.nan)

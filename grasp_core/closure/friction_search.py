@@ -63,10 +63,8 @@ GROWTH = ((0.1 * FRICTIONLESS, 3.0), (1e-3, 2.0), (math.inf, 10.0))
 """Pairs of a distance and a factor: up to that distance from an undecided friction, the next trial
 is that factor farther away."""
 NUDGE = 0.4
-OVERSHOOT = 1.0
-"""Trials pass the expected threshold, to close in from both sides: by `NUDGE` times the accuracy,
-and by `OVERSHOOT` times the error of Newton's method, which is its step's square over the friction.
-"""
+"""Trials pass the expected threshold, to close in from both sides: by this share of the accuracy,
+and by the error of Newton's method, which is its step's square over the friction."""
 HALVING = 6
 """Number of trials after which the interval is halved once, whatever Newton's method suggests."""
 MOST_TRIALS = 80
@@ -401,7 +399,7 @@ def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tupl
 
 def slightly_past(root: float, trial: float, lower: float, upper: float) -> float:
     """Move a root by Newton's method past itself, towards the wider side of an interval."""
-    past = NUDGE * FRICTION_ACCURACY * root + OVERSHOOT * (root - trial) ** 2 / root
+    past = NUDGE * FRICTION_ACCURACY * root + (root - trial) ** 2 / root
     if upper - root > root - lower:
         return root + min(past, 0.5 * (upper - root))
     return root - min(past, 0.5 * (root - lower))

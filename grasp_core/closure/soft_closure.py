@@ -32,6 +32,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.closure import friction_search
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.decision import (
     DECIDED,
@@ -41,14 +42,6 @@ from grasp_core.closure.decision import (
     touching_twist,
 )
 from grasp_core.closure.friction_interval import FRICTIONLESS, NEARLY_AT_REST
-from grasp_core.closure.friction_search import (
-    FIRST_TRIAL,
-    FRICTION_ACCURACY,
-    HALVING,
-    MOST_TRIALS,
-    NUDGE,
-    slightly_past,
-)
 from grasp_core.closure.proofs import SMALLEST_NORMAL
 from grasp_core.closure.soft_contacts import (
     LOCAL,
@@ -188,15 +181,17 @@ def friction_interval(contacts: SoftContacts, highest: float) -> SoftInterval:
     found = SoftInterval(contacts, 0.0, math.inf)
     start = 2.0 * highest if highest < 0.5 * LARGEST_FRICTION else LARGEST_FRICTION
     _try(found, start)
-    trial, away = min(FIRST_TRIAL, 0.5 * highest), 0.0
-    for count in range(MOST_TRIALS):
-        narrow = found.upper - found.lower <= FRICTION_ACCURACY * found.lower
+    trial, away = min(friction_search.FIRST_TRIAL, 0.5 * highest), 0.0
+    for count in range(friction_search.MOST_TRIALS):
+        narrow = found.upper - found.lower <= friction_search.FRICTION_ACCURACY * found.lower
         if narrow or found.upper <= FRICTIONLESS or not math.isfinite(found.upper):
             break
         root = _try(found, max(trial, FRICTIONLESS))
         if found.lower < trial < found.upper:
             # nothing is proved at the trial, probably the threshold: close in from both sides
-            away = max(WIDENED * away, NUDGE * FRICTION_ACCURACY * trial)
+            away = max(
+                WIDENED * away, friction_search.NUDGE * friction_search.FRICTION_ACCURACY * trial
+            )
             above = trial + away if trial + away < found.upper else found.upper
             below = max(trial - away, found.lower)
             _try(found, above)
@@ -205,8 +200,8 @@ def friction_interval(contacts: SoftContacts, highest: float) -> SoftInterval:
                 break
             continue
         lower, upper, away = found.lower, found.upper, 0.0
-        if lower < root < upper and count % HALVING != HALVING - 1:
-            trial = slightly_past(root, trial, lower, upper)
+        if lower < root < upper and count % friction_search.HALVING != friction_search.HALVING - 1:
+            trial = friction_search.slightly_past(root, trial, lower, upper)
         else:
             trial = math.sqrt(lower * upper) if lower > 0.0 else 0.1 * upper
     return found

@@ -232,7 +232,7 @@ def face_changes(old: Polyhedron, new: Polyhedron, rule: Likeness) -> tuple[Face
             and (found := _successor(face, new, free, wide, math.inf)) is not None
         ):
             free.remove(found)
-            turn = _turn(face, new.faces[found])
+            turn = turn_of(face.normal, new.faces[found].normal)
             changes[index] = replace(change, likely=found, likely_turn=turn)
     return tuple(changes)
 
@@ -281,7 +281,7 @@ def _change(
     along = float(now.normal @ face.normal)
     # (1), positive outwards
     distance = float(now.normal @ (face.centroid - now.centroid)) / along
-    turn = _turn(face, now)
+    turn = turn_of(face.normal, now.normal)
     moved = abs(distance) > MOVED * size or turn > TURNED
     return FaceChange(index, successor, distance, turn, face.area, now.area, moved, normal, center)
 
@@ -291,7 +291,7 @@ def _triple(numbers: Array) -> Triple:
     return x, y, z
 
 
-def _turn(face: Face, now: Face) -> float:
-    """Return the angle between the normals of two faces [rad]."""
-    sine = float(np.linalg.norm(cross(face.normal, now.normal)))
-    return math.atan2(sine, float(now.normal @ face.normal))
+def turn_of(normal: Array, now: Array) -> float:
+    """Return the angle between two normals [rad]."""
+    sine = float(np.linalg.norm(cross(normal, now)))
+    return math.atan2(sine, float(now @ normal))

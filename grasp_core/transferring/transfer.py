@@ -27,7 +27,6 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from grasp_core.arrays import cross
 from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import coefficient, instance, several
 from grasp_core.closure.critical_friction import critical_friction
@@ -50,6 +49,7 @@ from grasp_core.transferring.face_changes import (
     face_changes,
     likeness,
     place_of,
+    turn_of,
 )
 from grasp_core.values import FINGERS, Contact, Grasp, Witness, four
 
@@ -264,8 +264,7 @@ class _Judge:
         near = place or place_of(self.new, at, normal, self.rule, math.inf)
         if near is None:
             return CarriedContact(finger, face, None, None, math.inf, 0.0)
-        sine = float(np.linalg.norm(cross(normal, near.contact.normal)))
-        turn = math.atan2(sine, float(normal @ near.contact.normal))
+        turn = turn_of(normal, near.contact.normal)
         if place is None:
             return CarriedContact(finger, face, None, None, near.distance, turn)
         return CarriedContact(finger, face, place.part.face, place.contact, place.distance, turn)
