@@ -67,9 +67,9 @@ from grasp_core.records.grasps_files import save_grasps as save_grasps
 from grasp_core.regions.certificates import CertifiedRegions as CertifiedRegions
 from grasp_core.regions.certify_regions import certify_regions as certify_regions
 from grasp_core.transferring.face_changes import FaceChange as FaceChange
-from grasp_core.transferring.judging import GraspFigures as GraspFigures
 from grasp_core.transferring.transfer import CarriedContact as CarriedContact
 from grasp_core.transferring.transfer import CarriedGrasp as CarriedGrasp
+from grasp_core.transferring.transfer import GraspFigures as GraspFigures
 from grasp_core.transferring.transfer import Transfer as Transfer
 from grasp_core.transferring.transfer import transfer as transfer
 from grasp_core.values import Contact as Contact

@@ -1,7 +1,9 @@
 """Checks contacts, and builds their frames and the matrices from contact forces to wrenches.
 
 A wrench is (force, torque), (6,), with the torque about a stated centre. A contact force is what
-the finger applies to the object, in the object's frame.
+the finger applies to the object, in the object's frame. In this room positions, normals and forces
+are (k, 3), a friction is (k,), and many sets of contacts have an axis before these; positions and
+lengths are in metres, except for arms and twists at unit size (see `unit_size`).
 """
 
 import hashlib
@@ -12,7 +14,15 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import SMALLEST_SIZE, Array, frozen, frozen_each, frozen_units, real_array
+from grasp_core.arrays import (
+    SMALLEST_SIZE,
+    Array,
+    cross,
+    frozen,
+    frozen_each,
+    frozen_units,
+    real_array,
+)
 from grasp_core.checked import LARGEST_FRICTION, instance, several, shown
 from grasp_core.errors import InputError
 from grasp_core.frames import plane_tangents
@@ -25,7 +35,7 @@ WRENCH = 6
 
 
 def stacked(contacts: Iterable[Contact]) -> tuple[Array, Array]:
-    """Return the positions [m] and inward normals of contacts, each (k, 3)."""
+    """Return the positions and inward normals of contacts."""
     listed = tuple(contacts)
     positions = np.array([contact.position for contact in listed])
     return positions, np.array([contact.normal for contact in listed])
@@ -35,13 +45,14 @@ def contact_arrays(
     positions: ArrayLike | Grasp | Iterable[Grasp] | Sequence[Contact], normals: ArrayLike | None,
     *, many: bool = False,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Return checked positions and normals of one set of contacts, or of many sets.
-
-    Takes `positions` (k, 3) or (g, k, 3) [m].
-    """
+    """Return checked positions and normals of one set of contacts, or of many sets."""
     given: Any = positions
     if normals is None and many:
-        return _of_grasps((given,) if isinstance(given, Grasp) else given)
+        check = partial(instance, kind=Grasp, name="positions", remedy="or pass normals too")
+        listed = [given] if isinstance(given, Grasp) else given
+        grasps = several(listed, check, "positions", "Grasp values")
+        points = np.array([grasp.positions for grasp in grasps]).reshape(-1, FINGERS, 3)
+        return points, np.array([grasp.normals for grasp in grasps]).reshape(-1, FINGERS, 3)
     held = None if many else contacts_in(given)
     if held is not None and normals is not None:
         what = "a Grasp is" if isinstance(given, Grasp) else "Contacts are"
@@ -76,20 +87,8 @@ def contacts_in(given: Any) -> tuple[Contact, ...] | None:
     return several(listed, check, "positions", "Contacts")
 
 
-def _of_grasps(given: Any) -> tuple[Array, Array]:
-    check = partial(instance, kind=Grasp, name="positions", remedy="or pass normals too")
-    grasps = several(given, check, "positions", "Grasp values")
-    shape = (len(grasps), FINGERS, 3)
-    points = np.array([grasp.positions for grasp in grasps], dtype=np.float64).reshape(shape)
-    units = np.array([grasp.normals for grasp in grasps], dtype=np.float64).reshape(shape)
-    return points, units
-
-
 def check_spread(extents: Array, name: str = "positions") -> None:
-    """Refuse contacts that are apart by so little that squares of lengths vanish.
-
-    Takes `extents` (..., 3) [m].
-    """
+    """Refuse contacts whose `extents`, (..., 3), are so small that squares of them vanish."""
     sizes: Array = extents.max(axis=-1)
     tiny = (sizes > 0.0) & (sizes < SMALLEST_SIZE)
     if tiny.any():
@@ -100,10 +99,7 @@ def check_spread(extents: Array, name: str = "positions") -> None:
 
 
 def contact_frictions(friction: ArrayLike, shape: int | tuple[int, int]) -> Array:
-    """Return one checked Coulomb coefficient for each contact.
-
-    Takes `friction` (k,) or (g, k); `shape` (g, k).
-    """
+    """Return one checked Coulomb coefficient for each contact, of a shape (k,) or (g, k)."""
     sizes = (shape,) if isinstance(shape, int) else shape
     values = real_array(friction, "friction")
     if values.ndim < len(sizes):
@@ -119,16 +115,37 @@ def contact_frictions(friction: ArrayLike, shape: int | tuple[int, int]) -> Arra
 
 
 def unit_size(points: Array) -> tuple[Array, Array, Array]:
-    """Scale contacts (..., k, 3) so that the longest arm from their mean has length one.
+    """Return arms from the mean contact over the longest, that centre, and that length.
 
-    Gives arms from the mean contact over the longest, (..., k, 3); that centre, (..., 3) [m]; and
-    that length, (...) [m], which is one where all contacts are in one place.
+    The length is one where all contacts are in one place.
     """
     centers: Array = points.mean(axis=-2)
     arms = points - centers[..., None, :]
     lengths: Array = np.linalg.norm(arms, axis=-1).max(axis=-1)
     sizes = np.where(lengths > 0.0, lengths, 1.0)
     return arms / sizes[..., None, None], centers, sizes
+
+
+def to_center(twist: Array, center: Array, size: Array | float) -> Array:
+    """Move twists (..., 6) [m/s, rad/s] from the frame's origin to the centre, at unit size."""
+    moved = twist[..., :3] + cross(twist[..., 3:], center)
+    return np.concatenate([moved, twist[..., 3:] * np.asarray(size)[..., None]], axis=-1)
+
+
+def to_origin(twist: Array, center: Array, size: Array | float) -> Array:
+    """Move twists (..., 6) at unit size from the centre to the frame's origin."""
+    turning = twist[..., 3:] / np.asarray(size)[..., None]
+    return np.concatenate([twist[..., :3] - cross(turning, center), turning], axis=-1)
+
+
+def keep_arrays(certificate: object, *names: str) -> None:
+    """Copy fields of a frozen value into read-only float arrays; None stays None."""
+    for name in names:
+        array = getattr(certificate, name)
+        if array is not None:
+            kept = real_array(array, name)
+            kept.setflags(write=False)
+            object.__setattr__(certificate, name, kept)
 
 
 def contacts_sha256(contacts: Iterable[Contact]) -> str:
@@ -139,10 +156,7 @@ def contacts_sha256(contacts: Iterable[Contact]) -> str:
 
 
 def grasp_map(positions: Array, center: Array | None = None) -> Array:
-    """Build the matrix that maps stacked contact forces (3k,) to their wrench, (..., 6, 3k).
-
-    Takes `positions` (..., k, 3) [m]; `center` (3,) [m].
-    """
+    """Build the matrix that maps stacked contact forces (3k,) to their wrench, (..., 6, 3k)."""
     arms = positions if center is None else positions - center
     x, y, z = arms[..., 0], arms[..., 1], arms[..., 2]
     G = np.zeros((*arms.shape[:-2], WRENCH, arms.shape[-2], 3))

@@ -25,7 +25,7 @@ narrow, `friction_search` goes program by program, with proofs in rational arith
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 from grasp_core.arrays import Array, cross
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contacts import WRENCH, contact_arrays, normal_and_tangential, unit_size
-from grasp_core.closure.decision import deepest_forces
+from grasp_core.closure.decision import KERNEL, deepest_forces
 from grasp_core.closure.friction_interval import FRICTIONLESS, REPORTED_AS_ZERO, FrictionInterval
 from grasp_core.closure.friction_search import FRICTION_ACCURACY, SHAVED, Ends, search_interval
 from grasp_core.closure.proofs import CHECK_SLACK, RANK, proves_closure
@@ -42,7 +42,6 @@ from grasp_core.closure.soft_contacts import SoftContacts, contact_torsions
 from grasp_core.compiled import compiled
 from grasp_core.values import Contact, Grasp
 
-KERNEL = "grasp_core.closure.critical_friction_kernel"
 NO_FORCE = 1e-100
 """Least normal force that is divided by: a contact that does not push would need infinite friction.
 """
@@ -124,11 +123,12 @@ def critical_friction_interval(
         InputError: Shapes or lengths are wrong.
     """
     points, units = contact_arrays(positions, normals)
-    quick, ends = _at_once(points[None], units[None]), Ends.of(points, units)
+    found, upper, forces, twists = _at_once(points[None], units[None])
+    ends = Ends(points, units, unit_size(points)[0])
     # the quick answer is proved again in rational arithmetic before it is kept
-    if quick.found[0]:
-        ends.close(quick.forces[0], float(quick.upper[0]), exactly=True)
-        ends.open(quick.twists[0])
+    if found[0]:
+        ends.close(forces[0], float(upper[0]), exactly=True)
+        ends.open(twists[0])
     if ends.settled:
         return ends.interval()
     slow, quick_half = search_interval(points, units), ends.interval()
@@ -138,31 +138,20 @@ def critical_friction_interval(
 
 
 def _upper_ends(points: Array, units: Array) -> Array:
-    quick = _at_once(points, units)
-    upper, arms = quick.upper.copy(), unit_size(points)[0]
-    for i in np.flatnonzero(~quick.found):
+    found, upper, _, _ = _at_once(points, units)
+    arms = unit_size(points)[0]
+    for i in np.flatnonzero(~found):
         easy = _close_without_friction(arms[i], units[i])
         upper[i] = 0.0 if easy else search_interval(points[i], units[i]).upper
     upper[upper <= REPORTED_AS_ZERO] = 0.0
     return upper
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Quick:
-    """Narrow intervals of critical friction for many sets of contacts, found in compiled code."""
+def _at_once(points: Array, normals: Array) -> tuple[NDArray[np.bool_], Array, Array, Array]:
+    """Search for narrow intervals in compiled code, and prove both of their ends.
 
-    found: NDArray[np.bool_]
-    """Whether a narrow interval was found and proved for each set, (g,)."""
-    upper: Array
-    """Upper ends of the intervals, (g,)."""
-    forces: Array
-    """Forces that prove closure at `upper`, (g, k, 3)."""
-    twists: Array
-    """Twists that separate just below `upper`, about the mean contact and at unit size, (g, 6)."""
-
-
-def _at_once(points: Array, normals: Array) -> _Quick:
-    """Search for narrow intervals in compiled code, and prove both of their ends."""
+    Gives where one was found; upper ends, and forces and twists that prove closure just there.
+    """
     arms, _, _ = unit_size(points)
     units = np.array(normals)  # writable, like all that the search is compiled for
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
@@ -184,15 +173,14 @@ def _at_once(points: Array, normals: Array) -> _Quick:
     upper[left] = highest[left]
     forces[left], _, _ = deepest_forces(arms[left], units[left], highest[left])
     found[left] = proves_closure(forces[left], arms[left], units[left], highest[left, None])
-    return _Quick(found, upper, forces, twists)
+    return found, upper, forces, twists
 
 
 def _separate(twists: Array, arms: Array, normals: Array, friction: Array) -> NDArray[np.bool_]:
     """Return which twists leave each contact at rest, or departing as steeply as (2) asks.
 
-    Each contact may move by the rounding of its own speed only. A bound on the rounding of the
-    whole twist would accept twists that do not separate, where the margin grows with the square of
-    the friction.
+    Each contact may move by the rounding of its own speed only: that of the whole twist is too much
+    where the margin grows with the square of the friction.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         sizes = np.linalg.norm(twists, axis=1)[:, None]
@@ -204,10 +192,7 @@ def _separate(twists: Array, arms: Array, normals: Array, friction: Array) -> ND
 
 
 def _close_without_friction(arms: Array, normals: Array) -> bool:
-    """Return whether pushes along the normals balance.
-
-    Only the most even pushes are tried.
-    """
+    """Return whether pushes along the normals balance; only the most even ones are tried."""
     along_normals = np.hstack([normals, cross(arms, normals)])
     left, values, _ = np.linalg.svd(along_normals)
     # the projection of equal pushes onto those that balance

@@ -42,10 +42,7 @@ NEAR_ONE = 1e-10
 def search(
     arms: Array, normals: Array, width: float, forces: Array, twists: Array, bounds: Array
 ) -> None:
-    """Bracket the critical friction of each of many sets of contacts.
-
-    Takes `arms`, `normals`, `forces` (g, k, 3); `twists` (g, 6); `bounds` (g, 2).
-    """
+    """Bracket the critical friction of each of many sets of contacts, with bounds (g, 2)."""
     k = arms.shape[1]
     axes, rows, columns = np.empty((k, 3, 3)), np.empty((k, 3, WRENCH)), np.empty((k, 3, WRENCH))
     mean, twist, span = np.empty(WRENCH), np.empty(WRENCH), np.empty((WRENCH, WRENCH))
@@ -63,13 +60,13 @@ def search(
                 _in_space(pair, primal, friction, axes, forces[g])
             if dual > 1.0 + NEAR_ONE and friction > lower:
                 lower = friction
-                _copy(y, twists[g])
-            _copy(y, twist)
+                twists[g] = y
+            twist[:] = y
             # the twist of any program separates up to some friction once contacts are put to rest
             separates = _separates(rows, pair[1], span, twist)
             if separates > lower:
                 lower = separates
-                _copy(twist, twists[g])
+                twists[g] = twist
             if upper - lower <= width * lower:
                 break
             friction = _next(pair, 0.5 * (primal + dual), friction, lower, upper, width)
@@ -82,10 +79,7 @@ def search(
 def deepest(
     contacts: tuple[Array, Array, Array], share: float, forces: Array, twists: Array, values: Array
 ) -> None:
-    """Balance each of many sets of contacts with forces as deep inside their cones as possible.
-
-    Takes `contacts` (g, k, 3) or (g,); `forces` (g, k, 3); `twists` (g, 6); `values` (g, 2).
-    """
+    """Balance many sets (arms, normals, frictions) with forces as deep in their cones as can be."""
     arms, normals, frictions = contacts
     k = arms.shape[1]
     axes, rows, columns = np.empty((k, 3, 3)), np.empty((k, 3, WRENCH)), np.empty((k, 3, WRENCH))
@@ -95,15 +89,14 @@ def deepest(
         _at_friction(rows, mean, frictions[g], columns)
         primal, dual = least_cone_sum(columns, mean, share, pair, y)
         values[g, 0], values[g, 1] = primal, dual
-        _copy(y, twists[g])
+        twists[g] = y
         _in_space(pair, primal, frictions[g], axes, forces[g])
 
 
 @loop("numpy")
 def _set_up(arms: Array, normals: Array, axes: Array, rows: Array, mean: Array) -> None:
     """Fill in the contacts' axes, their wrenches, (k, 3, 6), and the normals' mean wrench."""
-    for w in range(WRENCH):
-        mean[w] = 0.0
+    mean[:] = 0.0
     for i in range(len(arms)):
         _orthonormal(normals[i], axes[i])
         for a in range(3):
@@ -117,7 +110,6 @@ def _set_up(arms: Array, normals: Array, axes: Array, rows: Array, mean: Array) 
 
 @loop("numpy")
 def _orthonormal(normal: Array, axes: Array) -> None:
-    """Fill in a unit normal and two tangents as an orthonormal frame, (3, 3)."""
     far = 0
     for j in range(3):
         axes[0, j] = normal[j]
@@ -178,7 +170,6 @@ def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
 
 @loop("numpy")
 def _least_ratio(rows: Array, z: Array, still: float, twist: Array) -> float:
-    """Return the least ratio of leaving to sliding over the contacts that are not at rest."""
     least = MOST_FRICTION
     for i in range(len(rows)):
         if z[i, 0] > still:
@@ -197,8 +188,7 @@ def _add(row: Array, span: Array, spanned: int) -> int:
     if spanned == WRENCH:
         return spanned
     fresh, before = span[spanned], math.sqrt(_dot(row, row))
-    for w in range(WRENCH):
-        fresh[w] = row[w]
+    fresh[:] = row
     for _ in range(2):  # once more for what rounding leaves
         for a in range(spanned):
             _take_off(fresh, span[a])
@@ -218,12 +208,6 @@ def _take_off(vector: Array, unit: Array) -> None:
 
 
 @loop("numpy")
-def _copy(source: Array, target: Array) -> None:
-    for w in range(WRENCH):
-        target[w] = source[w]
-
-
-@loop("numpy")
 def _dot(a: Array, b: Array) -> float:
     total = 0.0
     for w in range(WRENCH):
@@ -235,11 +219,10 @@ def _dot(a: Array, b: Array) -> float:
 def _next(
     pair: Array, value: float, friction: float, lower: float, upper: float, width: float
 ) -> float:
-    """Return the friction to try next: where Newton's method has 1 / V = 1, slightly passed.
+    """Return the friction to try next: where Newton's method has 1 / V = 1, passed a little.
 
-    It is passed towards the wider side of the interval. Friction enters the program through the
-    tangential columns of A_i only, and y is their multiplier: the slope of V over the logarithm of
-    the friction is the sum of s_i1 z_i1 and s_i2 z_i2.
+    Friction enters the program through the tangential columns of A_i only, and y is their
+    multiplier: the slope of V over its logarithm is the sum of s_i1 z_i1 and s_i2 z_i2.
     """
     slope = 0.0
     for i in range(pair.shape[1]):

@@ -6,11 +6,12 @@ need a twist that lies on the cones, or one that leaves contacts at rest that ba
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, cross
+from grasp_core.arrays import Array, Indices, cross
 from grasp_core.closure.contacts import (
     WRENCH,
     contact_frames,
@@ -60,10 +61,9 @@ def deepest_forces(
 ) -> tuple[Array, Array, Array]:
     """Balance many sets of contacts with forces as deep in the cones as possible.
 
-    Takes `arms`, `normals` (g, k, 3); `friction` (g,). Gives forces, (g, k, 3); twists, (g, 6), on
-    which the supports are at most the margin over the friction; and lower and upper bounds of the
-    margin, (g, 2), where the forces balance. A search that broke down, as it does on degenerate
-    contacts, ends with bounds that have crossed or are not numbers.
+    Gives forces, (g, k, 3); twists, (g, 6), on which the supports are at most the margin over the
+    friction; and lower and upper bounds of the margin, (g, 2), where the forces balance. A search
+    that broke down, as on degenerate contacts, ends with bounds that have crossed or are NaN.
     """
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
     values = np.ones((len(arms), 2))
@@ -74,13 +74,11 @@ def deepest_forces(
 
 
 def margin_program(balance: Array, normals: Array, friction: Array) -> tuple[float, Array, Array]:
-    """Solve for the margin t, balancing forces (k, 3), and the twist of the dual program.
+    """Solve for the margin t, balancing forces (k, 3), and the twist of the dual program, (m,).
 
-    The twist has one entry for each row of `balance`. The unknowns of a contact are its normal
-    force and its tangential force over mu, so that small coefficients are solved as well as large
-    ones; without friction only the normal force is unknown.
-
-    Takes `balance` (m, 3k); `normals` (k, 3); `friction` (k,).
+    The forces balance if `balance`, (m, 3k), maps them to zero. The unknowns of a contact are its
+    normal force and its tangential force over mu, so that small coefficients are solved as well as
+    large ones; without friction only the normal force is unknown.
     """
     k, m = len(normals), len(balance)
     frames = contact_frames(normals) * np.array([np.ones(k), friction, friction]).T[:, None]
@@ -127,17 +125,16 @@ def departing_twist(rows: Array, share: Array) -> Array | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """The margin program's solution, and the verdict on force closure that it proves."""
+    """The margin program's solution, and the verdict on force closure that it proves.
+
+    Only `closed` is proved: True by `forces`, False by `twist`, (6,), and None by neither. Forces
+    are (k, 3), or local coordinates of soft contacts, (k, 4).
+    """
 
     margin: float
-    """Optimum of the program as the solver found it, dimensionless; only `closed` is proved."""
     forces: Array
-    """Balancing forces, (k, 3), or local coordinates of soft contacts, (k, 4); they prove closure
-    if `closed` is True."""
     twist: Array
-    """Twist of the dual program, (6,); it refutes closure if `closed` is False."""
     closed: bool | None
-    """The verdict; None where neither closure nor its opposite is proved."""
 
 
 def decide(arms: Array, normals: Array, friction: Array) -> Answer:
@@ -150,19 +147,40 @@ def _decided_by_programs(arms: Array, normals: Array, friction: Array) -> Answer
     try:
         margin, forces, twist = margin_program(grasp_map(arms), normals, friction)
     except SolverError:
-        # nearly parallel normals: the program has no solution, or none to within rounding
-        return _apart(arms, normals, friction)
+        # nearly parallel normals: no solution, or none to within rounding; the twist towards the
+        # nearest wrench may refute closure
+        _, facing = nearest_wrench(WrenchSet.at(arms, normals, friction))
+        closed = False if refutes_closure(facing, arms, normals, friction) else None
+        return Answer(-math.inf, np.zeros_like(arms), facing, closed)
     if proves_closure(forces, arms, normals, friction):
         return Answer(margin, forces, twist, closed=True)
     if margin < 0.0 and refutes_closure(twist, arms, normals, friction):
         return Answer(margin, forces, twist, closed=False)
+
+    def pushed(twist: Array) -> tuple[Array, Array]:
+        velocities = twist[:3] + cross(twist[3:], arms)
+        along, across = normal_and_tangential(velocities, normals)
+        slides = velocities - along[:, None] * normals
+        sideways = slides / np.maximum(across, SMALLEST_NORMAL)[:, None]
+        forces = normals + friction[:, None] * sideways
+        return along + friction * across, np.hstack([forces, cross(arms, forces)])
+
+    def held(some: Indices) -> Array:
+        return generators_of(arms[some], normals[some], friction[some]).T
+
+    def solved(twists: Array, rest: Indices) -> tuple[float, Array, Array]:
+        margin, forces, reduced = margin_program(
+            twists.T @ grasp_map(arms[rest]), normals[rest], friction[rest]
+        )
+        return margin, depths_in_cones(forces, normals[rest], friction[rest]), reduced
+
     # at a margin of zero, (2) holds once the twist is taken onto the cones
     if abs(margin) < DECIDED:
-        touching = _touching_twist(twist, arms, normals, friction)
+        touching = touching_twist(twist, pushed)
         if refutes_closure(touching, arms, normals, friction):
             return Answer(0.0, forces, touching, closed=False)
     # some contacts may balance by themselves: the margin is zero then, and only the others depart
-    sparing = _twist_sparing_interior_forces(arms, normals, friction, forces)
+    sparing = sparing_twist(depths_in_cones(forces, normals, friction), held, solved)
     if sparing is not None and refutes_closure(sparing, arms, normals, friction):
         return Answer(0.0, forces, sparing, closed=False)
     return Answer(margin, forces, twist, closed=None)
@@ -186,76 +204,57 @@ def _decided_quickly(arms: Array, normals: Array, friction: Array) -> Answer | N
     return None
 
 
-def _apart(arms: Array, normals: Array, friction: Array) -> Answer:
-    """Refute closure by the twist towards the nearest wrench, or leave it undecided."""
-    wrenches = WrenchSet.at(arms, normals, friction)
-    _, facing = nearest_wrench(wrenches)
-    refuted = refutes_closure(facing, arms, normals, friction)
-    return Answer(-math.inf, np.zeros_like(arms), facing, closed=False if refuted else None)
-
-
-def _touching_twist(twist: Array, arms: Array, normals: Array, friction: Array) -> Array:
+def touching_twist(twist: Array, pushed: Callable[[Array], tuple[Array, Array]]) -> Array:
     """Change a twist so that supports that are nearly zero are zero up to rounding.
 
     Where the margin is exactly zero, as with symmetric normals at just their critical friction, the
     solver's twist passes the cones by its own tolerance; Newton's method takes it onto them.
+    `pushed` gives the supports, (k,), and their gradients, (k, 6): each is the wrench of the force
+    in the cone that works most along the twist.
     """
     twist = twist / max(float(np.linalg.norm(twist)), SMALLEST_NORMAL)
     for _ in range(NEWTON_STEPS):
-        velocities = twist[:3] + cross(twist[3:], arms)
-        along, across = normal_and_tangential(velocities, normals)
-        excess = along + friction * across
+        excess, gradients = pushed(twist)
         touched = excess > -TOUCHING
-        # the gradient of s_i in y is the wrench of the force in cone i that works most along y
-        sideways = (velocities - along[:, None] * normals) / np.maximum(across, SMALLEST_NORMAL)[
-            :, None
-        ]
-        forces = (normals + friction[:, None] * sideways)[touched]
-        slopes = np.hstack([forces, cross(arms[touched], forces)])
-        step, *_ = np.linalg.lstsq(slopes, excess[touched], rcond=RANK)
+        step, *_ = np.linalg.lstsq(gradients[touched], excess[touched], rcond=RANK)
         twist = twist - np.asarray(step, dtype=np.float64)
     return twist
 
 
-def _twist_sparing_interior_forces(
-    arms: Array, normals: Array, friction: Array, forces: Array
+def sparing_twist(
+    depths: Array,
+    held: Callable[[Indices], Array],
+    solved: Callable[[Array, Indices], tuple[float, Array, Array]],
 ) -> Array | None:
     """Find a separating twist where some contacts balance each other.
 
-    Their forces are inside their cones, so the margin is zero however far the other contacts are
-    from completing closure. A separating twist must leave the balanced contacts at rest; among such
-    twists the margin program is solved again, for the other contacts only, until its optimum is
-    negative or no contact is left.
+    Their forces are inside their cones, by `depths`, so the margin is zero however far the others
+    are from completing closure. A separating twist must leave the balanced contacts at rest, all
+    that `held` gives of them. Among such twists, (6, m), the margin program is `solved` again for
+    the other contacts, until its optimum is negative or no contact is left.
     """
-    rest = np.arange(len(arms))
-    twists = np.eye(WRENCH)
+    rest, twists = np.arange(len(depths)), np.eye(WRENCH)
     while True:  # each turn takes balanced contacts from the rest, or returns
-        depth = depths_in_cones(forces, normals[rest], friction[rest])
-        balanced = depth > INTERIOR
+        balanced = depths > INTERIOR
         if not balanced.any():
             return None
-        generators = generators_of(
-            arms[rest[balanced]], normals[rest[balanced]], friction[rest[balanced]]
-        )
-        # a force inside its cone can work along every velocity of its contact, so that must be zero
-        twists = null_space(generators.T @ twists, twists)
+        # a force inside its cone can work along all that its contact feels, so that must be zero
+        twists = twists @ null_space(held(rest[balanced]) @ twists)
         rest = rest[~balanced]
         if not twists.shape[1]:
             return None
         if not rest.size:
             return twists[:, 0]
-        balance = twists.T @ grasp_map(arms[rest])
-        margin, forces, reduced = margin_program(balance, normals[rest], friction[rest])
+        margin, depths, reduced = solved(twists, rest)
         if margin < -DECIDED:
             return twists @ reduced
         if margin > DECIDED:
             return None
 
 
-def null_space(rows: Array, basis: Array) -> Array:
-    """Return a basis of the vectors in the span of `basis` (columns) that `rows` maps to 0."""
+def null_space(rows: Array) -> Array:
+    """Return orthonormal columns that `rows` maps to zero."""
     if not rows.size:
-        return basis
+        return np.eye(rows.shape[1])
     _, values, right = np.linalg.svd(rows)
-    rank = int((values > RANK).sum())
-    return basis @ right[rank:].T
+    return right[int((values > RANK).sum()) :].T

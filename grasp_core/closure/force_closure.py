@@ -46,26 +46,19 @@ from grasp_core.arrays import (
     is_array,
     is_number,
     of_order_one,
-    real_array,
 )
 from grasp_core.by_value import ByValue, trusted
-from grasp_core.closure import soft_closure, soft_contacts
+from grasp_core.closure import proofs, soft_closure, soft_contacts
 from grasp_core.closure.contacts import (
     contact_arrays,
     contact_frictions,
+    keep_arrays,
     normal_and_tangential,
+    to_center,
+    to_origin,
     unit_size,
 )
 from grasp_core.closure.decision import DECIDED, FAR, PRECISE, decide, deepest_forces
-from grasp_core.closure.proofs import (
-    margin_ceiling,
-    margin_ceilings,
-    proved_margin,
-    proved_margins,
-    proves_closure,
-    refutes_closure,
-    without_giants,
-)
 from grasp_core.closure.soft_contacts import SoftContacts, are_torsions, contact_torsions
 from grasp_core.errors import UndecidedError
 from grasp_core.values import Contact, Grasp
@@ -80,10 +73,6 @@ SUMMED = 1e-9
 wrench at unit size, which is zero."""
 FAR_BELOW = -1e6
 """Margin below which minus infinity is reported: hardly any forces balance."""
-ARRAYS = (
-    "positions", "normals", "friction", "forces", "separating_wrench", "torsion_m", "torques",
-)  # fmt: skip
-"""Fields of a certificate that hold an array."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -118,12 +107,10 @@ class ClosureCertificate(ByValue):
     [m], strictly inside the cones. None otherwise."""
 
     def __post_init__(self) -> None:
-        for name in ARRAYS:
-            array = getattr(self, name)
-            if array is not None:
-                kept = real_array(array, name)
-                kept.setflags(write=False)
-                object.__setattr__(self, name, kept)
+        keep_arrays(
+            self, "positions", "normals", "friction", "forces", "separating_wrench", "torsion_m",
+            "torques",
+        )  # fmt: skip
 
     def verify(self) -> bool:
         """Check every field again in plain arithmetic, without any solver.
@@ -140,10 +127,7 @@ class ClosureCertificate(ByValue):
             return self.closed is False and no_forces and 0.0 >= self.margin >= self.proved()
 
     def separates(self) -> bool:
-        """Return whether the wrench separates, whatever the margin.
-
-        Shapes and types of the fields are not checked again.
-        """
+        """Return whether the wrench separates, whatever the margin, in fields of sound shapes."""
         return self.forces is None and self.proved() <= 0.0
 
     def _are_contacts(self) -> bool:
@@ -171,54 +155,45 @@ class ClosureCertificate(ByValue):
         arms, center, size = unit_size(self.positions)
         # `verify` asks only for unit length to nine digits, so the directions are taken exactly
         normals = self.normals / np.linalg.norm(self.normals, axis=1, keepdims=True)
+        soft = None
         if self.torsion_m is not None:
             soft = SoftContacts.of(self.positions, normals, self.friction, self.torsion_m)
-            return self._proved_with_torsion(soft, caution)
         if self.closed:
-            forces = self.forces
-            if not (is_array(forces, *arms.shape) and _balance(forces, arms, normals)):
+            if not is_array(self.forces, *arms.shape):
                 return -math.inf
-            # without friction `proved_margin` sees only normal parts, so slides are checked here
-            if (normal_and_tangential(forces, normals)[1][self.friction == 0.0] > SUMMED).any():
-                return -math.inf
-            return proved_margin(forces, arms, normals, self.friction, caution)
-        wrench = self._direction()
-        if wrench is None:
+            if soft is not None:
+                return self._proved_with_torques(soft, self.forces, caution)
+            return self._proved_by(self.forces, arms, normals, caution)
+        if not is_array(self.separating_wrench, 6):
             return math.inf
-        # the twist of (4), moved from the frame's origin to the mean contact, at unit size
-        turned = cross(wrench[3:], center)
-        twist = np.concatenate([wrench[:3] + turned, wrench[3:] * size])
-        ceiling = margin_ceiling(twist, arms, normals, self.friction, caution)
+        # the twist of (4), whose length means nothing
+        twist = to_center(of_order_one(self.separating_wrench)[0], center, size)
+        if soft is not None:
+            ceiling = soft_contacts.margin_ceiling(soft, twist, caution)
+        else:
+            ceiling = proofs.margin_ceiling(twist, arms, normals, self.friction, caution)
         return -math.inf if ceiling <= FAR_BELOW else ceiling
 
-    def _proved_with_torsion(self, contacts: SoftContacts, caution: float) -> float:
-        """Compute the margin that the fields prove for soft contacts."""
-        if self.closed:
-            forces, torques, count = self.forces, self.torques, len(self.friction)
-            if not (is_array(forces, count, 3) and is_array(torques, count)):
-                return -math.inf
-            local = contacts.local(forces, torques)
-            missed = max(contacts.missed(forces, torques), abs(float(local[:, 0].sum()) - 1.0))
-            if not missed <= SUMMED:
-                return -math.inf
-            return soft_contacts.proved_margin(contacts, local, caution)
-        wrench = self._direction()
-        if wrench is None:
-            return math.inf
-        ceiling = soft_contacts.margin_ceiling(contacts, contacts.at_unit_size(wrench), caution)
-        return -math.inf if ceiling <= FAR_BELOW else ceiling
+    def _proved_by(self, forces: Array, arms: Array, normals: Array, caution: float) -> float:
+        wrench = np.concatenate([forces.sum(axis=0), cross(arms, forces).sum(axis=0)])
+        pushes = float(np.einsum("ki,ki->", forces, normals))
+        # what (1) and (2) ask of them
+        if not (float(np.abs(wrench).max()) <= SUMMED and abs(pushes - 1.0) <= SUMMED):
+            return -math.inf
+        # without friction `proved_margin` sees only normal parts, so slides are checked here
+        if (normal_and_tangential(forces, normals)[1][self.friction == 0.0] > SUMMED).any():
+            return -math.inf
+        return proofs.proved_margin(forces, arms, normals, self.friction, caution)
 
-    def _direction(self) -> Array | None:
-        """Return the separating wrench, whose length means nothing, at order one; None if none."""
-        wrench = self.separating_wrench
-        return of_order_one(wrench)[0] if is_array(wrench, 6) else None
-
-
-def _balance(forces: Array, arms: Array, normals: Array) -> bool:
-    """Return whether forces balance at unit size, (1), and their normal parts sum to 1, (2)."""
-    wrench = np.concatenate([forces.sum(axis=0), cross(arms, forces).sum(axis=0)])
-    pushes = float(np.einsum("ki,ki->", forces, normals))
-    return float(np.abs(wrench).max()) <= SUMMED and abs(pushes - 1.0) <= SUMMED
+    def _proved_with_torques(self, contacts: SoftContacts, forces: Array, caution: float) -> float:
+        torques = self.torques
+        if not is_array(torques, len(self.friction)):
+            return -math.inf
+        local = contacts.local(forces, torques)
+        missed = max(contacts.missed(forces, torques), abs(float(local[:, 0].sum()) - 1.0))
+        if not missed <= SUMMED:
+            return -math.inf
+        return soft_contacts.proved_margin(contacts, local, caution)
 
 
 def force_closure(
@@ -246,24 +221,21 @@ def force_closure(
     points, units = contact_arrays(positions, normals)
     mu = contact_frictions(friction, len(points))
     torsions = contact_torsions(torsion_m, mu)
+    arms, center, size = unit_size(points)
     forces, wrench, torques = None, None, None
     if torsions is None:
-        arms, center, size = unit_size(points)
         answer = decide(arms, units, mu)
         if answer.closed:
             # (2) exactly: scaling forces leaves (1) and the sign of (3) alone
             forces = answer.forces / float(np.einsum("ki,ki->", answer.forces, units))
-        elif answer.closed is False:
-            turning = answer.twist[3:] / size
-            wrench = np.concatenate([answer.twist[:3] - cross(turning, center), turning])
     else:
         contacts = SoftContacts.of(points, units, mu, torsions)
         answer = soft_closure.decide(contacts)
         if answer.closed:
             local = answer.forces / float(answer.forces[:, 0].sum())
             forces, torques = contacts.in_space(local)
-        elif answer.closed is False:
-            wrench = contacts.about_origin(answer.twist)
+    if answer.closed is False:
+        wrench = to_origin(answer.twist, center, size)
     if answer.closed is not None:
         found = ClosureCertificate(
             answer.closed, answer.margin, points, units, mu, forces, wrench, torsions, torques
@@ -284,33 +256,13 @@ def force_closure(
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Decided:
-    """Verdicts of compiled code on many sets of contacts, each proved or left open."""
-
-    closed: NDArray[np.bool_]
-    """Where `forces` prove closure, (g,)."""
-    separated: NDArray[np.bool_]
-    """Where `twists` prove its opposite, (g,)."""
-    forces: Array
-    """Balancing forces whose normal parts sum to one, (g, k, 3)."""
-    wrenches: Array
-    """Separating wrenches about the frame's origin, (g, 6)."""
-    margins: Array
-    """Proved margins, (g,); NaN where nothing is proved."""
-
-
 def closing_margins(positions: Array, normals: Array, friction: float) -> Array:
-    """Compute the margins of certificates of force closure for many sets of contacts, (g,).
+    """Compute the margins, (g,), that `force_closure` gives for many closed sets of contacts.
 
-    Each is, up to rounding, the margin of the certificate that `force_closure` gives.
-
-    Takes `positions` (g, k, 3) [m]; `normals` (g, k, 3). Gives proved margins, above zero; NaN
-    where compiled code does not prove closure, which tells nothing: `force_closure` decides such
-    contacts.
+    They are NaN where compiled code does not prove closure, which tells nothing.
     """
-    decided = _decided(positions, normals, friction)
-    return np.where(decided.closed, decided.margins, math.nan)
+    closed, margins, _, _ = _decided(positions, normals, friction)
+    return np.where(closed, margins, math.nan)
 
 
 def certificates(
@@ -318,71 +270,62 @@ def certificates(
 ) -> list[ClosureCertificate | None]:
     """Find the certificates that `force_closure` gives for many sets of contacts.
 
-    Takes `positions` (g, k, 3) [m]; `normals` (g, k, 3). Gives a certificate for each set, as
-    `ClosureCertificate.verify` accepts it; None leaves the set undecided.
+    Each is as `ClosureCertificate.verify` accepts it; None leaves the set undecided.
     """
-    decided = _decided(positions, normals, friction)
-    points, units, forces, wrenches = (
-        np.array(each) for each in (positions, normals, decided.forces, decided.wrenches)
-    )
+    closed, margins, forces, wrenches = _decided(positions, normals, friction)
+    points, units = np.array(positions), np.array(normals)
     mu = np.full(points.shape[1], friction)
     for array in (points, units, forces, wrenches, mu):
         array.setflags(write=False)
     return [
-        trusted(
-            ClosureCertificate, closed=closed, margin=margin, positions=points[i],
-            normals=units[i], friction=mu, forces=forces[i] if closed else None,
-            separating_wrench=None if closed else wrenches[i], torsion_m=None, torques=None,
+        None if math.isnan(margin) else trusted(
+            ClosureCertificate, closed=shut, margin=margin, positions=points[i],
+            normals=units[i], friction=mu, forces=forces[i] if shut else None,
+            separating_wrench=None if shut else wrenches[i], torsion_m=None, torques=None,
         )
-        if closed or separated
-        else None
-        for i, (closed, separated, margin) in enumerate(
-            zip(
-                decided.closed.tolist(), decided.separated.tolist(), decided.margins.tolist(),
-                strict=True,
-            )
-        )
+        for i, (shut, margin) in enumerate(zip(closed.tolist(), margins.tolist(), strict=True))
     ]  # fmt: skip
 
 
-def _decided(positions: Array, normals: Array, friction: float) -> _Decided:
-    """Decide what compiled code can prove, with the checks of `force_closure` and `verify`."""
+def _decided(
+    positions: Array, normals: Array, friction: float
+) -> tuple[NDArray[np.bool_], Array, Array, Array]:
+    """Decide what compiled code can prove, with the checks of `force_closure` and `verify`.
+
+    Gives which sets are closed; the proved margins, NaN where nothing is proved; forces that prove
+    closure, (g, k, 3), and wrenches that prove its opposite, (g, 6), where one of them is proved.
+    """
     count = len(positions)
     if not (friction > 0.0 and count):
-        never = np.zeros(count, dtype=bool)
-        nothing = np.full(count, math.nan)
-        return _Decided(never, never, np.zeros_like(positions), np.zeros((count, 6)), nothing)
+        never, nothing = np.zeros(count, dtype=bool), np.full(count, math.nan)
+        return never, nothing, np.zeros_like(positions), np.zeros((count, 6))
     arms, centers, sizes = unit_size(positions)
     every = np.full(count, friction)
     forces, twists, margins = deepest_forces(arms, normals, every, PRECISE)
-    forces, twists = without_giants(forces, 2), without_giants(twists, 1)
+    forces, twists = proofs.without_giants(forces, 2), proofs.without_giants(twists, 1)
     lower, upper = margins.T
     with np.errstate(invalid="ignore"):  # a search that broke down ends with NaN
         close = np.abs(upper - lower) <= DECIDED * np.maximum(friction, np.abs(lower))
         close &= np.abs(lower) <= FAR * friction
         close &= (np.abs(np.linalg.norm(normals, axis=-1) - 1.0) <= UNIT_SLACK).all(axis=-1)
         closed, separated = close & (lower > DECIDED), close & (upper < -DECIDED)
-    closed &= proves_closure(forces, arms, normals, every[:, None])
-    separated &= refutes_closure(twists, arms, normals, every[:, None])
+    closed &= proofs.proves_closure(forces, arms, normals, every[:, None])
+    separated &= proofs.refutes_closure(twists, arms, normals, every[:, None])
     found = np.full(count, math.nan)
     pushes = np.einsum("gki,gki->g", forces, normals)
     forces = forces / np.where(closed, pushes, 1.0)[:, None, None]
-    turning = twists[:, 3:] / sizes[:, None]
-    wrenches = np.concatenate([twists[:, :3] - cross(turning, centers), turning], axis=1)
+    wrenches = to_origin(twists, centers, sizes)
     units = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
     found[closed] = _verified_closed(forces[closed], arms[closed], units[closed], friction)
-    # `verify` moves the wrench back to the mean contact, at unit size
-    moved = wrenches[:, :3] + cross(wrenches[:, 3:], centers)
-    back = np.concatenate([moved, wrenches[:, 3:] * sizes[:, None]], axis=1)
+    back = to_center(wrenches, centers, sizes)  # as `verify` does
     found[separated] = _verified_open(back[separated], arms[separated], units[separated], friction)
-    proved = ~np.isnan(found)
-    return _Decided(closed & proved, separated & proved, forces, wrenches, found)
+    return closed & ~np.isnan(found), found, forces, wrenches
 
 
 def _verified_closed(forces: Array, arms: Array, normals: Array, friction: float) -> Array:
     """Return the margins that forces prove, (g,); NaN where `verify` would not accept them."""
-    found = proved_margins(forces, arms, normals, friction, CAUTION)
-    verified = (found > 0.0) & (found <= proved_margins(forces, arms, normals, friction))
+    found = proofs.proved_margins(forces, arms, normals, friction, CAUTION)
+    verified = (found > 0.0) & (found <= proofs.proved_margins(forces, arms, normals, friction))
     wrenches = np.concatenate([forces.sum(axis=1), cross(arms, forces).sum(axis=1)], axis=1)
     pushes = np.einsum("gki,gki->g", forces, normals)
     verified &= np.abs(wrenches).max(axis=1, initial=0.0) <= SUMMED
@@ -395,7 +338,8 @@ def _verified_open(twists: Array, arms: Array, normals: Array, friction: float) 
     found, bound = (
         np.where(ceilings <= FAR_BELOW, -math.inf, ceilings)
         for ceilings in (
-            margin_ceilings(twists, arms, normals, friction, caution) for caution in (CAUTION, 1.0)
+            proofs.margin_ceilings(twists, arms, normals, friction, caution)
+            for caution in (CAUTION, 1.0)
         )
     )
     return np.where((found <= 0.0) & (found >= bound), found, math.nan)

@@ -30,10 +30,17 @@ from typing import TypeVar
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, are_units, cross, is_array, is_number, real_array
+from grasp_core.arrays import Array, Indices, are_units, cross, is_array, is_number
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST_FRICTION
-from grasp_core.closure.contacts import FEWEST, WRENCH, grasp_map, normal_and_tangential, unit_size
+from grasp_core.closure.contacts import (
+    FEWEST,
+    WRENCH,
+    grasp_map,
+    keep_arrays,
+    normal_and_tangential,
+    unit_size,
+)
 
 Number = TypeVar("Number", int, Fraction)
 Exact = list[Fraction]
@@ -45,6 +52,7 @@ tried in turn; the last one defines the rank that force closure asks for."""
 NEARLY_AT_REST = 1e-9
 """Speed below which a contact is meant to be at rest, for twists of unit size."""
 AXES = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+UNITS: list[Exact] = [[Fraction(x) for x in axis] for axis in AXES]
 SAME = Fraction(1, 10**12)
 """Speed at which a contact that cannot be put to rest exactly still counts as at rest, for twists
 of unit size: moving it by this share of the contacts' size would put it to rest."""
@@ -57,20 +65,14 @@ need slightly more than `FRICTIONLESS` on one machine and not on another."""
 
 
 def closes(forces: Array, positions: Array, normals: Array, friction: float) -> bool:
-    """Return whether nearby forces balance exactly, strictly inside cones of full rank.
-
-    Takes `forces`, `normals` (k, 3); `positions` (k, 3) [m].
-    """
+    """Return whether nearby forces balance exactly, strictly inside cones of full rank."""
     return closing_forces(forces, positions, normals, friction) is not None
 
 
 def closing_forces(
     forces: Array, positions: Array, normals: Array, friction: float
 ) -> Array | None:
-    """Return the exactly balanced forces that `closes` finds as floats; None if there are none.
-
-    Takes `forces`, `normals` (k, 3); `positions` (k, 3) [m].
-    """
+    """Return the exactly balanced forces that `closes` finds, as floats; None if there are none."""
     if not (np.isfinite(forces).all() and 0.0 < friction < math.inf):
         return None
     arms, _ = _arms(positions)
@@ -80,7 +82,11 @@ def closing_forces(
     columns = _columns(arms, np.argsort(-depths, kind="stable"))
     if columns is None:
         return None
-    balanced = _balanced(_nearly_balanced(forces, arms, depths), positions, columns)
+    # nearly balanced by least squares, deeper forces changed by more
+    G, room = grasp_map(arms), np.repeat(depths, 3)
+    change = np.linalg.lstsq(G * room, G @ forces.ravel(), rcond=INDEPENDENT[-1])[0]
+    near = forces - (room * np.asarray(change, dtype=np.float64)).reshape(forces.shape)
+    balanced = _balanced(near, positions, columns)
     if balanced is None:
         return None
     whole, unit = balanced
@@ -93,7 +99,7 @@ def closing_forces(
 def separates(twist: Array, positions: Array, normals: Array, friction: float) -> bool:
     """Return whether, for a nearby twist, no force in the friction cones has positive power.
 
-    Takes `twist` (6,) [m/s, rad/s]; `positions` (k, 3) [m]; `normals` (k, 3).
+    The twist, (6,) [m/s, rad/s], is about the first contact.
     """
     arms, size = _arms(positions)
     unit = twist * np.repeat([1.0, size], 3)
@@ -104,7 +110,11 @@ def separates(twist: Array, positions: Array, normals: Array, friction: float) -
     rows = grasp_map(arms).T
     still = np.flatnonzero(np.linalg.norm((rows @ unit).reshape(-1, 3), axis=1) <= NEARLY_AT_REST)
     wanted = (3 * still[:, None] + np.arange(3)).ravel()
-    exact_arms = _exact_arms(positions, size)
+    exact_arms = [
+        [(x - o) / Fraction(size) for x, o in zip(point, first, strict=True)]
+        for first in _vectors(positions[:1])
+        for point in _vectors(positions)
+    ]
     # an independent choice of the velocities to be made zero: the others vanish with them
     resting = [divmod(int(wanted[each]), 3) for each in _independent(rows[wanted], INDEPENDENT[-1])]
     exact = _at_rest([Fraction(x) for x in unit.tolist()], exact_arms, resting)
@@ -113,10 +123,11 @@ def separates(twist: Array, positions: Array, normals: Array, friction: float) -
     # what is left of a twist that is put to rest may be short: all speeds are relative to it
     rest = SAME * max(map(abs, exact))
     slope = None if friction == math.inf else Fraction(friction) ** 2
-    return all(
-        _departs(_velocity(exact, arm), normal, slope, rest)
-        for arm, normal in zip(exact_arms, _vectors(normals), strict=True)
-    )
+    for arm, normal in zip(exact_arms, _vectors(normals), strict=True):
+        velocity = [a + b for a, b in zip(exact[:3], _cross(exact[3:], arm), strict=True)]
+        if not _departs(velocity, normal, slope, rest):
+            return False
+    return True
 
 
 def _arms(positions: Array) -> tuple[Array, float]:
@@ -130,26 +141,14 @@ def _vectors(rows: Array) -> list[Exact]:
     return [[Fraction(x) for x in row] for row in rows.tolist()]
 
 
-def _exact_arms(positions: Array, size: float) -> list[Exact]:
-    exact, unit = _vectors(positions), Fraction(size)
-    return [[(x - o) / unit for x, o in zip(point, exact[0], strict=True)] for point in exact]
-
-
 def _columns(arms: Array, order: Indices) -> list[tuple[int, int]] | None:
-    """Choose six independent columns of the grasp map, as (contact, axis), in order of contacts."""
+    """Choose six independent columns of the grasp map, (contact, axis), in an order of contacts."""
     wrenches = grasp_map(arms).T.reshape(-1, 3, WRENCH)[order].reshape(-1, WRENCH)
     for least in INDEPENDENT:
         found = _independent(wrenches, least)
         if len(found) == WRENCH:
             return [(int(order[each // 3]), each % 3) for each in found]
     return None
-
-
-def _nearly_balanced(forces: Array, arms: Array, depths: Array) -> Array:
-    """Change forces so that they balance up to rounding, deeper ones by more."""
-    G, room = grasp_map(arms), np.repeat(depths, 3)
-    change = np.linalg.lstsq(G * room, G @ forces.ravel(), rcond=INDEPENDENT[-1])[0]
-    return forces - (room * np.asarray(change, dtype=np.float64)).reshape(forces.shape)
 
 
 def _independent(rows: Array, least: float) -> list[int]:
@@ -175,9 +174,9 @@ def _whole(rows: Array) -> tuple[list[list[int]], int]:
 def _balanced(
     forces: Array, positions: Array, columns: list[tuple[int, int]]
 ) -> tuple[list[list[int]], int] | None:
-    """Change some components of forces, listed as (contact, axis), until they balance exactly.
+    """Change components of forces, listed as (contact, axis), until they balance exactly.
 
-    Gives the forces as whole numbers over one positive number, which is given last.
+    The forces are whole numbers over one positive number, which is given last.
     """
     (whole, unit), (points, _) = _whole(forces), _whole(positions)
     arms = [[x - o for x, o in zip(point, points[0], strict=True)] for point in points]
@@ -198,11 +197,9 @@ def _balanced(
 
 
 def _eliminated(table: list[list[int]]) -> int:
-    """Solve six equations in whole numbers, rows of (coefficients, right side), in place.
+    """Solve six equations (coefficients, right side) in place by Bareiss's elimination.
 
-    By Bareiss's elimination, whose divisions leave no remainder.
-
-    Gives the determinant up to its sign, which is the last columns' denominator; 0 if singular.
+    It divides without remainder, and gives the last column's denominator; 0 if singular.
     """
     before = 1
     for k in range(WRENCH):
@@ -223,27 +220,17 @@ def _eliminated(table: list[list[int]]) -> int:
 
 def _at_rest(twist: Exact, arms: list[Exact], resting: list[tuple[int, int]]) -> Exact | None:
     """Change a twist so that contacts' velocities along some axes, (contact, axis), are zero."""
-    rows = [_wrench(axis, arms[contact]) for contact, axis in resting]
+    # the product of such a wrench of a unit force with a twist is a contact's speed
+    rows: list[Exact] = [
+        [*UNITS[axis], *_cross(arms[contact], UNITS[axis])] for contact, axis in resting
+    ]
     speeds = [sum((a * b for a, b in zip(row, twist, strict=True)), Fraction(0)) for row in rows]
     changes = _solution(rows, speeds)
     return changes and [part - change for part, change in zip(twist, changes, strict=True)]
 
 
-def _wrench(axis: int, arm: Exact) -> Exact:
-    """Return the wrench of a unit force; its product with a twist is a contact's speed."""
-    force = [Fraction(int(axis == each)) for each in range(3)]
-    return [*force, *_cross(arm, force)]
-
-
-def _velocity(twist: Exact, arm: Exact) -> Exact:
-    return [a + b for a, b in zip(twist[:3], _cross(twist[3:], arm), strict=True)]
-
-
 def _solution(rows: list[Exact], right: Exact) -> Exact | None:
-    """Solve rows @ x = right for six numbers by elimination, or return None.
-
-    Numbers that the rows leave free are zero.
-    """
+    """Solve rows @ x = right for six numbers, zero where the rows leave them free, or None."""
     table = [[*row, value] for row, value in zip(rows, right, strict=True)]
     pivots = list[int]()
     for i, row in enumerate(table):
@@ -263,17 +250,13 @@ def _solution(rows: list[Exact], right: Exact) -> Exact | None:
 
 
 def _inside(force: list[int], normal: list[int], friction: float) -> bool:
-    """Return whether a force is inside its friction cone, (1)."""
     above, below = friction.as_integer_ratio()
     along, across = _squares(force, normal)
     return _dot(force, normal) > 0 and across * below**2 < above**2 * along
 
 
 def _departs(velocity: Exact, normal: Exact, slope: Fraction | None, rest: Fraction) -> bool:
-    """Return whether a contact departs steeply enough, (2), or its speed is at most `rest`.
-
-    `slope` is the square of the friction; with None, (2) must hold for every friction.
-    """
+    """Return whether a contact departs by (2) with mu^2 = slope, or any if None, or is at rest."""
     if _dot(velocity, velocity) <= rest**2:
         return True
     along, across = _squares(velocity, normal)
@@ -324,12 +307,7 @@ class FrictionInterval(ByValue):
     which no force inside cones of friction `lower` has positive power. None where `lower` is 0."""
 
     def __post_init__(self) -> None:
-        for name in ("positions", "normals", "forces", "twist"):
-            array = getattr(self, name)
-            if array is not None:
-                kept = real_array(array, name)
-                kept.setflags(write=False)
-                object.__setattr__(self, name, kept)
+        keep_arrays(self, "positions", "normals", "forces", "twist")
 
     @property
     def critical_friction(self) -> float:
@@ -366,10 +344,7 @@ class FrictionInterval(ByValue):
 
 
 def at_the_first(twist: Array, positions: Array) -> Array:
-    """Move a twist at unit size from the mean contact to the first contact, (6,) [m/s, rad/s].
-
-    Takes `twist` (6,); `positions` (k, 3) [m].
-    """
+    """Move a twist at unit size from the mean contact to the first contact, (6,) [m/s, rad/s]."""
     arms, _, size = unit_size(positions)
     velocity = twist[:3] + cross(twist[3:], arms[0])
     return np.concatenate([velocity, twist[3:] / size])

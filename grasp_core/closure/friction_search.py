@@ -35,7 +35,7 @@ import numpy as np
 from grasp_core.arrays import Array, cross
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contacts import WRENCH, grasp_map, normal_and_tangential, unit_size
-from grasp_core.closure.decision import Answer, decide, margin_program
+from grasp_core.closure.decision import Answer, decide, margin_program, null_space
 from grasp_core.closure.friction_interval import (
     FRICTIONLESS,
     NEARLY_AT_REST,
@@ -45,20 +45,14 @@ from grasp_core.closure.friction_interval import (
     closing_forces,
     separates,
 )
-from grasp_core.closure.proofs import proves_closure
+from grasp_core.closure.proofs import RANK, SMALLEST_NORMAL, proves_closure
 from grasp_core.errors import SolverError
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 
-DEPENDENT = 1e-9
-"""Singular values of unit-size wrenches below this value count as zero."""
-SUPPORTED = 0.5
-"""Border between pushes of zero and of one: pushes that can be positive can be one."""
 LARGEST_VARIABLE = 1e4
 """Largest size of a variable of the programs, whose answers are of order one."""
 POSITIVE = 1e-6
 """Optima below this count as zero: a hundred times the residual of a linear program."""
-STEP_SHARE = 0.5
-"""Share of what is left of a cone that the forces of the next round may take."""
 FRICTION_ACCURACY = 5e-8
 """Width of the final interval of a critical friction, relative to its upper end."""
 FIRST_TRIAL = 0.5
@@ -69,10 +63,8 @@ GROWTH = ((0.1 * FRICTIONLESS, 3.0), (1e-3, 2.0), (math.inf, 10.0))
 """Pairs of a distance and a factor: up to that distance from an undecided friction, the next trial
 is that factor farther away."""
 NUDGE = 0.4
-OVERSHOOT = 1.0
-"""Trials pass the expected threshold, to close in from both sides: by `NUDGE` times the accuracy,
-and by `OVERSHOOT` times the error of Newton's method, which is its step's square over the friction.
-"""
+"""Trials pass the expected threshold, to close in from both sides: by this share of the accuracy,
+and by the error of Newton's method, which is its step's square over the friction."""
 HALVING = 6
 """Number of trials after which the interval is halved once, whatever Newton's method suggests."""
 MOST_TRIALS = 80
@@ -83,44 +75,29 @@ LITTLE = 1e-3
 RESTING = (NEARLY_AT_REST, 1e-7, 1e-5, 1e-3)
 """Speeds below which contacts are put to rest under a unit twist, tried in turn: a solver leaves
 the square root of its accuracy where two contacts carry nearly all force."""
-EVENED = 3
-"""Number of times that a program is solved again in units of the pushes that it found before."""
-FAINTEST = 1e-10
-"""Smallest push, as a share of the largest, that is used as a unit."""
 ADDED, SHAVED = 5e-9, 1e-10
 """Relative allowances for rounding: `ADDED` raises the friction that forces need, `SHAVED` lowers
 the friction up to which a twist separates."""
-STALLED = 1e-3
-"""Length below which a unit twist whose slow contacts were put to rest is only rounding."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Rounds:
-    """Balanced forces of each round of the search, or the twist with which the rounds end."""
-
-    forces: tuple[Array, ...]
-    """Balanced forces of each round, (k, 3) each; empty unless every positive friction is
-    enough."""
-    twist: Array | None
-    """Twist under which contacts depart along their normals or are at rest, (6,); None where
-    `forces` are given or nothing was found."""
-
-    def at(self, friction: float, normals: Array) -> Array:
-        """Combine the rounds to balanced forces inside the cones of a friction, (k, 3)."""
-        total = self.forces[0]
-        for forces in self.forces[1:]:
-            along, across = normal_and_tangential(total, normals)
-            sizes = np.linalg.norm(forces, axis=1)
-            room, taken = (friction * along - across)[along > 0.0], sizes[along > 0.0]
-            share = STEP_SHARE / (1.0 + friction) * np.min(room / np.maximum(taken, DEPENDENT))
-            total = total + min(float(share), 1.0) * forces
-        return total
+def combined(rounds: list[Array], friction: float, normals: Array) -> Array:
+    """Combine the forces of some rounds to balanced ones inside the cones of a friction, (k, 3)."""
+    total = rounds[0]
+    for forces in rounds[1:]:
+        along, across = normal_and_tangential(total, normals)
+        sizes = np.linalg.norm(forces, axis=1)
+        room, taken = (friction * along - across)[along > 0.0], sizes[along > 0.0]
+        # half of what is left of a cone
+        share = 0.5 / (1.0 + friction) * np.min(room / np.maximum(taken, RANK))
+        total = total + min(float(share), 1.0) * forces
+    return total
 
 
-def rounds(arms: Array, normals: Array) -> Rounds:
+def rounds(arms: Array, normals: Array) -> tuple[list[Array], Array | None]:
     """Find out whether every positive friction is enough for force closure.
 
-    Takes `arms`, `normals` (k, 3).
+    If so, the balanced forces of each round are given; otherwise none, and where one was found a
+    twist, (6,), under which contacts depart along their normals or are at rest.
     """
     maps = grasp_map(arms).reshape(WRENCH, -1, 3)
     pushes = np.einsum("wki,ki->wk", maps, normals)
@@ -130,34 +107,31 @@ def rounds(arms: Array, normals: Array) -> Rounds:
         free = np.flatnonzero(~settled)
         held = maps[:, settled].reshape(WRENCH, -1)
         # (1), seen only in the directions of wrenches that the contacts of S cannot apply
-        outside = _complement(held)
+        outside = null_space(held.T)
         weights = _most_pushes(outside.T @ pushes[:, free])
         if weights is None:
-            return Rounds((), _departing(outside, pushes[:, free]))
+            return [], _departing(outside, pushes[:, free])
         forces = np.zeros_like(arms)
         forces[free] = weights[:, None] * normals[free]
         needed = -pushes[:, free] @ weights
-        supporting = np.asarray(np.linalg.lstsq(held, needed, rcond=DEPENDENT)[0], dtype=np.float64)
+        supporting = np.asarray(np.linalg.lstsq(held, needed, rcond=RANK)[0], dtype=np.float64)
         forces[settled] = supporting.reshape(-1, 3)
         found.append(forces)
         settled[free[weights > 0.0]] = True
-    left = _complement(grasp_map(arms))
-    return Rounds((), left[:, 0]) if left.shape[1] else Rounds(tuple(found), None)
+    left = null_space(grasp_map(arms).T)
+    return ([], left[:, 0]) if left.shape[1] else (found, None)
 
 
 def hopeless_twist(arms: Array, normals: Array) -> Array | None:
-    """Find a twist (6,) that separates at every friction, by (2); None if there is none.
-
-    Takes `arms`, `normals` (k, 3).
-    """
-    at_rest = _complement(grasp_map(arms))
+    """Find a twist (6,) that separates at every friction, by (2); None if there is none."""
+    at_rest = null_space(grasp_map(arms).T)
     if at_rest.shape[1]:
         return at_rest[:, 0]
     k = len(arms)
     # (2) as a null space: the variables are the twist and the speeds c_i, whose sum is maximised
     departing = np.zeros((k, 3, k))
     departing[np.arange(k), :, np.arange(k)] = normals
-    basis = _null_space(np.hstack([grasp_map(arms).T, departing.reshape(3 * k, k)]))
+    basis = null_space(np.hstack([grasp_map(arms).T, departing.reshape(3 * k, k)]))
     speeds = basis[WRENCH:]
     rows = np.vstack([-speeds, speeds.sum(axis=0), np.eye(basis.shape[1]), -np.eye(basis.shape[1])])
     limits = np.repeat([0.0, 1.0, LARGEST_VARIABLE, LARGEST_VARIABLE], [k, 1, *basis.shape[1:] * 2])
@@ -166,13 +140,8 @@ def hopeless_twist(arms: Array, normals: Array) -> Array | None:
 
 
 def pushing_forces(arms: Array, normals: Array) -> Array | None:
-    """Find balanced forces (k, 3) that push at every contact; None if there are none.
-
-    Some friction allows such forces.
-
-    Takes `arms`, `normals` (k, 3).
-    """
-    basis = _null_space(grasp_map(arms))
+    """Find balanced forces that push at every contact, as some friction allows; None if none do."""
+    basis = null_space(grasp_map(arms))
     n = basis.shape[1]
     pushes = np.einsum("kin,ki->kn", basis.reshape(*arms.shape, n), normals)
     rows = np.vstack([np.hstack([-pushes, np.ones((len(arms), 1))]), np.eye(2 * n, n + 1)])
@@ -184,7 +153,7 @@ def pushing_forces(arms: Array, normals: Array) -> Array | None:
 
 def _most_pushes(rows: Array) -> Array | None:
     """Find weights (n,) >= 0 with rows @ weights = 0, as many of them positive as possible."""
-    basis = _null_space(rows)
+    basis = null_space(rows)
     k, n = basis.shape
     # shares from 0 to 1, each at most its weight: their sum counts the weights that can be positive
     shares = np.eye(k)
@@ -197,11 +166,12 @@ def _most_pushes(rows: Array) -> Array | None:
     )
     if found is None:
         return None
-    return np.where(found[n:] > SUPPORTED, basis @ found[:n], 0.0)
+    # pushes that can be positive can be one
+    return np.where(found[n:] > 0.5, basis @ found[:n], 0.0)  # noqa: PLR2004 - between 0 and 1
 
 
 def _departing(outside: Array, pushes: Array) -> Array | None:
-    """Find the combination of the columns of `outside` that departs most evenly, or None."""
+    """Find the combination of the columns of `outside` that departs most evenly."""
     m, n = outside.shape[1], pushes.shape[1]
     steep = np.hstack([pushes.T @ outside, np.ones((n, 1))])
     box = np.hstack([np.vstack([np.eye(m), -np.eye(m)]), np.zeros((2 * m, 1))])
@@ -220,26 +190,10 @@ def _best(c: Array, A: Array, b: Array) -> Array | None:
     return found.x if isinstance(found, Optimum) and found.value > POSITIVE else None
 
 
-def _null_space(rows: Array) -> Array:
-    """Return orthonormal columns that `rows` maps to zero."""
-    if not rows.size:
-        return np.eye(rows.shape[1])
-    _, values, right = np.linalg.svd(rows)
-    return right[int((values > DEPENDENT).sum()) :].T
-
-
-def _complement(wrenches: Array) -> Array:
-    """Return orthonormal columns that are orthogonal to all of the wrenches (6, n)."""
-    return _null_space(wrenches.T) if wrenches.size else np.eye(WRENCH)
-
-
 def search_interval(points: Array, units: Array) -> FrictionInterval:
-    """Find the interval of the critical friction, as narrow as accuracy or proofs allow.
-
-    Takes `points` (k, 3) [m]; `units` (k, 3).
-    """
+    """Find the interval of the critical friction, as narrow as accuracy or proofs allow."""
     for strict in (False, True):
-        found = _searched(Ends.of(points, units, strict=strict)).interval()
+        found = _searched(Ends(points, units, unit_size(points)[0], strict)).interval()
         if found.verify():
             return found
     return FrictionInterval(0.0, math.inf, points, units, None, None)
@@ -248,7 +202,9 @@ def search_interval(points: Array, units: Array) -> FrictionInterval:
 def _searched(ends: "Ends") -> "Ends":
     arms, units = ends.arms, ends.units
     hopeless = hopeless_twist(arms, units)
-    if hopeless is not None and ends.open_at_all(hopeless):
+    if hopeless is not None:
+        ends.opened(hopeless, math.inf)
+    if ends.lower == math.inf:
         return ends
     _try_little(ends)
     trial = max(FIRST_TRIAL, 2.0 * ends.lower)
@@ -257,11 +213,17 @@ def _searched(ends: "Ends") -> "Ends":
             break
         trial = min(trial, LARGEST_FRICTION)
         answer = _asked(arms, units, trial)
-        ends.learn(trial, answer)
+        ends.close(answer.forces, trial)
+        ends.open(answer.twist)
         if ends.lower < trial < ends.upper:
             _try_evened(ends, trial, answer.forces)
         ends.decided(trial)
-        trial = ends.next_trial(trial, answer.margin, _slope(answer, arms, units))
+        # the slope of the margin over mu with respect to the logarithm of mu
+        velocities = answer.twist[:3] + cross(answer.twist[3:], arms)
+        along = np.einsum("ki,ki->k", answer.forces, units)
+        slides = answer.forces - along[:, None] * units
+        slope = float(np.einsum("ki,ki->", velocities, slides))
+        trial = ends.next_trial(trial, answer.margin, slope)
     if ends.forces is None and ends.lower < LARGEST_FRICTION:
         pushing = pushing_forces(arms, units)
         if pushing is not None:
@@ -271,28 +233,29 @@ def _searched(ends: "Ends") -> "Ends":
 
 def _try_little(ends: "Ends") -> None:
     """Look for a proof of closure at very small friction, or else for a first lower end."""
-    little, friction = rounds(ends.arms, ends.units), FRICTIONLESS
-    if little.twist is not None:
-        ends.open(little.twist)
+    (every, twist), friction = rounds(ends.arms, ends.units), FRICTIONLESS
+    if twist is not None:
+        ends.open(twist)
     # friction is doubled: ten times from `FRICTIONLESS` to `LITTLE`
-    while little.forces and friction <= LITTLE and ends.forces is None:
-        ends.close(little.at(friction, ends.units), friction, exactly=True)
+    while every and friction <= LITTLE and ends.forces is None:
+        ends.close(combined(every, friction, ends.units), friction, exactly=True)
         friction *= 2.0
     if ends.forces is None and ends.lower < FRICTIONLESS:
-        ends.learn(FRICTIONLESS, _asked(ends.arms, ends.units, FRICTIONLESS))
+        answer = _asked(ends.arms, ends.units, FRICTIONLESS)
+        ends.close(answer.forces, FRICTIONLESS)
+        ends.open(answer.twist)
 
 
 def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
     """Solve the margin program again in units of the pushes of its own answer.
 
-    Near a threshold, some contacts push much less than others. The depth of their forces in the
-    cones is then too small for a solver to tell from zero. In units of their own pushes, these
-    forces are as deep as others.
+    Near a threshold, some contacts push so much less than others that a solver cannot tell their
+    depth from zero. In units of their own pushes, they are as deep.
     """
     G, alike = grasp_map(ends.arms), np.full(len(ends.arms), friction)
-    for _ in range(EVENED):
+    for _ in range(3):
         pushes, _ = normal_and_tangential(forces, ends.units)
-        pushes = np.maximum(pushes, FAINTEST * np.abs(pushes).max())
+        pushes = np.maximum(pushes, 1e-10 * np.abs(pushes).max())
         if not pushes.min() > 0.0:
             return
         scaled = np.repeat(pushes, 3)
@@ -320,9 +283,7 @@ class Ends:
     """The proved ends of an interval of friction, and where to try next."""
 
     points: Array
-    """Contact points, (k, 3) [m]."""
     units: Array
-    """Inward unit normals, (k, 3)."""
     arms: Array
     """Arms of the contacts at unit size, (k, 3)."""
     strict: bool = True
@@ -341,11 +302,6 @@ class Ends:
     spread: float = 0.0
     """Distance from `center` at which the next proofs are tried."""
 
-    @classmethod
-    def of(cls, points: Array, units: Array, *, strict: bool = True) -> "Ends":
-        """Start with an interval about which nothing is proved yet."""
-        return cls(points, units, unit_size(points)[0], strict)
-
     @property
     def settled(self) -> bool:
         """Return whether the interval is as narrow as asked for, or as proofs allow."""
@@ -362,11 +318,6 @@ class Ends:
             if exact is not None and closes(exact, *contacts, self.upper):
                 forces = exact
         return FrictionInterval(self.lower, self.upper, *contacts, forces, self.twist)
-
-    def learn(self, friction: float, answer: Answer) -> None:
-        """Move both ends as far as the program's answer at a friction proves."""
-        self.close(answer.forces, friction)
-        self.open(answer.twist)
 
     def decided(self, friction: float) -> None:
         """Look farther away from a friction at which nothing was proved, or give up there."""
@@ -387,16 +338,13 @@ class Ends:
         tried = [needed + share * (friction - needed) for share in PROOF_SHARES]
         for enough in (friction,) if exactly else (*tried, friction):
             enough = max(enough, FRICTIONLESS)
-            below = enough <= friction and enough < self.upper
-            if below and self._closes(forces, enough):
+            if not (enough <= friction and enough < self.upper):
+                continue
+            alike = np.full(len(self.arms), enough)
+            easy = not self.strict and proves_closure(forces, self.arms, self.units, alike)
+            if easy or closes(forces, self.points, self.units, enough):
                 self.upper, self.forces = enough, forces
                 return
-
-    def _closes(self, forces: Array, friction: float) -> bool:
-        alike = np.full(len(self.arms), friction)
-        if not self.strict and proves_closure(forces, self.arms, self.units, alike):
-            return True
-        return closes(forces, self.points, self.units, friction)
 
     def open(self, twist: Array) -> None:
         """Raise the lower end to the friction up to which a twist separates."""
@@ -407,14 +355,10 @@ class Ends:
             still, friction = _put_to_rest(twist / length, self.arms, self.units, slow)
             friction *= 1.0 - SHAVED
             if self.lower < friction < self.upper:
-                self._opened(still, friction)
+                self.opened(still, friction)
 
-    def open_at_all(self, twist: Array) -> bool:
-        """Return whether a twist separates at every friction; then the search ends."""
-        self._opened(twist, math.inf)
-        return self.lower == math.inf
-
-    def _opened(self, twist: Array, friction: float) -> None:
+    def opened(self, twist: Array, friction: float) -> None:
+        """Raise the lower end to a friction, where a twist separates there."""
         twist = at_the_first(twist, self.points)
         easy = not self.strict and friction < math.inf
         if easy or separates(twist, self.points, self.units, friction):
@@ -430,16 +374,15 @@ class Ends:
         if self.lower < root < self.upper and self.trials % HALVING:
             return slightly_past(root, friction, self.lower, self.upper)
         if self.lower > 0.0:
-            return _between(self.lower, self.upper)
+            # in the middle, measured by the cones' half-angles
+            highest = min(self.upper, 4.0 * LARGEST_FRICTION)
+            return math.tan(0.5 * (math.atan(self.lower) + math.atan(highest)))
         self.share *= self.share
         return max(2.0 * self.share * self.upper, FRICTIONLESS)
 
 
 def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tuple[Array, float]:
-    """Put slow contacts to rest under a unit twist.
-
-    Gives the changed twist, and the friction up to which it may separate.
-    """
+    """Put slow contacts to rest under a unit twist, which separates at most up to a friction."""
     rows = grasp_map(arms).T.reshape(-1, 3, WRENCH)
     slowest = np.linalg.norm(rows @ twist, axis=1) <= slow
     resting = rows[slowest].reshape(-1, WRENCH)
@@ -447,29 +390,16 @@ def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tupl
         for _ in range(2):  # once more for what rounding leaves
             twist = twist - np.linalg.lstsq(resting, resting @ twist, rcond=NEARLY_AT_REST)[0]
     along, across = normal_and_tangential(rows[~slowest] @ twist, normals[~slowest])
-    if not np.linalg.norm(twist) > STALLED:
+    if not np.linalg.norm(twist) > 1e-3:  # noqa: PLR2004 - what is left is only rounding
         return twist, 0.0
     with np.errstate(over="ignore"):  # contacts that hardly slide are separated at any friction
-        ratios = -along / np.maximum(across, np.finfo(np.float64).tiny)
+        ratios = -along / np.maximum(across, SMALLEST_NORMAL)
     return twist, float(ratios.min(initial=2.0 * LARGEST_FRICTION))
 
 
 def slightly_past(root: float, trial: float, lower: float, upper: float) -> float:
     """Move a root by Newton's method past itself, towards the wider side of an interval."""
-    past = NUDGE * FRICTION_ACCURACY * root + OVERSHOOT * (root - trial) ** 2 / root
+    past = NUDGE * FRICTION_ACCURACY * root + (root - trial) ** 2 / root
     if upper - root > root - lower:
         return root + min(past, 0.5 * (upper - root))
     return root - min(past, 0.5 * (root - lower))
-
-
-def _between(lower: float, upper: float) -> float:
-    """Return the friction in the middle between two, measured by the cones' half-angles."""
-    return math.tan(0.5 * (math.atan(lower) + math.atan(min(upper, 4.0 * LARGEST_FRICTION))))
-
-
-def _slope(answer: Answer, arms: Array, normals: Array) -> float:
-    """Return the slope of the margin over mu with respect to the logarithm of mu."""
-    velocities = answer.twist[:3] + cross(answer.twist[3:], arms)
-    along = np.einsum("ki,ki->k", answer.forces, normals)
-    slides = answer.forces - along[:, None] * normals
-    return float(np.einsum("ki,ki->", velocities, slides))

@@ -20,6 +20,7 @@ Source: Sudsang & Ponce 1995, Proposition 2; Dandurand, "The rigidity of compoun
 grids", Structural Topology 10, 1984, for line varieties.
 """
 
+import math
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -36,15 +37,14 @@ ON_CLASS = 1e-7
 spread over a unit length: ten times what a linear program's answer may be off."""
 ONE_POINT = 1e-12
 """Points closer than this, relative to their coordinates, are one point."""
-DEPENDENT = 3
-"""Largest rank of four dependent lines."""
+LINES = 4
 REGULUS = 3
 """Rank of the reciprocal form on the span of four lines that lie on a regulus."""
 
 
 def plucker_vectors(points: Array, directions: Array) -> Array:
-    """Return the Pluecker vectors (d, x x d) of lines, (k, 6)."""
-    return np.hstack([directions, cross(points, directions)])
+    """Return the Pluecker vectors (d, x x d) of lines, (..., 6)."""
+    return np.concatenate([directions, cross(points, directions)], axis=-1)
 
 
 def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
@@ -61,71 +61,38 @@ def classify_lines(points: ArrayLike, directions: ArrayLike) -> LineClass:
         InputError: A shape is wrong, or a direction is zero.
     """
     x = frozen(points, (4, 3), "points")
-    d = frozen(directions, (4, 3), "directions")
-    lengths = np.linalg.norm(d, axis=1, keepdims=True)
-    if lengths.min() < SMALLEST_SIZE:
+    return classify_each(x[None], frozen(directions, (4, 3), "directions")[None])[0]
+
+
+def classify_each(points: Array, directions: Array) -> list[LineClass]:
+    """Classify many sets of four lines, (g, 4, 3) each, as `classify_lines` classifies one."""
+    lengths = np.linalg.norm(directions, axis=-1, keepdims=True)
+    if lengths.min(initial=math.inf) < SMALLEST_SIZE:
         raise InputError(
             f"directions must not be zero: each must have a length of {SMALLEST_SIZE:g} "
             f"at least, got {float(lengths.min()):.6g}"
         )
-    check_spread(np.ptp(x, axis=0), "points")
-    d = d / lengths
+    check_spread(np.ptp(points, axis=1), "points")
+    units = directions / lengths
     # lengths count relative to the spread, unless the points are one point but for rounding
-    arms = x - x.mean(axis=0)
-    spread = float(np.linalg.norm(arms, axis=1).max())
-    if spread > ONE_POINT * float(np.abs(x).max()):
-        arms = arms / spread
-    _, sizes, basis = np.linalg.svd(plucker_vectors(arms, d))
-    # dependent vectors are those of (1)
-    rank = int((sizes > ON_CLASS).sum())
-    if rank == len(d):
-        return "independent"
-    span = basis[:rank]
-    # (2), on an orthonormal basis of the span
-    form = span[:, :3] @ span[:, 3:].T
-    meeting = int((np.abs(np.linalg.eigvalsh(form + form.T)) > ON_CLASS).sum())
-    if meeting >= REGULUS:
-        return "regulus"
-    if meeting > 0:
-        return "pencil"
-    # both have form zero: planar lines and their points span two dimensions
-    flatness = np.linalg.svd(np.vstack([d, arms]), compute_uv=False)[2]
-    return "planar" if flatness <= ON_CLASS else "concurrent"
-
-
-def classify_each(points: Array, directions: Array) -> list[LineClass]:
-    """Classify many sets of four lines, as `classify_lines` classifies one.
-
-    Takes `points` (g, 4, 3) [m]; `directions` (g, 4, 3).
-    """
-    found: list[LineClass | None] = [None] * len(points)
-    lengths = np.linalg.norm(directions, axis=-1, keepdims=True)
     arms = points - points.mean(axis=1, keepdims=True)
     spreads = np.linalg.norm(arms, axis=-1).max(axis=-1, initial=0.0)
-    usual = (lengths >= SMALLEST_SIZE).all(axis=(1, 2)) & (spreads >= SMALLEST_SIZE)
-    usual &= spreads > ONE_POINT * np.abs(points).max(axis=(1, 2), initial=0.0)
-    rows = np.flatnonzero(usual)
-    units, arms = directions[rows] / lengths[rows], arms[rows] / spreads[rows, None, None]
-    vectors = np.concatenate([units, cross(arms, units)], axis=-1)
-    _, sizes, basis = np.linalg.svd(vectors, full_matrices=False)
-    ranks = (sizes > ON_CLASS).sum(axis=-1)
-    # (1); sets of a smaller rank are rare, and left to `classify_lines`
-    for row in np.flatnonzero(ranks > DEPENDENT).tolist():
-        found[rows[row]] = "independent"
-    three = np.flatnonzero(ranks == DEPENDENT)
-    span = basis[three, :DEPENDENT]
-    # (2), on an orthonormal basis of the span
+    wide = spreads > ONE_POINT * np.abs(points).max(axis=(1, 2), initial=0.0)
+    arms = arms / np.where(wide, spreads, 1.0)[:, None, None]
+    _, sizes, basis = np.linalg.svd(plucker_vectors(arms, units), full_matrices=False)
+    # dependent vectors are those of (1)
+    spanning = sizes > ON_CLASS
+    span = basis * spanning[..., None]
+    # (2), on an orthonormal basis of the span, and zero on what is left of the four
     form = span[..., :3] @ span[..., 3:].swapaxes(-1, -2)
     values = np.linalg.eigvalsh(form + form.swapaxes(-1, -2))
     meeting = (np.abs(values) > ON_CLASS).sum(axis=-1)
-    flat = np.linalg.svd(np.concatenate([units[three], arms[three]], axis=1), compute_uv=False)
-    # both have form zero: planar lines and their points span two dimensions
-    planar = flat[:, 2] <= ON_CLASS
-    for row, count, plane in zip(three.tolist(), meeting.tolist(), planar.tolist(), strict=True):
+    # of form zero: planar lines and their points span two dimensions
+    flat = np.linalg.svd(np.concatenate([units, arms], axis=1), compute_uv=False)[:, 2] <= ON_CLASS
+    found: list[LineClass] = []
+    ranks = spanning.sum(axis=-1)
+    for rank, count, plane in zip(ranks.tolist(), meeting.tolist(), flat.tolist(), strict=True):
         together: LineClass = "planar" if plane else "concurrent"
         crossing: LineClass = "regulus" if count >= REGULUS else "pencil"
-        found[rows[row]] = crossing if count else together
-    return [
-        known or classify_lines(at, along)
-        for known, at, along in zip(found, points, directions, strict=True)
-    ]
+        found.append("independent" if rank == LINES else crossing if count else together)
+    return found

@@ -56,16 +56,18 @@ SHORTER = 0.99
 def least_cone_sum(
     columns: Array, mean: Array, share: float, pair: Array, y: Array
 ) -> tuple[float, float]:
-    """Solve the margin program (1) and its dual (2), up to a gap between their values.
+    """Solve the program (1) and its dual (2), up to a share of the distance of their values from 1.
 
-    Takes `columns` (k, 3, 6); `mean`, `y` (6,); `pair` (2, k, 3). Gives values of the primal and of
-    the dual program. The optimum lies between them where the forces balance.
+    The columns are (k, 3, 6); s and z are filled in as a pair, (2, k, 3), and y. Gives both values:
+    the optimum lies between them where the forces balance.
     """
     k = len(columns)
     W, middle, V = np.empty((2, k, 3, 3)), np.empty((k, 3)), np.empty((WRENCH, k, 3))
     R, missing, wanted = np.empty((WRENCH, WRENCH)), np.empty(WRENCH), np.empty((k, 3))
     step, turn = np.empty((2, k, 3)), np.empty(WRENCH)
-    _start(pair, y)
+    pair[:] = 0.0
+    pair[:, :, 0] = 1.0
+    y[:] = 0.0
     primal = dual = 0.0
     for _ in range(MOST_STEPS):
         primal, dual, gap = _values(mean, pair, y)
@@ -88,17 +90,7 @@ def least_cone_sum(
 
 
 @loop("numpy")
-def _start(pair: Array, y: Array) -> None:
-    for i in range(pair.shape[1]):
-        for j in range(3):
-            pair[0, i, j] = pair[1, i, j] = 1.0 if j == 0 else 0.0
-    for w in range(WRENCH):
-        y[w] = 0.0
-
-
-@loop("numpy")
 def _values(mean: Array, pair: Array, y: Array) -> tuple[float, float, float]:
-    """Compute the values of the programs (1) and (2), and the sum of s_i.z_i."""
     primal = dual = gap = 0.0
     for i in range(pair.shape[1]):
         primal += pair[0, i, 0]
@@ -126,10 +118,7 @@ def _missing(columns: Array, mean: Array, pair: Array, missing: Array) -> float:
 
 @loop("numpy")
 def _factor(columns: Array, W: Array, V: Array, R: Array) -> bool:
-    """Find reflections 1 - v v' that turn the columns A_i W_i into a triangular matrix R.
-
-    Gives false if the wrenches do not span all six dimensions.
-    """
+    """Find reflections 1 - v v' that make columns A_i W_i triangular; False if they do not span."""
     for w in range(WRENCH):
         for i in range(len(columns)):
             for j in range(3):
@@ -157,7 +146,6 @@ def _factor(columns: Array, W: Array, V: Array, R: Array) -> bool:
 
 @loop("numpy")
 def _reflect(V: Array, v: int, X: Array, x: int) -> None:
-    """Apply the v-th reflection to the x-th of some vectors."""
     share = _dot(V, v, X, x)
     for i in range(V.shape[1]):
         for j in range(3):
@@ -174,16 +162,17 @@ def _dot(V: Array, v: int, X: Array, x: int) -> float:
 
 @loop("numpy")
 def _direct(V: Array, R: Array, missing: Array, wanted: Array, step: Array, turn: Array) -> None:
-    """Compute a Newton step: parts for s and z, which scaled sum to `wanted`, and one for y.
-
-    The step also supplies the wrench that the forces lack to balance.
-    """
+    """Compute a Newton step that supplies the missing wrench: for s and z, scaled, and for y."""
     for i in range(len(wanted)):
         for j in range(3):
             step[0, i, j], step[1, i, j] = wanted[i, j], 0.0
     for v in range(WRENCH):
         _reflect(V, v, step, 0)
-    _solve_lower(R, missing, turn)
+    for w in range(WRENCH):  # R'x = missing, by forward substitution
+        turn[w] = missing[w]
+        for v in range(w):
+            turn[w] -= R[v, w] * turn[v]
+        turn[w] /= R[w, w]
     for w in range(WRENCH):
         turn[w] -= step[0, w // 3, w % 3]
         step[1, w // 3, w % 3] = -turn[w]
@@ -192,23 +181,7 @@ def _direct(V: Array, R: Array, missing: Array, wanted: Array, step: Array, turn
     for i in range(len(wanted)):
         for j in range(3):
             step[0, i, j] = wanted[i, j] - step[1, i, j]
-    _solve_upper(R, turn)
-
-
-@loop("numpy")
-def _solve_lower(R: Array, b: Array, x: Array) -> None:
-    """Solve R'x = b for x by forward substitution."""
-    for w in range(WRENCH):
-        x[w] = b[w]
-        for v in range(w):
-            x[w] -= R[v, w] * x[v]
-        x[w] /= R[w, w]
-
-
-@loop("numpy")
-def _solve_upper(R: Array, x: Array) -> None:
-    """Solve R x = b for x in place by back substitution."""
-    for w in range(WRENCH - 1, -1, -1):
+    for w in range(WRENCH - 1, -1, -1):  # R x = turn, by back substitution
         for v in range(w + 1, WRENCH):
-            x[w] -= R[w, v] * x[v]
-        x[w] /= R[w, w]
+            turn[w] -= R[w, v] * turn[v]
+        turn[w] /= R[w, w]

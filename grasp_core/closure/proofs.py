@@ -1,6 +1,7 @@
 """Proves force closure by contact forces, and its opposite by twists.
 
-Contacts are given at unit size: arms from their mean point, the longest of length one. The program
+Contacts are given at unit size: arms from their mean point, the longest of length one. Arms,
+normals and forces are (..., k, 3), twists (..., 6), frictions (..., k) or (..., 1). The program
 and the supports s_i are those of `force_closure`. Let d_i be the depth mu_i n_i.f_i - |tangential
 part of f_i| of force i in its cone, or n_i.f_i without friction, w the wrench of all forces, and
 sigma the sixth singular value of the matrix of wrenches that contacts can apply. A correction of
@@ -62,10 +63,7 @@ def allowed(friction: Array) -> NDArray[np.bool_]:
 
 
 def generators_of(arms: Array, normals: Array, friction: Array) -> Array:
-    """Return wrenches that span the space of all wrenches that the contacts can apply.
-
-    There are three for each contact, or one without friction.
-    """
+    """Return wrenches that span all that contacts can apply: three each, one without friction."""
     G = grasp_map(arms)
     if (friction > 0.0).all():
         return G
@@ -75,11 +73,7 @@ def generators_of(arms: Array, normals: Array, friction: Array) -> Array:
 def refutes_closure(
     twist: Array, arms: Array, normals: Array, friction: Array
 ) -> NDArray[np.bool_]:
-    """Return whether, by (2), no contact force in its cone has positive power on a twist.
-
-    Takes `twist` (..., 6); `arms`, `normals` (..., k, 3); `friction` (..., k) or (..., 1). Gives
-    truth values, (...).
-    """
+    """Return whether, by (2), no contact force in its cone has positive power on a twist."""
     twist = without_giants(twist, 1)
     length: Array = np.linalg.norm(twist, axis=-1)
     # over the length of the longest force with unit normal part, which rounding is relative to
@@ -90,11 +84,7 @@ def refutes_closure(
 def proves_closure(
     forces: Array, arms: Array, normals: Array, friction: Array
 ) -> NDArray[np.bool_]:
-    """Return whether forces, by (1), prove closure: they stay in the cones once balanced.
-
-    Takes `forces`, `arms`, `normals` (..., k, 3); `friction` (..., k) or (..., 1). Gives truth
-    values, (...).
-    """
+    """Return whether forces, by (1), prove closure: they stay in the cones once balanced."""
     forces, maps = without_giants(forces, 2), grasp_map(arms)
     flat = np.broadcast_to(friction == 0.0, forces.shape[:-1])[..., None]
     if flat.any():
@@ -120,10 +110,10 @@ def proves_closure(
 def proved_margin(
     forces: Array, arms: Array, normals: Array, friction: Array, caution: float = 1.0
 ) -> float:
-    """Compute the margin (1) that forces prove: their depth, less the cost of balancing them.
+    """Compute the margin (1) that forces (k, 3) prove; minus infinity if they prove none.
 
-    Takes `forces`, `arms`, `normals` (k, 3); `friction` (k,). Gives a lower bound of the optimum of
-    the margin program; minus infinity if there is none.
+    It bounds the optimum of the margin program from below: the forces' depth, less the cost of
+    balancing them.
     """
     along, _ = normal_and_tangential(forces, normals)
     depth = depths_in_cones(forces, normals, friction)
@@ -147,15 +137,10 @@ def proved_margin(
 def margin_ceiling(
     twist: Array, arms: Array, normals: Array, friction: Array, caution: float = 1.0
 ) -> float:
-    """Bound the margin of closure from above by (3), with a twist that separates the contacts.
+    """Bound the margin of closure from above by (3), with a twist (6,) that separates the contacts.
 
-    No contact force does positive work on such a twist, within rounding. The margin is how
-    deep in their cones balanced forces can lie, relative to the sum of their normal parts; without
-    closure it is negative.
-
-    Takes `twist` (6,); `arms`, `normals` (k, 3); `friction` (k,). Gives the bound, below zero; zero
-    where the largest work M that a force does on the twist is zero to within rounding; infinity
-    where M is more, and the twist proves nothing.
+    The bound is negative; zero where M is zero to within rounding; infinity where M is more, and
+    the twist proves nothing.
     """
     if not refutes_closure(twist, arms, normals, friction):
         return math.inf
@@ -171,10 +156,7 @@ def margin_ceiling(
 
 
 def without_giants(vectors: Array, axes: int) -> Array:
-    """Replace sets that contain huge numbers or NaN by zeros, which prove nothing.
-
-    Takes `vectors` (..., 6) or (..., k, 3).
-    """
+    """Replace sets that contain huge numbers or NaN by zeros, which prove nothing."""
     last = tuple(range(-axes, 0))
     sizes = np.max(np.abs(vectors), axis=last, keepdims=True, initial=0.0)
     return np.where(sizes < GIANT, vectors, 0.0)
@@ -189,13 +171,7 @@ def depths_in_cones(forces: Array, normals: Array, friction: Array) -> Array:
 def proved_margins(
     forces: Array, arms: Array, normals: Array, friction: float, caution: float = 1.0
 ) -> Array:
-    """Compute the margins (1) that the forces of many sets of contacts prove, (g,).
-
-    `proved_margin` explains them; friction has to be positive, and one for all contacts.
-
-    Takes `forces`, `arms`, `normals` (g, k, 3). Gives lower bounds of the optima of the margin
-    programs; minus infinity where there is none.
-    """
+    """Compute `proved_margin` of many sets of contacts, (g,), with one positive friction."""
     maps = grasp_map(arms)
     if not maps.size:
         return np.full(len(arms), -math.inf)
@@ -216,12 +192,7 @@ def proved_margins(
 def margin_ceilings(
     twists: Array, arms: Array, normals: Array, friction: float, caution: float = 1.0
 ) -> Array:
-    """Bound the margins of closure of many sets of contacts from above by (3), (g,).
-
-    `margin_ceiling` explains the bounds.
-
-    Takes `twists` (g, 6); `arms`, `normals` (g, k, 3).
-    """
+    """Compute `margin_ceiling` of many sets of contacts, (g,), with one friction for all."""
     every = np.full((len(twists), 1), friction)
     velocities = twists[:, None, :3] + cross(twists[:, None, 3:], arms)
     along, _ = normal_and_tangential(velocities, normals)

@@ -30,28 +30,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices
 from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.closure import friction_search
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.decision import (
     DECIDED,
-    INTERIOR,
-    NEWTON_STEPS,
-    TOUCHING,
     Answer,
     departing_twist,
-    null_space,
+    sparing_twist,
+    touching_twist,
 )
 from grasp_core.closure.friction_interval import FRICTIONLESS, NEARLY_AT_REST
-from grasp_core.closure.friction_search import (
-    FIRST_TRIAL,
-    FRICTION_ACCURACY,
-    HALVING,
-    MOST_TRIALS,
-    NUDGE,
-    slightly_past,
-)
-from grasp_core.closure.proofs import RANK, SMALLEST_NORMAL
+from grasp_core.closure.proofs import SMALLEST_NORMAL
 from grasp_core.closure.soft_contacts import (
     LOCAL,
     SoftContacts,
@@ -78,11 +69,30 @@ def decide(contacts: SoftContacts) -> Answer:
         return Answer(math.nan, nothing, np.zeros(WRENCH), closed=None)
     if proved_margin(contacts, local) > 0.0:
         return Answer(margin, local, twist, closed=True)
+
+    def pushed(twist: Array) -> tuple[Array, Array]:
+        slopes = contacts.slopes(twist)
+        across = np.maximum(np.linalg.norm(slopes[:, 1:], axis=1), SMALLEST_NORMAL)
+        working = np.hstack([np.ones((len(slopes), 1)), slopes[:, 1:] / across[:, None]])
+        return supports(slopes), np.einsum("kwj,kj->kw", contacts.A, working)
+
+    def held(some: Indices) -> Array:
+        return contacts.A[some].transpose(0, 2, 1).reshape(-1, WRENCH)
+
+    def solved(twists: Array, rest: Indices) -> tuple[float, Array, Array]:
+        left = contacts.A[rest].transpose(1, 0, 2).reshape(WRENCH, -1)
+        try:
+            margin, local, reduced = margin_program(twists.T @ left, contacts.shares[rest])
+        except SolverError:
+            return math.inf, np.zeros(len(rest)), np.zeros(0)
+        return margin, depths(local), reduced
+
     candidates = [twist]
     if abs(margin) < DECIDED:
-        candidates.append(_touching(contacts, twist))
-    sparing = _sparing(contacts, local) if margin > -DECIDED else None
-    candidates += [] if sparing is None else [sparing, _touching(contacts, sparing)]
+        candidates.append(touching_twist(twist, pushed))
+    sparing = sparing_twist(depths(local), held, solved) if margin > -DECIDED else None
+    if sparing is not None:
+        candidates += [sparing, touching_twist(sparing, pushed)]
     for each in candidates:
         if margin_ceiling(contacts, each) <= 0.0:
             return Answer(margin, local, each, closed=False)
@@ -90,9 +100,9 @@ def decide(contacts: SoftContacts) -> Answer:
 
 
 def margin_program(balance: Array, shares: Array) -> tuple[float, Array, Array]:
-    """Solve (1) for the margin, local coordinates (k, 4), and the twist of the dual program.
+    """Solve (1) for the margin, local coordinates (k, 4), and the twist of the dual program, (m,).
 
-    Takes `balance` (m, 4k); `shares` (k,).
+    They balance if `balance`, (m, 4k), maps them to zero; `shares` are the r_i.
     """
     k, m = len(shares), len(balance)
     n = LOCAL * k
@@ -115,80 +125,18 @@ def margin_program(balance: Array, shares: Array) -> tuple[float, Array, Array]:
     return float(solution.x[-1]) / least, x.reshape(k, LOCAL), -solution.z[:m]
 
 
-def _touching(contacts: SoftContacts, twist: Array) -> Array:
-    """Change a twist by Newton's method, so that nearly zero supports are zero up to rounding."""
-    twist = twist / max(float(np.linalg.norm(twist)), SMALLEST_NORMAL)
-    for _ in range(NEWTON_STEPS):
-        slopes = contacts.slopes(twist)
-        across = np.maximum(np.linalg.norm(slopes[:, 1:], axis=1), SMALLEST_NORMAL)
-        excess = supports(slopes)
-        touched = excess > -TOUCHING
-        # the gradient of s_i in y is the wrench of the force in cone i that works most along y
-        working = np.hstack([np.ones((len(slopes), 1)), slopes[:, 1:] / across[:, None]])
-        gradients = np.einsum("kwj,kj->kw", contacts.A, working)[touched]
-        step = np.asarray(
-            np.linalg.lstsq(gradients, excess[touched], rcond=RANK)[0], dtype=np.float64
-        )
-        twist = twist - step
-    return twist
-
-
-def _sparing(contacts: SoftContacts, local: Array) -> Array | None:
-    """Find a separating twist where some contacts balance each other, as for hard contacts.
-
-    Such a twist leaves the balanced contacts at rest. Among these twists the program is solved
-    again for the other contacts, until its optimum is negative or no contact is left.
-    """
-    rest, twists = np.arange(len(local)), np.eye(WRENCH)
-    while True:  # each turn takes balanced contacts from the rest, or returns
-        balanced = depths(local) > INTERIOR
-        if not balanced.any():
-            return None
-        # a force inside its cone can work along all that its contact feels, so that must be zero
-        held = contacts.A[rest[balanced]].transpose(0, 2, 1).reshape(-1, WRENCH)
-        twists = null_space(held @ twists, twists)
-        rest = rest[~balanced]
-        if not twists.shape[1]:
-            return None
-        if not rest.size:
-            return twists[:, 0]
-        left = contacts.A[rest].transpose(1, 0, 2).reshape(WRENCH, -1)
-        try:
-            margin, local, reduced = margin_program(twists.T @ left, contacts.shares[rest])
-        except SolverError:
-            return None
-        if margin < -DECIDED:
-            return twists @ reduced
-        if margin > DECIDED:
-            return None
-
-
 @dataclass(slots=True)
 class SoftInterval:
-    """Friction up to `lower`, without force closure, and from `upper` on, with force closure."""
+    """Friction up to `lower`, without force closure, and from `upper` on, with force closure.
+
+    A twist at unit size, (6,), proves the one, and local coordinates, (k, 4), the other.
+    """
 
     contacts: SoftContacts
-    """The contacts, at any friction."""
     lower: float
     upper: float
     twist: Array | None = None
-    """Twist that separates at `lower`, at unit size, (6,)."""
     local: Array | None = None
-    """Local coordinates that prove closure at `upper`, (k, 4)."""
-
-    def proved(self) -> bool:
-        """Check both ends in plain arithmetic; an end without proof claims nothing."""
-        below = self.twist is not None and _open(self.contacts, self.twist, self.lower)
-        above = self.local is not None and _closed(self.contacts, self.local, self.upper)
-        unclaimed = self.twist is None and self.lower == 0.0
-        return (below or unclaimed) and (above or self.local is None)
-
-    @property
-    def narrow(self) -> bool:
-        """Whether the interval is as narrow as asked for."""
-        return (
-            self.upper - self.lower <= FRICTION_ACCURACY * self.lower or self.upper <= FRICTIONLESS
-        )
 
     def close(self, forces: Array, torques: Array, friction: float) -> None:
         """Lower the upper end to the friction that forces need, or at which they were found."""
@@ -199,24 +147,23 @@ class SoftInterval:
             if not tried <= min(friction, self.upper):
                 continue
             local = contacts.at_friction(tried).local(forces, torques)
-            if _closed(contacts, local, tried):
+            if proved_margin(contacts.at_friction(tried), local) > 0.0:
                 self.upper, self.local = tried, local
                 return
 
     def open(self, twist: Array, friction: float) -> None:
         """Raise the lower end to the friction up to which a twist separates, or at least did."""
-        for tried in (self._separated(twist), friction):
-            if self.lower < tried < self.upper and _open(self.contacts, twist, tried):
-                self.lower, self.twist = tried, twist
-                return
-
-    def _separated(self, twist: Array) -> float:
         slopes = self.contacts.at_friction(1.0).slopes(twist)
         slopes = slopes[np.abs(slopes).max(axis=1) > NEARLY_AT_REST * float(np.linalg.norm(twist))]
         along, across = np.minimum(slopes[:, 0], 0.0), np.hypot(slopes[:, 1], slopes[:, 2])
         room = np.sqrt(np.maximum(along**2 - slopes[:, 3] ** 2, 0.0))
-        tiny = np.finfo(np.float64).tiny
-        return float((room / np.maximum(across, tiny)).min(initial=LARGEST_FRICTION))
+        # by (3), of contacts that are not at rest
+        separated = (room / np.maximum(across, SMALLEST_NORMAL)).min(initial=LARGEST_FRICTION)
+        for tried in (float(separated), friction):
+            within = self.lower < tried < self.upper
+            if within and margin_ceiling(self.contacts.at_friction(tried), twist) <= 0.0:
+                self.lower, self.twist = tried, twist
+                return
 
 
 def needed_friction(contacts: SoftContacts, forces: Array, torques: Array) -> float:
@@ -234,14 +181,17 @@ def friction_interval(contacts: SoftContacts, highest: float) -> SoftInterval:
     found = SoftInterval(contacts, 0.0, math.inf)
     start = 2.0 * highest if highest < 0.5 * LARGEST_FRICTION else LARGEST_FRICTION
     _try(found, start)
-    trial, away = min(FIRST_TRIAL, 0.5 * highest), 0.0
-    for count in range(MOST_TRIALS):
-        if found.narrow or not math.isfinite(found.upper):
+    trial, away = min(friction_search.FIRST_TRIAL, 0.5 * highest), 0.0
+    for count in range(friction_search.MOST_TRIALS):
+        narrow = found.upper - found.lower <= friction_search.FRICTION_ACCURACY * found.lower
+        if narrow or found.upper <= FRICTIONLESS or not math.isfinite(found.upper):
             break
         root = _try(found, max(trial, FRICTIONLESS))
         if found.lower < trial < found.upper:
             # nothing is proved at the trial, probably the threshold: close in from both sides
-            away = max(WIDENED * away, NUDGE * FRICTION_ACCURACY * trial)
+            away = max(
+                WIDENED * away, friction_search.NUDGE * friction_search.FRICTION_ACCURACY * trial
+            )
             above = trial + away if trial + away < found.upper else found.upper
             below = max(trial - away, found.lower)
             _try(found, above)
@@ -249,15 +199,12 @@ def friction_interval(contacts: SoftContacts, highest: float) -> SoftInterval:
             if found.upper <= above and found.lower >= below:
                 break
             continue
-        trial, away = _next(found, root, trial, halve=count % HALVING == HALVING - 1), 0.0
+        lower, upper, away = found.lower, found.upper, 0.0
+        if lower < root < upper and count % friction_search.HALVING != friction_search.HALVING - 1:
+            trial = friction_search.slightly_past(root, trial, lower, upper)
+        else:
+            trial = math.sqrt(lower * upper) if lower > 0.0 else 0.1 * upper
     return found
-
-
-def _next(found: SoftInterval, root: float, trial: float, *, halve: bool) -> float:
-    lower, upper = found.lower, found.upper
-    if lower < root < upper and not halve:
-        return slightly_past(root, trial, lower, upper)
-    return math.sqrt(lower * upper) if lower > 0.0 else 0.1 * upper
 
 
 def _try(found: SoftInterval, friction: float) -> float:
@@ -280,11 +227,3 @@ def _try(found: SoftInterval, friction: float) -> float:
     # (4), over the logarithm of the friction
     slope = float(slides.sum())
     return friction * (1.0 - margin / slope) if slope > 0.0 and math.isfinite(margin) else math.nan
-
-
-def _closed(contacts: SoftContacts, local: Array, friction: float) -> bool:
-    return proved_margin(contacts.at_friction(friction), local) > 0.0
-
-
-def _open(contacts: SoftContacts, twist: Array, friction: float) -> bool:
-    return margin_ceiling(contacts.at_friction(friction), twist) <= 0.0

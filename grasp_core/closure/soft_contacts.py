@@ -43,7 +43,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, cross, frozen, frozen_each, is_array
+from grasp_core.arrays import Array, frozen, frozen_each, is_array
 from grasp_core.checked import LARGEST
 from grasp_core.closure.contacts import WRENCH, contact_frames, grasp_map, in_frames, unit_size
 from grasp_core.closure.proofs import CHECK_SLACK, RANK
@@ -54,10 +54,7 @@ LOCAL = 4
 
 
 def contact_torsions(torsion_m: ArrayLike, friction: Array) -> Array | None:
-    """Return one checked torsional coefficient for each contact; None if no contact has any.
-
-    Takes `torsion_m` (k,) [m]; `friction` (k,).
-    """
+    """Return one checked torsional coefficient for each contact; None if no contact has any."""
     mu_t = frozen(frozen_each(torsion_m, len(friction), "torsion_m"), friction.shape, "torsion_m")
     if not mu_t.any():
         return None
@@ -75,10 +72,7 @@ def contact_torsions(torsion_m: ArrayLike, friction: Array) -> Array | None:
 
 
 def torsion_lengths(torsions: Array, friction: Array) -> Array:
-    """Return the lengths mu_t / mu that make torques of contacts comparable with forces, (k,) [m].
-
-    They are zero without friction, where there is no torsion either.
-    """
+    """Return the lengths mu_t / mu that make torques of contacts forces; zero without friction."""
     return torsions / np.where(friction > 0.0, friction, 1.0)
 
 
@@ -95,13 +89,10 @@ class SoftContacts:
     """Soft contacts at unit size, and the matrices (2) from local coordinates to wrenches."""
 
     friction: Array
-    """Coulomb coefficients mu, (k,)."""
     reach: Array
     """Torsional coefficients mu_t over the contacts' size, (k,)."""
     frames: Array
     """Columns (normal, tangent, tangent) of each contact, (k, 3, 3)."""
-    center: Array
-    """Mean of the contacts, (3,) [m]."""
     size: float
     """Length that torques are divided by [m]."""
     A: Array
@@ -111,11 +102,8 @@ class SoftContacts:
     def of(
         cls, positions: Array, normals: Array, friction: Array, torsions: Array
     ) -> "SoftContacts":
-        """Set up contacts from checked arrays.
-
-        Takes `positions` (k, 3) [m]; `normals` (k, 3); `friction` (k,); `torsions` (k,) [m].
-        """
-        arms, center, size = unit_size(positions)
+        """Set up contacts from checked arrays, with torsions in metres."""
+        arms, _, size = unit_size(positions)
         frames, reach = contact_frames(normals), torsions / size
         k = len(arms)
         A = np.zeros((k, WRENCH, LOCAL))
@@ -123,13 +111,13 @@ class SoftContacts:
         A[:, :, :3] = maps.transpose(1, 0, 2)
         A[:, :, 1:3] *= friction[:, None, None]
         A[:, 3:, 3] = reach[:, None] * frames[:, :, 0]
-        return cls(friction, reach, frames, center, float(size), A)
+        return cls(friction, reach, frames, float(size), A)
 
     def at_friction(self, friction: float) -> "SoftContacts":
         """Return the same contacts with another Coulomb coefficient and the same torsion."""
         A, mu = self.A.copy(), np.full(len(self.friction), friction)
         A[:, :, 1:3] *= (mu / self.friction)[:, None, None]
-        return SoftContacts(mu, self.reach, self.frames, self.center, self.size, A)
+        return SoftContacts(mu, self.reach, self.frames, self.size, A)
 
     @property
     def matrix(self) -> Array:
@@ -157,10 +145,7 @@ class SoftContacts:
         return forces, local[:, 3] * self.reach * self.size
 
     def local(self, forces: Array, torques: Array) -> Array:
-        """Return the local coordinates (k, 4) of forces (k, 3) and torques about normals (k,).
-
-        What a contact cannot transmit is left out.
-        """
+        """Return local coordinates, (k, 4), of what contacts can transmit of forces and torques."""
         parts = np.einsum("kij,ki->kj", self.frames, forces)
         turning = torques / self.size
         spread = np.column_stack([np.ones_like(self.friction), *[self.friction] * 2, self.reach])
@@ -168,25 +153,11 @@ class SoftContacts:
         return np.divide(every, spread, out=np.zeros_like(every), where=spread > 0.0)
 
     def missed(self, forces: Array, torques: Array) -> float:
-        """Compute by how much forces and torques miss balance, or what contacts can transmit.
-
-        Gives the largest component of a wrench at unit size, or of a part that friction or torsion
-        of zero does not allow.
-        """
+        """Compute by how much forces and torques miss balance and what contacts can transmit."""
         local = self.local(forces, torques)
         kept, turned = self.in_space(local)
         parts = (forces - kept, (torques - turned) / self.size, self.matrix @ local.ravel())
         return max(float(np.abs(part).max()) for part in parts)
-
-    def at_unit_size(self, wrench: Array) -> Array:
-        """Move a twist (6,) [m/s, rad/s] from the frame's origin to the mean contact, scaled."""
-        turned = cross(wrench[3:], self.center)
-        return np.concatenate([wrench[:3] + turned, wrench[3:] * self.size])
-
-    def about_origin(self, twist: Array) -> Array:
-        """Move a twist at unit size from the mean contact to the frame's origin, (6,)."""
-        turning = twist[3:] / self.size
-        return np.concatenate([twist[:3] - cross(turning, self.center), turning])
 
 
 def supports(slopes: Array) -> Array:
@@ -200,11 +171,7 @@ def depths(local: Array) -> Array:
 
 
 def proved_margin(contacts: SoftContacts, local: Array, caution: float = 1.0) -> float:
-    """Compute the margin (4) that forces and torques prove.
-
-    Takes `local` (k, 4). Gives a lower bound of the optimum of the margin program; minus infinity
-    if there is none.
-    """
+    """Compute the margin (4) that local coordinates (k, 4) prove; minus infinity if none."""
     matrix = contacts.matrix
     if not (np.isfinite(matrix).all() and np.isfinite(local).all()) or matrix.shape[1] < WRENCH:
         return -math.inf
@@ -221,11 +188,7 @@ def proved_margin(contacts: SoftContacts, local: Array, caution: float = 1.0) ->
 
 
 def margin_ceiling(contacts: SoftContacts, twist: Array, caution: float = 1.0) -> float:
-    """Bound the margin of closure from above by (5), with a twist that separates the contacts.
-
-    Takes `twist` (6,). Gives the bound, below zero; zero where the largest support M is zero to
-    within rounding; infinity where M is more, and the twist proves nothing.
-    """
+    """Bound the margin of closure from above by (5), as `proofs.margin_ceiling` does by (3)."""
     length = float(np.linalg.norm(twist))
     if not 0.0 < length < math.inf:
         return math.inf

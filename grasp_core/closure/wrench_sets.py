@@ -64,7 +64,7 @@ much where torques are over a thousandth of the scale (see `measures`)."""
 
 
 def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
-    """Compute levers of contacts (k, 3) about a centre, divided by the torque scale."""
+    """Compute levers of contacts about a centre, divided by the torque scale."""
     scale = positive(torque_scale, "torque_scale")
     spread = np.ptp(points, axis=0)
     check_spread(spread)
@@ -127,7 +127,7 @@ class WrenchSet(ByValue):
 
     @classmethod
     def at(cls, arms: Array, normals: Array, friction: Array, norm: Norm = "l1") -> Self:
-        """Make the set of contacts with levers and inward unit normals, (k, 3) each, unchecked."""
+        """Make the set of contacts with levers and inward unit normals, unchecked."""
         return cls(in_frames(grasp_map(arms), contact_frames(normals)), friction, norm)
 
     def on_grid(self) -> "WrenchSet":
@@ -137,12 +137,7 @@ class WrenchSet(ByValue):
         )
 
     def sound(self) -> bool:
-        """Return whether this is the wrench set of some contacts, up to `SAME_FRAME`.
-
-        The force rows of `G` must be an orthonormal frame for each contact, and the torque rows
-        those of the frame's vectors at one point: then the torque rows times the transposed frame
-        form a skew matrix.
-        """
+        """Return whether this is the wrench set of some contacts, up to `SAME_FRAME`."""
         k = len(self.friction) if is_array(self.friction, None) else 0
         known = is_a(self.norm, str) and self.norm in get_args(Norm)
         if not (known and k and are_frictions(self.friction, k)):
@@ -154,7 +149,8 @@ class WrenchSet(ByValue):
         square = frames @ frames.transpose(0, 2, 1)
         levers = turns @ frames.transpose(0, 2, 1)
         slack = SAME_FRAME * np.maximum(np.abs(levers).max(axis=(1, 2), keepdims=True), 1.0)
-        # G = (F; [x] F) for a frame F at the point x, so that F F' = 1 and G_torque F' = [x]
+        # G = (F; [x] F) for an orthonormal frame F at each contact's point x, so that F F' = 1,
+        # and G_torque F' = [x] is skew
         return (
             bool((np.abs(square - np.eye(3)) <= SAME_FRAME).all())
             and bool((np.abs(levers + levers.transpose(0, 2, 1)) <= slack).all())
@@ -169,10 +165,7 @@ class WrenchSet(ByValue):
 
     @property
     def size(self) -> float:
-        """Return the length [N] of the longest wrench of a unit normal force, roughly.
-
-        It may be too long or too short by a factor 1.5.
-        """
+        """Return the length [N] of the longest wrench of a unit normal force, to a factor 1.5."""
         longest = np.linalg.norm(self.G, axis=0).max()
         return float(longest * np.sqrt(1.0 + self.friction.max() ** 2))
 
@@ -187,10 +180,7 @@ class WrenchSet(ByValue):
         return self.reach(direction @ self.G)
 
     def reach(self, slopes: Array) -> tuple[float, Array]:
-        """Compute the largest value of a linear function of local forces, and forces that have it.
-
-        Takes `slopes` (3k,) or (4k,).
-        """
+        """Compute the largest value of a linear function on the set, and forces that have it."""
         slopes = slopes.reshape(-1, self.width)
         across = _across(slopes)
         each = slopes[:, 0] + self.friction * across
@@ -224,10 +214,7 @@ class WrenchSet(ByValue):
         return rows if self.norm == "linf" else rows[:-1]
 
     def holds(self, forces: Array, slack: float | Array) -> bool:
-        """Return whether local forces, one a row, are within cones and bounds.
-
-        Takes `forces` (n, 3k) or (n, 4k); `slack` (n,).
-        """
+        """Return whether local forces, (n, 3k) or (n, 4k), are within cones and bounds."""
         each = forces.reshape(len(forces), -1, self.width)
         pushes, slides = each[:, :, 0], _across(each)
         if self.norm == "l1":
@@ -240,11 +227,7 @@ class WrenchSet(ByValue):
 
 
 def with_torques(G: Array, normals: Array, lengths: Array) -> Array:
-    """Add a column to each contact: the wrench of a torque about the normal, a force at a lever.
-
-    Takes `G` (6, 3k); `normals` (k, 3); `lengths` (k,). Gives the matrix on local forces of soft
-    contacts, (6, 4k).
-    """
+    """Add a column to each contact in `G`, (6, 3k): a torque about the normal, over a length."""
     k = len(normals)
     every = np.zeros((WRENCH, k, LOCAL))
     every[:, :, :3] = G.reshape(WRENCH, k, 3)
@@ -268,29 +251,30 @@ def _are_torques(columns: Array, normals: Array) -> bool:
 
 
 def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
-    """Find the wrench nearest to zero of forces whose normal parts sum to one.
+    """Find forces, whose normal parts sum to one, of the wrench nearest to zero.
 
-    It is found by a cone program that always has a solution.
-
-    Gives local forces of that wrench, which show how near to balance the contacts come; and the
-    direction from it to zero, (m,), a twist in which no contact has more support than minus the
-    distance. If the distance is positive, it separates the contacts' wrenches from zero.
+    The direction from it to zero, (m,), is a twist in which no contact has more support than minus
+    the distance. The program always has a solution.
     """
     m, n = wrenches.G.shape
     k, width = len(wrenches.friction), wrenches.width
-    q = np.append(np.zeros(n), 1.0)
-    share = np.append(np.tile(np.eye(width)[0], k), 0.0)
-    distance = np.vstack([-q, np.hstack([-wrenches.G / wrenches.size, np.zeros((m, 1))])])
-    sides = np.zeros((n, n + 1))
-    sides[np.arange(n), np.arange(n)] = -1.0
-    sides[::width, :n:width] = -np.diag(wrenches.friction)
-    pushes = np.hstack([-np.eye(n)[::width], np.zeros((k, 1))])
+    parts, sides = force_rows(wrenches.friction, width)
     # rows: normal parts sum to one, are not negative, distance >= |wrench|, friction cones
-    A = np.vstack([share, pushes, distance, sides])
-    b = np.append(1.0, np.zeros(len(A) - 1))
+    rows = [parts.sum(axis=0), -parts, np.zeros(n), -wrenches.G / wrenches.size, sides]
+    distance, b = np.zeros(k + m + n + 2), np.zeros(k + m + n + 2)
+    distance[k + 1], b[0] = -1.0, 1.0
+    A, q = np.column_stack([np.vstack(rows), distance]), np.append(np.zeros(n), 1.0)
     answer = minimize(ConicProgram(q, A, b, 1, k, (m + 1, *(width,) * k)))
     facing = answer.z[k + 2 : k + m + 2]
     return into_cones(answer.x[:n], wrenches.friction), facing
+
+
+def force_rows(friction: Array, width: int) -> tuple[Array, Array]:
+    """Return rows of programs over n local forces: normal parts, (k, n), and cones, (n, n)."""
+    n = width * len(friction)
+    sides = -np.eye(n)
+    sides[::width, ::width] = -np.diag(friction)
+    return np.eye(n)[::width], sides
 
 
 def into_cones(forces: Array, friction: Array) -> Array:

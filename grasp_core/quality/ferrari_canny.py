@@ -49,10 +49,6 @@ than they gain."""
 MOST_SIMPLICES, MOST_POINTS = 60_000, 4096
 """Simplices and corners at which the polytope stops growing; its bounds hold all the same, farther
 apart."""
-FLATNESS = 1e-9
-"""Points closer than this to a common plane, relative to their extent, span nothing more."""
-ABOVE = 1e-12
-"""Height from which on a point sees a simplex, relative to the extent: some thousand roundings."""
 CHECK_SLACK = 1e-12
 """Slack of the plain-arithmetic checks, relative to the longest wrench."""
 MOST_SLACK = 1e-6
@@ -170,8 +166,9 @@ def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
     kernel = compiled(KERNEL)
     linf = wrenches.norm == "linf"
     cones = kernel.Cones(np.array(wrenches.G, order="C"), np.array(wrenches.friction), linf)
-    limits = kernel.Limits(gap, MOST_SIMPLICES, MOST_POINTS, FLATNESS, ABOVE)
-    status, forces, corners, normals, weakest = kernel.grow(cones, wrenches.edges(), limits)
+    status, forces, corners, normals, weakest = kernel.grow(
+        cones, wrenches.edges(), gap, MOST_SIMPLICES, MOST_POINTS
+    )
     slack = CHECK_SLACK * wrenches.size
     if status == kernel.GROWN:
         polytope = InnerPolytope(forces, corners, normals)
@@ -192,14 +189,11 @@ def _outside(wrenches: WrenchSet, direction: Array | None) -> FerrariCanny:
     # a degenerate set has support zero across its span; each direction bounds Q by (1)
     trials = [] if direction is None else [direction]
     _, _, right = np.linalg.svd(wrenches.edges() @ wrenches.G.T, full_matrices=False)
-    trials += [_unit(y) for y in (-wrench, facing, right[-1], -right[-1]) if y.any()]
+    others = [y for y in (-wrench, facing, right[-1], -right[-1]) if y.any()]
+    trials += [y / float(np.linalg.norm(y)) for y in others]
     weakest = min(trials, key=lambda y: wrenches.support(y)[0])
     upper = wrenches.support(weakest)[0]
     # resting fingers apply no wrench, which is allowed by linf
     if wrenches.norm == "linf":
         forces, length = np.zeros_like(forces), 0.0
     return FerrariCanny(-length, max(upper, -length), wrenches, weakest, None, forces)
-
-
-def _unit(direction: Array) -> Array:
-    return direction / float(np.linalg.norm(direction))

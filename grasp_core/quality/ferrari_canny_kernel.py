@@ -22,6 +22,10 @@ from grasp_core.solvers.hull_kernel import (
     vacant_hull,
 )
 
+FLATNESS = 1e-9
+"""Points closer than this to a common plane, relative to their extent, span nothing more."""
+ABOVE = 1e-12
+"""Height from which on a point sees a simplex, relative to the extent: some thousand roundings."""
 ROOM = 2048
 """Number of simplices for which there is room at first; it is at least doubled when it is full."""
 GROWN, OUTSIDE, FLAT, LOST = 0, 1, 2, 3
@@ -36,45 +40,32 @@ class Cones(NamedTuple):
     """Matrix from local contact forces to their wrench, (6, 3k), or (6, 4k) with torsion,
     contiguous."""
     friction: Array
-    """Coulomb coefficients, (k,)."""
     linf: bool
     """Whether each normal force is bounded; otherwise their sum is."""
 
 
-class Limits(NamedTuple):
-    """The limits at which a polytope stops growing."""
-
-    gap: float
-    """Relative gap (upper - lower) / upper at which the polytope stops growing."""
-    simplices: int
-    points: int
-    flat: float
-    """Distance from a common plane, relative to the extent, below which points count as lying in
-    it."""
-    above: float
-    """Height above a simplex, relative to the extent, from which a point sees the simplex."""
-
-
 @loop()
-def grow(cones: Cones, edges: Array, limits: Limits) -> tuple[int, Array, Indices, Array, Array]:
-    """Grow a polytope inside the set of wrenches, around zero if that is inside.
+def grow(
+    cones: Cones, edges: Array, gap: float, most_simplices: int, most_points: int
+) -> tuple[int, Array, Indices, Array, Array]:
+    """Grow a polytope inside the set of wrenches, around zero if that is inside, up to a gap.
 
     Gives how it ended; local forces of the points, (p, 3k); corners, (m, 6), and normals, (m, 6),
     of the simplices; the direction of least support found, (6,).
     """
     weakest, upper = np.zeros(D), np.inf
-    forces, points = np.empty((limits.points, edges.shape[1])), np.empty((limits.points, D))
-    hull, slack = vacant_hull(ROOM), _begin(cones.G, edges, limits, forces, points)
+    forces, points = np.empty((most_points, edges.shape[1])), np.empty((most_points, D))
+    hull, slack = vacant_hull(ROOM), _begin(cones.G, edges, forces, points)
     if slack < 0.0 or not enclose(hull, points):
         return FLAT, forces[:0], hull.corners[:0], hull.normals[:0], weakest
     count = D + 1
-    while True:  # each turn adds a point, up to `limits.points`
+    while True:  # each turn adds a point, up to `most_points`
         nearest = lowest(hull)
         support = _support(cones, hull.normals[nearest], forces[count])
         if support < upper:
             upper, weakest = support, hull.normals[nearest].copy()
-        full = count + 1 == limits.points or hull.counts[0] > limits.simplices
-        if upper <= slack or full or upper - hull.offsets[nearest] <= limits.gap * upper:
+        full = count + 1 == most_points or hull.counts[0] > most_simplices
+        if upper <= slack or full or upper - hull.offsets[nearest] <= gap * upper:
             break
         _wrench(cones.G, forces[count], points[count])
         seen, ridges = look(hull, points[count], nearest, slack, count)
@@ -130,7 +121,7 @@ def _wrench(G: Array, force: Array, point: Array) -> None:
 
 
 @loop()
-def _begin(G: Array, edges: Array, limits: Limits, forces: Array, points: Array) -> float:
+def _begin(G: Array, edges: Array, forces: Array, points: Array) -> float:
     """Choose seven points, each as far as possible from the affine hull of those before.
 
     Gives the height from which on points see a simplex; -1 if all points are flat.
@@ -146,20 +137,23 @@ def _begin(G: Array, edges: Array, limits: Limits, forces: Array, points: Array)
         farthest, square = _farthest(rest)
         if square <= flat:
             return -1.0
-        for i in range(edges.shape[1]):
-            forces[step, i] = edges[farthest, i]
-        for j in range(D):
-            points[step, j] = wrenches[farthest, j]
+        forces[step], points[step] = edges[farthest], wrenches[farthest]
         if step == 0:
-            flat = (limits.flat * _shift(wrenches, points[0], rest)) ** 2
+            flat = (FLATNESS * _shift(wrenches, points[0], rest)) ** 2
         else:
             _flatten(rest, farthest, np.sqrt(square))
-    return limits.above * _extent(points)
+    # the extent of the seven points along the axis on which it is largest
+    extent = 0.0
+    for j in range(D):
+        least = largest = points[0, j]
+        for i in range(D + 1):
+            least, largest = min(least, points[i, j]), max(largest, points[i, j])
+        extent = max(extent, largest - least)
+    return ABOVE * extent
 
 
 @loop()
 def _shift(wrenches: Array, origin: Array, rest: Array) -> float:
-    """Fill in the wrenches relative to an origin; return the largest of their components."""
     largest = 0.0
     for i in range(len(wrenches)):
         for j in range(D):
@@ -182,7 +176,6 @@ def _farthest(rest: Array) -> tuple[int, float]:
 
 @loop()
 def _flatten(rest: Array, chosen: int, length: float) -> None:
-    """Subtract from each row its component along a chosen row."""
     unit = np.empty(D)
     for j in range(D):
         unit[j] = rest[chosen, j] / length
@@ -192,15 +185,3 @@ def _flatten(rest: Array, chosen: int, length: float) -> None:
             along += rest[i, j] * unit[j]
         for j in range(D):
             rest[i, j] -= along * unit[j]
-
-
-@loop()
-def _extent(points: Array) -> float:
-    """Return the extent of the first seven points along the axis on which it is largest."""
-    extent = 0.0
-    for j in range(D):
-        least = largest = points[0, j]
-        for i in range(D + 1):
-            least, largest = min(least, points[i, j]), max(largest, points[i, j])
-        extent = max(extent, largest - least)
-    return extent

@@ -55,20 +55,11 @@ from typing import Literal, NamedTuple, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_core.arrays import (
-    Array,
-    Indices,
-    are_units,
-    frozen,
-    frozen_copy,
-    is_a,
-    is_array,
-    is_number,
-)
+from grasp_core.arrays import Array, are_units, frozen, is_a, is_array, is_number
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, one_of
 from grasp_core.closure.contacts import WRENCH
-from grasp_core.closure.wrench_sets import WrenchSet, into_cones
+from grasp_core.closure.wrench_sets import WrenchSet, force_rows, into_cones
 from grasp_core.errors import InputError, SolverError
 from grasp_core.quality.ferrari_canny import (
     CHECK_SLACK,
@@ -105,16 +96,12 @@ NONE_SHOWN = -1.0
 """Lower bound where no multiple is shown to be resisted, not even zero."""
 
 
-def _no_loads() -> Array:
-    return frozen_copy(np.zeros((0, WRENCH)))
-
-
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Measure(ByValue):
     """The set of loads whose largest resisted multiple is a measure of contacts."""
 
     name: MeasureName
-    loads: Array = field(default_factory=_no_loads)
+    loads: Array = field(default_factory=lambda: np.zeros((0, WRENCH)))
     """External wrenches of a task, with torques about the centre of mass over the object's radius,
     (m, 6) [N]; none for other measures."""
 
@@ -123,11 +110,7 @@ class Measure(ByValue):
 
     @classmethod
     def of(cls, name: str, wrenches: ArrayLike | None, radius: float) -> "Measure":
-        """Make a measure from a user's words and wrenches.
-
-        Takes `wrenches` (force, torque) or (m, 6) [N, N m]; `radius` [m]. Gives the measure, with
-        torques over the radius.
-        """
+        """Make a measure from a user's words and wrenches (force, torque), (m, 6) [N, N m]."""
         one_of(name, get_args(MeasureName), "measure")
         if name != "task":
             if wrenches is not None:
@@ -180,7 +163,7 @@ class Measure(ByValue):
         return float(np.linalg.norm(self.loads, axis=1).max()) if self.name == "task" else 1.0
 
     def demands(self, twists: Array) -> Array:
-        """Compute the demands (1) of twists at unit length, (n, 6): how much they ask for, (n,)."""
+        """Compute the demands (1) of unit twists, (n, 6)."""
         if self.name == "weight":
             return np.asarray(np.linalg.norm(twists[:, :3], axis=1), dtype=np.float64)
         if self.name == "task":
@@ -188,10 +171,7 @@ class Measure(ByValue):
         return np.ones(len(twists))
 
     def multiples(self, supports: Array, demands: Array) -> Array:
-        """Compute the multiples of the loads that twists allow, of the supports' shape (..., n).
-
-        Twists with negative support allow none; theirs are negative.
-        """
+        """Compute the multiples of the loads that twists allow, negative where supports are."""
         with np.errstate(divide="ignore", invalid="ignore"):
             allowed = np.where(demands > 0.0, supports / demands, np.inf)
         return np.where(supports < 0.0, supports / np.maximum(demands, SMALL_DEMAND), allowed)
@@ -236,9 +216,7 @@ class ResistedLoads(ByValue):
     def verify(self) -> bool:
         """Check both bounds again in plain arithmetic, without any solver.
 
-        They hold to within 1e-12 of the longest wrench.
-
-        Gives whether both are proved; only the upper one where the lower one is -1.
+        They hold to within 1e-12 of the longest wrench; a lower one of -1 claims nothing.
         """
         with np.errstate(all="ignore"):
             sound = (
@@ -282,10 +260,7 @@ def thin(wrenches: WrenchSet) -> WrenchSet:
 
 
 def resisted_loads(wrenches: WrenchSet, measure: Measure, gap: float = GAP) -> ResistedLoads:
-    """Bound the largest multiple of a set of loads that contacts resist.
-
-    Gives both bounds with their proofs.
-    """
+    """Bound the largest multiple of a set of loads that contacts resist, with proofs."""
     if measure.name == "weight":
         ball = wrench_set_quality(thin(wrenches), gap)
         direction, upper = _least(wrenches, measure, [ball.direction / np.repeat([1.0, THIN], 3)])
@@ -315,7 +290,7 @@ def measured_set(
 
 
 def _without_rests(wrenches: WrenchSet, loads: Array, forces: Array, ball: FerrariCanny) -> Array:
-    """Return the multiples of loads (m, 6) that forces (m, 3k) and a ball show by (3), (m,).
+    """Return the multiples of loads that forces and a ball show by (3), (m,).
 
     They are minus infinity where the ball is not above rounding.
     """
@@ -332,8 +307,7 @@ def _without_rests(wrenches: WrenchSet, loads: Array, forces: Array, ball: Ferra
 def _least(wrenches: WrenchSet, measure: Measure, twists: list[Array]) -> tuple[Array, float]:
     """Return the twist, at unit length, that allows the least multiple, and the multiple.
 
-    Forces along the axes are tried as well, so that it is finite. Of twists whose multiples are
-    equal but for the accuracy of programs the first counts, the same on every machine.
+    Forces along the axes make it finite. Of multiples that programs find equal the first counts.
     """
     axes = np.eye(WRENCH)[:3]
     every = _units(np.array([*twists, *axes, *-axes]))
@@ -355,54 +329,46 @@ def _units(rows: Array) -> Array:
 
 
 class TaskLimit(NamedTuple):
-    """How large a multiple of one load contacts in force closure resist."""
+    """The multiple of a load that contacts in closure resist, by local forces (3k,), at most.
+
+    The limiting twist, (6,), has demand one.
+    """
 
     multiple: float
     forces: Array
-    """Local forces that resist the multiple, (3k,)."""
     twist: Array
-    """Twist with demand one that limits the multiple, (6,)."""
 
 
 def task_limits(wrenches: WrenchSet, measure: Measure) -> list[TaskLimit]:
     """Find the largest multiple of each load of a task that contacts in force closure resist."""
-    return [_limit(wrenches, load) for load in measure.loads]
-
-
-def _limit(wrenches: WrenchSet, load: Array) -> TaskLimit:
-    G, mu = wrenches.G, wrenches.friction
-    k, n, size = len(mu), G.shape[1], float(np.linalg.norm(load))
-    A = np.zeros((WRENCH + 1 + k + n, n + 1))
-    A[:WRENCH, :-1], A[:WRENCH, -1] = G, load / size
-    A[WRENCH, :n:3] = 1.0
-    A[WRENCH + 1 + np.arange(k), np.arange(0, n, 3)] = -1.0
-    cones: Indices = np.arange(WRENCH + 1 + k, len(A))
-    A[cones, np.arange(n)] = -1.0
-    A[cones[::3], np.arange(0, n, 3)] = -mu
-    q, b = np.append(np.zeros(n), -1.0), np.zeros(len(A))
+    k, n = len(wrenches.friction), wrenches.G.shape[1]
+    parts, sides = force_rows(wrenches.friction, 3)
+    rows = np.vstack([wrenches.G, parts.sum(axis=0), -parts, sides])
+    q, b = np.append(np.zeros(n), -1.0), np.zeros(len(rows))
     b[WRENCH] = 1.0
-    answer = minimize(ConicProgram(q, A, b, WRENCH + 1, k, (3,) * k))
-    multiple = float(answer.x[-1]) / size
-    if not multiple > 0.0:
-        raise SolverError("a load of a task has no resisted multiple although contacts are closed")
-    # the multipliers have z.load = |load|, so that their demand is positive the other way
-    return TaskLimit(multiple, answer.x[:-1], -answer.z[:WRENCH] / size)
+    found = list[TaskLimit]()
+    for load in measure.loads:
+        size = float(np.linalg.norm(load))
+        A = np.column_stack([rows, np.append(load / size, np.zeros(1 + k + n))])
+        answer = minimize(ConicProgram(q, A, b, WRENCH + 1, k, (3,) * k))
+        multiple = float(answer.x[-1]) / size
+        if not multiple > 0.0:
+            raise SolverError(
+                "a load of a task has no resisted multiple although contacts are closed"
+            )
+        # the multipliers have z.load = |load|, so that their demand is positive the other way
+        found.append(TaskLimit(multiple, answer.x[:-1], -answer.z[:WRENCH] / size))
+    return found
 
 
 def _limiting_twist(wrenches: WrenchSet, load: Array) -> Array:
     """Return a twist that bounds the resisted multiple of a load, by the program (4), (6,)."""
-    G, mu = wrenches.G, wrenches.friction
-    k, n = len(mu), G.shape[1]
-    A = np.zeros((1 + k + 1 + WRENCH + n, n + 2))
-    A[0, :n:3] = 1.0
-    A[1 + np.arange(k), np.arange(0, n, 3)] = -1.0
-    # rows: distance >= |wrench + m load|, friction cones
+    k, n = len(wrenches.friction), wrenches.G.shape[1]
+    parts, sides = force_rows(wrenches.friction, 3)
+    # rows: normal parts sum to one, are not negative, distance >= |wrench + m load|, cones
+    rows = np.vstack([parts.sum(axis=0), -parts, np.zeros(n), -wrenches.G, sides])
     rest = slice(2 + k, 2 + k + WRENCH)
-    A[1 + k, -1] = -1.0
-    A[rest, :n], A[rest, n] = -G, -load / np.linalg.norm(load)
-    cones: Indices = np.arange(2 + k + WRENCH, len(A))
-    A[cones, np.arange(n)] = -1.0
-    A[cones[::3], np.arange(0, n, 3)] = -mu
-    q, b = np.concatenate([np.zeros(n), [-1.0, STEEP]]), np.zeros(len(A))
-    b[0] = 1.0
+    more, b = np.zeros((len(rows), 2)), np.zeros(len(rows))
+    more[rest, 0], more[1 + k, 1], b[0] = -load / np.linalg.norm(load), -1.0, 1.0
+    A, q = np.hstack([rows, more]), np.concatenate([np.zeros(n), [-1.0, STEEP]])
     return minimize(ConicProgram(q, A, b, 1, k, (1 + WRENCH, *(3,) * k))).z[rest]

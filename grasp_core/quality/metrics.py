@@ -29,7 +29,6 @@ from grasp_core.errors import InputError
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.values import Contact, Grasp
 
-FEWEST_EDGES = 3
 RANK = 1e-9
 """Share of the largest singular value below which a singular value counts as zero."""
 UNREACHABLE = 1e-9
@@ -38,7 +37,7 @@ UNREACHABLE = 1e-9
 
 def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
     """Compute wrenches of pyramid edges inscribed in friction cones, (k edges, 6)."""
-    whole(edges, "edges", least=FEWEST_EDGES, most=MOST_EDGES)
+    whole(edges, "edges", least=3, most=MOST_EDGES)
     turns = 2.0 * np.pi * np.arange(edges) / edges
     circle = np.column_stack([np.ones(edges), np.cos(turns), np.sin(turns)])
     slopes = wrenches.friction
@@ -83,18 +82,14 @@ def min_weight(
     wrenches = WrenchSet.of(points, units, friction, center=center, torque_scale=float(size))
     W = pyramid_wrenches(wrenches, edges)
     N, mean = len(W), W.mean(axis=0)
-    if not _balanced_by_any_weights(W):
+    # weights of any sign, with sum one, that make the wrenches vanish
+    rows = np.vstack([W.T, np.ones(N)])
+    wanted = np.append(np.zeros(WRENCH), 1.0)
+    weights = np.asarray(np.linalg.lstsq(rows, wanted, rcond=RANK)[0], dtype=np.float64)
+    if float(np.abs(rows @ weights - wanted).max()) > UNREACHABLE:
         return -math.inf
     best = maximize(LinearProgram(N * mean, N * (mean - W), np.ones(N)))
     return (1.0 - best.value) / N if isinstance(best, Optimum) else -math.inf
-
-
-def _balanced_by_any_weights(W: Array) -> bool:
-    """Return whether some weights of any sign, with sum one, make rows vanish."""
-    rows = np.vstack([W.T, np.ones(len(W))])
-    wanted = np.append(np.zeros(len(rows) - 1), 1.0)
-    weights = np.asarray(np.linalg.lstsq(rows, wanted, rcond=RANK)[0], dtype=np.float64)
-    return float(np.abs(rows @ weights - wanted).max()) <= UNREACHABLE
 
 
 def hull_volume(

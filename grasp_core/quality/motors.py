@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, is_array, real_array
+from grasp_core.arrays import Array, frozen, frozen_each, is_array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, instance
 from grasp_core.errors import InputError
@@ -75,8 +75,9 @@ class Motors(ByValue):
             InputError: Shapes or ranges are wrong, or a motor cannot carry the links.
         """
         rows = frozen(levers, (None, None), "levers")
-        spread = (_each(limits, len(rows)), _each(gravity, len(rows)))
-        return cls(rows, *spread)
+        joints = len(rows)
+        each = frozen_each(limits, joints, "limits"), frozen_each(gravity, joints, "gravity")
+        return cls(rows, *each)
 
     @classmethod
     def in_any_orientation(
@@ -132,12 +133,6 @@ class Motors(ByValue):
     def relaxed(self, multipliers: Array) -> float:
         """Compute the right side of (2) for multipliers of the joints, (joints,)."""
         return float(np.abs(multipliers) @ self.limits - multipliers @ self.gravity)
-
-
-def _each(value: ArrayLike, joints: int) -> Array:
-    """Spread a number over the joints; arrays are left as they are."""
-    given = real_array(value, "limits and gravity")
-    return np.full(joints, float(given)) if given.ndim == 0 else given
 
 
 def motors_for(motors: Motors | None, contacts: int) -> Motors:

@@ -54,7 +54,7 @@ from grasp_core.closure.contacts import (
     in_frames,
 )
 from grasp_core.closure.soft_contacts import LOCAL, contact_torsions, torsion_lengths
-from grasp_core.closure.wrench_sets import WrenchSet, with_torques
+from grasp_core.closure.wrench_sets import WrenchSet, force_rows, with_torques
 from grasp_core.errors import InputError, SolverError
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.solvers.conic import ConicProgram, minimize
@@ -85,13 +85,13 @@ class Farthest(NamedTuple):
     """How large a multiple of a wrench is resisted, by the program (1), and what limits it."""
 
     multiple: float
-    """Largest multiple that is resisted; it may be negative by rounding."""
+    """Negative, if at all, by rounding."""
     local: Array
     """Local forces over the largest normal force that resist it, (k, 3) or (k, 4)."""
     twist: Array
     """Twist y of the limiting facet, scaled and about the contacts' mean, (6,)."""
     multipliers: Array
-    """Multipliers m of the joints that go with it, (joints,) [1/(N m)]."""
+    """Multipliers m of the joints, (joints,) [1/(N m)]."""
 
 
 class WrenchBody:
@@ -101,11 +101,7 @@ class WrenchBody:
         self, arms: Array, normals: Array, friction: Array, max_normal_force: float,
         motors: Motors | None = None, torsions: Array | None = None,
     ) -> None:  # fmt: skip
-        """Set up the conic program; its last column will hold the wrench in question.
-
-        Takes `arms` (k, 3) [m]; `normals` (k, 3); `friction` (k,); `max_normal_force` [N];
-        `torsions` (k,) [m].
-        """
+        """Set up the conic program; its last column will hold the wrench in question."""
         self.max_normal_force = positive(max_normal_force, "max_normal_force")
         self.count = k = len(arms)
         self.motors = motors_for(motors, k)
@@ -122,34 +118,21 @@ class WrenchBody:
         self.width = LOCAL if torsions is not None else 3
         levers = in_frames(self.motors.levers, self.frames)
         self.levers = levers if torsions is None else np.zeros((0, LOCAL * k))
-        self.A, self.b = self._rows(friction)
-
-    def _rows(self, friction: Array) -> tuple[Array, Array]:
-        """Build the rows of (1) in units of f_max.
-
-        They are G f + lambda w = 0, then 0 <= normal parts <= 1, then the torques of each joint
-        over its limit, both ways, then the cones.
-        """
-        k, joints, width = self.count, len(self.levers), self.width
-        n = width * k
-        A = np.zeros((WRENCH + 2 * k + 2 * joints + n, n + 1))
-        A[:WRENCH, :-1] = self.G
-        caps, torques = WRENCH + np.arange(2 * k), WRENCH + 2 * k + np.arange(2 * joints)
-        cones = WRENCH + 2 * k + 2 * joints + np.arange(n)
-        A[caps, np.tile(np.arange(0, n, width), 2)] = np.repeat([1.0, -1.0], k)
+        # rows of (1) in units of f_max: G f + lambda w = 0, then 0 <= normal parts <= 1, then the
+        # torques of each joint over its limit, both ways, then the cones
+        parts, sides = force_rows(friction, self.width)
         shares = self.max_normal_force * self.levers / self.motors.limits[:, None]
-        A[torques, :-1] = np.vstack([shares, -shares])
-        A[cones, np.arange(n)] = -1.0
-        A[cones[::width], np.arange(0, n, width)] = -friction
+        rows = np.vstack([self.G, parts, -parts, shares, -shares, sides])
+        self.A = np.column_stack([rows, np.zeros(len(rows))])
         carried = self.motors.gravity / self.motors.limits
-        b = [np.zeros(6), np.ones(k), np.zeros(k), 1.0 - carried, 1.0 + carried, np.zeros(n)]
-        return A, np.concatenate(b)
+        capped = [np.zeros(WRENCH), np.ones(k), np.zeros(k), 1.0 - carried, 1.0 + carried]
+        self.b = np.concatenate([*capped, np.zeros(len(sides))])
 
     def largest(self, wrench: Array, carried: Array) -> Farthest:
         """Find the largest multiple of a wrench that is resisted while joints carry as many times.
 
-        Takes `wrench` (6,); `carried` (joints,) [N m]. Gives the multiple, and a facet with m.q -
-        y.w = 1, so that none above (3) is resisted.
+        With `carried` q, (joints,) [N m], the facet has m.q - y.w = 1, so that no multiple above
+        (3) is resisted.
         """
         unit = self.about_middle(wrench)
         length = float(np.linalg.norm(unit))
@@ -192,10 +175,7 @@ class WrenchBody:
         return pushed + self.motors.relaxed(multipliers)
 
     def holds(self, shares: Array, loads: Array, slack: float | Array) -> bool:
-        """Return whether forces are in their cones, no larger than allowed, and balance loads.
-
-        Takes `shares` (n, 3k) or (n, 4k); `loads` (n, 6); `slack` (n,).
-        """
+        """Return whether forces, (n, 3k) or (n, 4k), are allowed and balance loads, (n, 6)."""
         left = np.linalg.norm(shares @ self.G.T + loads, axis=1)
         return bool((left <= slack).all()) and self.bounded.holds(shares, slack)
 
@@ -342,45 +322,35 @@ def limit_of(body: WrenchBody, wrench: Array) -> WrenchLimit:
 
 def attains(body: WrenchBody, found: WrenchLimit) -> bool:
     """Return whether the forces are allowed and balance the limit's multiple of the wrench."""
-    shares = _shares(body, found).reshape(1, -1)
+    shares = np.einsum("kij,ki->kj", body.frames, found.forces) / body.max_normal_force
+    if body.lengths is not None and found.torques is not None:
+        turns = found.torques / body.max_normal_force
+        # a torque that a contact cannot transmit is in no cone
+        lacking = np.where(turns == 0.0, 0.0, np.inf)
+        turns = np.divide(turns, body.lengths, out=lacking, where=body.lengths > 0.0)
+        shares = np.column_stack([shares, turns])
     load = found.limit / body.max_normal_force * body.about_middle(found.wrench)
     torques = body.motors.torques(found.forces)
     # rows of torques are met as all rows of the program are, by shares of the motors' limits
-    balanced = body.holds(shares, load[None], HELD * body.bounded.size)
+    balanced = body.holds(shares.reshape(1, -1), load[None], HELD * body.bounded.size)
     return balanced and body.is_strong_enough(torques[None], HELD * np.maximum(1.0, body.strongest))
-
-
-def _shares(body: WrenchBody, found: WrenchLimit) -> Array:
-    """Return the local forces of a limit over the largest normal force, (k, 3) or (k, 4)."""
-    shares = np.einsum("kij,ki->kj", body.frames, found.forces) / body.max_normal_force
-    if body.lengths is None or found.torques is None:
-        return shares
-    arms, torques = body.lengths, found.torques / body.max_normal_force
-    # a torque that a contact cannot transmit is in no cone
-    lacking = np.where(torques == 0.0, 0.0, np.inf)
-    turns = np.divide(torques, arms, out=lacking, where=arms > 0.0)
-    return np.column_stack([shares, turns])
 
 
 def bounds(body: WrenchBody, found: WrenchLimit) -> bool:
     """Return whether the facet proves that no multiple above the upper one is resisted."""
     load, twist = body.about_middle(found.wrench), body.scaled(found.facet)
     power, length = float(twist @ load), float(np.linalg.norm(load))
-    if not (_are_short(body, found, length) and abs(power + 1.0) <= MOST_OFF):
+    # facet and multipliers have to be short enough for rounding
+    long, middle = np.abs(found.facet * body.scale), float(np.linalg.norm(body.middle))
+    moved = float(np.linalg.norm(long) + np.linalg.norm(found.facet[3:]) * middle)
+    pulled = float((np.abs(found.motor_multipliers) @ np.abs(body.levers)).max(initial=0.0))
+    if not ((moved + pulled) * length <= LONGEST and abs(power + 1.0) <= MOST_OFF):
         return False
     # (3): h(y) is at most the upper limit times -y.w, but for rounding
     bound = body.scaled_support(twist, found.motor_multipliers)
     largest = body.max_normal_force * body.bounded.size
     slack = largest * min(LAST_DIGITS * float(np.linalg.norm(twist)), HELD / length)
     return bound <= found.upper * min(1.0, -power) * (1.0 + FACET_SLACK) + slack
-
-
-def _are_short(body: WrenchBody, found: WrenchLimit, load: float) -> bool:
-    """Return whether facet and multipliers are short enough for rounding, given a load's length."""
-    twist, middle = np.abs(found.facet * body.scale), float(np.linalg.norm(body.middle))
-    moved = float(np.linalg.norm(twist) + np.linalg.norm(found.facet[3:]) * middle)
-    pulled = float((np.abs(found.motor_multipliers) @ np.abs(body.levers)).max(initial=0.0))
-    return (moved + pulled) * load <= LONGEST
 
 
 def max_resisted_wrench(
@@ -470,10 +440,7 @@ def _check_sizes(loads: Array, name: str) -> None:
 
 
 def axis_wrenches(torque_scale: float) -> Array:
-    """Return the twelve unit wrenches along and against each axis, (12, 6) [N, N m].
-
-    Takes `torque_scale` [m].
-    """
+    """Return the twelve unit wrenches along and against each axis, (12, 6) [N, N m]."""
     scale = np.array([1.0] * 3 + [torque_scale] * 3)
     return np.vstack([np.eye(6), -np.eye(6)]) * scale
 
@@ -481,25 +448,17 @@ def axis_wrenches(torque_scale: float) -> Array:
 def weakest_from(
     body: WrenchBody, limits: Iterable[WrenchLimit], torque_scale: float
 ) -> WrenchLimit:
-    """Search for a wrench of unit size that is locally the hardest to resist.
-
-    Takes `torque_scale` [m]. Gives the weakest limit found: its wrench has |(force, torque /
-    torque_scale)| = 1.
-    """
+    """Search for a wrench with |(force, torque / torque_scale)| = 1 that is locally the weakest."""
     scale = np.array([1.0] * 3 + [torque_scale] * 3)
-    every = list(limits)
-    weak = [every[place] for place in smallest_first([found.limit for found in every])]
-    ends = [_descend(body, start, scale) for start in weak[:STARTS]]
+    every, ends = list(limits), list[WrenchLimit]()
+    for place in smallest_first([found.limit for found in every])[:STARTS]:
+        best = every[place]
+        for _ in range(MAX_STEPS):
+            # (4): the wrench that the limiting facet points at, by the scaled product of wrenches
+            facing = -best.facet * scale**2
+            found = limit_of(body, facing / float(np.linalg.norm(facing / scale)))
+            if found.limit > best.limit * (1.0 - SETTLED):
+                break
+            best = found
+        ends.append(best)
     return ends[first_best([-found.limit for found in ends])]
-
-
-def _descend(body: WrenchBody, start: WrenchLimit, scale: Array) -> WrenchLimit:
-    best = start
-    for _ in range(MAX_STEPS):
-        # (4): the wrench that the limiting facet points at, by the scaled product of wrenches
-        facing = -best.facet * scale**2
-        found = limit_of(body, facing / float(np.linalg.norm(facing / scale)))
-        if found.limit > best.limit * (1.0 - SETTLED):
-            break
-        best = found
-    return best

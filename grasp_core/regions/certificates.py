@@ -33,6 +33,11 @@ from grasp_core.geometry.polygons import (
 from grasp_core.regions.proof import TwistCover
 from grasp_core.values import FINGERS, ContactRegion
 
+ARRAYS = {
+    "centers": (FINGERS, 3), "normals": (FINGERS, 3), "friction": (FINGERS,), "origin": (3,),
+    "depths": (FINGERS,), "open_choice": (FINGERS, 3), "open_wrench": (6,),
+}  # fmt: skip
+"""Shapes of the fields that hold arrays; the last two may be None."""
 PLACED = 1e-9
 """How far points may be off their planes and borders, and radii off their measured values, relative
 to `scale`, which is no longer than contacts are apart: files that keep ten digits stay within it.
@@ -75,17 +80,23 @@ class CertifiedRegions(ByValue):
     """Length that the proof uses as its unit [m]."""
 
     def __post_init__(self) -> None:
-        for name in ("centers", "normals"):
-            object.__setattr__(self, name, frozen(getattr(self, name), (FINGERS, 3), name))
         object.__setattr__(self, "friction", contact_frictions(self.friction, FINGERS))
-        object.__setattr__(self, "origin", frozen(self.origin, (3,), "origin"))
-        object.__setattr__(self, "depths", frozen(self.depths, (FINGERS,), "depths"))
-        for name, shape in (("open_choice", (FINGERS, 3)), ("open_wrench", (6,))):
-            if getattr(self, name) is not None:
+        for name, shape in ARRAYS.items():
+            if getattr(self, name) is not None or not name.startswith("open"):
                 object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
-        each = partial(frozen, shape=(None, 3), name="borders")
-        object.__setattr__(self, "borders", several(self.borders, each, "borders", "polygons"))
-        _check_parts(self)
+        border = partial(frozen, shape=(None, 3), name="borders")
+        object.__setattr__(self, "borders", several(self.borders, border, "borders", "polygons"))
+        region = partial(instance, kind=ContactRegion, name="regions")
+        regions = several(self.regions, region, "regions", "ContactRegion values")
+        if not len(regions) == len(self.borders) == FINGERS:
+            got = f"{len(regions)} regions and {len(self.borders)} borders"
+            raise InputError(
+                f"regions and borders must be {FINGERS} each, one per finger, got {got}"
+            )
+        instance(self.cover, TwistCover, "cover")
+        positive(self.scale, "scale")
+        number(self.radius, "radius", least=0.0)
+        number(self.limit, "limit", least=0.0, most=math.inf)
         if (self.depths < 0.0).any():
             raise InputError(f"depths must not be negative, got {float(self.depths.min()):.6g}")
 
@@ -98,27 +109,25 @@ class CertifiedRegions(ByValue):
         has the object checks that `borders` are parts of its faces.
         """
         with np.errstate(all="ignore"):
-            return (
-                self._has_numbers()
-                and self._has_fitting_scale()
-                and self._has_discs()
-                and self._is_open()
-                and self._closes()
-            )
+            known = self._has_numbers() and self._has_fitting_scale()
+            return known and self._has_discs() and self._is_open() and self._closes()
 
     def _has_numbers(self) -> bool:
+        arrays = all(
+            is_array(value, *shape) if value is not None else name.startswith("open")
+            for name, shape in ARRAYS.items()
+            for value in [getattr(self, name)]
+        )
         return (
-            is_number(self.scale, least=SMALLEST)
-            and is_array(self.origin, 3)
-            and is_array(self.depths, FINGERS)
+            arrays
             and bool((self.depths >= 0.0).all())
-            and is_array(self.centers, FINGERS, 3)
             and are_units(self.normals, FINGERS, 3)
             and are_frictions(self.friction, FINGERS)
             and is_tuple_of(self.regions, ContactRegion, FINGERS)
             and is_tuple_of(self.borders, np.ndarray, FINGERS)
-            and all(len(border) >= FEWEST_CORNERS for border in self.borders)
+            and all(is_array(each, None, 3) and len(each) > 0 for each in self.borders)
             and is_a(self.cover, TwistCover)
+            and is_number(self.scale, least=SMALLEST)
             and is_number(self.radius, least=0.0)
         )
 
@@ -127,10 +136,7 @@ class CertifiedRegions(ByValue):
 
         What may be `PLACED` off is measured with it: twice as long as it need be, for rounding.
         """
-        if not all(is_array(border, None, 3) for border in self.borders):
-            return False
-        apart = float(np.linalg.norm(np.ptp(np.vstack(self.borders), axis=0)))
-        return self.scale <= 2.0 * apart
+        return self.scale <= 2.0 * float(np.linalg.norm(np.ptp(np.vstack(self.borders), axis=0)))
 
     def _has_discs(self) -> bool:
         farthest = 0.0
@@ -154,10 +160,7 @@ class CertifiedRegions(ByValue):
         return self.radius <= (farthest + PLACED) * self.scale
 
     def _flat(self, i: int, polygon: Array) -> FlatPolygon | None:
-        """Write a polygon in the plane of a finger's border, at unit size.
-
-        The result is None if it is not a convex polygon in that plane.
-        """
+        """Write a convex polygon in the plane of a finger's border, at unit size; else None."""
         if not is_array(polygon, None, 3) or not FEWEST_CORNERS <= len(polygon) <= MOST_CORNERS:
             return None
         start = self.borders[i][0]
@@ -175,7 +178,7 @@ class CertifiedRegions(ByValue):
         choice, wrench = self.open_choice, self.open_wrench
         if choice is None:
             return wrench is None and self.limit == math.inf
-        if not is_array(choice, FINGERS, 3) or not is_number(self.limit, least=0.0):
+        if not is_number(self.limit, least=0.0):
             return False
         for i, place in enumerate(choice):
             border, at = self._flat(i, self.borders[i]), self._at(i, place)
@@ -192,16 +195,3 @@ class CertifiedRegions(ByValue):
             for r, n, depth in zip(self.regions, self.normals, self.depths, strict=True)
         ]
         return self.cover.verify(prisms, self.normals, self.friction)
-
-
-def _check_parts(found: CertifiedRegions) -> None:
-    """Refuse fields of the wrong type, number or sign."""
-    each = partial(instance, kind=ContactRegion, name="regions")
-    count = len(several(found.regions, each, "regions", "ContactRegion values"))
-    if not count == len(found.borders) == FINGERS:
-        got = f"{count} regions and {len(found.borders)} borders"
-        raise InputError(f"regions and borders must be {FINGERS} each, one per finger, got {got}")
-    instance(found.cover, TwistCover, "cover")
-    positive(found.scale, "scale")
-    number(found.radius, "radius", least=0.0)
-    number(found.limit, "limit", least=0.0, most=math.inf)

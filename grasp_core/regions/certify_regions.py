@@ -11,18 +11,12 @@ normals are used there, and the friction angle is reduced by the angle between s
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import (
-    BOUNDS,
-    coefficient,
-    number,
-    switch,
-    whole,
-)
+from grasp_core.checked import BOUNDS, coefficient, number, switch, whole
 from grasp_core.closure.contacts import stacked
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.errors import InputError, SolverError, UndecidedError
@@ -97,7 +91,7 @@ def certify_regions(
         raise InputError(
             f"grasp {grasp.id} is not in force closure at friction {left:.6g}; raise the friction"
         )
-    unit = _Unit.of(body, positions)
+    unit = _Unit(body, positions)
     pieces = _pieces(body, grasp, unit, clearance)
     # where the surface leans more than the friction angle nothing can be proved
     least = math.atan(left) - max(body.faces[face].spread for face in grasp.faces)
@@ -125,7 +119,6 @@ def certify_regions(
     return found
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class _Unit:
     """A unit of length and an origin that make the contacts' longest lever about one.
 
@@ -133,34 +126,24 @@ class _Unit:
     the contacts.
     """
 
-    origin: Array
-    scale: float
-
-    @classmethod
-    def of(cls, body: Polyhedron, positions: Array) -> "_Unit":
+    def __init__(self, body: Polyhedron, positions: Array) -> None:
         places = (positions - body.center_of_mass) / body.radius
         middle = on_grid(places.mean(axis=0), UNIT_DIGITS)
         lever = float(np.linalg.norm(places - middle, axis=1).max())
-        return cls(
-            body.center_of_mass + body.radius * middle, body.radius * coarse(lever, UNIT_DIGITS)
-        )
+        self.origin = body.center_of_mass + body.radius * middle
+        self.scale = body.radius * coarse(lever, UNIT_DIGITS)
 
     def at(self, points: Array) -> Array:
-        """Convert points from the object's frame to this unit, (..., 3)."""
         return (points - self.origin) / self.scale
 
     def back(self, points: Array) -> Array:
-        """Convert points from this unit to the object's frame, (..., 3) [m]."""
         return self.origin + self.scale * points
 
 
 def _pieces(
     body: Polyhedron, grasp: Grasp, unit: _Unit, clearance: float
 ) -> tuple[FacePiece, ...] | None:
-    """Return the convex piece under each contact, clear of edges; None if a face is too narrow.
-
-    If a face has several pieces, the one in which the contact is deepest is taken.
-    """
+    """Return the pieces that contacts are deepest in, clear of edges; None if one is too narrow."""
     found = list[FacePiece]()
     for index, contact in zip(grasp.faces, grasp.contacts, strict=True):
         face = body.faces[index]
@@ -180,7 +163,11 @@ def _placed(
     grounds: Grounds, proved: Proved, polygons: list[Array], unit: _Unit
 ) -> CertifiedRegions:
     """Return polygons as regions in the object's frame, with their proof."""
-    trimmed = [_trimmed(polygon, y) for polygon, y in zip(polygons, proved.ys, strict=True)]
+    trimmed = list[Array]()
+    for polygon, y in zip(polygons, proved.ys, strict=True):
+        fewer = with_fewer_corners(polygon)
+        E, b = edge_rows(fewer)
+        trimmed.append(fewer if (E @ y <= b).all() else polygon)  # else the centre would be lost
     centers = unit.back(grounds.points(proved.ys))
     opened = _open_choice(grounds, proved, unit)
     choice = None if opened is None else opened.positions
@@ -230,18 +217,10 @@ def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> flo
     return low
 
 
-def _trimmed(polygon: Array, y: Array) -> Array:
-    """Reduce the corners of a polygon, unless the result would lose its centre."""
-    fewer = with_fewer_corners(polygon)
-    E, b = edge_rows(fewer)
-    return fewer if (E @ y <= b).all() else polygon
-
-
 def _open_choice(grounds: Grounds, proved: Proved, unit: _Unit) -> ClosureCertificate | None:
-    """Return the proof, in the object's frame, that contacts are not in force closure.
+    """Return the proof, in the object's frame, that contacts on the pieces are not closed.
 
-    The result is None unless the exact test agrees and the contacts are on the pieces. Nothing is
-    claimed about patches, as curved surfaces are not planes.
+    Nothing is claimed about patches, as curved surfaces are not planes.
     """
     if proved.choice is None or any(piece.depth or piece.spread for piece in grounds.pieces):
         return None

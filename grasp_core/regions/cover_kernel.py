@@ -87,9 +87,8 @@ def holds(sites: Sites, i: int, x: float, y: float) -> bool:
 def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
     """Return whether a contact resists a twist wherever it is; `shift` is a place where it may not.
 
-    Friction has no power on a contact that does not slide. Elsewhere the largest power that
-    friction allows is convex in the place, and the search steps to where it is least. The result is
-    also False, with a place that does resist, if too many steps would be needed.
+    Where a contact slides, the largest power that friction allows is convex in the place, and the
+    search steps to where it is least. After too many steps `shift` may be a place that resists.
     """
     most = sites.friction[i] * (1.0 - CLEAR_OF_CONE)
     out, x, y = 0.0, 0.0, 0.0
@@ -127,21 +126,22 @@ def is_open(motions: Array, sites: Sites, shifts: Array) -> bool:
 
 
 class Tree(NamedTuple):
-    """The outcome of a search for at most n cones; `search` fills in the arrays."""
+    """The outcome of a search for at most n cones; `search` fills in the arrays.
+
+    For each cone there is the number of the edge that divides it, or `LEAF`, (n,), and forces along
+    the frames, (n, k, 3). At shifts along the frames, (k, 3), contacts do not resist some twist.
+    """
 
     codes: Indices
-    """For each cone, the number of the edge at which it is divided, or `LEAF`, (n,)."""
     forces: Array
-    """Forces on cones that are not divided, along the frames, (n, k, 3)."""
     shifts: Array
-    """Shifts of the contacts, along the frames, at which they do not resist some twist, (k, 3)."""
 
 
 @loop("numpy")
 def pivot(ids: Indices, weights: Array, motions: Array, i: int, most: float) -> tuple[float, float]:
-    """Compute a tangential force on the axis of the mean twist, if friction allows it.
+    """Compute a tangential force, as friction allows, along the mean twist's axis.
 
-    Along this axis a contact's force has the same power wherever the contact is.
+    There its power is the same wherever the contact is.
     """
     f, g, along = 0.0, 0.0, 0.0
     for place in range(RAYS):
@@ -227,10 +227,9 @@ def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
 def find_forces(
     ids: Indices, motions: Array, sites: Sites, clear: Array, forces: Array, weights: Array
 ) -> bool:
-    """Find forces with power on all rays of a cone; return whether they were found.
+    """Find forces with power on all rays of a cone, as `sites` describes.
 
-    `grasp_core.regions.sites` describes the method. It stops as soon as no force of any contact has
-    power for the weights; the weights are then those of a twist that may be unresisted.
+    It stops once no force has power for the weights: those of a twist that may be unresisted.
     """
     regrets, powers = np.zeros(RAYS), np.empty(RAYS)
     weights[:] = 1.0 / RAYS
@@ -297,27 +296,22 @@ def edge_to_cut(ids: Indices, rays: Array, weights: Array) -> tuple[int, int, in
 
 
 @loop("numpy")
-def orthants(rays: Array, sites: Sites, axes: Array, motions: Array, cones: Indices) -> None:
-    """Fill in the first rays, which are the axes and their opposites, and the cones they span."""
+def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> tuple[int, int]:
+    """Divide cones until each is covered, a twist is unresisted, or there are too many cones.
+
+    Gives how the search ended, and the number of cones.
+    """
+    most, clear = needs
+    rays = np.zeros((2 * RAYS + most, RAYS))
+    motions = np.empty((2 * RAYS + most, len(sites.points), MOTIONS))
+    cones, weights = np.empty((most, RAYS), dtype=np.int64), np.empty(RAYS)
+    # the first rays are the axes and their opposites, which span the orthants
     for ray in range(2 * RAYS):
         rays[ray, ray // 2] = 1.0 - 2.0 * (ray % 2)
         fill_motions(ray, rays, sites, axes, motions)
     for signs in range(1 << RAYS):
         for j in range(RAYS):
             cones[signs, j] = 2 * j + (signs >> j & 1)
-
-
-@loop("numpy")
-def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> tuple[int, int]:
-    """Divide cones until each is covered, a twist is unresisted, or there are too many cones.
-
-    Takes `axes` (6, 6); `needs` (k,). Gives how the search ended, and the number of cones.
-    """
-    most, clear = needs
-    rays = np.zeros((2 * RAYS + most, RAYS))
-    motions = np.empty((2 * RAYS + most, len(sites.points), MOTIONS))
-    cones, weights = np.empty((most, RAYS), dtype=np.int64), np.empty(RAYS)
-    orthants(rays, sites, axes, motions, cones)
     bad = np.empty(motions.shape[1:])
     count, made, done = 1 << RAYS, 2 * RAYS, 0
     while done < count:

@@ -54,10 +54,7 @@ STOPPING = 3.0
 
 
 def shared_out(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> list[Array]:
-    """Grow polygons around sites as far as their proof allows, in the planes, (c, 2) each.
-
-    Takes `ys` (k, 2).
-    """
+    """Grow polygons around sites as far as their proof allows, in the planes, (c, 2) each."""
     polygons = list[Array]()
     for _ in range(SHARINGS):
         polygons = _given_away(grounds, ys, sites, cover)
@@ -112,10 +109,7 @@ def _inside(polygon: Array, rows: Array, limits: Array) -> Array:
 
 
 def better_centers(grounds: Grounds, ys: Array) -> Array:
-    """Find centres with larger discs than around `ys`, in plane coordinates, (k, 2).
-
-    The result is `ys` itself if no radius is proved around it.
-    """
+    """Find centres with larger discs, or return the same where no radius is proved around them."""
     coarse = replace(grounds, cones=grounds.cones // MOVING)
     best = largest_discs(coarse, ys)
     if best is None:
@@ -143,7 +137,7 @@ def inside_faces(grounds: Grounds, proved: Proved) -> float:
 
 
 def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
-    """Find the best centres near the present ones for a cover's forces, (k, 2), or None."""
+    """Find the best centres near the present ones for a cover's forces, or None."""
     k = len(proved.ys)
     rows, limits = list[Array](), list[Array]()
     points = grounds.points(proved.ys)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, to_digits
+from grasp_core.arrays import Array, to_digits
 from grasp_core.compiled import compiled
 from grasp_core.geometry.polygons import SAME_CORNER, clip
 from grasp_core.objects.face_pieces import FacePiece
@@ -47,19 +47,10 @@ SIDES = 16
 """Number of sides of the polygon around a disc that extends beyond its face."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Searched:
-    """How a search ended: with a proof, with contacts not in force closure, or with neither."""
-
-    cover: TwistCover | None = None
-    choice: Array | None = None
-    """Contacts that leave a twist unresisted, except for rounding, (k, 3)."""
-
-
-def search_cover(sites: Sites, axes: Array, cones: int) -> Searched:
+def search_cover(sites: Sites, axes: Array, cones: int) -> tuple[TwistCover | None, Array | None]:
     """Search for a cover that proves force closure for all contacts in given sites.
 
-    Takes `axes` (6, 6).
+    Otherwise contacts, (k, 3), may be found that leave a twist unresisted except for rounding.
     """
     # the search sees sites on a grid, so that it ends alike on all machines
     kernel, told = compiled(KERNEL), sites.on_grid()
@@ -68,15 +59,12 @@ def search_cover(sites: Sites, axes: Array, cones: int) -> Searched:
     ended, count = kernel.search(told, axes, (most, told.clear()), tree)
     # (5), translated from shifts along the frames to places
     if ended == kernel.REFUTED:
-        return Searched(choice=sites.points + np.einsum("kij,kj->ki", sites.frames, tree.shifts))
+        return None, sites.points + np.einsum("kij,kj->ki", sites.frames, tree.shifts)
     if ended != kernel.COVERED:
-        return Searched()
+        return None, None
     codes = tree.codes[:count]
-    return Searched(_cover(sites, axes, codes, tree.forces[:count][codes == LEAF]))
-
-
-def _cover(sites: Sites, axes: Array, codes: Indices, forces: Array) -> TwistCover:
-    return TwistCover(axes, codes, np.einsum("kij,mkj->mki", sites.frames, forces))
+    forces = tree.forces[:count][codes == LEAF]
+    return TwistCover(axes, codes, np.einsum("kij,mkj->mki", sites.frames, forces)), None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,9 +72,7 @@ class Grounds:
     """The pieces that contacts may stand on, at unit size, with friction and the effort allowed."""
 
     pieces: tuple[FacePiece, ...]
-    """Convex piece of a face for each contact, with lengths about any common origin."""
     friction: Array
-    """Coulomb coefficient of each contact, (k,)."""
     cones: int
     """Largest number of cones in one proof."""
 
@@ -96,7 +82,7 @@ class Grounds:
         return np.array([np.column_stack([p.normal, p.frame]) for p in self.pieces])
 
     def points(self, ys: Array) -> Array:
-        """Return the points in space, (k, 3), with the plane coordinates `ys`, (k, 2)."""
+        """Return the points in space, (k, 3), with plane coordinates (k, 2)."""
         return np.array([piece.point(y) for piece, y in zip(self.pieces, ys, strict=True)])
 
     def places(self, i: int) -> Array:
@@ -105,7 +91,7 @@ class Grounds:
         return piece.origin + piece.corners @ piece.frame.T
 
     def around(self, ys: Array, polygons: Sequence[Array], radii: Array) -> Sites:
-        """Make sites of polygons (c, 2), in the planes, widened by `radii`, (k,)."""
+        """Make sites of polygons (c, 2), in the planes, widened by radii."""
         return Sites(
             self.points(ys),
             self.frames,
@@ -116,21 +102,23 @@ class Grounds:
         )
 
     def discs(self, ys: Array, radius: float) -> Sites:
-        """Return the sites within discs around points `ys`, (k, 2), cut to the pieces."""
+        """Return the sites within discs around points, cut to the pieces."""
         radii, polygons = np.zeros(len(ys)), list[Array]()
         for i, (piece, y) in enumerate(zip(self.pieces, ys, strict=True)):
             if (piece.E @ y + radius <= piece.b - SAME_CORNER).all():  # not if it touches an edge
                 radii[i] = radius
                 polygons.append(y[None])
             else:
-                polygons.append(part_of_disc(piece, y, radius))
+                # the corners of a polygon around the disc
+                turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
+                rows = np.column_stack([np.cos(turns), np.sin(turns)])
+                polygons.append(clip(piece.corners, rows, rows @ y + radius))
         return self.around(ys, polygons, radii)
 
     def axes(self, ys: Array) -> Array:
-        """Choose six twists as rows, (6, 6), that move the contacts at similar speeds.
+        """Choose six twists as rows that move contacts at similar speeds, tangential ones times mu.
 
-        Tangential speeds count in proportion to the friction. With these twists, long objects need
-        no more cones than round ones.
+        With these, long objects need no more cones than round ones.
         """
         motions = list[Array]()
         for (x, y, z), F, mu in zip(self.points(ys), self.frames, self.friction, strict=True):
@@ -145,10 +133,9 @@ class Grounds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proved:
-    """Discs proved to keep force closure, and larger discs that contain a counterexample."""
+    """Discs around `ys` proved to keep force closure, and larger ones with a counterexample."""
 
     ys: Array
-    """Centres of the discs, in plane coordinates, (k, 2)."""
     radius: float
     cover: TwistCover
     limit: float
@@ -157,27 +144,8 @@ class Proved:
     """Contacts that are not force-closed, in discs of radius `limit`, (k, 3)."""
 
 
-def part_of_disc(piece: FacePiece, y: Array, radius: float) -> Array:
-    """Return the corners of a polygon around a disc, cut to its piece, (c, 2)."""
-    turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
-    rows = np.column_stack([np.cos(turns), np.sin(turns)])
-    return clip(piece.corners, rows, rows @ y + radius)
-
-
-def reach_of(grounds: Grounds, ys: Array) -> float:
-    """Return a radius at which discs hold the whole pieces, or slightly more."""
-    least = max(
-        float(np.linalg.norm(piece.corners - y, axis=1).max())
-        for piece, y in zip(grounds.pieces, ys, strict=True)
-    )
-    return coarse(least, REACH_DIGITS)
-
-
 def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> Proved | None:
-    """Find the largest equal discs, up to whole faces, that a cover proves, or None.
-
-    Takes `ys` (k, 2).
-    """
+    """Find the largest equal discs, up to whole faces, that a cover proves, or None."""
     search = _Search(grounds, ys)
     search.widen(grounds.cones // COARSE, first, FAST, SLOW - 1.0)
     search.widen(grounds.cones, SLOW * search.lower or first, SLOW, FINENESS)
@@ -188,11 +156,15 @@ def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> P
 
 
 class _Search:
-    """The state of a search for the largest discs: radii proved so far, and radii refuted."""
+    """Radii proved so far, and radii refuted, in a search for the largest discs."""
 
     def __init__(self, grounds: Grounds, ys: Array) -> None:
         self.grounds, self.ys, self.axes = grounds, ys, grounds.axes(ys)
-        self.reach = reach_of(grounds, ys)
+        holding = max(
+            float(np.linalg.norm(piece.corners - y, axis=1).max())
+            for piece, y in zip(grounds.pieces, ys, strict=True)
+        )
+        self.reach = coarse(holding, REACH_DIGITS)  # discs hold the whole pieces, or slightly more
         self.lower = 0.0
         self.limit: float = math.inf
         self.cover: TwistCover | None = None
@@ -206,13 +178,13 @@ class _Search:
             radius = min(radius, self.reach)
             if radius <= self.lower:
                 break
-            found = search_cover(self.grounds.discs(self.ys, radius), self.axes, cones)
-            if found.cover is not None:
-                self.lower, self.cover = radius, found.cover
+            cover, choice = search_cover(self.grounds.discs(self.ys, radius), self.axes, cones)
+            if cover is not None:
+                self.lower, self.cover = radius, cover
             else:
                 upper = radius
-                if found.choice is not None:
-                    self.limit, self.choice = radius, found.choice
+                if choice is not None:
+                    self.limit, self.choice = radius, choice
             if math.isinf(upper):
                 radius = growth * self.lower
             else:
@@ -224,9 +196,9 @@ class _Search:
         # each turn halves the interval, or doubles what is searched of it, up to the reach
         while self.limit - below > OPEN_NEAR * self.lower and min(radius, self.reach) > below:
             radius = min(radius, self.reach)
-            found = search_cover(self.grounds.discs(self.ys, radius), self.axes, cones)
-            if found.choice is not None:
-                self.limit, self.choice = radius, found.choice
+            _, choice = search_cover(self.grounds.discs(self.ys, radius), self.axes, cones)
+            if choice is not None:
+                self.limit, self.choice = radius, choice
             else:
                 below = radius
             ahead = below + 2.0 * max(below - self.lower, OPEN_NEAR * self.lower)

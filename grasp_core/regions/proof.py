@@ -103,37 +103,38 @@ class TwistCover(ByValue):
         while len(cones):
             codes = self.codes[at : at + len(cones)]
             if len(codes) < len(cones):
-                raise InputError(
-                    "cover.codes must hold one code per cone, but it ends before the last cone"
-                )
+                break
             uncut = codes == LEAF
             count = int(np.count_nonzero(uncut))
             yield slice(begun, begun + count), cones[uncut]
             at, begun = at + len(cones), begun + count
             cones = halves(cones[~uncut], codes[~uncut])
-        if at < len(self.codes):
-            raise InputError(
-                "cover.codes must hold one code per cone, but it goes on after the last cone"
-            )
+        if len(cones) or at < len(self.codes):
+            how = "ends before" if len(cones) else "goes on after"
+            raise InputError(f"cover.codes must hold one code per cone, but it {how} the last cone")
 
     def verify(self, regions: Sequence[Array], normals: Array, friction: Array) -> bool:
-        """Return whether all contacts in regions are proved force-closed, in plain arithmetic.
+        """Return whether all contacts in regions, (c, 3) each, are proved force-closed.
 
         The answer is False for arguments that are not regions, normals or friction.
-
-        Takes `regions` (c, 3); `normals` (k, 3); `friction` (k,).
         """
         k = self.forces.shape[1]
         if not (are_units(normals, k, 3, slack=SLACK) and are_frictions(friction, k)):
             return False
+        placed = is_a(regions, Sequence) and len(regions) == k
+        placed = placed and all(is_array(each, None, 3) and len(each) > 0 for each in regions)
         largest = np.abs(self.forces).max(axis=(1, 2), initial=0.0)
-        if not (_are_places(regions, k) and (largest > 0.0).all() and self._independent()):
+        lengths = np.linalg.norm(self.axes, axis=1)
+        exact = ((lengths > 1.0 / LARGEST_ENTRY) & (lengths < LARGEST_ENTRY)).all()
+        if not (placed and (largest > 0.0).all() and exact):
             return False
+        independence = np.linalg.svd(self.axes / lengths[:, None], compute_uv=False)[-1]
         forces = self.forces / largest[:, None, None]  # else squares of tiny ones are zero
         along = np.einsum("mki,ki->mk", forces, normals)
         across = np.linalg.norm(forces - along[..., None] * normals, axis=2)
         # every F_i lies in its cone C_i
-        if not ((along >= 0.0) & (across <= friction * along)).all():
+        in_cones = ((along >= 0.0) & (across <= friction * along)).all()
+        if not (independence > SLACK and in_cones):
             return False
         try:
             return all(
@@ -141,12 +142,6 @@ class TwistCover(ByValue):
             )
         except InputError:
             return False
-
-    def _independent(self) -> bool:
-        lengths = np.linalg.norm(self.axes, axis=1)
-        if not ((lengths > 1.0 / LARGEST_ENTRY) & (lengths < LARGEST_ENTRY)).all():
-            return False
-        return bool(np.linalg.svd(self.axes / lengths[:, None], compute_uv=False)[-1] > SLACK)
 
     def _powerful(self, forces: Array, rays: Array, regions: Sequence[Array]) -> bool:
         """Return whether forces have positive power, h > 0 in (2), on the rays of each cone."""
@@ -163,27 +158,16 @@ class TwistCover(ByValue):
         return bool((powers > sizes).all())
 
 
-def _are_places(regions: Sequence[Array], count: int) -> bool:
-    """Return whether regions are `count` lists of points."""
-    listed = is_a(regions, Sequence) and len(regions) == count
-    return listed and all(is_array(region, None, 3) and len(region) > 0 for region in regions)
-
-
 def power_of(F: Array, twists: Array) -> tuple[Array, Array]:
     """Compute the power F.(a + b x x) of forces (m, 3) at x under twists (m, r, 6).
 
-    It is linear in x: slope times x plus a constant.
-
-    Gives the slopes F x b, (m, r, 3), and the constants F.a, (m, r).
+    It is linear in x: the slopes F x b, (m, r, 3), and the constants F.a, (m, r), are given.
     """
     return np.cross(F[:, None], twists[..., 3:]), np.einsum("mi,mri->mr", F, twists[..., :3])
 
 
 def summed(rays: Array, axes: Array) -> Array:
-    """Return the sum of the lengths that make up each twist, (m, r), for bounds on rounding.
-
-    The twists themselves are shorter where axes nearly cancel each other.
-    """
+    """Return the sum of the lengths that make up each twist, (m, r), also where they cancel."""
     return np.linalg.norm(np.abs(rays) @ np.abs(axes), axis=2)
 
 

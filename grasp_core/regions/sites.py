@@ -45,10 +45,7 @@ class Sites(NamedTuple):
     """Largest distance of contacts from the planes of their polygons, (k,)."""
 
     def on_grid(self) -> "Sites":
-        """Round the sites to a grid, so that a search does not depend on last digits.
-
-        Rounding never raises the friction.
-        """
+        """Round to a grid, so that last digits do not matter to a search; friction never rises."""
         friction = -coarse(-self.friction, GRID_DIGITS)
         return Sites(
             on_grid(self.points),
@@ -60,20 +57,14 @@ class Sites(NamedTuple):
         )
 
     def clear(self) -> Array:
-        """Return the power that a unit normal force must keep per unit of twist, (k,).
-
-        Rounding to the grid changes the power by less.
-        """
+        """Return the power per unit of force and twist that rounding to the grid may take, (k,)."""
         aside = np.sqrt(np.einsum("kcj,kcj->kc", self.corners, self.corners)).max(axis=1)
         places = np.sqrt(np.einsum("kj,kj->k", self.points, self.points))
         farthest = 1.0 + float((places + aside + self.radii + self.depths).max())
         return AHEAD * farthest * (1.0 + self.friction)
 
     def lowest(self, i: int, slopes: Array) -> Array:
-        """Find the least values of linear functions over a contact's polygon and disc, (...,).
-
-        Takes `slopes` (..., 2).
-        """
+        """Find the least values of functions with slopes (..., 2) over a contact's site, (...,)."""
         lengths = np.sqrt(np.einsum("...j,...j->...", slopes, slopes))
         return (slopes @ self.corners[i].T).min(axis=-1) - self.radii[i] * lengths
 

@@ -1,9 +1,24 @@
-"""Says which face of an old part became which face of a changed one, and how it moved.
+"""Says where a contact or a face of an old part is on a changed one, and how it moved.
+
+Both parts are in the same frame and unit. For a point p of the old surface with the inward normal
+n, the point q of the new surface that takes its place is found by these rules, in this order:
+
+1. A face is *like* n if its own inward normal makes an angle of at most `angle` with n.
+2. On each like face, the candidate is the point nearest to p, its holes and notches left out: the
+   foot of the perpendicular, or a point of the border if the foot is outside.
+3. The nearest candidate is q if |q - p| <= `distance`. Of candidates that are equally near, to
+   within `SAME` of the old part's size, the one on the face with the lowest number is q.
+4. Otherwise p has no place on the new surface.
+
+Therefore a point on a face that has moved along its normal by h goes straight along that normal, by
+h; one on a face that has not changed stays where it is; and one where a hole was drilled goes to
+the rim of the hole. Nothing is found through the part: the face on the other side of a plate has
+the opposite normal, which is never like.
 
 Each old face is represented by the centres of the convex pieces that tile it, weighted by area. Its
 *distance* from a new face is the mean distance of these centres from that face. Of the new faces
-that are like it (see `like_faces`), the nearest becomes its successor if its distance is at most
-the one that contacts may move. An old face without such a successor gets the nearest like face that
+that are like it, the nearest becomes its successor if its distance is at most the one that contacts
+may move. An old face without such a successor gets the nearest like face that
 succeeds no other one, however far it is. Of equally near faces, the one with the lowest number is
 taken. One new face may succeed several old ones that have merged; of a face that was cut in two,
 one part succeeds it, and the other counts as added.
@@ -23,19 +38,37 @@ positive outwards, because normals point into the part.
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array, cross
 from grasp_core.by_value import counted
+from grasp_core.checked import BOUNDS, instance, number
+from grasp_core.errors import InputError
 from grasp_core.objects.on_faces import ON_FACE
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
-from grasp_core.planning.given_contacts import nearest_in
-from grasp_core.transferring.like_faces import SAME, WIDEST_DEG, Likeness
+from grasp_core.planning.given_contacts import (
+    FlatPart,
+    Nearest,
+    flat_parts,
+    nearest_in,
+    nearest_like,
+)
 
 Triple: TypeAlias = tuple[float, float, float]
+SHARE_OF_SIZE = 0.05
+"""Default for how far a contact may move, relative to the old part's radius."""
+ANGLE_DEG = 5.0
+"""Default for the largest angle between the normals of like faces [deg]."""
+WIDEST_DEG = BOUNDS["changed_by_deg"]["most"]
+"""Largest such angle that is accepted [deg]: beyond it, a face of a box and its chamfer would be
+like each other."""
+SAME = 1e-9
+"""Difference of distances, relative to the old part's radius, and of angles [rad] that is rounding:
+a face that has moved by exactly the allowed distance is still near enough."""
 MOVED = ON_FACE
 """Least distance that counts as moved, relative to the old part's radius: files that keep six
 digits stay within it."""
@@ -47,6 +80,59 @@ RESHAPED = 1e-5
 MOST_NAMED = 12
 """Largest number of faces that one line names."""
 MM = 1e3
+
+
+@dataclass(frozen=True, slots=True)
+class Likeness:
+    """How near, and how little turned, a face must be to take the place of another one."""
+
+    distance: float
+    """Largest distance by which a contact may move [m]."""
+    angle: float
+    """Largest angle between the two normals [rad]."""
+    same: float
+    """Difference of distances that is rounding [m]."""
+
+    @property
+    def reach(self) -> float:
+        """Return the largest distance, with rounding [m]."""
+        return self.distance + self.same
+
+
+def likeness(old: Polyhedron, distance: float | None, angle_deg: float) -> Likeness:
+    """Build the rule for an old part."""
+    where = f", the part's radius in m, or None for {SHARE_OF_SIZE:g} of it"
+    usual = SHARE_OF_SIZE * old.radius
+    most = usual if distance is None else distance
+    return Likeness(
+        number(most, "distance", least=0.0, most=old.radius, where=where),
+        math.radians(number(angle_deg, "angle_deg", **BOUNDS["changed_by_deg"])),
+        SAME * old.radius,
+    )
+
+
+def check_planar(body: Polyhedron, name: str) -> None:
+    """Refuse a value that is no part, or a part whose faces are patches of a curved surface."""
+    instance(body, Polyhedron, name, "gc.load_polyhedron reads one from a mesh file")
+    if body.patches is not None:
+        raise InputError(
+            f"{name} must have exact planar faces, but {body.name} was read as patches of a curved "
+            "surface; read it with faces='planar', or plan on the changed part anew"
+        )
+
+
+def place_of(
+    new: Polyhedron, point: Array, normal: Array, rule: Likeness, reach: float
+) -> Nearest | None:
+    """Find the nearest point on a like face of a changed part, within reach; None if none is."""
+    lean = rule.angle + SAME
+    return nearest_like(_parts(new), point, normal, lean=lean, reach=reach, margin=rule.same)
+
+
+@lru_cache(maxsize=8)
+def _parts(body: Polyhedron) -> tuple[FlatPart, ...]:
+    """List the parts of a surface once: they are searched for every contact."""
+    return flat_parts(body)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,9 +215,9 @@ def changes_in_words(
 
 def face_changes(old: Polyhedron, new: Polyhedron, rule: Likeness) -> tuple[FaceChange, ...]:
     """Find the successor of each face of an old part, in the order of the old faces."""
-    reach = rule.distance + rule.same
-    near = [_successor(face, new, range(len(new.faces)), rule, reach) for face in old.faces]
-    free = sorted({*range(len(new.faces))} - {*near})
+    every = range(len(new.faces))
+    near = [_successor(face, new, every, rule, rule.reach) for face in old.faces]
+    free = sorted({*every} - {*near})
     changes: list[FaceChange] = []
     for index, (face, successor) in enumerate(zip(old.faces, near, strict=True)):
         found = successor
@@ -146,7 +232,7 @@ def face_changes(old: Polyhedron, new: Polyhedron, rule: Likeness) -> tuple[Face
             and (found := _successor(face, new, free, wide, math.inf)) is not None
         ):
             free.remove(found)
-            turn = _turn(face, new.faces[found])
+            turn = turn_of(face.normal, new.faces[found].normal)
             changes[index] = replace(change, likely=found, likely_turn=turn)
     return tuple(changes)
 
@@ -181,7 +267,6 @@ def _successor(
 
 
 def _distance(face: Face, point: Array) -> float:
-    """Return the distance of a point from a planar face [m]."""
     feet = (nearest_in(piece, face.normal, point) for piece in face.pieces)
     return min(float(np.linalg.norm(foot - point)) for foot in feet)
 
@@ -196,7 +281,7 @@ def _change(
     along = float(now.normal @ face.normal)
     # (1), positive outwards
     distance = float(now.normal @ (face.centroid - now.centroid)) / along
-    turn = _turn(face, now)
+    turn = turn_of(face.normal, now.normal)
     moved = abs(distance) > MOVED * size or turn > TURNED
     return FaceChange(index, successor, distance, turn, face.area, now.area, moved, normal, center)
 
@@ -206,7 +291,7 @@ def _triple(numbers: Array) -> Triple:
     return x, y, z
 
 
-def _turn(face: Face, now: Face) -> float:
-    """Return the angle between the normals of two faces [rad]."""
-    sine = float(np.linalg.norm(cross(face.normal, now.normal)))
-    return math.atan2(sine, float(now.normal @ face.normal))
+def turn_of(normal: Array, now: Array) -> float:
+    """Return the angle between two normals [rad]."""
+    sine = float(np.linalg.norm(cross(normal, now)))
+    return math.atan2(sine, float(now @ normal))

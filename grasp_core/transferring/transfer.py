@@ -1,10 +1,18 @@
 """Carries grasps over to a changed part and judges them anew.
 
-A grasp keeps its fingers: finger i goes where `like_faces` says that its contact is now. A grasp is
-`gone` if a contact has no place, if its contacts are no longer in force closure at the friction, or
-if its fingers cannot reach it; otherwise its figures are compared with those on the old part, by
-the bands of `judging`, and it is `same`, `better` or `worse`. The old figures are computed anew at
-the same friction, so both sides are judged alike.
+A grasp keeps its fingers: finger i goes where `face_changes` says that its contact is now. A grasp
+is `gone` if a contact has no place, if its contacts are no longer in force closure at the friction,
+or if its fingers cannot reach it; otherwise its figures are compared with those on the old part,
+and it is `same`, `better` or `worse`. The figures are those that contacts of another tool get:
+force closure by a certificate, critical friction, and the Ferrari-Canny quality about the centre of
+mass, at the radius of the part that they are on. The old figures are computed anew at the same
+friction, so both sides are judged alike. A carried grasp claims no regions, and its witness is of
+the general type, a regulus.
+
+Bands: at friction mu, a critical friction counts as changed if it differs by more than
+`FRICTION_BAND` mu, and a quality if its proved lower bound differs by more than `QUALITY_BAND` of
+the old one. The band of critical frictions does not shrink with them: of a grasp whose forces meet
+in a point, the critical friction is nearly zero, and any motion of a face multiplies it.
 
 An id that a plan has made of face numbers, such as `c-0-1-2-7`, gets the new face numbers; any
 other id stays. Where a new id is taken, the later grasp gets `-2`, `-3` and so on behind it.
@@ -13,47 +21,63 @@ other id stays. Where a new id is taken, the later grasp gets `-2`, `-3` and so 
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from grasp_core.arrays import cross
 from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import coefficient, instance, several
+from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.errors import UndecidedError
+from grasp_core.families.free import of_general_type
+from grasp_core.families.placements import Placement
+from grasp_core.objects.face_pieces import piece_of
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.planning.given_contacts import Seated
-from grasp_core.planning.reach import Finger
+from grasp_core.planning.given_contacts import Seated, grasp_of
+from grasp_core.planning.reach import Finger, reach
 from grasp_core.transferring.face_changes import (
+    ANGLE_DEG,
     FaceChange,
+    Likeness,
     added_faces,
     changes_in_words,
-    face_changes,
-)
-from grasp_core.transferring.judging import (
-    CHANGES,
-    Change,
-    GraspFigures,
-    Judged,
-    compared,
-    judged,
-    reached,
-)
-from grasp_core.transferring.like_faces import (
-    ANGLE_DEG,
-    Likeness,
     check_planar,
+    face_changes,
     likeness,
-    nearest_at_any_distance,
     place_of,
+    turn_of,
 )
-from grasp_core.values import Contact, Grasp, four
+from grasp_core.values import FINGERS, Contact, Grasp, Witness, four
 
 BY_FACES = re.compile(r"([a-z](?:-[a-z])*)((?:-\d+[ab]?){4})")
 """Ids that plans make: letters of methods, then the faces by finger, perhaps halves of faces."""
 MM = 1e3
+Change: TypeAlias = Literal["same", "better", "worse", "gone"]
+"""How a grasp of the changed part compares with that of the old part."""
+CHANGES: tuple[Change, ...] = get_args(Change)
+FRICTION_BAND = 0.05
+"""Difference of critical frictions that does not count, as a share of the friction."""
+QUALITY_BAND = 0.05
+"""Difference of qualities that does not count, as a share of the old quality."""
+DRAWS = 8
+"""How often internal forces are drawn that may make the lines of a witness skew."""
+
+
+@dataclass(frozen=True, slots=True)
+class GraspFigures:
+    """What contacts reach at a friction."""
+
+    closure_margin: float
+    """Proved margin of force closure; zero or negative where the contacts are not closed."""
+    critical_friction: float
+    """Smallest Coulomb coefficient above which the contacts are in force closure; at most the
+    friction where they are closed, and infinite where none suffices."""
+    ferrari_canny: tuple[float, float]
+    """Proved lower and upper bound of the quality [N]; zeros where the contacts are not closed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -157,8 +181,8 @@ def transfer(
     """Carry grasps over to a part that has changed since they were planned, and judge them anew.
 
     Each contact goes to the nearest point of the changed part on a face whose normal is like its
-    own; the rules are in `grasp_core.transferring.like_faces`, the bands by which grasps are
-    compared in `grasp_core.transferring.judging`.
+    own; the rules are in `grasp_core.transferring.face_changes`, the bands by which grasps are
+    compared in `grasp_core.transferring.transfer`.
 
     Args:
         old: The part that the grasps were planned on, with planar faces.
@@ -195,8 +219,6 @@ def transfer(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Judge:
-    """Carries single grasps over from one part to another."""
-
     old: Polyhedron
     new: Polyhedron
     friction: float
@@ -210,7 +232,12 @@ class _Judge:
             self._contact(finger, face, contact)
             for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True))
         )
-        lost = [self._loss(each) for each in contacts if each.contact is None]
+        lost = list[str]()
+        for each in (each for each in contacts if each.contact is None):
+            near = f"no face is within {math.degrees(self.rule.angle):.4g} deg of it"
+            if math.isfinite(each.distance):
+                near = f"the nearest face like it is {MM * each.distance:.2f} mm away"
+            lost.append(f"finger {each.finger} has lost face {each.old_face}: {near}")
         if lost:
             return CarriedGrasp(grasp, "gone", "; ".join(lost), contacts, before, None, None)
         name = _free_id(_id_on(grasp, contacts), taken)
@@ -220,58 +247,94 @@ class _Judge:
                 four(each.contact for each in contacts if each.contact is not None),
                 float(np.max([each.distance for each in contacts])),
             )  # fmt: skip
-            now = judged(self.new, seated, self.friction, name)
+            figures, now = judged(self.new, seated, self.friction, name)
         except UndecidedError as error:
             why = f"whether its contacts are still in force closure is too close to call: {error}"
             return CarriedGrasp(grasp, "gone", why, contacts, before, None, None)
-        held = self._held(now)
+        held = self._held(figures, now)
         if isinstance(held, str):
-            return CarriedGrasp(grasp, "gone", held, contacts, before, now.figures, None)
+            return CarriedGrasp(grasp, "gone", held, contacts, before, figures, None)
         taken.add(name)
-        status, reason = compared(before, now.figures, self.friction)
-        return CarriedGrasp(grasp, status, reason, contacts, before, now.figures, held)
+        status, reason = compared(before, figures, self.friction)
+        return CarriedGrasp(grasp, status, reason, contacts, before, figures, held)
 
     def _contact(self, finger: int, face: int, contact: Contact) -> CarriedContact:
-        """Carry one contact over to the changed part."""
         at, normal = contact.position, contact.normal
-        place = place_of(self.new, at, normal, self.rule)
-        near = place or nearest_at_any_distance(self.new, at, normal, self.rule)
+        place = place_of(self.new, at, normal, self.rule, self.rule.reach)
+        near = place or place_of(self.new, at, normal, self.rule, math.inf)
         if near is None:
             return CarriedContact(finger, face, None, None, math.inf, 0.0)
-        sine = float(np.linalg.norm(cross(normal, near.contact.normal)))
-        turn = math.atan2(sine, float(normal @ near.contact.normal))
+        turn = turn_of(normal, near.contact.normal)
         if place is None:
             return CarriedContact(finger, face, None, None, near.distance, turn)
         return CarriedContact(finger, face, place.part.face, place.contact, place.distance, turn)
 
-    def _loss(self, found: CarriedContact) -> str:
-        """Say which finger has lost which face, and how far the nearest like face is."""
-        if math.isfinite(found.distance):
-            near = f"the nearest face like it is {MM * found.distance:.2f} mm away"
-        else:
-            near = f"no face is within {math.degrees(self.rule.angle):.4g} deg of it"
-        return f"finger {found.finger} has lost face {found.old_face}: {near}"
-
     def _before(self, grasp: Grasp) -> GraspFigures:
-        """Judge a grasp on the old part, as it will be judged on the changed one."""
         seated = Seated(self.old, grasp.faces, grasp.contacts, 0.0)
         try:
-            return judged(self.old, seated, self.friction, grasp.id).figures
+            return judged(self.old, seated, self.friction, grasp.id)[0]
         except UndecidedError:  # at its critical friction, so neither better nor closed for sure
             return GraspFigures(0.0, self.friction, (0.0, 0.0))
 
-    def _held(self, now: Judged) -> Grasp | str:
-        """Return the grasp that contacts make, or why they make none."""
-        if now.figures.closure_margin <= 0.0:
-            needed = now.figures.critical_friction
+    def _held(self, figures: GraspFigures, grasp: Grasp | None) -> Grasp | str:
+        """Return the grasp that contacts make, within reach, or why they make none."""
+        if figures.closure_margin <= 0.0:
+            needed = figures.critical_friction
             said = f"above {needed:.4f} they are" if math.isfinite(needed) else "none suffices"
             return f"its contacts are not in force closure at friction {self.friction:g}: {said}"
-        if now.grasp is None:
+        if grasp is None:
             return "its friction cones leave too little room for a witness of force closure"
         if self.finger is None:
-            return now.grasp
-        found = reached(self.new, now.grasp, self.finger)
-        return f"out of reach: {found}" if isinstance(found, str) else found
+            return grasp
+        ways = reach(self.new, grasp.faces, grasp.positions, grasp.normals, self.finger)
+        if ways.directions is None:
+            return f"out of reach: {ways.reason}"
+        return replace(grasp, approach_directions=-ways.directions)
+
+
+def judged(
+    body: Polyhedron, seated: Seated, friction: float, name: str
+) -> tuple[GraspFigures, Grasp | None]:
+    """Judge contacts on the faces of a part, and make a grasp of them if they are closed.
+
+    The forces of a certificate may all meet, as at the face centres of a regular solid, so the
+    grasp gets balanced forces whose lines are skew; it is None if the cones leave no room for them.
+    """
+    found = grasp_of(seated, friction, name)
+    if isinstance(found, ClosureCertificate):
+        critical = critical_friction(found.positions, found.normals)
+        return GraspFigures(found.margin, critical, (0.0, 0.0)), None
+    figures = GraspFigures(found.closure_margin, found.critical_friction, found.ferrari_canny)
+    center, size = body.center_of_mass, body.radius
+    faces = [(index, body.faces[index]) for index in found.faces]
+    pieces = [
+        piece_of(index, face.normal, (face.pieces[0] - center) / size) for index, face in faces
+    ]
+    positions, none = (found.positions - center) / size, np.empty((0, 3))
+    plain = Placement(positions, found.witness.forces, none, np.zeros(FINGERS), 0.0)
+    for draw in range(DRAWS):
+        skew = of_general_type(pieces, plain, friction, np.random.default_rng(draw))
+        if skew is not None:
+            return figures, replace(found, witness=Witness(found.positions, skew.forces))
+    return figures, None
+
+
+def compared(old: GraspFigures, new: GraspFigures, friction: float) -> tuple[Change, str]:
+    """Say how the figures of a grasp that is still closed have changed, and which ones."""
+    if old.closure_margin <= 0.0:
+        return "better", f"not in force closure before, at friction {friction:g}"
+    rise = new.critical_friction - old.critical_friction
+    gain = new.ferrari_canny[0] - old.ferrari_canny[0]
+    of_friction = f"critical friction {old.critical_friction:.4f} -> {new.critical_friction:.4f}"
+    of_quality = f"quality {old.ferrari_canny[0]:.4f} -> {new.ferrari_canny[0]:.4f} N"
+    allowed, band = FRICTION_BAND * friction, QUALITY_BAND * old.ferrari_canny[0]
+    worse = [text for text, by in ((of_friction, rise - allowed), (of_quality, -gain - band))
+             if by > 0.0]  # fmt: skip
+    if worse:
+        return "worse", "; ".join(worse)
+    better = [text for text, by in ((of_friction, -rise - allowed), (of_quality, gain - band))
+              if by > 0.0]  # fmt: skip
+    return ("better", "; ".join(better)) if better else ("same", "")
 
 
 def _id_on(grasp: Grasp, contacts: Iterable[CarriedContact]) -> str:

@@ -15,7 +15,7 @@ from enum import StrEnum
 from math import radians
 from typing import Any, cast
 
-from grasp_core.transferring.judging import FRICTION_BAND
+from grasp_core.transferring.transfer import FRICTION_BAND
 from sim_validate.baselines.baseline import DIGITS, Baseline, Entry, ExecutionEntry
 from sim_validate.execution.verdict import may_slip
 from sim_validate.simulation.traces import LET_GO, Outcome
@@ -272,7 +272,7 @@ OTHER_VERSIONS = Bands(
 )  # fmt: skip
 OTHER_PART = replace(OTHER_VERSIONS, same_part=False)
 """Bands for a changed part: to these, `FRICTION_BAND` of the friction is added for critical
-frictions, as in `grasp_core.transferring.judging`."""
+frictions, as in `grasp_core.transferring.transfer`."""
 
 
 @dataclass(frozen=True, slots=True)

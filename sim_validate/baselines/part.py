@@ -29,12 +29,15 @@ from grasp_core.transferring.changed_part import (
     load_changed_part,
 )
 from grasp_core.transferring.face_changes import (
+    ANGLE_DEG,
     FaceChange,
+    Likeness,
     added_faces,
     changes_in_words,
+    check_planar,
     face_changes,
+    likeness,
 )
-from grasp_core.transferring.like_faces import ANGLE_DEG, Likeness, check_planar, likeness
 from grasp_core.transferring.transfer import Transfer, transfer
 from sim_validate.baselines.baseline import Baseline, RecordedPart, recorded_part
 

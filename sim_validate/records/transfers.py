@@ -20,14 +20,16 @@ from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.provenance import versions
 from grasp_core.records.grasps_json import SavedGrasps, plan_to_json
 from grasp_core.transferring.face_changes import FaceChange, changes_in_words
-from grasp_core.transferring.judging import (
+from grasp_core.transferring.transfer import (
     CHANGES,
     FRICTION_BAND,
     QUALITY_BAND,
+    CarriedContact,
+    CarriedGrasp,
     Change,
     GraspFigures,
+    Transfer,
 )
-from grasp_core.transferring.transfer import CarriedContact, CarriedGrasp, Transfer
 from grasp_core.values import FINGERS, Contact
 from sim_validate.records.fields import Count, Finite, ObjectRecord, Positive, object_record
 

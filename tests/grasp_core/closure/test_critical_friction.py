@@ -22,18 +22,6 @@ BOX_SIDES = (
 """Closed at any positive friction, with a margin that grows with its square."""
 
 
-def test_closure_is_certified_just_above_and_refuted_just_below():
-    rng, tested = np.random.default_rng(5), 0
-    for grasp in gc.plan(example_object("random-12-1"), 0.5, families="free", limit=60).grasps:
-        mu = gc.critical_friction(grasp)
-        if mu > 1e-3:
-            step = float(rng.uniform(1e-6, 1e-3))
-            assert gc.force_closure(grasp, friction=mu * (1 + step)).closed
-            assert not gc.force_closure(grasp, friction=mu * (1 - step)).closed
-            tested += 1
-    assert tested >= 40
-
-
 def test_a_margin_that_grows_with_the_square_shows_no_friction():
     assert gc.force_closure(*BOX_SIDES, 1e-5).closed
     assert gc.critical_friction(*BOX_SIDES) == 0.0
@@ -92,17 +80,17 @@ def made_sets(count):
 def test_many_at_once_and_one_by_one_give_intervals_that_overlap(count):
     """Both are as narrow as the accuracy."""
     positions, normals = contact_sets(count)
-    quick = critical._at_once(positions, normals)
+    quick_ones, upper, _, _ = critical._at_once(positions, normals)
     every = gc.critical_frictions(positions, normals)
     width = 1.0 + 1.1 * critical.FRICTION_ACCURACY
     for i, (points, units) in enumerate(zip(positions, normals, strict=True)):
         slow = friction_search.search_interval(points, units)
-        if quick.found[i]:
-            assert every[i] == quick.upper[i]
-            assert slow.lower <= quick.upper[i] <= width * slow.upper
+        if quick_ones[i]:
+            assert every[i] == upper[i]
+            assert slow.lower <= upper[i] <= width * slow.upper
         else:
             assert every[i] == (0.0 if slow.upper <= critical.FRICTIONLESS else slow.upper)
-    assert quick.found.mean() >= 0.6
+    assert quick_ones.mean() >= 0.6
     assert len(every) >= 140
 
 
@@ -113,7 +101,7 @@ def test_what_the_search_finds_proves_both_ends():
     forces, twists, bounds = np.zeros_like(arms), np.zeros((len(arms), 6)), np.zeros((len(arms), 2))
     compiled(critical.KERNEL).search(arms, normals, 5e-8, forces, twists, bounds)
     proved = 0
-    for i in np.flatnonzero(critical._at_once(positions, normals).found):
+    for i in np.flatnonzero(critical._at_once(positions, normals)[0]):
         lower, upper = bounds[i]
         if upper - lower > 5e-8 * lower:
             continue
@@ -130,13 +118,6 @@ def test_what_the_search_finds_proves_both_ends():
         assert np.abs(np.cross(arms[i], forces[i]).sum(axis=0)).max() <= 1e-9
         proved += 1
     assert proved >= 100
-
-
-def test_one_set_of_contacts_is_treated_like_many():
-    positions, normals = contact_sets()
-    every = gc.critical_frictions(positions, normals)
-    for i in range(0, len(every), 7):
-        assert gc.critical_friction(positions[i], normals[i]) == every[i]
 
 
 def test_grasps_are_taken_as_they_are():
@@ -171,30 +152,17 @@ def test_what_the_search_gets_wrong_is_made_program_by_program(monkeypatch, spoi
     right = gc.critical_frictions(positions, normals)
     monkeypatch.setattr(kernel, "search", search)
     monkeypatch.setattr(kernel, "deepest", deepest)
-    assert not critical._at_once(positions, normals).found.any()
+    assert not critical._at_once(positions, normals)[0].any()
     np.testing.assert_allclose(
         gc.critical_frictions(positions, normals), right, rtol=1e-7, atol=1e-7
     )
-
-
-def test_hopeless_and_frictionless_sets_are_left_to_the_reference():
-    grasp = gc.plan(
-        example_object("wedge"), 0.5, families="pencil", cones="normal", limit=1
-    ).grasps[0]
-    parallel = np.tile([0.0, 0, 1], (4, 1))
-    positions = np.array([grasp.positions, TETRA_CENTERS, TETRA_CENTERS])
-    normals = np.array([grasp.normals, parallel, TETRA_NORMALS])
-    found = gc.critical_frictions(positions, normals)
-    assert found[:2].tolist() == [0.0, math.inf]
-    assert found[2] == gc.critical_friction(TETRA_CENTERS, TETRA_NORMALS) == 0.0
-    assert not critical._at_once(positions, normals).found.any()
 
 
 def nothing_at_once(points, normals):
     """What a compiled search tells that finds no interval."""
     contacts = len(points)
     nothing, found = np.zeros_like(normals), np.zeros(contacts, dtype=bool)
-    return critical._Quick(found, np.zeros(contacts), nothing, np.zeros((contacts, 6)))
+    return found, np.zeros(contacts), nothing, np.zeros((contacts, 6))
 
 
 def test_where_no_program_is_solved_the_upper_end_is_still_one(monkeypatch):

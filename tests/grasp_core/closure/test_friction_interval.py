@@ -199,47 +199,19 @@ from tests.grasp_core.grid_contacts import contact_sets
 found = [gc.critical_friction(p, n) for p, n, _ in contact_sets(int(sys.argv[1]), seed=27)]
 np.save(sys.argv[2], found)
 """
-NO_VECTORS = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX2 FMA3"
-
-
-def frictions_elsewhere(folder, count, environment):
-    """Critical frictions of the same contacts by another process."""
-    root = Path(__file__).parents[3]
-    subprocess.run(
-        [sys.executable, "-c", ELSEWHERE, str(count), str(folder / "found.npy")],
-        check=True, cwd=root, env=os.environ | {"PYTHONPATH": str(root)} | environment,
-    )  # fmt: skip
-    return np.load(folder / "found.npy")
-
-
-def agree_everywhere(folder, count, environment):
-    here = np.array([gc.critical_friction(p, n) for p, n, _ in contact_sets(count, seed=27)])
-    there = frictions_elsewhere(folder, count, environment)
-    assert (np.isinf(here) == np.isinf(there)).all()
-    finite = np.isfinite(here)
-    assert finite.sum() >= 0.6 * count
-    np.testing.assert_allclose(there[finite], here[finite], rtol=WIDTH, atol=WIDTH)
 
 
 def test_another_processors_rounding_changes_no_more_than_the_width(tmp_path):
-    agree_everywhere(tmp_path, 60, {"OPENBLAS_CORETYPE": "Nehalem"})
-
-
-@pytest.mark.long
-@pytest.mark.timeout(900)
-@pytest.mark.parametrize(
-    "environment",
-    [
-        {"OPENBLAS_CORETYPE": "Haswell"}, {"OPENBLAS_CORETYPE": "Zen"},
-        {"OPENBLAS_CORETYPE": "Sandybridge"}, {"NPY_DISABLE_CPU_FEATURES": NO_VECTORS},
-        {"NUMBA_CPU_NAME": "generic"},
-    ],
-    ids=lambda environment: "=".join(*environment.items())[:40],
-)  # fmt: skip
-def test_rounding_of_every_kind_changes_no_more_than_the_width(tmp_path, environment):
-    compiled = {"NUMBA_CACHE_DIR": str(tmp_path / "numba")}
-    others = compiled if "NUMBA_CPU_NAME" in environment else {}
-    agree_everywhere(tmp_path, 400, environment | others)
+    here = np.array([gc.critical_friction(p, n) for p, n, _ in contact_sets(60, seed=27)])
+    root, kept = Path(__file__).parents[3], tmp_path / "found.npy"
+    subprocess.run(
+        [sys.executable, "-c", ELSEWHERE, "60", str(kept)], check=True, cwd=root,
+        env=os.environ | {"PYTHONPATH": str(root), "OPENBLAS_CORETYPE": "Nehalem"},
+    )  # fmt: skip
+    there, finite = np.load(kept), np.isfinite(here)
+    assert (np.isinf(here) == np.isinf(there)).all()
+    assert finite.sum() >= 36
+    np.testing.assert_allclose(there[finite], here[finite], rtol=WIDTH, atol=WIDTH)
 
 
 def tampered(found):

@@ -52,26 +52,6 @@ def test_critical_frictions_at_the_face_centres_of_a_regular_solid(name, expecte
     assert seen == expected
 
 
-def test_a_critical_friction_of_zero_is_bracketed_to_a_few_millionths():
-    """Closure is proved at 2e-6 for each of these contacts."""
-    zeros = [n for n in quadruples(SOLIDS["dodecahedron"]) if cotangent_of_cap(n) < 1e-9]
-    assert all(gc.force_closure(-normals, normals, 2e-6).closed for normals in zeros)
-    assert max(gc.critical_friction(-normals, normals) for normals in zeros) < 4e-6
-
-
-def test_the_faces_that_an_octahedron_needs_friction_on():
-    """A face with its three neighbours, and the four faces around a vertex."""
-    normals = all_signs(3)
-    for chosen in quadruples(normals):
-        critical = gc.critical_friction(-units(chosen), units(chosen))
-        if any((chosen @ face == 1.0).sum() == 3 for face in chosen):
-            assert critical == pytest.approx(1.0 / math.sqrt(8.0), rel=TOLERANCE)
-        elif (np.abs(chosen.sum(axis=0)) == 4.0).any():
-            assert critical == pytest.approx(1.0 / math.sqrt(2.0), rel=TOLERANCE)
-        else:
-            assert critical < 1e-5
-
-
 def wedge_contacts(length, l, m, s):  # noqa: E741 - the oracle's letters
     """Two contacts on either end of a double-wedge bar."""
     x = length + 1.0 - s

@@ -1,13 +1,11 @@
-from collections import Counter
 from itertools import permutations
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.lines import classify_each, classify_lines
+from grasp_core.closure.lines import classify_each
 from grasp_core.cones.spanning import positively_span
-from grasp_core.errors import InputError
 from tests.judges import random_rotation
 
 DEPENDENT = 1e-9
@@ -237,13 +235,6 @@ def test_coinciding_lines_and_points_get_some_class():
             assert gc.classify_lines(np.zeros((4, 3)), directions) in ("planar", "concurrent")
 
 
-def test_lines_given_by_the_point_where_they_meet_are_concurrent():
-    rng = np.random.default_rng(10)
-    for _ in range(50):
-        focus, directions = rng.normal(size=3), random_directions(rng)
-        assert gc.classify_lines(np.tile(focus, (4, 1)), directions) == "concurrent"
-
-
 def test_lines_given_by_their_common_point_up_to_rounding_are_concurrent():
     """The spread of the points is then noise, and no length to measure lines against."""
     rng = np.random.default_rng(11)
@@ -268,31 +259,12 @@ def test_what_is_no_line_is_refused():
             gc.classify_lines(np.where(points == points[0, 0], entry, points), directions)
 
 
-def test_many_sets_of_lines_are_classified_like_one():
-    """Sets of every class, moved and scaled at random, with some of no class and one point."""
-    rng, classes = np.random.default_rng(11), Counter()
-    x, y, z = np.eye(3)
-    kinds = [
-        (rng.normal(size=(4, 3)), rng.normal(size=(4, 3))),
-        (np.array([x, -x, y, -y]), np.array([x, -x, y, -y]) + 2.0 * z),
-        (np.array([x, -x, y, -y]), np.array([y, x, y, x + y])),
-        (np.array([x, -x, y, -y]), np.array([z - x, z + x, -2.0 * z - y, y - z])),
-        (np.array([x, y, -x, -y]), np.array([y + z, z - x, z - y, x + z])),
-        (np.zeros((4, 3)), np.array([x, y, z, x + y])),
-        (np.array([x, -x, y, -y]), np.array([z, z, z, z])),
-    ]
-    points, directions = [], []
-    for trial in range(140):
-        at, along = kinds[trial % len(kinds)]
-        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-        size = 10.0 ** rng.uniform(-2, 1)
-        points.append(size * at @ turn.T + rng.normal(size=3) * (trial % 2))
-        directions.append(along @ turn.T * rng.uniform(0.1, 10.0, size=(4, 1)))
-    found = classify_each(np.array(points), np.array(directions))
-    for at, along, known in zip(points, directions, found, strict=True):
-        assert known == classify_lines(at, along)
-        classes[known] += 1
-    assert set(classes) >= {"independent", "concurrent", "planar", "regulus"}
-    assert classify_each(np.empty((0, 4, 3)), np.empty((0, 4, 3))) == []
-    with pytest.raises(InputError, match="directions must not be zero"):
-        classify_each(np.array(points), 0.0 * np.array(directions))
+def test_many_sets_of_lines_are_classified_at_once():
+    rng = np.random.default_rng(11)
+    names = [name for _, name in CONSTRUCTIONS]
+    sets = [moved(rng, *construct(rng)) for construct, _ in CONSTRUCTIONS]
+    points, directions = (np.array(each) for each in zip(*sets, strict=True))
+    assert classify_each(points, directions) == names
+    assert classify_each(points[:0], directions[:0]) == []
+    with pytest.raises(gc.InputError, match="directions must not be zero"):
+        classify_each(points, 0.0 * directions)

@@ -79,15 +79,6 @@ def test_two_opposite_soft_fingers_close_and_hard_ones_never_do():
         assert soft.margin == pytest.approx(0.25, rel=1e-6)
 
 
-def test_two_offset_soft_fingers_need_the_slope_of_the_line_between_them():
-    x, n = OPPOSITE
-    x = x + np.array([[0, 0.02, 0], [0, -0.02, 0]])
-    for friction, closed in ((0.3999, False), (0.4001, True)):
-        found = gc.force_closure(x, n, friction, torsion_m=0.01)
-        assert found.closed is closed
-        assert found.verify()
-
-
 def test_torsion_adds_what_a_missing_turn_about_one_axis_needs():
     """Three hard fingers in a plane at 120 degrees lack nothing; two hard and one soft lack none.
 

@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull
 import grasp_core as gc
 from grasp_core.closure.contacts import contact_frames
 from scenes.example_objects import example_object
-from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
 
 
 def edge_wrenches(positions, normals, friction, edges):
@@ -66,20 +66,6 @@ def test_min_weight_of_generic_contacts_is_positive_only_with_closure():
 def test_weights_of_contacts_that_push_one_way_cannot_balance():
     normals = np.tile([0.0, 0, 1], (4, 1))
     assert gc.min_weight(TETRA_CENTERS, normals, 0.5) == -math.inf
-
-
-def test_min_weight_and_singular_value_do_not_depend_on_order():
-    rng = np.random.default_rng(2)
-    positions, normals = random_contacts(rng)
-    order = rng.permutation(4)
-    assert gc.min_weight(positions[order], normals[order]) == pytest.approx(
-        gc.min_weight(positions, normals), abs=1e-12
-    )
-    R = random_rotation(rng)
-    one = gc.smallest_singular_value(positions, torque_scale=2.0)
-    assert gc.smallest_singular_value(positions[order] @ R.T, torque_scale=2.0) == pytest.approx(
-        one
-    )
 
 
 def test_frames_of_many_contacts_are_those_of_one_set():

@@ -11,9 +11,13 @@ import trimesh
 import grasp_core as gc
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
-from grasp_core.transferring.face_changes import added_faces, changes_in_words, face_changes
-from grasp_core.transferring.judging import FRICTION_BAND, QUALITY_BAND, compared
-from grasp_core.transferring.like_faces import likeness
+from grasp_core.transferring.face_changes import (
+    added_faces,
+    changes_in_words,
+    face_changes,
+    likeness,
+)
+from grasp_core.transferring.transfer import FRICTION_BAND, QUALITY_BAND, compared
 from scenes.example_objects import example_object
 from tests.changed_parts import (
     distances,
@@ -341,30 +345,6 @@ def test_curved_parts_and_grasps_of_other_parts_are_refused(box):
             gc.transfer(old, new, grasps, FRICTION)
     with pytest.raises(gc.InputError, match="use a grasp of this object"):
         gc.transfer(scaled(body, 2.0), body, grasps, FRICTION)
-
-
-def test_a_fine_mesh_of_planar_faces_can_be_carried_over():
-    """A ball of 1280 planar faces, blown up by a thousandth: every contact finds its face."""
-    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
-    body = gc.Polyhedron.from_mesh(ball.vertices, ball.faces, faces="planar")
-    rng = np.random.default_rng(0)
-    grasps = [
-        grasp for _ in range(30)
-        if (grasp := grasp_on(body, rng.choice(len(body.faces), 4, replace=False))) is not None
-    ]  # fmt: skip
-    assert len(grasps) >= 3
-    found = gc.transfer(body, scaled(body, 1.001), grasps, 1.0)
-    assert found.count("same") == len(grasps)
-    assert all(each.distance == pytest.approx(5e-5, rel=0.01)
-               for grasp in found.grasps for each in grasp.contacts)  # fmt: skip
-
-
-def grasp_on(body, faces):
-    from grasp_core.planning.given_contacts import grasp_of, seat
-
-    points = np.array([body.faces[face].centroid for face in faces])
-    found = grasp_of(seat(body, points, body.normals[faces]), 1.0, "ball")
-    return found if isinstance(found, gc.Grasp) else None
 
 
 def test_bands_are_where_they_are_said_to_be():
