@@ -177,7 +177,6 @@ def is_indices(value: Any, *shape: int | None) -> TypeGuard[Indices]:
 
 
 def _fits(value: Any, kind: type, shape: tuple[int | None, ...]) -> bool:
-    """Return whether a value is a plain array of a type of entries and a shape."""
     if type(value) is not np.ndarray:
         return False
     array: NDArray[Any] = value

@@ -29,7 +29,6 @@ class ByValue:
     __slots__ = ()
 
     def __eq__(self, other: object) -> bool:
-        """Return whether another value is of the same class and has the same fields."""
         if self is other:
             return True
         if type(self) is not type(other):
@@ -50,7 +49,6 @@ class ByValue:
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Return whether two fields are equal."""
     if one is other:
         return True
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
@@ -130,7 +128,6 @@ def changed(settings: Any) -> str:
 
 
 def _usual(field: Field[Any]) -> object:
-    """Return the default of a field; `MISSING` where there is none."""
     made = field.default_factory
     return field.default if made is MISSING else made()
 

@@ -39,10 +39,7 @@ def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:
 
 
 def poses_along(origins: Array, directions: Array) -> Array:
-    """Return poses whose z axes run along given directions, (k, 4, 4).
-
-    Takes `origins` (k, 3) [m]; `directions` (k, 3).
-    """
+    """Return poses whose z axes run along given directions, (k, 4, 4)."""
     poses = np.tile(np.eye(POSE), (len(origins), 1, 1))
     for pose, (x, y, z) in zip(poses, directions.tolist(), strict=True):
         pose[:3, :3] = np.array([*plane_tangents(x, y, z), (x, y, z)]).T

@@ -31,8 +31,6 @@ def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES)
     """Compute inward unit normals g of a pyramid inscribed in a circular cone, (sides, 3).
 
     All v with g.v >= 0 for all g are inside the cone.
-
-    Takes `toward` (3,).
     """
     return pyramid_facets(cone.axis, cone.half_angle, toward, sides)
 
@@ -40,9 +38,7 @@ def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES)
 def pyramid_facets(axes: Array, half_angle: float, toward: Array, sides: int) -> Array:
     """Compute inward unit normals of pyramids in equally wide cones, (..., sides, 3).
 
-    See `inscribed_facets` for what such a pyramid is.
-
-    Takes `axes`, `toward` (..., 3); `half_angle` [rad].
+    Takes `axes`, `toward` (..., 3). See `inscribed_facets` for what such a pyramid is.
     """
     first = toward - np.sum(toward * axes, axis=-1, keepdims=True) * axes
     first = first / np.linalg.norm(first, axis=-1, keepdims=True)

@@ -195,12 +195,10 @@ def signed_determinants(vectors: Array) -> Array:
 
 
 def triple_sine(one: Array, two: Array, three: Array) -> Array:
-    """Compute the sine of the half-angle at which three cones first touch one plane.
+    """Compute the term of one triple of axes (..., 3) in (2), (...): zero where they are coplanar.
 
-    It has the sign of the axes' determinant.
-
-    Takes `one`, `two`, `three` (..., 3). Gives the term of one triple in (2), (...): zero where the
-    three are coplanar.
+    It is the sine of the half-angle at which three cones first touch one plane, with the sign of
+    the axes' determinant.
     """
     one, two, three = np.broadcast_arrays(one, two, three)
     crosses = np.stack([np.cross(two, three), np.cross(three, one), np.cross(one, two)], axis=-2)
@@ -221,10 +219,7 @@ class SpanningQuadruples:
 
 
 def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruples:
-    """List all quadruples of directions that positively span at a larger angle than given.
-
-    Takes `normals` (n, 3); `least_angle` [rad].
-    """
+    """List all quadruples of directions that positively span at a larger angle than given."""
     return SpanningTable(normals, least_angle).quadruples(0, len(normals))
 
 
@@ -265,7 +260,6 @@ class SpanningTable:
 
 
 def _sorted(parts: Sequence[Indices], count: int) -> Indices:
-    """Sort quadruples of direction indices in lexicographic order, (q, 4)."""
     places = count ** np.arange(3, -1, -1)
     keys = np.sort(np.concatenate(parts) @ places)
     return keys[:, None] // places % count
@@ -275,10 +269,7 @@ _TINY = float(np.finfo(np.float64).tiny)
 
 
 def span_angles(normals: Array) -> Array:
-    """Find the span angle of many quadruples of unit vectors (q, 4, 3), (q,) [rad].
-
-    Gives theta* of each; 0.0 where the vectors do not positively span R^3.
-    """
+    """Find the span angles of quadruples (q, 4, 3), (q,) [rad]; 0.0 where they do not span."""
     triples = normals[:, TRIPLES]
     # (2), the minimum over signs being taken in `triple_sine`
     sines = np.abs(triple_sine(triples[:, :, 0], triples[:, :, 1], triples[:, :, 2]))
@@ -296,10 +287,7 @@ def each_positively_spans(vectors: Array) -> NDArray[np.bool_]:
 
 
 def each_cones_positively_span(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
-    """Return for many quadruples of circular cones whether they satisfy the generalised P3, (q,).
-
-    Takes `axes` (q, 4, 3); `half_angles` (q, 4) [rad].
-    """
+    """Return which quadruples of circular cones satisfy the generalised P3, (q,)."""
     spans = each_positively_spans(axes)
     triples = axes[spans][:, TRIPLES]
     sines = np.sin(half_angles[spans])[:, TRIPLES]

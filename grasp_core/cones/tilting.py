@@ -27,6 +27,9 @@ Then all four are moved at random, in steps that grow with success and shrink wi
 the same for any quadruple, in frames that turn with it, so that turned objects get turned cones.
 
 Source: this project's; P3 with its closed form is explained in `spanning`.
+
+Arrays have a row for each of q quadruples: normals, axes and directions are (q, 4, 3), friction
+angles `thetas` (q, 4) and half-angles (q,) [rad].
 """
 
 from dataclasses import dataclass
@@ -77,10 +80,7 @@ class TiltedCones:
 
 
 def tilted_cones(normals: Array, thetas: Array) -> TiltedCones:
-    """Search for wide force cones that positively span, for many quadruples.
-
-    Takes `normals` (q, 4, 3); `thetas` (q, 4) [rad].
-    """
+    """Search for wide force cones that positively span, for many quadruples."""
     cuts = [*range(0, len(normals), CHUNK), len(normals)]
     parts = [_search(normals[i:j], thetas[i:j]) for i, j in pairwise(cuts)]
     if not parts:
@@ -94,8 +94,6 @@ def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
 
     Where the normals span, the smallest over m of max angle(n_i, m) - 90 deg is theta*. Else it is
     negative, and taken where m is in the middle of two normals, or as far from three.
-
-    Takes `normals` (q, 4, 3); `thetas` (q, 4) [rad]; `sines` (q,).
     """
     lowest = np.empty(len(normals))
     compiled(KERNEL).lowest_heights(np.ascontiguousarray(normals), lowest)
@@ -106,19 +104,13 @@ def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
 
 
 def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:
-    """Search for force cones with axes near given directions inside the friction cones.
-
-    Takes `directions`, `normals` (q, 4, 3); `thetas` (q, 4) [rad].
-    """
+    """Search for force cones with axes near given directions inside the friction cones."""
     axes = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
     return TiltedCones(*_improved(axes, normals, thetas))
 
 
 def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> TiltedCones:
-    """Search for force cones whose axes lean towards common points as far as possible.
-
-    Takes `points` (q, 3); `positions`, `normals` (q, 4, 3); `thetas` (q, 4) [rad].
-    """
+    """Search for force cones whose axes lean towards common points as far as possible."""
     ways = points[:, None] - positions
     inward = np.einsum("qfi,qfi->qf", ways, normals)
     ways = ways * np.where(inward < -SLIGHT, -1.0, 1.0)[..., None]  # away from points outside
@@ -152,11 +144,7 @@ def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
 
 
 def _bent(axes: Array, reached: Array, normals: Array, thetas: Array) -> tuple[Array, Array]:
-    """Bend axes out of a plane in which the normals nearly lie, two to either side.
-
-    Takes `axes`, `normals` (q, 4, 3); `reached` (q,) [rad]; `thetas` (q, 4) [rad]. Gives axes and
-    half-angles, with bent axes where they are better.
-    """
+    """Bend axes out of a plane in which the normals nearly lie, two to either side, if better."""
     _, _, directions = np.linalg.svd(normals)
     across = directions[:, 2]
     turns = np.cross(normals[:, :1], normals[:, 1:])

@@ -162,8 +162,6 @@ def concurrent_radius_bounds(reaches: Array, _: Array, half_angles: Array) -> Ar
     """Bound the disc radii of concurrent grasps from above, (..., 1).
 
     The bound is (5), as the least s_i is at most the weighted mean of all s_i.
-
-    Takes `reaches` [object radii]; `half_angles` [rad].
     """
     bounds: Array = reaches * np.tan(half_angles)
     return bounds[..., None]

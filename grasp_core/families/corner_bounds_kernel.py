@@ -29,10 +29,7 @@ def fill(
     half_angles: Array,
     limits: Array,
 ) -> None:
-    """Bound the discs of many quadruples from above (see `disc_limits`).
-
-    Takes `normals` (f, 3); `faces`, `limits` (q, 4); `axes` (q, 4, 3); `half_angles` (q,) [rad].
-    """
+    """Bound the discs of many quadruples from above (see `disc_limits`)."""
     for q in range(len(faces)):
         if half_angles[q] <= 0.0:  # there are no such cones, and so no discs
             limits[q] = 0.0

@@ -201,10 +201,7 @@ def grasp_from_patch(
 def smallest_forces(
     pieces: Sequence[FacePiece], points: Array, normals: Array, friction: float, depth: float
 ) -> Array | None:
-    """Find the smallest balanced forces at points of pieces, (k, 3), or None if there are none.
-
-    Takes `points`, `normals` (k, 3).
-    """
+    """Find the smallest balanced forces at points of pieces, (k, 3), or None if there are none."""
     # (4): f_0 is the least-squares solution, Z spans what it leaves free
     conditions = np.vstack([grasp_map(points), normals.reshape(1, -1)])
     left, sizes, right = np.linalg.svd(conditions)
@@ -221,11 +218,7 @@ def smallest_forces(
 
 
 def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | None:
-    """Place contacts at which given forces balance, as far from the edges as possible.
-
-    Takes `forces` (4, 3). Gives the placement; None if the contacts would be too near an edge or on
-    one line.
-    """
+    """Place contacts where forces balance, far from the edges; None near one or on one line."""
     A_eq = np.zeros((3, 2 * FINGERS + 1))
     b_eq = np.zeros(3)
     rows: list[Array] = []
@@ -433,10 +426,7 @@ def close_patch(
 def close_patches(
     quadruples: Sequence[Sequence[FacePiece]], friction: float
 ) -> list[ClosureCertificate | None]:
-    """Decide force closure of contacts at all corners of many sets of four pieces, at once.
-
-    Gives a certificate for each, or None where `close_patch` has to decide.
-    """
+    """Decide `close_patch` for many sets of whole pieces; None where it has to decide alone."""
     contacts = [corner_contacts(pieces, part_at(pieces, ())) for pieces in quadruples]
     sizes = np.array([len(points) for points, _ in contacts], dtype=np.int64)
     found: list[ClosureCertificate | None] = [None] * len(quadruples)

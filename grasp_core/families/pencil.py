@@ -82,10 +82,7 @@ def place_pencil(
     least_gap: float,
     cells: Sequence[Cell] = (CELL_A, CELL_B),
 ) -> Placement | NoPlacement:
-    """Place two foci and the largest four equal discs, for the better order of the foci.
-
-    Takes `pieces` (0, 1) or (2, 3).
-    """
+    """Place two foci and the largest four equal discs, for the better order of the foci."""
     u = focus_direction(np.array([cone.axis for cone in cones]))
     discs = _discs(pieces, cones, u)
     best, bound = None, -math.inf
@@ -110,8 +107,6 @@ def pencil_radius_bounds(
     With positive weights of sum lam a = 0, (1) gives sum lam_ij s_ij = -sum lam_ij a_ij.q_ij - (c_2
     - c_1).w. In cell A the last term only lowers it. In cell B it is 2 k |w|, at most half of the
     left side, which can therefore double.
-
-    Takes `widths` (..., 4, 4); `half_angles` [rad].
     """
     depths = [
         np.minimum(2.0 * reaches, 0.5 * np.minimum(widths[..., i, j], widths[..., k, m]))

@@ -78,8 +78,6 @@ def focus_direction(axes: Array) -> Array:
     The first focus belongs to fingers 0 and 1, the second to fingers 2 and 3. The direction lies in
     the planes of both pairs, and the first pair pushes along it: with positive weights lam of sum
     lam a = 0, u points along w = lam_0 a_0 + lam_1 a_1 = -lam_2 a_2 - lam_3 a_3.
-
-    Takes `axes` (..., 4, 3).
     """
     first = np.einsum("...i,...ij->...j", balancing_weights(axes)[..., :2], axes[..., :2, :])
     w = np.asarray(first, dtype=np.float64)
@@ -102,8 +100,7 @@ def largest_discs(
 ) -> LargestDiscs | NoPlacement:
     """Find the largest four equal discs, then enlarge each, subject to rows A x <= b.
 
-    Takes `A` (rows, n); `b` (rows,). Gives the discs, or a proved bound below `least` on their
-    common radius.
+    Gives the discs, or a proved bound below `least` on their common radius.
     """
     n = A.shape[1]
     common = np.eye(n)[smallest]

@@ -115,7 +115,6 @@ class ManyPlacements:
         ]
 
     def _discs(self, attempts: Attempts, placed: Placed) -> list[tuple[ContactRegion, ...] | None]:
-        """Make the discs of pencils, as `constructions` makes them one by one."""
         rings = placed.positions[:, :, None] + (
             placed.radii[:, :, None, None] * self._rings[attempts.faces]
         )
@@ -125,7 +124,6 @@ class ManyPlacements:
     def _footprints(
         self, attempts: Attempts, turns: Array, placed: Placed
     ) -> list[tuple[ContactRegion, ...] | None]:
-        """Cut the regions of concurrent grasps out of their faces."""
         most = self._table.E.shape[1] + len(turns) + 1
         shape = placed.radii.shape
         cut = Footprints(
@@ -148,7 +146,6 @@ class ManyPlacements:
 
 
 def _placement(placed: Placed, place: int, construction: Construction) -> Placement | None:
-    """Return the placement of one attempt; None where there is none."""
     if placed.ends[place] != PLACED:
         return None
     foci = 2 if construction.family == "pencil" else 1
@@ -253,7 +250,6 @@ class Settling:
             end.planned, end.least = found, surpassing(found[2].merit)
 
     def _settle(self, attempt: Attempt, end: End) -> None:
-        """Enter the contacts of an attempt, moved to the true surface."""
         if end.planned is None or end.failed:
             return
         chosen, cones, placement, known = end.planned

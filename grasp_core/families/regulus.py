@@ -90,20 +90,13 @@ CHOICES: tuple[Choice, ...] = tuple(
 
 
 def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
-    """Return whether both pairs of each quadruple leave their slopes an interval (3), (q,).
-
-    Takes `axes` (q, 4, 3); `half_angles` (q,) [rad].
-    """
+    """Return whether both pairs of each quadruple leave their slopes an interval (3), (q,)."""
     least, largest = _slope_angles(axes, half_angles[:, None])
     return np.all(least < largest, axis=1)
 
 
 def _slope_angles(axes: Array, half_angles: Array) -> tuple[Array, Array]:
-    """Return the ends of (3): the least and largest angle of each pair's forces [rad].
-
-    Takes `axes` (..., 4, 3); `half_angles` (..., 1) or (..., 4) [rad]. Gives two arrays, each (...,
-    2).
-    """
+    """Return the least and largest angle of (3) for both pairs of axes (..., 4, 3), (..., 2)."""
     resultants = focus_direction(axes)[..., None, :] * RESULTANTS[:, None]
     phi = angles_between(axes, resultants)
     in_pairs = (*phi.shape[:-1], 2, 2)
@@ -231,8 +224,7 @@ def place_regulus(
 ) -> Placement | NoPlacement:
     """Place four contacts on the lines of one regulus, near the centres of the faces.
 
-    Takes `pieces` (0, 1) or (2, 3). Gives the placement, with minus the largest offset t as its
-    merit, or its absence for the slopes tried.
+    The merit is minus the largest offset t; no placement means none for the slopes tried.
     """
     known = _best_choice(pieces, cones)
     if known is not None:

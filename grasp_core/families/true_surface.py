@@ -40,10 +40,7 @@ def on_true_surface(
     regions: Sequence[ContactRegion],
     place: OnFacets,
 ) -> tuple[tuple[FacePiece, ...], Placement] | None:
-    """Move a placement to the true surface; None if no contacts there hold the same grasp.
-
-    Gives the pieces that the contacts are on, and the placement.
-    """
+    """Move a placement to the true surface; None if no contacts there hold the same grasp."""
     if all(shape.facets is None for shape in shapes):
         return pieces, planned
     along = [np.array([piece.normal for piece in pieces]), np.array([c.axis for c in cones])]

@@ -24,10 +24,7 @@ from grasp_core.solvers.ties import first_best
 
 
 def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Array:
-    """Find the surface point nearest to each of several points, (n, 3) [m].
-
-    Takes `vertices` (v, 3) [m]; `triangles` (t, 3); `points` (n, 3) [m].
-    """
+    """Find the surface point nearest to each of several points, (n, 3) [m]."""
     candidates = nearest_on_triangles(vertices[triangles], points)
     distances = np.linalg.norm(candidates - points[:, None], axis=2)
     chosen = [first_best(-own) for own in distances]
@@ -35,10 +32,7 @@ def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Ar
 
 
 def nearest_on_triangles(corners: Array, points: Array) -> Array:
-    """Find the point of each of several triangles nearest to points, (..., t, 3) [m].
-
-    Takes `corners` (t, 3, 3) [m]; `points` (..., 3) [m].
-    """
+    """Find the point of each triangle (t, 3, 3) nearest to points (..., 3), (..., t, 3) [m]."""
     points = points[..., None, :]
     candidates = np.stack([*_on_edges(corners, points), _foot(corners, points)])
     nearest = np.linalg.norm(candidates - points, axis=-1).argmin(axis=0)

@@ -176,8 +176,6 @@ def merge_into_convex_pieces(points: Array, triangles: Indices) -> list[Array]:
     Source:
         Hertel & Mehlhorn, "Fast triangulation of the plane with respect to simple
         polygons", Information and Control 64, 1985.
-
-    Takes `points` (n, 2); `triangles` (t, 3).
     """
     edges = {edge for triangle in triangles.tolist() for edge in _edges(triangle)}
     diagonals = sorted(edge for edge in edges if edge[0] < edge[1] and edge[::-1] in edges)
@@ -241,12 +239,9 @@ class FlatPolygon:
 
 
 def flat_polygon(arms: Array, normal: Array, slack: float) -> FlatPolygon | None:
-    """Make a convex polygon from points (k, 3) in the plane through zero, or None.
+    """Make a convex polygon from points (k, 3) in the plane through zero, counter-clockwise.
 
-    The polygon is counter-clockwise about its normal.
-
-    Gives the polygon; None if the points are off the plane, or not corners of a convex polygon in
-    order.
+    Gives None if the points are off the plane, or not corners of a convex polygon in order.
     """
     if float(np.abs(arms @ normal).max()) > slack:
         return None

@@ -30,7 +30,6 @@ class Solid:
     """Vertex indices, (t, 3)."""
 
     def __add__(self, other: "Solid") -> "Solid":
-        """Return the union of two solids."""
         return _solid(_manifold(self) + _manifold(other))
 
     def __sub__(self, other: "Solid") -> "Solid":
@@ -73,13 +72,10 @@ def triangulate(loops: Sequence[Array]) -> Indices:
 
 
 def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
-    """Cut off everything nearer than a margin to the border of a plane figure.
+    """Cut off everything nearer than a margin to the border of a plane figure of loops (k, 2).
 
     At corners that turn inwards a little more is cut off, so that the remaining parts have few
-    corners.
-
-    Takes `loops` (k, 2). Gives outer border and holes of each part; an empty list if the figure is
-    too narrow.
+    corners. Gives outer border and holes of each part; nothing if the figure is too narrow.
     """
     kernel = _kernel()
     size = float(np.ptp(np.vstack(loops), axis=0).max())

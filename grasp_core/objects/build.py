@@ -121,10 +121,7 @@ def build(
     center_of_mass: ArrayLike | None = None,
     known: Surface | None = None,
 ) -> Parts:
-    """Check a triangle mesh and find its faces.
-
-    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `rounding` [m]; `center_of_mass` (3,) [m].
-    """
+    """Check a triangle mesh and find its faces."""
     points, corners = _checked_arrays(vertices, triangles, choices.limits.max_triangles)
     extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
     off = single_rounding(points) if rounding is None else rounding
@@ -190,7 +187,6 @@ def _flatness(rounding: float, asked: float | None, extent: float) -> float:
 
 
 def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | None:
-    """Check the centre of mass that a user gave, (3,) [m]; None if none was given."""
     if center_of_mass is None:
         return None
     center = frozen(center_of_mass, (3,), "center_of_mass")
@@ -207,7 +203,6 @@ def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | No
 def _planar_groups(
     found: SoundSurface, flatness: Flatness, choices: MeshChoices
 ) -> list[Indices] | None:
-    """Group triangles into planar faces; None where patches are used instead."""
     if choices.faces == "patches":
         return None
     groups = coplanar_groups(found.points, found.corners, flatness, found.surface.caps)
@@ -223,7 +218,6 @@ def _planar_groups(
 
 
 def _patched(found: SoundSurface, limits: PatchLimits) -> tuple[tuple[Face, ...], list[str]]:
-    """Find the patches of a surface, and write notes about them."""
     patches = flat_patches(found.points, found.corners, limits, found.surface.caps)
     if len(patches) < FINGERS:
         raise MeshError(
@@ -296,10 +290,7 @@ def content_hash(points: Array, corners: Indices) -> str:
 
 
 def mass_properties(solid: Solid, center: Array | None = None) -> MassProperties:
-    """Compute the mass properties of a solid of uniform density.
-
-    Takes `center` (3,) [m].
-    """
+    """Compute mass properties at uniform density, about the centre of mass or a given centre."""
     a, b, c = solid.vertices[solid.triangles].transpose(1, 0, 2)
     areas = np.cross(b - a, c - b)  # normals, as long as twice the area
     total = a + b + c

@@ -59,10 +59,7 @@ object's extent."""
 def flat_patches(
     vertices: Array, triangles: Indices, limits: PatchLimits, caps: Indices = NO_CAPS
 ) -> tuple[Face, ...]:
-    """Find the largest nearly flat patches of a surface, those with the largest discs first.
-
-    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `caps` (c,).
-    """
+    """Find the largest nearly flat patches of a surface, those with the largest discs first."""
     surface = _Surface.of(vertices, triangles)
     depth = limits.depth * surface.extent
     found: list[tuple[float, Face]] = []
@@ -83,8 +80,6 @@ def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) ->
 
     A ring has dozens of equal patches, and without this rule the first ones would all be on one
     side.
-
-    Takes `found`, `extent` [m].
     """
     sizes = ranks([-radius for radius, _ in found])
     places = np.array([[*face.normal, *(face.centroid / extent)] for _, face in found])
@@ -133,7 +128,6 @@ class _Group:
 
 
 def _groups(surface: _Surface, spread: float, depth: float, caps: Indices) -> list[_Group]:
-    """Divide the triangles into disjoint nearly flat groups, the largest first."""
     smooth = _smoothed(surface)
     flatness: Array = np.einsum("ti,ti->t", smooth, surface.normals)
     flat_first = np.argsort(-graded(flatness, FLATNESS_DIGITS), kind="stable")
@@ -169,7 +163,6 @@ def _grown(
     depth: float,
     free: NDArray[np.bool_],
 ) -> Indices:
-    """Return the free triangles near a plane that connect to the seed across edges, (g,)."""
     normal, origin = plane
     seen = ~free
     seen[seed] = True
@@ -254,10 +247,7 @@ CANDIDATES = 400
 
 
 def clearest_point(points: Array, segments: Array) -> tuple[Array, float]:
-    """Find the point farthest from all segments, (2,), and its distance from them.
-
-    Takes `points` (n, 2); `segments` (m, 2, 2).
-    """
+    """Find the point farthest from all segments, (2,), and its distance from them."""
     tried = points[:: 1 + len(points) // CANDIDATES]
     room = np.array([_nearest(point, segments)[1].min() for point in tried])
     best = first_best(room)
@@ -265,12 +255,7 @@ def clearest_point(points: Array, segments: Array) -> tuple[Array, float]:
 
 
 def clearing(start: Array, segments: Array, gap: float) -> Array | None:
-    """Find a convex polygon around a point that no segment enters, (k, 2).
-
-    The polygon is counter-clockwise; None if there is no room for one.
-
-    Takes `start` (2,); `segments` (m, 2, 2).
-    """
+    """Find a convex polygon around a point that no segment (m, 2, 2) enters; None without room."""
     low, high = segments.min(axis=(0, 1)), segments.max(axis=(0, 1))
     box = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
     best, middle, stretch = None, start, np.eye(2)

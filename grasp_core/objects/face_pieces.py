@@ -155,10 +155,7 @@ def shape_of(pieces: Sequence[FacePiece]) -> FaceShape:
 def choices_near(
     shapes: Sequence[FaceShape], positions: Array, most: int
 ) -> list[tuple[FacePiece, ...]]:
-    """List choices of one piece per face, those nearest to given points of the planes first.
-
-    Takes `positions` (k, 3).
-    """
+    """List choices of one piece per face, those nearest to given points of the planes first."""
     ranked = [
         _nearest_first(shape.pieces, at)[:most] for shape, at in zip(shapes, positions, strict=True)
     ]
@@ -168,7 +165,6 @@ def choices_near(
 
 
 def _nearest_first(pieces: Sequence[FacePiece], at: Array) -> list[FacePiece]:
-    """Order pieces of a face, the nearest to a point of its plane first."""
     apart = [graded(-piece.inset(at), SAME_PLACE) for piece in pieces]
     return [pieces[place] for place in sorted(range(len(pieces)), key=apart.__getitem__)]
 
@@ -207,10 +203,7 @@ def pieces_by_face(body: Polyhedron) -> tuple[tuple[FacePiece, ...], ...]:
 
 
 def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
-    """Make the `FacePiece` of a convex polygon.
-
-    Takes `normal` (3,); `polygon` (k, 3).
-    """
+    """Make the `FacePiece` of a convex polygon (k, 3)."""
     edge = polygon[1] - polygon[0]
     along = np.asarray(edge / np.linalg.norm(edge), dtype=np.float64)
     frame = np.column_stack([along, np.cross(normal, along)])

@@ -82,10 +82,7 @@ def _on_surface(body: Polyhedron, face: Face, contact: Contact) -> bool:
 
 
 def within(point: Array, polygon: Array, normal: Array, slack: float) -> bool:
-    """Return whether a point is inside a convex polygon, or outside by at most `slack`.
-
-    Takes `point` (3,) [m]; `polygon` (n, 3) [m]; `normal` (3,); `slack` [m].
-    """
+    """Return whether a point is inside a convex polygon, or outside by at most `slack`."""
     edges = np.concatenate((polygon[1:], polygon[:1])) - polygon
     inward = cross(normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)
     return bool((np.einsum("ki,ki->k", inward, point - polygon) >= -slack).all())

@@ -74,8 +74,6 @@ def coplanar_groups(
     Groups grow from the largest triangles first, whose planes are the least affected by rounding.
     Where coordinates are rounded, the plane is fitted again to what has grown. A triangle thinner
     than the distance limit has no meaningful normal, so only its distance counts.
-
-    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `caps` (c,).
     """
     table = _Triangles.of(vertices[triangles], triangle_neighbours(triangles), flatness)
     group_of = np.full(len(triangles), -1)
@@ -194,10 +192,7 @@ def _face(vertices: Array, triangles: Indices, slack: float) -> Face:
 
 
 def convex_pieces(loops: list[Array], slack: float) -> list[Array]:
-    """Split a plane figure into convex polygons, (k, 2) each.
-
-    Takes `loops` (k, 2).
-    """
+    """Split a plane figure of loops (k, 2) into convex polygons."""
     if len(loops) == 1 and is_convex(loops[0]):
         return loops
     pieces = merge_into_convex_pieces(np.vstack(loops), triangulate(loops))

@@ -262,10 +262,7 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - what is known of a mesh, a keyword 
     known: Surface | None = None,
     kind: type[AnyPolyhedron] = Polyhedron,
 ) -> AnyPolyhedron:
-    """Check a triangle mesh and build the polyhedron of its faces.
-
-    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `rounding` [m].
-    """
+    """Check a triangle mesh and build the polyhedron of its faces."""
     text(name, "name")
     parts = build(
         vertices, triangles, choices, rounding=rounding, center_of_mass=center_of_mass, known=known

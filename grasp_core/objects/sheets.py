@@ -45,10 +45,7 @@ def check_bounds(points: Array, corners: Indices) -> None:
 
 
 def outward_sheets(points: Array, corners: Indices, *, largest_part: bool) -> Shells:
-    """Orient the parts of an open surface outwards.
-
-    Takes `points` (n, 3) [m]; `corners` (t, 3).
-    """
+    """Orient the parts of an open surface outwards."""
     areas, label, said = triangle_areas(points, corners), _labels(corners), list[str]()
     whole, count = float(areas.sum()), int(label.max()) + 1
     if largest_part:
@@ -127,10 +124,7 @@ BLOCK = 20_000
 
 
 def sampled(areas: Array) -> Indices:
-    """Choose triangles that stand for equal shares of a surface each, (s,).
-
-    Takes `areas` (t,).
-    """
+    """Choose triangles that stand for equal shares of a surface each, (s,)."""
     count = min(max(MOST_ANGLES // len(areas), FEWEST_SAMPLES), MOST_SAMPLES, len(areas))
     upto: Array = np.cumsum(areas)
     middles = np.linspace(0.0, float(upto[-1]), 2 * count + 1)[1::2]
@@ -138,10 +132,7 @@ def sampled(areas: Array) -> Indices:
 
 
 def winding_on(corners: Array, places: Indices) -> Array:
-    """Compute the mean of the winding numbers on both sides of triangles, at their middles, (s,).
-
-    Takes `corners` (t, 3, 3); `places` (s,).
-    """
+    """Compute the mean winding number of both sides of triangles, at their middles, (s,)."""
     found = np.zeros(len(places))
     step = max(BLOCK // len(corners), 1)
     axes = np.ascontiguousarray(corners.transpose(2, 1, 0))
@@ -154,10 +145,6 @@ def winding_on(corners: Array, places: Indices) -> Array:
 
 
 def _solid_angles(axes: Array, points: Array) -> Array:
-    """Compute the solid angles of triangles as seen from points, (p, t).
-
-    Takes `axes` (3, 3, t); `points` (p, 3).
-    """
     x, y, z = (axes[k] - points[:, k, None, None] for k in range(3))
     lengths = np.sqrt(x * x + y * y + z * z)
     (ax, bx, cx), (ay, by, cy), (az, bz, cz), (a, b, c) = (
@@ -177,8 +164,7 @@ def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.boo
     """Wind triangles like their neighbours; None if the surface has only one side.
 
     In each part that connects across edges of two triangles, the larger area keeps its winding.
-
-    Takes `corners` (t, 3); `areas` (t,). Gives the triangles, and which of them were turned.
+    Gives the triangles, and which of them were turned.
     """
     across = triangle_neighbours(corners)
     against = _against(corners, across)

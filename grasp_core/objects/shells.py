@@ -78,10 +78,7 @@ class _Body:
 def one_solid(
     points: Array, corners: Indices, caps: Indices, *, most: int, largest_part: bool
 ) -> Shells:
-    """Orient the shells of a mesh outwards, and make one solid of them.
-
-    Takes `points` (n, 3) [m]; `corners` (t, 3); `caps` (c,).
-    """
+    """Orient the shells of a mesh outwards, and make one solid of them."""
     whole = Solid(points, corners)
     check_volume(whole)
     said = list[str]()
@@ -216,7 +213,6 @@ def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
 
 
 def _with_cavities(shells: list[_Body], slack: float) -> list[_Body]:
-    """Give the cavities of a union to their bodies."""
     bodies = [shell for shell in shells if shell.solid.volume > 0.0]
     for shell in shells:
         if shell.solid.volume <= 0.0:
@@ -229,7 +225,6 @@ def _with_cavities(shells: list[_Body], slack: float) -> list[_Body]:
 
 
 def _shells(points: Array, corners: Indices, most: int) -> list[_Body]:
-    """Split a mesh into shells."""
     label = _labels(corners)
     if label.max() >= most:
         raise MeshError(

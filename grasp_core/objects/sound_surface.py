@@ -68,10 +68,7 @@ def sound_surface(
     largest_part: bool,
     known: Surface | None = None,
 ) -> SoundSurface:
-    """Make one surface of triangles.
-
-    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `flatness_m` [m].
-    """
+    """Make one surface of triangles."""
     if known is None:
         points, corners, said = _joined(vertices, triangles, flatness_m, most_parts)
         surface = Surface(flatness_m=flatness_m, repairs=tuple(said))
@@ -148,7 +145,6 @@ def _with_shells(found: SoundSurface, made: Shells) -> SoundSurface:
 
 
 def _wound(points: Array, corners: Indices) -> tuple[Indices, int]:
-    """Wind triangles like their neighbours; also return how many were turned."""
     found = wound_alike(corners, triangle_areas(points, corners))
     if found is None:
         raise MeshError(
@@ -160,7 +156,6 @@ def _wound(points: Array, corners: Indices) -> tuple[Indices, int]:
 
 
 def _capped(points: Array, corners: Indices, surface: Surface) -> tuple[Indices, Surface]:
-    """Close the holes of a surface if they are small, and say so."""
     caps = caps_of(points, corners)
     if caps is None:
         return corners, surface
@@ -201,10 +196,7 @@ class Caps:
 
 
 def caps_of(points: Array, corners: Indices) -> Caps | None:
-    """Close the holes of a surface; None if it has none, or its open edges do not form loops.
-
-    Takes `points` (n, 3) [m]; `corners` (t, 3).
-    """
+    """Close the holes of a surface; None if it has none, or its open edges do not form loops."""
     loops = _loops(corners)
     if not loops:
         return None

@@ -218,8 +218,7 @@ taken, so that rounding decides nothing."""
 def with_halves(body: Polyhedron, apart: float) -> tuple[Polyhedron, tuple[int, ...]]:
     """Add two half faces to an object for each face that is long enough for two contacts.
 
-    Takes `apart` [m]. Gives the object, and for each of its faces the whole face that it is or is a
-    part of.
+    Gives also, for each face, the whole face that it is or is a part of.
     """
     faces, owners = list(body.faces), list(range(len(body.faces)))
     for index, face in enumerate(body.faces):
@@ -279,10 +278,7 @@ def _longest(border: Array) -> Array:
 
 
 def clear_of_edges(body: Polyhedron, margin: float) -> Polyhedron:
-    """Shrink an object's faces so that contacts keep a distance from all edges and holes.
-
-    Takes `margin` [m].
-    """
+    """Shrink an object's faces so that contacts keep a distance from all edges and holes."""
     return replace(body, faces=tuple(_without_margin(face, margin) for face in body.faces))
 
 

@@ -210,7 +210,6 @@ def _marks(body: Polyhedron) -> tuple[Array, Array]:
 
 
 def _maps(turn: Array, marks: tuple[Array, Array]) -> bool:
-    """Return whether a matrix maps each vertex near another, and each face near another."""
     vertices, faces = marks
     turned = np.hstack([faces[:, :3] @ turn.T, faces[:, 3:] @ turn.T])
     return _is_matched(vertices @ turn.T, vertices) and _is_matched(turned, faces)

@@ -136,10 +136,7 @@ def closure_margin(
 def witness_fault(
     points: Array, normals: Array, forces: Array, friction: float, family: Family
 ) -> str | None:
-    """Return why witness forces are wrong (unbalanced, outside a cone, another family), or None.
-
-    Takes `points`, `normals`, `forces` (4, 3).
-    """
+    """Return why witness forces are wrong (unbalanced, outside a cone, another family), or None."""
     along, across = normal_and_tangential(forces, normals)
     if abs(float(along.sum()) - 1.0) > BALANCED:
         return "the normal parts of the witness forces do not sum to one"
@@ -154,10 +151,7 @@ def witness_fault(
 def witnesses_fit(
     points: Array, normals: Array, forces: Array, friction: float, families: Sequence[Family]
 ) -> list[bool]:
-    """Return for each of many sets of contacts whether `witness_fault` finds no fault.
-
-    Takes `points`, `normals`, `forces` (g, 4, 3); `families` (g,).
-    """
+    """Return for each of many sets of contacts whether `witness_fault` finds no fault."""
     along, across = normal_and_tangential(forces, normals)
     stacked = forces.reshape(len(forces), -1)
     missed = np.linalg.norm(np.einsum("gwj,gj->gw", grasp_map(points), stacked), axis=-1)

@@ -62,10 +62,7 @@ class Seated:
 
 
 def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
-    """Move four contacts to the nearest faces of an object with fitting normals.
-
-    Takes `positions` (4, 3) [m]; `normals` (4, 3).
-    """
+    """Move four contacts to the nearest faces of an object with fitting normals."""
     points = frozen(positions, (FINGERS, 3), "positions")
     inward = frozen_units(normals, (FINGERS, 3), "normals")
     parts = flat_parts(body)
@@ -83,11 +80,9 @@ def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
 
 
 def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCertificate:
-    """Make a grasp of four contacts, or prove that they are not in force closure.
+    """Make a grasp of four contacts, or return the proof that they are not in force closure.
 
     The grasp has no contact regions, and its family is `regulus`, the most general one.
-
-    Gives the grasp, or the certificate with a separating wrench.
     """
     body = seated.body
     positions = np.array([contact.position for contact in seated.contacts])
@@ -161,8 +156,7 @@ def nearest_like(
 ) -> Nearest | None:  # fmt: skip
     """Find the point nearest to a given one on parts whose normals lean little from a given one.
 
-    Takes `point` (3,) [m]; `normal` (3,); `lean` [rad]; `reach`, `margin` [m]. Gives the point,
-    with its part's normal; None if no such part is within reach.
+    Gives None if no such part is within reach.
     """
     normals = np.array([part.normal for part in parts])
     firsts = np.array([part.polygon[0] for part in parts])
@@ -181,7 +175,6 @@ def nearest_like(
 def _nearest(
     body: Polyhedron, parts: Sequence[FlatPart], finger: int, point: Array, normal: Array
 ) -> Nearest:
-    """Find the nearest part with a fitting normal, and the contact on it."""
     reach = LARGEST_MOVE * body.radius
     found = nearest_like(
         parts, point, normal, lean=LARGEST_LEAN, reach=reach, margin=NEARER * body.radius

@@ -6,6 +6,9 @@ the region around a contact in which it may move while the grasp stays good.
 Cones around the normals, as in the paper, are planned at theta_plan = min(theta, just below the
 span angle theta*): these smaller cones lie inside the real ones, so what holds for them holds at
 the friction asked for. Tilted cones are an alternative, and for most quadruples the only one.
+
+Quadruples are rows: faces (q, 4), axes of both choices of cones (q, 2, 4, 3), angles [rad]; bounds
+on discs are in object radii.
 """
 
 import math
@@ -63,10 +66,7 @@ class PlannedCones:
         )
 
     def widest(self, quads: Indices) -> Array:
-        """Return upper bounds on the half-angles of any choice of force cones, (q,) [rad].
-
-        Takes `quads` (q, 4).
-        """
+        """Return upper bounds on the half-angles of any choice of force cones, (q,) [rad]."""
         normals, thetas = self.normals[quads], self._thetas[quads]
         sines = span_sines(normals)
         around = _around(sines, thetas)
@@ -83,9 +83,6 @@ class PlannedCones:
         1 / sin(psi) is above cot(h - theta + psi). Where h < theta, cones that positively span (P3)
         still never overlap: half the angle between their axes is above psi, so the true bound is
         below tan(psi / 2) / sin(psi) = 1 / (2 cos^2(psi / 2)), and the bound of w is above this.
-
-        Takes `quads` (q, 4); `widest` (q,) [rad]. Gives bounds in object radii, for cones that
-        positively span.
         """
         extent = float(np.linalg.norm(self._corners.points, axis=-1).max(initial=0.0))
         leaning = np.maximum(self._thetas[quads].max(axis=1, initial=0.0) - widest, 0.0)
@@ -93,10 +90,9 @@ class PlannedCones:
         return angle_limits(extent, widths, widest)
 
     def chosen(self, quads: Indices) -> tuple[Array, Array]:
-        """Choose force cones for face quadruples, around the normals and tilted.
+        """Choose force cones around the normals and tilted: axes (q, 2, 4, 3), half-angles (q, 2).
 
-        Takes `quads` (q, 4). Gives unit axes of both choices, (q, 2, 4, 3), and their half-angles,
-        (q, 2) [rad], which are not positive where the choice does not exist.
+        Half-angles are not positive where the choice does not exist.
         """
         normals, thetas = self.normals[quads], self._thetas[quads]
         axes = [normals, normals]
@@ -108,11 +104,7 @@ class PlannedCones:
         return np.stack(axes, axis=1), np.stack(half_angles, axis=1)
 
     def limits_of(self, quads: Indices, axes: Array, half_angles: Array) -> Array:
-        """Return upper bounds on the discs for chosen cones, (q, 2, 4), see `disc_limits`.
-
-        Takes `quads` (q, 4); `axes` (q, 2, 4, 3); `half_angles` (q, 2) [rad]. Gives bounds in
-        object radii.
-        """
+        """Return upper bounds on the discs for chosen cones, (q, 2, 4), see `disc_limits`."""
         limits = [
             disc_limits(self._corners, self.normals, quads, axes[:, kind], half_angles[:, kind])
             for kind in range(1 + self.tilted)
@@ -147,8 +139,7 @@ class PlannedCones:
 def usable_half_angles(theta: float, spreads: Array) -> Array:
     """Compute half-angles that stay inside the friction cones all over a curved patch [rad].
 
-    Takes `theta`, `spreads` [rad]. Gives half-angles shaped like `spreads`; where the patch leans
-    too far, a positive one too small for any construction.
+    Where the patch leans too far they are positive, but too small for any construction.
     """
     return np.maximum(INSIDE_FRICTION * theta - spreads, 0.5 * LEAST_SPAN_ANGLE)
 
@@ -156,10 +147,7 @@ def usable_half_angles(theta: float, spreads: Array) -> Array:
 def cones_around(
     placed: Sequence[tuple[Sequence[FacePiece], Placement]], theta: float
 ) -> list[tuple[Cones, ...]]:
-    """Choose tilted force cones: towards the faces' or the object's middle, or around the forces.
-
-    Takes `theta` [rad].
-    """
+    """Choose tilted cones: towards the faces' or the object's middle, or around the forces."""
     normals = np.array([[piece.normal for piece in pieces] for pieces, _ in placed])
     spreads = np.array([[piece.spread for piece in pieces] for pieces, _ in placed])
     thetas = usable_half_angles(theta, spreads)

@@ -95,10 +95,7 @@ class ConedQuadruples:
         return np.where(usable[:, :, None] & (bounds >= LEAST_RADIUS), bounds, -np.inf)
 
     def attempts(self, row: int, construction: Construction, bounds: Array) -> tuple[Attempt, ...]:
-        """List the attempts to make on the quadruple in one row.
-
-        Takes `bounds` (2, orders).
-        """
+        """List the attempts to make on the quadruple in one row."""
         found: list[Attempt] = []
         made = cache(partial(self._cones, row))
         for column, order in enumerate(construction.orders):
@@ -112,7 +109,6 @@ class ConedQuadruples:
         return tuple(found)
 
     def _cones(self, row: int, kind: int) -> Cones:
-        """Return one choice of force cones, in the order of the faces."""
         half_angle = float(self.half_angles[row, kind])
         axes = frozen_copy(self.axes[row, kind])
         return four(trusted(ForceCone, axis=axis, half_angle=half_angle) for axis in axes)
@@ -183,10 +179,7 @@ def kept(blocks: Blocks, count: int) -> Blocks:
 
 
 def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
-    """Split all face quadruples of an object into blocks.
-
-    Takes `shared` (s, 4).
-    """
+    """Split all face quadruples of an object into blocks."""
     order = _by_room(cones, whole)
     order = order[cones.rooms[order] > 0.0]
     ends = _range_ends(math.comb(len(order), FINGERS))

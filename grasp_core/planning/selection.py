@@ -61,17 +61,14 @@ def _measure(body: Polyhedron, request: PlanRequest) -> tuple[Callable[[Certifie
 
 
 def _contacts(found: Certified) -> tuple[Array, Array]:
-    """Return positions and normals of a grasp's contacts at unit object size, (4, 3) each."""
     return found.placement.positions, found.normals
 
 
 def _mass(body: Polyhedron, rank_by: RankBy) -> float:
-    """Return the mass whose weight grows until a contact slips [kg]."""
     return 1.0 if rank_by == "payload" else DENSITY_KG_PER_M3 * body.volume
 
 
 def _tip_radius(body: Polyhedron, finger: Finger | None) -> float:
-    """Return the radius of the fingertips [m]."""
     return TIP_RADIUS * body.radius if finger is None else finger.radius_m
 
 
@@ -80,7 +77,7 @@ def carried(
 ) -> float:
     """Return what a planned grasp carries under one squeeze, as grasps are ranked by it.
 
-    Takes `rank_by` [kg]. Gives the mass or the multiple; 0 if no squeeze holds the object stably.
+    Gives the mass [kg] or the multiple of the weight; 0 if no squeeze holds the object stably.
     """
     loads = any_direction(_mass(body, rank_by))
     tip = _tip_radius(body, finger)

@@ -153,7 +153,6 @@ def _check_ids(ids: list[str]) -> None:
 
 
 def _planned(text: str, overrides: Overrides) -> tuple[ContactSet, ...]:
-    """Read the contacts of a `grasps.json`."""
     if overrides.outward:
         raise InputError("the normals of a grasps.json point into the object: leave out --outward")
     saved = grasps_from_json(text)
