@@ -74,16 +74,20 @@ def _is_nan(value: Any) -> bool:
 
 
 def _hashed(value: object, name: str) -> object:
-    """Return what a hash takes of a field: nothing where it would have to be computed."""
-    try:
-        kept = object.__getattribute__(value, name)
-    except AttributeError:
-        return None
-    if isinstance(kept, np.ndarray):
-        entries = cast("NDArray[Any]", kept)
+    known = kept(value, name)
+    if isinstance(known, np.ndarray):
+        entries = cast("NDArray[Any]", known)
         first = entries.flat[:HASHED_ENTRIES].tolist()
         return (entries.shape, *(0.0 if _is_nan(entry) else entry for entry in first))
-    return kept if isinstance(kept, HASHED) else None
+    return known if isinstance(known, HASHED) else None
+
+
+def kept(value: object, name: str) -> Any:
+    """Return a field as it is; None where it would have to be computed first."""
+    try:
+        return object.__getattribute__(value, name)
+    except AttributeError:
+        return None
 
 
 def trusted(kind: type[Item], /, **given: Any) -> Item:

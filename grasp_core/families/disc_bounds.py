@@ -47,9 +47,10 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
 from grasp_core.families.concurrent import concurrent_radius_bounds
-from grasp_core.families.constructions import LEAST_RADIUS, PAIRINGS, Construction
+from grasp_core.families.constructions import PAIRINGS, Construction
 from grasp_core.families.kernel_tables import Attempts, Corners, FaceTable, face_table
 from grasp_core.families.pencil import pencil_radius_bounds
+from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.families.regulus import regulus_bounds
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.objects.polyhedron import Polyhedron

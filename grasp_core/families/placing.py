@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -24,9 +24,9 @@ from grasp_core.errors import SolverError
 from grasp_core.families.concurrent import BEFORE, BEHIND, MIXED_SIDES
 from grasp_core.families.constructions import (
     DISC_CORNERS,
-    LEAST_RADIUS,
     MIXED,
     Construction,
+    circle,
     regions_of,
 )
 from grasp_core.families.kernel_tables import (
@@ -39,7 +39,7 @@ from grasp_core.families.kernel_tables import (
     face_table,
     room_for,
 )
-from grasp_core.families.placements import Placement
+from grasp_core.families.placements import LEAST_RADIUS, Placement
 from grasp_core.families.true_surface import on_true_surface
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.solvers.ties import surpassing
@@ -59,17 +59,15 @@ MOST_CHOICES = 8
 `max_face_parts`."""
 
 Cones: TypeAlias = tuple[ForceCone, ForceCone, ForceCone, ForceCone]
+Settled: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...]]
+"""Convex pieces of four faces, force cones, contacts, and the regions of the fingers."""
 Planned: TypeAlias = tuple[
     tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...] | None
 ]
-"""Convex pieces of four faces, their force cones, the contacts placed on them, and the regions of
-the fingers where they are known."""
-Settled: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...]]
-"""Pieces of the true surface, force cones, contacts, and the regions of the fingers."""
+"""The same; None for regions that are left to the construction."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Known:
+class Known(NamedTuple):
     """What compiled code says about one attempt: contacts with regions, or that there are none."""
 
     placement: Placement | None
@@ -140,9 +138,7 @@ class ManyPlacements:
     @cached_property
     def _rings(self) -> Array:
         """Border points of a disc of radius one on each face, about its centre, (f, n, 3)."""
-        turns = 2.0 * np.pi * np.arange(DISC_CORNERS) / DISC_CORNERS
-        circle = np.column_stack([np.cos(turns), np.sin(turns)])
-        return np.array([circle @ frame.T for frame in self._table.frames])
+        return np.array([circle() @ frame.T for frame in self._table.frames])
 
 
 def _placement(placed: Placed, place: int, construction: Construction) -> Placement | None:
@@ -160,23 +156,17 @@ def _regions(
 ) -> list[tuple[ContactRegion, ...] | None]:
     """Make the regions of each attempt; None where a polygon has no corners."""
     cut.polygons.setflags(write=False)
-    found: list[tuple[ContactRegion, ...] | None] = []
-    for place, (corners, sizes, end) in enumerate(
-        zip(cut.counts.tolist(), cut.radii.tolist(), ends.tolist(), strict=True)
-    ):
-        known = end == PLACED and min(corners) > 0
-        found.append(
-            four(
-                trusted(
-                    ContactRegion,
-                    kind=kind,
-                    polygon=cut.polygons[place, finger, : corners[finger]],
-                    inscribed_radius=sizes[finger],
-                )
-                for finger in range(FINGERS)
+    found: list[tuple[ContactRegion, ...] | None] = [None] * len(ends)
+    counts, radii = cut.counts.tolist(), cut.radii.tolist()
+    for place in np.flatnonzero((ends == PLACED) & (cut.counts.min(axis=1) > 0)).tolist():
+        found[place] = four(
+            trusted(
+                ContactRegion,
+                kind=kind,
+                polygon=cut.polygons[place, finger, : counts[place][finger]],
+                inscribed_radius=radii[place][finger],
             )
-            if known
-            else None
+            for finger in range(FINGERS)
         )
     return found
 

@@ -43,9 +43,8 @@ Source: Sudsang & Ponce 1995, section 3.3; the pitch equation and its use are th
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import product
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,8 +104,7 @@ def _slope_angles(axes: Array, half_angles: Array) -> tuple[Array, Array]:
     return least, np.minimum(largest, np.pi / 2.0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Pair:
+class Pair(NamedTuple):
     """Frame (u, v, N) of one pair, each (3,), and the angles (3) that its slope may have [rad]."""
 
     u: Array
@@ -118,8 +116,7 @@ class Pair:
     largest_angle: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Line:
+class Line(NamedTuple):
     """Force direction F v and contact D v - F v as functions of the variables v, each (3, 10)."""
 
     D: Array
@@ -179,20 +176,9 @@ def regulus_program(
     for piece, G, line in zip(pieces, facets, lines, strict=True):
         flat, middle = piece.frame.T @ (line.D - line.F), piece.frame.T @ piece.origin
         # (4), (5) with both signs, (6) and (7)
-        rows += [
-            piece.E @ flat,
-            flat - offset,
-            -flat - offset,
-            -G @ line.F,
-            -piece.normal @ line.F,
-        ]
-        limits += [
-            piece.b - LEAST_INSET + piece.E @ middle,
-            middle,
-            -middle,
-            np.zeros(len(G)),
-            -LEAST_DEPTH,
-        ]
+        rows += [piece.E @ flat, flat - offset, -flat - offset, -G @ line.F, -piece.normal @ line.F]
+        inside = piece.b - LEAST_INSET + piece.E @ middle
+        limits += [inside, middle, -middle, np.zeros(len(G)), -LEAST_DEPTH]
     # contacts lie in the planes of their faces
     normals = np.array([piece.normal for piece in pieces])
     A_eq = np.array([n @ (line.D - line.F) for n, line in zip(normals, lines, strict=True)])

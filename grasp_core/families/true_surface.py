@@ -45,15 +45,10 @@ def on_true_surface(
         return pieces, planned
     along = [np.array([piece.normal for piece in pieces]), np.array([c.axis for c in cones])]
     for directions in along:
-        facets = [
-            _facet(shape, piece, at, direction, region)
-            for shape, piece, at, direction, region in zip(
-                shapes, pieces, planned.positions, directions, regions, strict=True
-            )
-        ]
-        if any(facet is None for facet in facets):
+        given = zip(shapes, pieces, planned.positions, directions, regions, strict=True)
+        chosen = tuple(facet for each in given if (facet := _facet(*each)) is not None)
+        if len(chosen) < len(pieces):
             continue
-        chosen = tuple(facet for facet in facets if facet is not None)
         found = _aimed(chosen, cones, planned, directions) or place(chosen)
         if found is not None:
             return chosen, replace(found, radii=planned.radii, merit=planned.merit)

@@ -46,7 +46,12 @@ def check_bounds(points: Array, corners: Indices) -> None:
 
 def outward_sheets(points: Array, corners: Indices, *, largest_part: bool) -> Shells:
     """Orient the parts of an open surface outwards."""
-    areas, label, said = triangle_areas(points, corners), _labels(corners), list[str]()
+    # parts connect across edges of two triangles
+    across = triangle_neighbours(corners)
+    here = np.repeat(np.arange(len(corners)), SIDES + 1)
+    links = np.column_stack([here, across.ravel()])[across.ravel() >= 0]
+    _, label = np.unique(components(len(corners), links), return_inverse=True)
+    areas, said = triangle_areas(points, corners), list[str]()
     whole, count = float(areas.sum()), int(label.max()) + 1
     if largest_part:
         kept = label == np.bincount(label, weights=areas).argmax()
@@ -96,15 +101,6 @@ def _winding_of_parts(points: Array, corners: Indices, areas: Array, label: Indi
         for weight in (found, np.ones(len(places)))
     )
     return sums / np.maximum(counts, 1.0)
-
-
-def _labels(corners: Indices) -> Indices:
-    """Number the part of each triangle; parts connect across edges of two triangles, (t,)."""
-    across = triangle_neighbours(corners)
-    here = np.repeat(np.arange(len(corners)), SIDES + 1)
-    links = np.column_stack([here, across.ravel()])[across.ravel() >= 0]
-    _, label = np.unique(components(len(corners), links), return_inverse=True)
-    return label
 
 
 def _crossing(share: float) -> MeshError:
@@ -167,11 +163,21 @@ def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.boo
     Gives the triangles, and which of them were turned.
     """
     across = triangle_neighbours(corners)
-    against = _against(corners, across)
+    # across these edges the neighbour runs along the edge in the same direction, (t, 3)
+    heads, others = np.roll(corners, -1, axis=1), corners[across]
+    same = (others == corners[..., None]) & (np.roll(others, -1, axis=2) == heads[..., None])
+    against = same.any(axis=2) & (across >= 0)
     turned, part = np.zeros(len(corners), dtype=np.bool_), np.full(len(corners), -1)
     for seed in range(len(corners)):
-        if part[seed] < 0:
-            _spread(seed, across, against, turned, part)
+        if part[seed] >= 0:
+            continue
+        part[seed], front = seed, [seed]
+        while front:  # each triangle that connects with the seed is reached once
+            here = front.pop()
+            for side, other in enumerate(across[here].tolist()):
+                if other >= 0 and part[other] < 0:
+                    part[other], turned[other] = seed, turned[here] ^ against[here, side]
+                    front.append(other)
     inner = across >= 0
     if (inner & ((turned[:, None] ^ turned[across]) != against)).any():
         return None
@@ -181,31 +187,3 @@ def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.boo
     )
     turned ^= (swept > 0.5 * size)[part]
     return np.where(turned[:, None], corners[:, ::-1], corners), turned
-
-
-def _spread(
-    seed: int,
-    across: Indices,
-    against: NDArray[np.bool_],
-    turned: NDArray[np.bool_],
-    part: Indices,
-) -> None:
-    """Carry the winding of one triangle to all that connect with it; each is reached once."""
-    part[seed] = seed
-    front = [seed]
-    while front:
-        here = front.pop()
-        for side in range(3):
-            other = int(across[here, side])
-            if other >= 0 and part[other] < 0:
-                part[other], turned[other] = seed, turned[here] ^ against[here, side]
-                front.append(other)
-
-
-def _against(corners: Indices, across: Indices) -> NDArray[np.bool_]:
-    """Tell across which edges the neighbour runs along the edge in the same direction, (t, 3)."""
-    tails, heads = corners, np.roll(corners, -1, axis=1)
-    others = corners[across]
-    ahead = np.roll(others, -1, axis=2)
-    same = (others == tails[..., None]) & (ahead == heads[..., None])
-    return same.any(axis=2) & (across >= 0)

@@ -118,6 +118,7 @@ def _limited(work: Object, searches: Searches) -> Iterator[tuple[int, list[Certi
 
 
 def _held(searches: Searches) -> set[FaceQuadruple]:
+    """Quadruples on which a grasp was found."""
     return set[FaceQuadruple]().union(*(search.held for search in searches.values()))
 
 
@@ -164,6 +165,7 @@ def unreached(searches: Searches) -> dict[FaceQuadruple, str]:
 
 
 def _without_room(on: Standard) -> int:
+    """Number of quadruples with a face that has no room for a contact."""
     whole = len(on.faces)
     roomy = sum(shape is not None for shape in on.shapes[:whole])
     shared = sum(any(on.shapes[face] is None for face in faces) for faces in on.shared.tolist())

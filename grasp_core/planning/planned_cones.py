@@ -21,7 +21,6 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.cones.spanning import span_sines
 from grasp_core.cones.tilting import tilted_cones, toward, widened, widest_half_angles
-from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.families.disc_bounds import (
     angle_limits,
     corners_of,
@@ -30,7 +29,7 @@ from grasp_core.families.disc_bounds import (
     widths_apart,
 )
 from grasp_core.families.kernel_tables import Corners
-from grasp_core.families.placements import Placement
+from grasp_core.families.placements import LEAST_RADIUS, Placement
 from grasp_core.families.placing import Cones
 from grasp_core.objects.face_pieces import FacePiece, Shapes
 from grasp_core.objects.polyhedron import Polyhedron

@@ -146,6 +146,7 @@ def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
 
 
 def _planned(body: Polyhedron, request: PlanRequest, on: Standard, searches: Searches) -> Plan:
+    """Put together a plan from what the searches found, with the best grasps."""
     best = chosen(body, [search.best for search in searches.values()], request)
     start = time.process_time()
     grasps = to_grasps(body, request.friction, [as_given(found, on) for found in best])
@@ -184,6 +185,7 @@ def _planned(body: Polyhedron, request: PlanRequest, on: Standard, searches: Sea
 
 
 def _absence(body: Polyhedron, request: PlanRequest, counts: PlanCounts, known: Outcomes) -> str:
+    """Why there is no grasp, as a sentence with the object's name."""
     name = body.name
     if known.out_of_reach:
         return (

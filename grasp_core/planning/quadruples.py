@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices, frozen_copy
 from grasp_core.by_value import trusted
 from grasp_core.cones.spanning import SpanningTable
-from grasp_core.families.constructions import LEAST_RADIUS, Construction
+from grasp_core.families.constructions import Construction
+from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.families.placing import Attempt, Cones
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
 from grasp_core.solvers.ties import coarse, graded

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import text_of
 from grasp_core.frames import radians_of
 from grasp_core.mesh_files.limits import MeshLimits
@@ -228,20 +228,13 @@ def _finger_of(record: "GraspsRecord") -> Finger | None:
 
 
 def _grasps_of(body: Polyhedron, record: "GraspsRecord") -> tuple[Grasp, ...]:
-    grasps = tuple(
-        _named_grasp(body, grasp, record.friction, i) for i, grasp in enumerate(record.grasps)
-    )
+    grasps = list[Grasp]()
+    for place, each in enumerate(record.grasps):
+        with about(f"grasps[{place}]"):
+            grasps.append(_grasp_from_record(body, each, record.friction))
     if len({grasp.id for grasp in grasps}) < len(grasps):
         raise InputError("grasps: two grasps have the same id; ids must differ")
-    return grasps
-
-
-def _named_grasp(body: Polyhedron, record: "GraspRecord", friction: float, number: int) -> Grasp:
-    """Read a grasp from its record; a refusal names the grasp's place in the file."""
-    try:
-        return _grasp_from_record(body, record, friction)
-    except InputError as error:
-        raise InputError(f"grasps[{number}]: {error}") from error
+    return tuple(grasps)
 
 
 def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float) -> Grasp:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from grasp_core.cones.spanning import span_sines, spanning_quadruples
-from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS, PAIRINGS
+from grasp_core.families.constructions import CONSTRUCTIONS, PAIRINGS
 from grasp_core.families.disc_bounds import AttemptBounds, corners_of, disc_limits
 from grasp_core.families.kernel_tables import Attempts
+from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.objects.face_pieces import face_shapes
 from scenes.example_objects import example_object
 from tests.grasp_core.families import reference_corner_bounds as reference

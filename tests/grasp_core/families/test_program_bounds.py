@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.families.constructions import CONSTRUCTIONS, LEAST_RADIUS
+from grasp_core.families.constructions import CONSTRUCTIONS
 from grasp_core.families.disc_bounds import KERNELS, AttemptBounds
 from grasp_core.families.kernel_tables import Attempts
-from grasp_core.families.placements import Placement
+from grasp_core.families.placements import LEAST_RADIUS, Placement
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
 from grasp_core.planning.quadruples import all_blocks

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.families.constructions import LEAST_RADIUS
+from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.planning.request import METHODS
 from scenes.example_objects import example_object
 from tests.benchmarks.objects import sphere_hull
