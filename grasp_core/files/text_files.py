@@ -32,25 +32,19 @@ def write_parts(path: Path, parts: Iterable[bytes]) -> Path:
 def replacing(path: Path) -> Generator[Path]:
     """Yield another path with the same suffix to write to; afterwards that file replaces `path`."""
     path.parent.mkdir(parents=True, exist_ok=True)
+    prefix = f".{path.name[:SHOWN]}{UNFINISHED}"
     try:
-        with _beside(path) as temporary:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
+        temporary = Path(name)
+        try:
+            os.close(handle)
             yield temporary
             temporary.chmod(0o644)
             temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
     except OSError as error:
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
-
-
-@contextmanager
-def _beside(path: Path) -> Generator[Path]:
-    """Yield the path of an empty file in the same folder; the file is removed afterwards."""
-    prefix = f".{path.name[:SHOWN]}{UNFINISHED}"
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
-    try:
-        os.close(handle)
-        yield Path(name)
-    finally:
-        Path(name).unlink(missing_ok=True)
 
 
 def remove_unfinished(folder: Path) -> None:

@@ -91,10 +91,8 @@ def with_fewer_corners(polygon: Array) -> Array:
     """Drop corners that add little area to a convex polygon (k, 2); the result is inside it."""
     left = TRIMMED * signed_area(polygon)
     while len(polygon) > 3:  # noqa: PLR2004 - a triangle has no corner to spare
-        before, after = (
-            np.roll(polygon, 1, axis=0) - polygon,
-            np.roll(polygon, -1, axis=0) - polygon,
-        )
+        before = np.roll(polygon, 1, axis=0) - polygon
+        after = np.roll(polygon, -1, axis=0) - polygon
         areas = 0.5 * np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
         least = first_best(-areas, ON_LINE)
         left -= areas[least]
@@ -191,7 +189,10 @@ def _merged(points: Array, triangles: Indices, diagonals: list[tuple[int, int]])
         one, two = owner[tail, head], owner[head, tail]
         if one == two:
             continue
-        joined = _join(pieces[one], pieces[two], tail, head)
+        # along the common edge: walk one from head to tail, then the other back
+        start, other = pieces[one].index(head), pieces[two].index(tail)
+        back = pieces[two][other:] + pieces[two][:other]
+        joined = pieces[one][start:] + pieces[one][:start] + back[1:-1]
         if len(set(joined)) == len(joined) and is_convex(points[joined]):
             pieces[one] = joined
             del pieces[two]
@@ -201,14 +202,6 @@ def _merged(points: Array, triangles: Indices, diagonals: list[tuple[int, int]])
 
 def _edges(loop: list[int]) -> list[tuple[int, int]]:
     return list(zip(loop, loop[1:] + loop[:1], strict=True))
-
-
-def _join(one: list[int], two: list[int], tail: int, head: int) -> list[int]:
-    """Join two polygons along a common edge: walk `one` from head to tail, then `two` back."""
-    start, other = one.index(head), two.index(tail)
-    first = one[start:] + one[:start]
-    second = two[other:] + two[:other]
-    return first + second[1:-1]
 
 
 FEWEST_CORNERS, MOST_CORNERS = 3, 5000
@@ -258,15 +251,13 @@ def convex_polygon(corners: Array, slack: float) -> FlatPolygon | None:
         return None
     E, b = edge_rows(corners)
     found = FlatPolygon(corners, E, b)
-    turning = np.isfinite(E).all() and signed_area(corners) > 0.0 and _turns_once(E)
-    return found if turning and found.holds(corners, slack) else None
-
-
-def _turns_once(E: Array) -> bool:
-    """Return whether normals of a polygon's edges, (k, 2), turn around once, not more often."""
+    if not (np.isfinite(E).all() and signed_area(corners) > 0.0):
+        return None
+    # the normals turn around once, not more often
     following = np.roll(E, -1, axis=0)
     turns = E[:, 0] * following[:, 1] - E[:, 1] * following[:, 0]
-    return abs(float(np.arctan2(turns, (E * following).sum(axis=1)).sum())) < 3.0 * np.pi
+    once = abs(float(np.arctan2(turns, (E * following).sum(axis=1)).sum())) < 3.0 * np.pi
+    return found if once and found.holds(corners, slack) else None
 
 
 def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:

@@ -82,12 +82,11 @@ def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
     figure = kernel.CrossSection([loop / size for loop in loops], kernel.FillRule.EvenOdd)
     inset = figure.offset(-(margin / size + GRID), kernel.JoinType.Miter)
     parts = [[np.asarray(loop) * size for loop in part.to_polygons()] for part in inset.decompose()]
-    return [_outer_first(part) for part in parts if part]
-
-
-def _outer_first(loops: Sequence[Array]) -> list[Array]:
-    """Put the largest loop first, and keep the order of the others."""
-    return [loops[place] for place in largest_first([signed_area(loop) for loop in loops])]
+    return [
+        [part[place] for place in largest_first([signed_area(loop) for loop in part])]
+        for part in parts
+        if part
+    ]
 
 
 def intersection_volume(one: Solid, two: Solid) -> float:

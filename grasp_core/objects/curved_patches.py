@@ -26,6 +26,7 @@ through semidefinite programming", 2015), with the ellipse of the polygon's seco
 import math
 from bisect import insort
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,8 +119,7 @@ class _Surface:
         return cls(corners, normals, 0.5 * lengths, triangle_neighbours(triangles), extent)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Group:
+class _Group(NamedTuple):
     """Connected triangles, with the outward normal of their plane and their area [m^2]."""
 
     triangles: Indices
@@ -199,8 +199,11 @@ def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Fac
     tails, heads = flat, np.roll(flat, -1, axis=1)
     border = np.stack([tails[~inside], heads[~inside]], axis=1)
     start, room = clearest_point(flat.mean(axis=1), border)
+    along, away = heads - tails, start - tails
+    turns = along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0]
+    over = (turns > 0.0).all(axis=1) | (turns < 0.0).all(axis=1)
     # the derivation needs one triangle over the point from which the polygon grows
-    if room <= 0.0 or _sheets(flat, start) != 1:
+    if room <= 0.0 or over.sum() != 1:
         return None
     polygon = clearing(start, border, BORDER_GAP * surface.extent)
     if polygon is None:
@@ -213,26 +216,19 @@ def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Fac
     leans = angles_between(-surface.normals[facets], normal)
     area, centroid = area_and_centroid([polygon])
     plane = origin + middle * normal
+    corners = plane + polygon @ frame.T
     face = Face(
         normal=normal,
         centroid=plane + frame @ centroid,
         area=area,
-        polygon=plane + polygon @ frame.T,
+        polygon=corners,
         holes=(),
-        pieces=(plane + polygon @ frame.T,),
+        pieces=(corners,),
         spread=float(leans.max()),
         depth=0.5 * float(np.ptp(heights)),
         facets=facets,
     )
     return float((b - E @ centroid).min()), face
-
-
-def _sheets(flat: Array, point: Array) -> int:
-    """Count the triangles (t, 3, 2) that cover a point."""
-    tails, heads = flat, np.roll(flat, -1, axis=1)
-    along, away = heads - tails, point - tails
-    turns = along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0]
-    return int(((turns > 0.0).all(axis=1) | (turns < 0.0).all(axis=1)).sum())
 
 
 ROUNDS = 5

@@ -156,17 +156,14 @@ def choices_near(
     shapes: Sequence[FaceShape], positions: Array, most: int
 ) -> list[tuple[FacePiece, ...]]:
     """List choices of one piece per face, those nearest to given points of the planes first."""
-    ranked = [
-        _nearest_first(shape.pieces, at)[:most] for shape, at in zip(shapes, positions, strict=True)
-    ]
+    ranked: list[list[FacePiece]] = []
+    for shape, at in zip(shapes, positions, strict=True):
+        apart = [graded(-piece.inset(at), SAME_PLACE) for piece in shape.pieces]
+        order = sorted(range(len(apart)), key=apart.__getitem__)
+        ranked.append([shape.pieces[place] for place in order[:most]])
     every = product(*(range(len(each)) for each in ranked))
     ranks = sorted(every, key=lambda rank: (sum(rank), rank))[:most]
     return [tuple(each[place] for each, place in zip(ranked, rank, strict=True)) for rank in ranks]
-
-
-def _nearest_first(pieces: Sequence[FacePiece], at: Array) -> list[FacePiece]:
-    apart = [graded(-piece.inset(at), SAME_PLACE) for piece in pieces]
-    return [pieces[place] for place in sorted(range(len(pieces)), key=apart.__getitem__)]
 
 
 def inset_piece(piece: FacePiece, inset: float) -> FacePiece:

@@ -66,17 +66,23 @@ def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
     points = frozen(positions, (FINGERS, 3), "positions")
     inward = frozen_units(normals, (FINGERS, 3), "normals")
     parts = flat_parts(body)
-    found = [
-        _nearest(body, parts, i, p, n) for i, (p, n) in enumerate(zip(points, inward, strict=True))
-    ]
-    faces = [each.part.face for each in found]
+    found = list[Nearest]()
+    reach, margin = LARGEST_MOVE * body.radius, NEARER * body.radius
+    for finger, (point, normal) in enumerate(zip(points, inward, strict=True)):
+        nearest = nearest_like(parts, point, normal, lean=LARGEST_LEAN, reach=reach, margin=margin)
+        if nearest is None:
+            raise InputError(
+                f"contact {finger} is on no face: expected one within {reach:.3g} m whose inward "
+                f"normal is within {math.degrees(LARGEST_LEAN):.0f} deg of the given one"
+            )
+        found.append(nearest)
+    faces = four(each.part.face for each in found)
     if body.patches is not None:
         around = [_around(body, each.part, each.contact) for each in found]
-        faces = [len(body.faces) + finger for finger in range(FINGERS)]
+        faces = four(len(body.faces) + finger for finger in range(FINGERS))
         body = replace(body, faces=(*body.faces, *around))
-    a, b, c, d = faces
     contacts = four(each.contact for each in found)
-    return Seated(body, (a, b, c, d), contacts, max(each.distance for each in found))
+    return Seated(body, faces, contacts, max(each.distance for each in found))
 
 
 def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCertificate:
@@ -170,21 +176,6 @@ def nearest_like(
         if distance <= reach and (best is None or distance < best.distance - margin):
             best = Nearest(part, Contact(at, part.normal), distance)
     return best
-
-
-def _nearest(
-    body: Polyhedron, parts: Sequence[FlatPart], finger: int, point: Array, normal: Array
-) -> Nearest:
-    reach = LARGEST_MOVE * body.radius
-    found = nearest_like(
-        parts, point, normal, lean=LARGEST_LEAN, reach=reach, margin=NEARER * body.radius
-    )
-    if found is None:
-        raise InputError(
-            f"contact {finger} is on no face: expected one within {reach:.3g} m whose inward "
-            f"normal is within {math.degrees(LARGEST_LEAN):.0f} deg of the given one"
-        )
-    return found
 
 
 def _around(body: Polyhedron, part: FlatPart, contact: Contact) -> Face:

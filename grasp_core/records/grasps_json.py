@@ -7,7 +7,7 @@ imported only where a file is read: plans are written without it.
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -96,17 +96,9 @@ def surface_record(surface: Surface) -> dict[str, object]:
 
 def surface_of_record(record: "SurfaceRecord") -> Surface:
     """Return what a record says of a surface."""
-    return Surface(
-        closed=record.closed,
-        caps=np.array(record.caps, dtype=np.int64),
-        holes=record.holes,
-        largest_hole_m=record.largest_hole_m,
-        volume_error=record.volume_error,
-        dropped=record.dropped,
-        flatness_m=record.flatness_m,
-        center_given=record.center_given,
-        repairs=tuple(record.repairs),
-    )
+    fields: dict[str, Any] = record.model_dump()
+    fields["repairs"] = tuple(record.repairs)
+    return Surface(**fields)
 
 
 def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:
@@ -149,11 +141,8 @@ def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:
 
 def grasps_from_json(text: str) -> SavedGrasps:
     """Read the text of a `grasps.json`."""
-    record = _record_of(text)
-    body = _body_of(record)
-    return SavedGrasps(
-        body, record.friction, record.seed, _grasps_of(body, record), _finger_of(record)
-    )
+    plan = plan_from_json(text)
+    return SavedGrasps(plan.body, plan.friction, plan.seed, plan.grasps, plan.finger)
 
 
 def plan_from_json(text: str) -> Plan:
@@ -162,7 +151,10 @@ def plan_from_json(text: str) -> Plan:
     A file keeps neither times nor what is known of face quadruples without grasps: `absences`,
     `undecided` and `unreached` are empty. Written again, the plan gives the same text.
     """
-    record = _record_of(text)
+    from grasp_core.files.json_text import record_of
+    from grasp_core.records.grasps_schema import GraspsRecord
+
+    record = record_of(GraspsRecord, text, "grasps.json", schema=SCHEMA)
     body, counts = _body_of(record), record.counts
     return Plan(
         body=body,
@@ -178,26 +170,10 @@ def plan_from_json(text: str) -> Plan:
         ),
         outcomes=Outcomes(**record.outcomes.model_dump()),
         absence=record.absence,
-        finger=_finger_of(record),
-        moves=tuple(
-            Moved(
-                move.id,
-                move.moved_from,
-                move.ferrari_canny_before,
-                move.ferrari_canny_after,
-                move.ferrari_canny_ceiling,
-            )
-            for move in record.optimization
-        ),
+        finger=None if record.finger is None else Finger(**record.finger.model_dump()),
+        moves=tuple(Moved(*move.model_dump().values()) for move in record.optimization),
         versions=record.versions,
     )
-
-
-def _record_of(text: str) -> "GraspsRecord":
-    from grasp_core.files.json_text import record_of
-    from grasp_core.records.grasps_schema import GraspsRecord
-
-    return record_of(GraspsRecord, text, "grasps.json", schema=SCHEMA)
 
 
 def _body_of(record: "GraspsRecord") -> Polyhedron:
@@ -221,10 +197,6 @@ def _body_of(record: "GraspsRecord") -> Polyhedron:
             "object.content_sha256: the hash does not fit the mesh in the file; plan again"
         )
     return body
-
-
-def _finger_of(record: "GraspsRecord") -> Finger | None:
-    return None if record.finger is None else Finger(**record.finger.model_dump())
 
 
 def _grasps_of(body: Polyhedron, record: "GraspsRecord") -> tuple[Grasp, ...]:

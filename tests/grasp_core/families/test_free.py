@@ -194,17 +194,6 @@ def test_splitting_proves_absence_where_the_patch_of_the_whole_faces_is_closed()
     climb(np.random.default_rng(5), pieces, friction, samples=400, steps=200)
 
 
-@pytest.mark.parametrize("restarts", [0, free.RESTARTS])
-def test_splitting_finds_a_grasp_that_restarts_miss(monkeypatch, restarts):
-    monkeypatch.setattr(free, "RESTARTS", restarts)
-    name, indices, friction = NEEDS_A_SPLIT
-    pieces = quadruple(name, indices)
-    assert place(pieces, friction) == Undecided(1.0)
-    found = place(pieces, friction, cells=100)
-    assert isinstance(found, Placement)
-    assert gc.force_closure(found.positions, normals_of(pieces), friction).closed
-
-
 def test_restarts_and_splits_stand_in_for_the_first_try(monkeypatch):
     """With the forces of the whole patch unused, half of the ways still lead to a grasp."""
     tried = free.grasp_from_patch
@@ -229,23 +218,6 @@ def test_restarts_and_splits_stand_in_for_the_first_try(monkeypatch):
     assert len(cases) >= 50
 
 
-def test_the_same_seed_gives_the_same_answer():
-    name, indices, friction = NEEDS_A_SPLIT
-    cases = [(pieces, mu, 1) for pieces, mu, _ in answers()[::20]]
-    cases.append((quadruple(name, indices), friction, 100))
-    for pieces, mu, cells in cases:
-        one, two = (place(pieces, mu, cells, seed=9) for _ in range(2))
-        assert type(one) is type(two)
-        if isinstance(one, Placement):
-            assert (one.positions == two.positions).all()
-            assert (one.forces == two.forces).all()
-            assert one.merit == two.merit
-        if isinstance(one, Absence):
-            twists = [[proof.separating_wrench for _, proof in x.leaves] for x in (one, two)]
-            assert np.array_equal(*twists)
-    assert len(cases) >= 20
-
-
 def test_a_grasp_of_two_parallel_slabs_is_not_along_one_line():
     """Forces across two slabs on a base balance at contacts in a row through their middles,
     which resist no turning about it: contacts on a line are never in force closure, and within
@@ -266,9 +238,3 @@ def test_a_grasp_of_two_parallel_slabs_is_not_along_one_line():
     assert isinstance(placed, Placement)
     spread = np.linalg.svd(placed.positions - placed.positions.mean(axis=0), compute_uv=False)
     assert spread[1] > free.LEAST_INSET
-
-
-def test_friction_must_be_positive():
-    """Four normals span at most four dimensions of wrenches; the corners of a face span more."""
-    with pytest.raises(gc.InputError, match="greater than 0"):
-        place(quadruple("tetrahedron", range(4)), 0.0)

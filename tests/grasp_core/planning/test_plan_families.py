@@ -56,16 +56,6 @@ def test_an_elongated_object_has_pencils_where_it_has_no_concurrent_grasp():
     assert {grasp.family for grasp in needing_friction} == {"regulus"}
 
 
-def test_one_family_may_be_chosen_and_gives_the_same_grasps():
-    body = example_object("octahedron")
-    together = {g.id for g in gc.plan(body, 0.3, families=FAMILIES, cones="normal").grasps}
-    apart = [
-        g.id for f in FAMILIES for g in gc.plan(body, 0.3, families=(f,), cones="normal").grasps
-    ]
-    assert len(apart) == len(together)
-    assert set(apart) == together
-
-
 def test_pairings_that_lead_to_the_same_contacts_are_kept_once():
     counts = gc.plan(example_object("tetrahedron"), 0.3).counts.families["regulus"]
     assert (counts.tried, counts.duplicates, counts.found) == (3, 2, 1)

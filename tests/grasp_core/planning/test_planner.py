@@ -10,7 +10,7 @@ from grasp_core.planning.request import METHODS
 from scenes.example_objects import example_object
 from tests.benchmarks.objects import sphere_hull
 from tests.judges import pyramid_margin, random_rotation
-from tests.marks import MORE, more
+from tests.marks import MORE
 
 TEN_DEGREES = math.tan(math.radians(10.0))
 RADIUS_ACCURACY = 1e-6
@@ -47,16 +47,6 @@ def test_the_tetrahedron_is_held_at_its_face_centres():
     np.testing.assert_allclose(grasp.focus_points, [[0.0, 0, 0]], atol=1e-7 * body.radius)
     centers = [body.faces[face].centroid for face in grasp.faces]
     np.testing.assert_allclose(grasp.positions, centers, atol=1e-7 * body.radius)
-
-
-def test_a_bar_whose_ends_are_far_apart_has_no_concurrent_grasp_at_ten_degrees():
-    """Nine quadruples span at ten degrees or more, and no focus serves any of them."""
-    found = gc.plan(
-        example_object("double-wedge-bar"), TEN_DEGREES, families=("concurrent",), cones="normal"
-    )
-    assert found.counts.spanning == 9
-    assert found.counts.families["concurrent"].infeasible == 9
-    assert "9 face quadruples span" in found.absence
 
 
 TILTED = [(name, "tilted") for name in ("wedge", "chamfered-box", "random-10-1", "random-12-1")]
@@ -156,54 +146,6 @@ def test_a_smaller_theta_is_allowed_and_gives_smaller_discs():
     assert narrow.grasps[0].force_cones[0].half_angle <= math.radians(5.0)
 
 
-@pytest.mark.parametrize("friction", [0.01, 0.05, 0.144])
-def test_symmetric_objects_are_planned_at_small_friction(friction):
-    found = gc.plan(
-        example_object("dodecahedron"), friction, families=("concurrent",), cones="normal"
-    )
-    assert len(found.grasps) == 30
-    assert {grasp.critical_friction for grasp in found.grasps} == {0.0}
-
-
-@pytest.mark.parametrize(
-    ("name", "family"),
-    [
-        ("random-10-1", "concurrent"),
-        ("octahedron", "pencil"),
-        pytest.param("random-10-1", "pencil", marks=MORE),
-        pytest.param("octahedron", "concurrent", marks=MORE),
-    ],
-)
-def test_a_limit_returns_the_best_of_all_grasps(name, family):
-    """Also where symmetry makes many grasps equally good."""
-    body = example_object(name)
-    everything = gc.plan(body, 0.3, families=family, cones="tilted")
-    few = gc.plan(body, 0.3, limit=7, families=family, cones="tilted")
-    assert len(few.grasps) == 7
-    assert [g.id for g in few.grasps] == [g.id for g in everything.grasps[:7]]
-    fewer = everything.counts.families[family].tried - few.counts.families[family].tried
-    assert fewer > 0 or name == "octahedron"
-
-
-@pytest.mark.parametrize("name", ["wedge", "l-bracket"])
-def test_a_larger_limit_only_adds_grasps(name):
-    kept = [
-        {grasp.id for grasp in gc.plan(example_object(name), 0.5, limit=limit).grasps}
-        for limit in (5, 15, 40)
-    ]
-    assert [len(ids) for ids in kept] == [5, 15, 40]
-    assert kept[0] < kept[1] < kept[2]
-
-
-def test_plans_are_the_same_every_time():
-    one, two = (gc.plan(example_object("box"), 0.4) for _ in range(2))
-    assert len(one.grasps) >= 20
-    assert [g.id for g in one.grasps] == [g.id for g in two.grasps]
-    assert len({g.id for g in one.grasps}) == len(one.grasps)
-    for a, b in zip(one.grasps, two.grasps, strict=True):
-        np.testing.assert_array_equal(a.positions, b.positions)
-
-
 def test_progress_is_reported_as_quadruples_are_tried():
     seen = []
     gc.plan(example_object("wedge"), progress=lambda *numbers: seen.append(numbers))
@@ -277,16 +219,3 @@ def test_grasps_are_streamed_as_they_are_found():
     first = next(streamed)
     everything = {first.id} | {grasp.id for grasp in streamed}
     assert everything == {grasp.id for grasp in gc.plan(body, 0.4).grasps}
-
-
-@pytest.mark.parametrize("name", ["hexagonal-pyramid", *more("l-bracket")])
-def test_turned_scaled_and_shaken_objects_have_the_same_faces_and_families(name):
-    """All methods, where much is symmetric and faces are not convex."""
-    rng, body = np.random.default_rng(5), example_object(name)
-    extent = np.ptp(body.vertices, axis=0).max()
-    expected = {(*sorted(g.faces), g.family) for g in gc.plan(body, 0.8).grasps}
-    for size in (1e-3, 0.03, 1.0):
-        noise, R = 1e-9 * rng.uniform(-1.0, 1.0, body.vertices.shape), random_rotation(rng)
-        there = remade(body, lambda v, n=noise, R=R, s=size: s * (v / extent + n) @ R.T + s)
-        assert {(*sorted(g.faces), g.family) for g in gc.plan(there, 0.8).grasps} == expected
-    assert len(expected) >= 35
