@@ -132,11 +132,7 @@ def of_order_one(*arrays: Array) -> list[Array]:
 
 
 def to_digits(values: Array, size: float = 0.0) -> Array:
-    """Round values to `DIGITS` digits of the largest of them, on a shifted grid.
-
-    The last bits of the answers of solvers depend on where their numbers lie in memory; results
-    that are simulated or written to files must not.
-    """
+    """Round values to `DIGITS` digits of the largest, so that no last bits of a solver show."""
     largest = max(float(np.abs(values).max(initial=0.0)), size)
     if largest == 0.0:
         return values

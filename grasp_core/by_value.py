@@ -91,10 +91,7 @@ def kept(value: object, name: str) -> Any:
 
 
 def trusted(kind: type[Item], /, **given: Any) -> Item:
-    """Make a frozen value without checking or copying its fields.
-
-    This is for thousands of values whose fields were computed and checked together.
-    """
+    """Make a frozen value of fields that were checked before, unchecked and uncopied."""
     made, put = object.__new__(kind), object.__setattr__
     for name in given:
         put(made, name, given[name])

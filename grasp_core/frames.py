@@ -48,10 +48,7 @@ def poses_along(origins: Array, directions: Array) -> Array:
 
 
 def radians_of(degrees: float) -> float:
-    """Return the angle [rad] that `math.degrees` turns into these degrees exactly.
-
-    Degrees that no angle becomes exactly are converted as by `math.radians`.
-    """
+    """Return the angle [rad] that `math.degrees` turns into these degrees, or the usual one."""
     nearest = math.radians(degrees)
     beside = (math.nextafter(nearest, math.inf), math.nextafter(nearest, -math.inf))
     exact = (angle for angle in (nearest, *beside) if math.degrees(angle) == degrees)

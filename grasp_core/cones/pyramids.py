@@ -28,10 +28,7 @@ def inscribed_share(sides: int = PYRAMID_SIDES) -> float:
 
 
 def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES) -> Array:
-    """Compute inward unit normals g of a pyramid inscribed in a circular cone, (sides, 3).
-
-    All v with g.v >= 0 for all g are inside the cone.
-    """
+    """Compute inward unit normals g of a pyramid in a cone, which holds all v with g.v >= 0."""
     return pyramid_facets(cone.axis, cone.half_angle, toward, sides)
 
 

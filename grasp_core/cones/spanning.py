@@ -158,10 +158,7 @@ def angles_between(one: Array, other: Array) -> Array:
 
 
 def positively_span(vectors: Array) -> NDArray[np.bool_]:
-    """Return whether four vectors each, (..., 4, 3), positively span R^3, (...).
-
-    They do if they span R^3 and some combination with positive weights vanishes.
-    """
+    """Return whether a combination of four vectors (..., 4, 3) with positive weights vanishes."""
     signed = signed_determinants(vectors)
     found: NDArray[np.bool_] = (signed.min(axis=-1) > DEPENDENT) | (
         signed.max(axis=-1) < -DEPENDENT
@@ -170,10 +167,7 @@ def positively_span(vectors: Array) -> NDArray[np.bool_]:
 
 
 def balancing_weights(vectors: Array) -> Array:
-    """Return weights with sum w_i v_i = 0 that sum to one in absolute value, (..., 4).
-
-    All are positive where the four vectors, (..., 4, 3), positively span R^3.
-    """
+    """Return weights of sum w_i v_i = 0, sum |w_i| = 1; positive if vectors span, (..., 4)."""
     signed = signed_determinants(vectors)
     tiny = float(np.finfo(np.float64).tiny)
     total = np.maximum(np.abs(signed).sum(axis=-1, keepdims=True), tiny)

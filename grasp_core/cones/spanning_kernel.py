@@ -138,8 +138,4 @@ def _longest_squared(g: float, h: float, k: float) -> float:
 
 @loop()
 def _crossed(u: Array, v: Array) -> tuple[float, float, float]:
-    return (
-        u[1] * v[2] - u[2] * v[1],
-        u[2] * v[0] - u[0] * v[2],
-        u[0] * v[1] - u[1] * v[0],
-    )
+    return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])

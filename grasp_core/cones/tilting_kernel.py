@@ -90,12 +90,7 @@ def bend(
                         way[d] = signs[s, finger] * across[q, d]
                     angle = cap * thetas[q, finger]
                     _into_cap(
-                        way,
-                        normals[q, finger],
-                        np.cos(angle),
-                        np.sin(angle),
-                        pace[0],
-                        bent[finger],
+                        way, normals[q, finger], np.cos(angle), np.sin(angle), pace[0], bent[finger]
                     )
                 floor = reached[q] + pace[0]
                 now = _half_angle(bent, normals[q], thetas[q], floor)

@@ -138,11 +138,7 @@ def place_on_sides(
 
 
 def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array, contact: Array) -> Array:
-    """Cut a piece to where a line in the force cone meets the focus, (k, 3).
-
-    The result is the inverted cone of section 3.1 on the contact's side of the focus, inscribed by
-    the same pyramid as in the program.
-    """
+    """Cut a piece to the inverted cone of section 3.1 on the contact's side of a focus, (k, 3)."""
     side = 1.0 if float(cone.axis @ (focus - contact)) > 0.0 else -1.0
     G = side * inscribed_facets(cone, piece.frame[:, 0])
     # (1) and (3) with r = 0 and x0 fixed bound the point y alone

@@ -145,11 +145,7 @@ def _take(
 
 @loop("numpy")
 def footprints(
-    faces: FaceTable,
-    attempts: Attempts,
-    turns: Array,
-    placed: Placed,
-    cut: Footprints,
+    faces: FaceTable, attempts: Attempts, turns: Array, placed: Placed, cut: Footprints
 ) -> None:
     """Cut the faces of each placed attempt to where a line in the force cone meets the focus."""
     polygons, counts, radii = cut

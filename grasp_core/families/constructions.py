@@ -9,11 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
-from grasp_core.families.concurrent import (
-    cone_footprint,
-    place_concurrent,
-    place_on_mixed_sides,
-)
+from grasp_core.families.concurrent import cone_footprint, place_concurrent, place_on_mixed_sides
 from grasp_core.families.pencil import place_pencil
 from grasp_core.families.placements import LEAST_RADIUS, NoPlacement, Placement
 from grasp_core.families.regulus import nearly_symmetric, place_regulus

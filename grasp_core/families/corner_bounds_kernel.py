@@ -22,12 +22,7 @@ NO_LEAN = 1e-6
 
 @loop()
 def fill(
-    corners: Corners,
-    normals: Array,
-    faces: Indices,
-    axes: Array,
-    half_angles: Array,
-    limits: Array,
+    corners: Corners, normals: Array, faces: Indices, axes: Array, half_angles: Array, limits: Array
 ) -> None:
     """Bound the discs of many quadruples from above (see `disc_limits`)."""
     for q in range(len(faces)):

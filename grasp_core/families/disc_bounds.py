@@ -67,10 +67,7 @@ KERNELS: dict[Family, str] = {
 
 
 def corners_of(body: Polyhedron) -> Corners:
-    """Return the corners of each face at object size one, the first corner repeated.
-
-    Lengths are divided by the object's radius and counted from its centre of mass.
-    """
+    """Return the corners of each face, padded, about the centre of mass and over the radius."""
     corners = [
         (np.vstack([face.polygon, *face.holes]) - body.center_of_mass) / body.radius
         for face in body.faces

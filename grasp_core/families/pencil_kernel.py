@@ -220,10 +220,7 @@ def pencil_bounds(
 def _depth_along(
     faces: FaceTable, attempts: Attempts, place: tuple[int, int], cell: float, u: Array
 ) -> tuple[Array, float, float]:
-    """Express a finger's distance s from its focus by (1), as a linear function.
-
-    Gives its slopes in (x0, k), its constant, and the sign of k u.
-    """
+    """Return a finger's s by (1): slopes in (x0, k), constant, and the sign of k u."""
     a, finger = place
     face, s = attempts.faces[a, finger], np.empty(K + 1)
     n, o = faces.normals[face], faces.origins[face]

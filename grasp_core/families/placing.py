@@ -22,13 +22,7 @@ from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
 from grasp_core.errors import SolverError
 from grasp_core.families.concurrent import BEFORE, BEHIND, MIXED_SIDES
-from grasp_core.families.constructions import (
-    DISC_CORNERS,
-    MIXED,
-    Construction,
-    circle,
-    regions_of,
-)
+from grasp_core.families.constructions import DISC_CORNERS, MIXED, Construction, circle, regions_of
 from grasp_core.families.kernel_tables import (
     LEFT,
     PLACED,
@@ -43,14 +37,7 @@ from grasp_core.families.placements import LEAST_RADIUS, Placement
 from grasp_core.families.true_surface import on_true_surface
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.solvers.ties import surpassing
-from grasp_core.values import (
-    FINGERS,
-    ContactRegion,
-    FaceQuadruple,
-    ForceCone,
-    RegionKind,
-    four,
-)
+from grasp_core.values import FINGERS, ContactRegion, FaceQuadruple, ForceCone, RegionKind, four
 
 Ask: TypeAlias = tuple[FaceQuadruple, Sequence[ForceCone], float]
 """One attempt: faces in finger order, a force cone on each, and the least radius that counts."""

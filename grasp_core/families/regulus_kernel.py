@@ -152,11 +152,7 @@ class _Line(NamedTuple):
 
 @loop()
 def regulus_bounds(
-    faces: FaceTable,
-    attempts: Attempts,
-    terms: RegulusTerms,
-    bounds: Array,
-    chosen: Indices,
+    faces: FaceTable, attempts: Attempts, terms: RegulusTerms, bounds: Array, chosen: Indices
 ) -> None:
     """Bound the merit, minus the largest offset t, over slopes until one is good enough."""
     others = 1 + FINGERS * (4 + 1 + 1) + 4  # gap; offsets, depth, equality; bounds on z / x

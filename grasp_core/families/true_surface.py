@@ -56,10 +56,7 @@ def on_true_surface(
 
 
 def _aimed(
-    facets: Sequence[FacePiece],
-    cones: Sequence[ForceCone],
-    planned: Placement,
-    directions: Array,
+    facets: Sequence[FacePiece], cones: Sequence[ForceCone], planned: Placement, directions: Array
 ) -> Placement | None:
     """Aim from contacts above or below the planned ones at the planned focus; None on failure."""
     if len(planned.foci) != 1:

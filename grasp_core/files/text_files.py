@@ -48,10 +48,7 @@ def replacing(path: Path) -> Generator[Path]:
 
 
 def remove_unfinished(folder: Path) -> None:
-    """Remove the files and folders that killed processes left unfinished in a folder.
-
-    Nothing else may be writing to the folder meanwhile.
-    """
+    """Remove what killed processes left unfinished in a folder to which nothing is writing now."""
     for path in folder.glob(f".*{UNFINISHED}*"):
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path, ignore_errors=True)
@@ -60,10 +57,7 @@ def remove_unfinished(folder: Path) -> None:
 
 
 def bounded_bytes(path: Path, most: int) -> bytes:
-    """Read the bytes of a file, or its first `most + 1` bytes if it is longer.
-
-    Named pipes are refused, so reading never blocks.
-    """
+    """Read a regular file, or its first `most + 1` bytes; pipes, which could block, are refused."""
     try:
         handle = os.open(
             path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)

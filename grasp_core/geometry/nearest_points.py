@@ -69,10 +69,7 @@ def _dots(a: Array, b: Array) -> Array:
 
 
 def _divided(a: Array, b: Array) -> Array:
-    """Divide arrays, with zero where the divisor is zero.
-
-    The divisor is zero for a triangle or an edge without size, whose corners are candidates anyway.
-    """
+    """Divide arrays, with zero where the divisor is zero: there corners are the candidates."""
     return np.divide(a, b, out=np.zeros_like(a), where=np.broadcast_to(b > 0.0, a.shape))
 
 
@@ -93,13 +90,7 @@ class Surface:
         self._inward = -outward / np.where(lengths > 0.0, lengths, 1.0)
 
     def holds(self, point: Array, normal: Array | None, slack: float) -> bool:
-        """Return whether a point is on a triangle whose normal agrees with the given one.
-
-        Args:
-            point: The point, (3,) [m].
-            normal: Unit vector into the solid, (3,); None accepts every triangle.
-            slack: How far the point may be from a triangle [m].
-        """
+        """Return whether a point is within `slack` of a triangle with such a normal, if given."""
         near = np.linalg.norm(nearest_on_triangles(self._corners, point) - point, axis=1) <= slack
         if normal is None:
             return bool(near.any())

@@ -32,11 +32,7 @@ TRIMMED = 1e-3
 
 
 def plane_frame(normal: Array) -> Array:
-    """Return two orthonormal columns spanning the plane with this normal, (3, 2).
-
-    (column 0, column 1, normal) is right-handed. The choice is deterministic and
-    depends on the normal only, so that all figures on one face share it.
-    """
+    """Return two orthonormal columns, (3, 2), right-handed with the normal, which decides them."""
     return np.array(plane_tangents(*normal.tolist())).T
 
 
@@ -114,10 +110,7 @@ def nearest_point(polygon: Array, point: Array) -> Array:
 
 
 def convex_hull(points: Array) -> Array:
-    """Return the corners of the convex hull of points (n, 2), counter-clockwise, (k, 2).
-
-    The first corner is the one that comes first among the points, however the figure is turned.
-    """
+    """Return the corners of a convex hull, counter-clockwise from the first point on, (k, 2)."""
     ordered = points[np.lexsort(points.T[::-1])]
 
     def lower(run: Array) -> list[Array]:
@@ -242,10 +235,7 @@ def flat_polygon(arms: Array, normal: Array, slack: float) -> FlatPolygon | None
 
 
 def convex_polygon(corners: Array, slack: float) -> FlatPolygon | None:
-    """Make a convex polygon from corners (k, 2); None if they are not its corners in order.
-
-    A corner that coincides with the corner before it, as cutting leaves them, counts once.
-    """
+    """Make a polygon of corners (k, 2), repeats left out; None if not convex and in order."""
     corners = tidy(corners)
     if len(corners) < FEWEST_CORNERS:
         return None
@@ -271,10 +261,7 @@ def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
 
 
 def holds_disc(polygon: FlatPolygon, border: FlatPolygon, center: Array, radius: float) -> bool:
-    """Return whether a polygon covers a disc within a border, but for a share `LEFT_OUT`.
-
-    The share refers to the polygon's own area.
-    """
+    """Return whether a polygon covers a disc in a border, but for `LEFT_OUT` of its own area."""
     turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
     rows = np.column_stack([np.cos(turns), np.sin(turns)])
     disc = clip(border.corners, rows, rows @ center + radius)

@@ -95,10 +95,7 @@ def intersection_volume(one: Solid, two: Solid) -> float:
 
 
 def union(solids: Sequence[tuple[Solid, Indices]]) -> tuple[Solid, Indices]:
-    """Unite solids whose triangles are numbered, and number the triangles of the union, (t,).
-
-    A triangle of the union has the number of the triangle that it is a part of.
-    """
+    """Unite solids whose triangles are numbered; parts of triangles keep their numbers, (t,)."""
     kernel = _kernel()
     parts = [_manifold(solid, numbers) for solid, numbers in solids]
     body = kernel.Manifold.batch_boolean(parts, kernel.OpType.Add)

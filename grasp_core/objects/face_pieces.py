@@ -68,10 +68,7 @@ class FacePiece(ByValue):
     """Largest distance of the true surface from the plane."""
 
     def sound(self) -> bool:
-        """Return whether the fields describe one convex polygon, at about unit size.
-
-        `face`, `spread` and `depth` are not checked, because they refer to the object.
-        """
+        """Return whether the fields describe one polygon; spread and depth are not checked."""
         with np.errstate(all="ignore"):
             count = len(self.corners) if is_array(self.corners, None, 2) else 0
             rows = len(self.E) if are_units(self.E, None, 2) else 0
@@ -175,10 +172,7 @@ def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
 
 
 def unit_pieces(body: Polyhedron) -> tuple[FacePiece, ...]:
-    """List all convex pieces large enough for a contact, at object size one.
-
-    Lengths are divided by the object's radius and counted from its centre of mass.
-    """
+    """List convex pieces with room for a contact, about the centre of mass, over the radius."""
     pieces = [
         replace(
             piece_of(index, face.normal, (polygon - body.center_of_mass) / body.radius),
@@ -225,10 +219,7 @@ def inscribed_disc_radius(polygon: Array, piece: FacePiece) -> float:
 
 
 def inscribed_disc_radius_of(polygon: Array, normal: Array) -> float:
-    """Compute the radius of the largest disc in a convex polygon (k, 3).
-
-    Its corners are counter-clockwise about the normal.
-    """
+    """Compute the radius of the largest disc in a convex polygon (k, 3), wound about the normal."""
     return inscribed_radius(*edge_rows((polygon - polygon[0]) @ plane_frame(normal)))
 
 

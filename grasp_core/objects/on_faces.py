@@ -48,10 +48,7 @@ def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
 
 @lru_cache(maxsize=32)
 def face_under(body: Polyhedron, contact: Contact) -> Face | None:
-    """Find the face on which a contact lies with the surface's normal; None if there is none.
-
-    What was found last is kept, as the controls of a grasp have many of its contacts.
-    """
+    """Find the face on which a contact lies with its normal; kept, as controls repeat it."""
     slack = ON_FACE * body.radius
     # planar faces that lean otherwise are left out at once; patches have many normals
     turned = np.abs(body.normals - contact.normal).max(axis=1)

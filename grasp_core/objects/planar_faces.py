@@ -138,10 +138,7 @@ class _Triangles:
 
 
 def triangle_neighbours(triangles: Indices) -> Indices:
-    """Find the triangle across each edge (k, k+1) of each triangle, (t, 3).
-
-    An entry is -1 unless the edge has exactly one other triangle.
-    """
+    """Find the one triangle across each edge (k, k+1), (t, 3); -1 if there is none, or several."""
     tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     edges = np.sort(np.column_stack([tail, head]), axis=1)
     _, place, uses = np.unique(edges, axis=0, return_inverse=True, return_counts=True)

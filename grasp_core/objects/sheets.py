@@ -87,10 +87,7 @@ def outward_sheets(points: Array, corners: Indices, *, largest_part: bool) -> Sh
 
 
 def _winding_of_parts(points: Array, corners: Indices, areas: Array, label: Indices) -> Array:
-    """Average the winding number over samples of each part, (parts,).
-
-    Parts that are too small and too many to be looked at count as lying on no solid.
-    """
+    """Average the winding number over samples of each part, (parts,); 0 for parts not looked at."""
     places = sampled(areas)
     _, first = np.unique(label, return_index=True)
     unseen = first[~np.isin(np.arange(len(first)), label[places])]

@@ -87,10 +87,7 @@ def surface_fault(corners: Indices) -> MeshError | None:
 
 
 def balanced(corners: Indices) -> bool:
-    """Return whether as many triangles run along each edge in one direction as in the other.
-
-    Such triangles have a whole winding number everywhere, so that they enclose a volume.
-    """
+    """Return whether edges are run along as often in both directions: a volume is enclosed then."""
     place, forward = edges_of(corners)
     return not np.bincount(place, weights=np.where(forward, 1.0, -1.0)).any()
 

@@ -211,10 +211,7 @@ taken, so that rounding decides nothing."""
 
 
 def with_halves(body: Polyhedron, apart: float) -> tuple[Polyhedron, tuple[int, ...]]:
-    """Add two half faces to an object for each face that is long enough for two contacts.
-
-    Gives also, for each face, the whole face that it is or is a part of.
-    """
+    """Add halves of faces that are long enough for two contacts; also list each face's owner."""
     faces, owners = list(body.faces), list(range(len(body.faces)))
     for index, face in enumerate(body.faces):
         halves = _halves(face, apart)

@@ -160,10 +160,7 @@ def nearest_like(
     parts: Sequence[FlatPart], point: Array, normal: Array, *, lean: float, reach: float,
     margin: float,
 ) -> Nearest | None:  # fmt: skip
-    """Find the point nearest to a given one on parts whose normals lean little from a given one.
-
-    Gives None if no such part is within reach.
-    """
+    """Find the point nearest to a given one on parts that lean little; None beyond reach."""
     normals = np.array([part.normal for part in parts])
     firsts = np.array([part.polygon[0] for part in parts])
     heights = np.einsum("ti,ti->t", normals, point - firsts)

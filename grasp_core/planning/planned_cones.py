@@ -89,10 +89,7 @@ class PlannedCones:
         return angle_limits(extent, widths, widest)
 
     def chosen(self, quads: Indices) -> tuple[Array, Array]:
-        """Choose force cones around the normals and tilted: axes (q, 2, 4, 3), half-angles (q, 2).
-
-        Half-angles are not positive where the choice does not exist.
-        """
+        """Choose cones around normals and tilted: axes (q, 2, 4, 3), half-angles or 0 (q, 2)."""
         normals, thetas = self.normals[quads], self._thetas[quads]
         axes = [normals, normals]
         half_angles = [_around(span_sines(normals), thetas), np.zeros(len(quads))]
@@ -136,10 +133,7 @@ class PlannedCones:
 
 
 def usable_half_angles(theta: float, spreads: Array) -> Array:
-    """Compute half-angles that stay inside the friction cones all over a curved patch [rad].
-
-    Where the patch leans too far they are positive, but too small for any construction.
-    """
+    """Compute half-angles inside friction cones all over a patch, too small where it leans."""
     return np.maximum(INSIDE_FRICTION * theta - spreads, 0.5 * LEAST_SPAN_ANGLE)
 
 

@@ -73,10 +73,7 @@ def _tip_radius(body: Polyhedron, finger: Finger | None) -> float:
 def carried(
     body: Polyhedron, grasp: Grasp, friction: float, rank_by: RankBy, finger: Finger | None = None
 ) -> float:
-    """Return what a planned grasp carries under one squeeze, as grasps are ranked by it.
-
-    Gives the mass [kg] or the multiple of the weight; 0 if no squeeze holds the object stably.
-    """
+    """Return the mass [kg] or multiple of the weight that ranks a grasp; 0 if none is held."""
     loads = any_direction(_mass(body, rank_by))
     tip = _tip_radius(body, finger)
     try:

@@ -54,8 +54,7 @@ class _GivenContact(_Strict):
 
 
 GivenContacts = Annotated[
-    list[_GivenContact],
-    Field(min_length=FEWEST_CONTACTS, max_length=MOST_CONTACTS, fail_fast=True),
+    list[_GivenContact], Field(min_length=FEWEST_CONTACTS, max_length=MOST_CONTACTS, fail_fast=True)
 ]
 
 

@@ -58,10 +58,7 @@ def plan_to_json(body: Polyhedron, plan: Plan) -> str:
             "name": body.name,
             "source_sha256": body.source_sha256,
             "content_sha256": body.content_sha256,
-            "mesh": {
-                "vertices_m": body.vertices.tolist(),
-                "triangles": body.triangles.tolist(),
-            },
+            "mesh": {"vertices_m": body.vertices.tolist(), "triangles": body.triangles.tolist()},
             "center_of_mass_m": body.center_of_mass.tolist(),
             "surface": surface_record(body.surface),
             "patches": None if body.patches is None else asdict(body.patches),
