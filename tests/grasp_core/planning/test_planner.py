@@ -289,8 +289,8 @@ def test_what_less_friction_holds_more_friction_holds(name, least):
         gc.plan(example_object(name), friction, families=METHODS, cones="tilted")
         for friction in (0.1, 0.3, 0.7)
     ]
-    for less, more in pairwise(plans):
-        held = [{tuple(sorted(g.faces)) for g in plan.grasps} for plan in (less, more)]
+    for pair in pairwise(plans):
+        held = [{tuple(sorted(g.faces)) for g in plan.grasps} for plan in pair]
         assert held[0] <= held[1]
         tested += len(held[0])
     assert tested >= least
