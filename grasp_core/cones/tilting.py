@@ -48,14 +48,12 @@ TOWARD = (0.5, 0.9)
 """Angles up to which axes may lean to meet in a point, in friction angles."""
 SWEEPS = 8
 MOVES = 60
-FIRST_MOVE = 0.2
-"""Length of the first random move, in friction angles."""
-GROWTH, DECAY = 1.3, 0.9
-"""Factors on the length of random moves, after a success and after a failure."""
 SLIGHT = 1e-6
 """Size below which improvements and directions decide nothing: vertices that are off by 1e-9 of an
 object turn the normals of its small faces by a hundred times that."""
-PACE = (FIRST_MOVE, GROWTH, DECAY, SLIGHT)
+PACE = (0.2, 1.3, 0.9, SLIGHT)
+"""Length of the first random move, in friction angles, its factors after a success and a failure,
+and the least improvement."""
 BESIDE = 0.1
 """Sine of the angle between two axes above which one can serve to find a direction across the
 other."""
@@ -130,7 +128,10 @@ def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> Ti
 def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
     best, half_angles = normals.copy(), half_angle(normals, normals, thetas)
     for cap in CAPS:
-        axes = _balanced(normals, cap * thetas)
+        # each unit vector in turn against the sum of the others, within a cap around its normal
+        axes = np.array(normals, order="C")
+        given = axes.copy(), np.ascontiguousarray(cap * thetas)
+        compiled(KERNEL).balance(axes, *given, SWEEPS, SLIGHT)
         reached = half_angle(axes, normals, thetas)
         better = reached > half_angles + SLIGHT
         best[better], half_angles[better] = axes[better], reached[better]
@@ -164,13 +165,6 @@ def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
     reached = np.empty(len(axes))
     compiled(KERNEL).half_angles(*map(np.ascontiguousarray, (axes, normals, thetas)), reached)
     return reached
-
-
-def _balanced(normals: Array, caps: Array) -> Array:
-    """Point each unit vector against the sum of the others, within caps around normals."""
-    axes = np.array(normals, order="C")
-    compiled(KERNEL).balance(axes, axes.copy(), np.ascontiguousarray(caps), SWEEPS, SLIGHT)
-    return axes
 
 
 def _into_cap(vectors: Array, centers: Array, angles: Array) -> Array:

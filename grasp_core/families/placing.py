@@ -1,11 +1,9 @@
 """Places contacts for many attempts of one construction, with the regions of the fingers.
 
-Convex pieces in the order of the fingers are taken with a force cone each. Compiled code
-solves the programs of the concurrent and the pencil construction and checks its answers by their
-residuals; what it does not prove is left to the construction itself, one attempt at a time.
-
-An attempt may have several choices of force cones, and its faces several convex pieces each. The
-contacts with the largest discs count, moved to the true surface where faces are curved.
+Compiled code solves the programs of the concurrent and the pencil construction and checks its
+answers by their residuals; what it does not prove is left to the construction itself, one attempt
+at a time. Of several choices of cones and pieces the contacts with the largest discs count, moved
+to the true surface where faces are curved.
 """
 
 import math

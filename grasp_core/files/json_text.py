@@ -1,10 +1,8 @@
 """Reads JSON text as plain values or checked records, and writes it with a line for each item.
 
 Cases that JSON leaves open are refused: a key twice in one object, numbers that are too large or
-not finite, very deep nesting, and characters that cannot be encoded. A file of another kind that
-graspproof writes is refused by its name. What pydantic finds wrong with a record becomes a
-sentence: field, expected, found value. In a text that is written, lines can be counted, searched
-and compared.
+not finite, very deep nesting, and characters that cannot be encoded. What pydantic finds wrong with
+a record becomes a sentence: field, expected, found value.
 """
 
 import json
