@@ -132,11 +132,7 @@ def of_order_one(*arrays: Array) -> list[Array]:
 
 
 def to_digits(values: Array, size: float = 0.0) -> Array:
-    """Round values to `DIGITS` digits of the largest of them, on a shifted grid.
-
-    The last bits of the answers of solvers depend on where their numbers lie in memory; results
-    that are simulated or written to files must not.
-    """
+    """Round values to `DIGITS` digits of the largest, so that no last bits of a solver show."""
     largest = max(float(np.abs(values).max(initial=0.0)), size)
     if largest == 0.0:
         return values
@@ -177,7 +173,6 @@ def is_indices(value: Any, *shape: int | None) -> TypeGuard[Indices]:
 
 
 def _fits(value: Any, kind: type, shape: tuple[int | None, ...]) -> bool:
-    """Return whether a value is a plain array of a type of entries and a shape."""
     if type(value) is not np.ndarray:
         return False
     array: NDArray[Any] = value

@@ -29,7 +29,6 @@ class ByValue:
     __slots__ = ()
 
     def __eq__(self, other: object) -> bool:
-        """Return whether another value is of the same class and has the same fields."""
         if self is other:
             return True
         if type(self) is not type(other):
@@ -50,7 +49,6 @@ class ByValue:
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Return whether two fields are equal."""
     if one is other:
         return True
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
@@ -76,23 +74,24 @@ def _is_nan(value: Any) -> bool:
 
 
 def _hashed(value: object, name: str) -> object:
-    """Return what a hash takes of a field: nothing where it would have to be computed."""
-    try:
-        kept = object.__getattribute__(value, name)
-    except AttributeError:
-        return None
-    if isinstance(kept, np.ndarray):
-        entries = cast("NDArray[Any]", kept)
+    known = kept(value, name)
+    if isinstance(known, np.ndarray):
+        entries = cast("NDArray[Any]", known)
         first = entries.flat[:HASHED_ENTRIES].tolist()
         return (entries.shape, *(0.0 if _is_nan(entry) else entry for entry in first))
-    return kept if isinstance(kept, HASHED) else None
+    return known if isinstance(known, HASHED) else None
+
+
+def kept(value: object, name: str) -> Any:
+    """Return a field as it is; None where it would have to be computed first."""
+    try:
+        return object.__getattribute__(value, name)
+    except AttributeError:
+        return None
 
 
 def trusted(kind: type[Item], /, **given: Any) -> Item:
-    """Make a frozen value without checking or copying its fields.
-
-    This is for thousands of values whose fields were computed and checked together.
-    """
+    """Make a frozen value of fields that were checked before, unchecked and uncopied."""
     made, put = object.__new__(kind), object.__setattr__
     for name in given:
         put(made, name, given[name])
@@ -130,7 +129,6 @@ def changed(settings: Any) -> str:
 
 
 def _usual(field: Field[Any]) -> object:
-    """Return the default of a field; `MISSING` where there is none."""
     made = field.default_factory
     return field.default if made is MISSING else made()
 

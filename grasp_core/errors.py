@@ -73,5 +73,7 @@ def about(where: object) -> Generator[None]:
     """Put the name of a file or a place in front of what an `InputError` in the block says."""
     try:
         yield
+    except MeshError as error:
+        raise MeshError(error.reason, f"{where}: {error.message}") from error
     except InputError as error:
         raise InputError(f"{where}: {error}") from error

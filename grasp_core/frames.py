@@ -39,10 +39,7 @@ def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:
 
 
 def poses_along(origins: Array, directions: Array) -> Array:
-    """Return poses whose z axes run along given directions, (k, 4, 4).
-
-    Takes `origins` (k, 3) [m]; `directions` (k, 3).
-    """
+    """Return poses whose z axes run along given directions, (k, 4, 4)."""
     poses = np.tile(np.eye(POSE), (len(origins), 1, 1))
     for pose, (x, y, z) in zip(poses, directions.tolist(), strict=True):
         pose[:3, :3] = np.array([*plane_tangents(x, y, z), (x, y, z)]).T
@@ -51,10 +48,7 @@ def poses_along(origins: Array, directions: Array) -> Array:
 
 
 def radians_of(degrees: float) -> float:
-    """Return the angle [rad] that `math.degrees` turns into these degrees exactly.
-
-    Degrees that no angle becomes exactly are converted as by `math.radians`.
-    """
+    """Return the angle [rad] that `math.degrees` turns into these degrees, or the usual one."""
     nearest = math.radians(degrees)
     beside = (math.nextafter(nearest, math.inf), math.nextafter(nearest, -math.inf))
     exact = (angle for angle in (nearest, *beside) if math.degrees(angle) == degrees)

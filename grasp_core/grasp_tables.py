@@ -46,19 +46,15 @@ class ById(Generic[Item]):
         return getattr(self, self.ITEMS)
 
     def __len__(self) -> int:
-        """Return the number of items."""
         return len(self._items)
 
     def __bool__(self) -> bool:
-        """Return True."""
         return True
 
     def __iter__(self) -> Iterator[Item]:
-        """Iterate over the items in their order."""
         return iter(self._items)
 
     def __contains__(self, wanted: object) -> bool:
-        """Return whether there is an item, or an item with an id."""
         return any(wanted in (item.id, item) for item in self._items)
 
     @overload

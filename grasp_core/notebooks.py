@@ -1,9 +1,7 @@
 """Lets values show themselves as pictures in notebooks, drawn by a package that stands on this one.
 
-This package draws nothing, and must not import the one that does. So `scenes` hands over a function
-when it is imported, and values ask for it: a notebook that has imported `scenes` shows pictures,
-any other shows the one line of `repr`. An entry point would do without that import, but it exists
-only where the package is installed, not where it lies on the path.
+This package must not import the one that draws: `scenes` hands over a function when it is imported,
+and values ask for it. Without `scenes` notebooks show `repr`.
 """
 
 from collections.abc import Callable

@@ -28,9 +28,8 @@ def versions() -> dict[str, str]:
     return dict(_installed())
 
 
-@cache
+@cache  # reading them takes as long as a tenth of a validation
 def _installed() -> Mapping[str, str]:
-    """Read the versions once per process: reading them takes as long as a tenth of a validation."""
     found = {"python": platform.python_version(), "machine": platform.machine()}
     for package in PACKAGES:
         try:

@@ -7,7 +7,7 @@ vectors that point into the object. Arrays are copied, checked and made read-onl
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, get_args
 
 import numpy as np
 
@@ -115,18 +115,6 @@ class Witness(ByValue):
         return summary("Witness", *(vector(force) for force in self.forces))
 
 
-class Figures(Protocol):
-    """Computes the figures of a grasp that are put off until somebody asks for them."""
-
-    def critical_friction(self) -> float:
-        """Return the grasp's critical friction."""
-        ...
-
-    def ferrari_canny(self) -> tuple[float, float]:
-        """Return the bounds of the grasp's quality."""
-        ...
-
-
 PUT_OFF = ("critical_friction", "ferrari_canny")
 """Fields of a grasp that may be computed when they are asked for."""
 
@@ -171,8 +159,8 @@ class Grasp(ByValue, InNotebooks):
     approach_directions: Array | None = None
     """Unit vector along which each finger moves in to its contact on a free line, (4, 3); None if
     no free lines were asked for (`plan(finger=...)`)."""
-    _figures: Figures | None = field(default=None, init=False, compare=False)
-    """Computes the figures at first use; None where they were given."""
+    _figures: Any = field(default=None, init=False, compare=False)
+    """Has a method for each figure that is `PUT_OFF`, by its name; None where they were given."""
 
     def __post_init__(self) -> None:
         text(self.id, "id")
@@ -203,10 +191,9 @@ class Grasp(ByValue, InNotebooks):
 
         def __getattr__(self, name: str) -> Any:
             """Compute a figure that was put off, and keep it."""
-            figures = self._figures if name in PUT_OFF else None
-            if figures is None:
+            if name not in PUT_OFF or self._figures is None:
                 raise AttributeError(f"a Grasp has no attribute {shown(name)}", name=name, obj=self)
-            object.__setattr__(self, name, getattr(figures, name)())
+            object.__setattr__(self, name, getattr(self._figures, name)())
             return getattr(self, name)
 
     @property
@@ -259,27 +246,6 @@ def _one_per_finger(value: Any, each: Callable[[Any], object], name: str, kind: 
     things = several(value, each, name, kind)
     if len(things) != FINGERS:
         raise InputError(f"a grasp needs {FINGERS} {name}, one per finger, got {len(things)}")
-
-
-def fill_in(
-    grasps: Iterable[Grasp], name: str, computed: Callable[[list[Figures]], Iterable[Any]]
-) -> None:
-    """Compute a figure that some grasps have put off, for all of them at once, and keep it."""
-    late = [
-        (grasp, way) for grasp in grasps
-        if (way := grasp._figures) is not None  # pyright: ignore[reportPrivateUsage] - our own
-        and not _is_known(grasp, name)
-    ]  # fmt: skip
-    for (grasp, _), value in zip(late, computed([way for _, way in late]), strict=True):
-        object.__setattr__(grasp, name, value)
-
-
-def _is_known(grasp: Grasp, name: str) -> bool:
-    try:
-        object.__getattribute__(grasp, name)  # which computes nothing
-    except AttributeError:
-        return False
-    return True
 
 
 def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:

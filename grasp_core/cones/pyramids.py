@@ -28,21 +28,14 @@ def inscribed_share(sides: int = PYRAMID_SIDES) -> float:
 
 
 def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES) -> Array:
-    """Compute inward unit normals g of a pyramid inscribed in a circular cone, (sides, 3).
-
-    All v with g.v >= 0 for all g are inside the cone.
-
-    Takes `toward` (3,).
-    """
+    """Compute inward unit normals g of a pyramid in a cone, which holds all v with g.v >= 0."""
     return pyramid_facets(cone.axis, cone.half_angle, toward, sides)
 
 
 def pyramid_facets(axes: Array, half_angle: float, toward: Array, sides: int) -> Array:
     """Compute inward unit normals of pyramids in equally wide cones, (..., sides, 3).
 
-    See `inscribed_facets` for what such a pyramid is.
-
-    Takes `axes`, `toward` (..., 3); `half_angle` [rad].
+    Takes `axes`, `toward` (..., 3). See `inscribed_facets` for what such a pyramid is.
     """
     first = toward - np.sum(toward * axes, axis=-1, keepdims=True) * axes
     first = first / np.linalg.norm(first, axis=-1, keepdims=True)

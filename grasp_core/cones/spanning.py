@@ -36,8 +36,6 @@ from grasp_core.errors import InputError
 from grasp_core.values import FINGERS
 
 SIGNS = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=np.float64)
-LARGEST_SPAN_ANGLE = math.asin(1.0 / 3.0)
-"""Largest span angle, which only the regular tetrahedron reaches [rad]."""
 KERNEL = "grasp_core.cones.spanning_kernel"
 FEW = 30
 """Number of directions up to which trying all quadruples is faster than loading compiled code."""
@@ -146,16 +144,7 @@ def cones_positively_span(axes: ArrayLike, half_angles: ArrayLike) -> bool:
         raise InputError(
             f"half_angles must be at least 0 and below pi/2 rad, got {angles.tolist()}"
         )
-    sines = np.sin(angles)
-    if not positively_span(units):
-        # positive spanning is what continuity in the derivation starts from
-        return False
-    for triple in combinations(range(4), 3):
-        # the corners of the box (1), whose sides now differ: none may reach the unit sphere
-        corners = np.linalg.solve(units[list(triple)], (SIGNS * sines[list(triple)]).T)
-        if np.linalg.norm(corners, axis=0).max() >= 1.0:
-            return False
-    return True
+    return bool(each_cones_positively_span(units[None], angles[None])[0])
 
 
 def angles_between(one: Array, other: Array) -> Array:
@@ -168,22 +157,20 @@ def angles_between(one: Array, other: Array) -> Array:
     return across
 
 
-def positively_span(vectors: Array) -> bool:
-    """Return whether four vectors, (4, 3), positively span R^3.
-
-    They do if they span R^3 and some combination with positive weights vanishes.
-    """
+def positively_span(vectors: Array) -> NDArray[np.bool_]:
+    """Return whether a combination of four vectors (..., 4, 3) with positive weights vanishes."""
     signed = signed_determinants(vectors)
-    return bool(signed.min() > DEPENDENT or signed.max() < -DEPENDENT)
+    found: NDArray[np.bool_] = (signed.min(axis=-1) > DEPENDENT) | (
+        signed.max(axis=-1) < -DEPENDENT
+    )
+    return found
 
 
 def balancing_weights(vectors: Array) -> Array:
-    """Return weights with sum w_i v_i = 0 that sum to one in absolute value, (..., 4).
-
-    All are positive where the four vectors, (..., 4, 3), positively span R^3.
-    """
+    """Return weights of sum w_i v_i = 0, sum |w_i| = 1; positive if vectors span, (..., 4)."""
     signed = signed_determinants(vectors)
-    total = np.maximum(np.abs(signed).sum(axis=-1, keepdims=True), _TINY)
+    tiny = float(np.finfo(np.float64).tiny)
+    total = np.maximum(np.abs(signed).sum(axis=-1, keepdims=True), tiny)
     return signed / total * np.sign(signed.sum(axis=-1, keepdims=True))
 
 
@@ -195,12 +182,10 @@ def signed_determinants(vectors: Array) -> Array:
 
 
 def triple_sine(one: Array, two: Array, three: Array) -> Array:
-    """Compute the sine of the half-angle at which three cones first touch one plane.
+    """Compute the term of one triple of axes (..., 3) in (2), (...): zero where they are coplanar.
 
-    It has the sign of the axes' determinant.
-
-    Takes `one`, `two`, `three` (..., 3). Gives the term of one triple in (2), (...): zero where the
-    three are coplanar.
+    It is the sine of the half-angle at which three cones first touch one plane, with the sign of
+    the axes' determinant.
     """
     one, two, three = np.broadcast_arrays(one, two, three)
     crosses = np.stack([np.cross(two, three), np.cross(three, one), np.cross(one, two)], axis=-2)
@@ -221,10 +206,7 @@ class SpanningQuadruples:
 
 
 def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruples:
-    """List all quadruples of directions that positively span at a larger angle than given.
-
-    Takes `normals` (n, 3); `least_angle` [rad].
-    """
+    """List all quadruples of directions that positively span at a larger angle than given."""
     return SpanningTable(normals, least_angle).quadruples(0, len(normals))
 
 
@@ -265,45 +247,27 @@ class SpanningTable:
 
 
 def _sorted(parts: Sequence[Indices], count: int) -> Indices:
-    """Sort quadruples of direction indices in lexicographic order, (q, 4)."""
     places = count ** np.arange(3, -1, -1)
     keys = np.sort(np.concatenate(parts) @ places)
     return keys[:, None] // places % count
 
 
-_TINY = float(np.finfo(np.float64).tiny)
-
-
 def span_angles(normals: Array) -> Array:
-    """Find the span angle of many quadruples of unit vectors (q, 4, 3), (q,) [rad].
-
-    Gives theta* of each; 0.0 where the vectors do not positively span R^3.
-    """
+    """Find the span angles of quadruples (q, 4, 3), (q,) [rad]; 0.0 where they do not span."""
     triples = normals[:, TRIPLES]
     # (2), the minimum over signs being taken in `triple_sine`
     sines = np.abs(triple_sine(triples[:, :, 0], triples[:, :, 1], triples[:, :, 2]))
     least = sines.min(axis=1, initial=1.0)
-    return np.where(each_positively_spans(normals), np.arcsin(least), 0.0)
-
-
-def each_positively_spans(vectors: Array) -> NDArray[np.bool_]:
-    """Return which quadruples of vectors (q, 4, 3) positively span R^3, (q,)."""
-    signed = signed_determinants(vectors)
-    spans: NDArray[np.bool_] = (signed.min(axis=-1) > DEPENDENT) | (
-        signed.max(axis=-1) < -DEPENDENT
-    )
-    return spans
+    return np.where(positively_span(normals), np.arcsin(least), 0.0)
 
 
 def each_cones_positively_span(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
-    """Return for many quadruples of circular cones whether they satisfy the generalised P3, (q,).
-
-    Takes `axes` (q, 4, 3); `half_angles` (q, 4) [rad].
-    """
-    spans = each_positively_spans(axes)
+    """Return which quadruples of circular cones satisfy the generalised P3, (q,)."""
+    # positive spanning is what continuity in the derivation starts from
+    spans = positively_span(axes)
     triples = axes[spans][:, TRIPLES]
     sines = np.sin(half_angles[spans])[:, TRIPLES]
-    # the corners of the box (1), whose sides differ: none may reach the unit sphere
+    # the corners of the box (1), whose sides now differ: none may reach the unit sphere
     corners = np.linalg.solve(triples, (SIGNS * sines[:, :, None]).swapaxes(-1, -2))
     spans[spans] = np.linalg.norm(corners, axis=-2).max(axis=(1, 2), initial=0.0) < 1.0
     return spans

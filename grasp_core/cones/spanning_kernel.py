@@ -27,10 +27,7 @@ def empty_table(count: int) -> NDArray[np.uint64]:
 
 @loop()
 def extend(table: NDArray[np.uint64], units: Array, start: int, end: int, least: float) -> None:
-    """Enter the directions start .. end - 1 into the table.
-
-    Takes `units` (n, 3).
-    """
+    """Enter the directions start .. end - 1 into the table."""
     for k in range(start, end):
         to_k = np.empty(k)
         for i in range(k):
@@ -50,10 +47,7 @@ def extend(table: NDArray[np.uint64], units: Array, start: int, end: int, least:
 
 @loop()
 def quadruples(table: NDArray[np.uint64], newest: int, found: Indices) -> int:
-    """List the spanning quadruples of one direction and three earlier ones.
-
-    Gives how many quadruples there are.
-    """
+    """List the spanning quadruples of one direction and three earlier ones; return their number."""
     count = 0
     word, bit = newest // WORD, np.uint64(1) << np.uint64(newest % WORD)
     for i in range(newest):
@@ -107,7 +101,6 @@ def _completed(
 
 @loop()
 def _place(bit: np.uint64) -> int:
-    """Return which bit of a word is set."""
     place, size = 0, 32
     while size:
         if bit >> np.uint64(size):
@@ -128,7 +121,6 @@ def _mark(table: NDArray[np.uint64], i: int, j: int, k: int) -> None:
 
 @loop()
 def _sine(u: Array, v: Array, w: Array) -> float:
-    """Return the absolute value of `triple_sine` of `spanning`."""
     x, y, z = _crossed(v, w)
     determinant = abs(x * u[0] + y * u[1] + z * u[2])
     if determinant <= DEPENDENT:
@@ -146,8 +138,4 @@ def _longest_squared(g: float, h: float, k: float) -> float:
 
 @loop()
 def _crossed(u: Array, v: Array) -> tuple[float, float, float]:
-    return (
-        u[1] * v[2] - u[2] * v[1],
-        u[2] * v[0] - u[0] * v[2],
-        u[0] * v[1] - u[1] * v[0],
-    )
+    return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])

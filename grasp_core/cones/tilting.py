@@ -27,6 +27,9 @@ Then all four are moved at random, in steps that grow with success and shrink wi
 the same for any quadruple, in frames that turn with it, so that turned objects get turned cones.
 
 Source: this project's; P3 with its closed form is explained in `spanning`.
+
+Arrays have a row for each of q quadruples: normals, axes and directions are (q, 4, 3), friction
+angles `thetas` (q, 4) and half-angles (q,) [rad].
 """
 
 from dataclasses import dataclass
@@ -45,14 +48,12 @@ TOWARD = (0.5, 0.9)
 """Angles up to which axes may lean to meet in a point, in friction angles."""
 SWEEPS = 8
 MOVES = 60
-FIRST_MOVE = 0.2
-"""Length of the first random move, in friction angles."""
-GROWTH, DECAY = 1.3, 0.9
-"""Factors on the length of random moves, after a success and after a failure."""
 SLIGHT = 1e-6
 """Size below which improvements and directions decide nothing: vertices that are off by 1e-9 of an
 object turn the normals of its small faces by a hundred times that."""
-PACE = (FIRST_MOVE, GROWTH, DECAY, SLIGHT)
+PACE = (0.2, 1.3, 0.9, SLIGHT)
+"""Length of the first random move, in friction angles, its factors after a success and a failure,
+and the least improvement."""
 BESIDE = 0.1
 """Sine of the angle between two axes above which one can serve to find a direction across the
 other."""
@@ -77,10 +78,7 @@ class TiltedCones:
 
 
 def tilted_cones(normals: Array, thetas: Array) -> TiltedCones:
-    """Search for wide force cones that positively span, for many quadruples.
-
-    Takes `normals` (q, 4, 3); `thetas` (q, 4) [rad].
-    """
+    """Search for wide force cones that positively span, for many quadruples."""
     cuts = [*range(0, len(normals), CHUNK), len(normals)]
     parts = [_search(normals[i:j], thetas[i:j]) for i, j in pairwise(cuts)]
     if not parts:
@@ -94,8 +92,6 @@ def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
 
     Where the normals span, the smallest over m of max angle(n_i, m) - 90 deg is theta*. Else it is
     negative, and taken where m is in the middle of two normals, or as far from three.
-
-    Takes `normals` (q, 4, 3); `thetas` (q, 4) [rad]; `sines` (q,).
     """
     lowest = np.empty(len(normals))
     compiled(KERNEL).lowest_heights(np.ascontiguousarray(normals), lowest)
@@ -106,19 +102,13 @@ def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
 
 
 def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:
-    """Search for force cones with axes near given directions inside the friction cones.
-
-    Takes `directions`, `normals` (q, 4, 3); `thetas` (q, 4) [rad].
-    """
+    """Search for force cones with axes near given directions inside the friction cones."""
     axes = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
     return TiltedCones(*_improved(axes, normals, thetas))
 
 
 def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> TiltedCones:
-    """Search for force cones whose axes lean towards common points as far as possible.
-
-    Takes `points` (q, 3); `positions`, `normals` (q, 4, 3); `thetas` (q, 4) [rad].
-    """
+    """Search for force cones whose axes lean towards common points as far as possible."""
     ways = points[:, None] - positions
     inward = np.einsum("qfi,qfi->qf", ways, normals)
     ways = ways * np.where(inward < -SLIGHT, -1.0, 1.0)[..., None]  # away from points outside
@@ -138,7 +128,10 @@ def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> Ti
 def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
     best, half_angles = normals.copy(), half_angle(normals, normals, thetas)
     for cap in CAPS:
-        axes = _balanced(normals, cap * thetas)
+        # each unit vector in turn against the sum of the others, within a cap around its normal
+        axes = np.array(normals, order="C")
+        given = axes.copy(), np.ascontiguousarray(cap * thetas)
+        compiled(KERNEL).balance(axes, *given, SWEEPS, SLIGHT)
         reached = half_angle(axes, normals, thetas)
         better = reached > half_angles + SLIGHT
         best[better], half_angles[better] = axes[better], reached[better]
@@ -152,11 +145,7 @@ def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
 
 
 def _bent(axes: Array, reached: Array, normals: Array, thetas: Array) -> tuple[Array, Array]:
-    """Bend axes out of a plane in which the normals nearly lie, two to either side.
-
-    Takes `axes`, `normals` (q, 4, 3); `reached` (q,) [rad]; `thetas` (q, 4) [rad]. Gives axes and
-    half-angles, with bent axes where they are better.
-    """
+    """Bend axes out of a plane in which the normals nearly lie, two to either side, if better."""
     _, _, directions = np.linalg.svd(normals)
     across = directions[:, 2]
     turns = np.cross(normals[:, :1], normals[:, 1:])
@@ -176,13 +165,6 @@ def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
     reached = np.empty(len(axes))
     compiled(KERNEL).half_angles(*map(np.ascontiguousarray, (axes, normals, thetas)), reached)
     return reached
-
-
-def _balanced(normals: Array, caps: Array) -> Array:
-    """Point each unit vector against the sum of the others, within caps around normals."""
-    axes = np.array(normals, order="C")
-    compiled(KERNEL).balance(axes, axes.copy(), np.ascontiguousarray(caps), SWEEPS, SLIGHT)
-    return axes
 
 
 def _into_cap(vectors: Array, centers: Array, angles: Array) -> Array:

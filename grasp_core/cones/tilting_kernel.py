@@ -51,10 +51,7 @@ def _height(normals: Array, middle: Array, side: float) -> float:
 
 @loop()
 def balance(axes: Array, normals: Array, caps: Array, sweeps: int, slight: float) -> None:
-    """Point each axis in turn against the sum of the others, within a cap around its normal.
-
-    Takes `axes`, `normals` (q, 4, 3); `caps` (q, 4) [rad].
-    """
+    """Point each axis in turn against the sum of the others, within a cap around its normal."""
     against = np.empty(3)
     for q in range(len(axes)):
         cosines, sines = np.cos(caps[q]), np.sin(caps[q])
@@ -83,11 +80,7 @@ def bend(
     signs: Array,
     pace: Array,
 ) -> None:
-    """Lean axes to either side of a plane, and keep those that allow the widest cones.
-
-    Takes `cones` (q, 4, 3) or (q,) [rad]; `normals` (q, 4, 3); `thetas` (q, 4) [rad]; `across` (q,
-    3); `signs` (s, 4).
-    """
+    """Lean axes to either side of a plane, and keep those that allow the widest cones."""
     (axes, reached), bent, way = cones, np.empty((FINGERS, 3)), np.empty(3)
     for q in range(len(axes)):
         for s in range(len(signs)):
@@ -97,12 +90,7 @@ def bend(
                         way[d] = signs[s, finger] * across[q, d]
                     angle = cap * thetas[q, finger]
                     _into_cap(
-                        way,
-                        normals[q, finger],
-                        np.cos(angle),
-                        np.sin(angle),
-                        pace[0],
-                        bent[finger],
+                        way, normals[q, finger], np.cos(angle), np.sin(angle), pace[0], bent[finger]
                     )
                 floor = reached[q] + pace[0]
                 now = _half_angle(bent, normals[q], thetas[q], floor)
@@ -120,11 +108,7 @@ def improve(
     moves: Array,
     pace: Array,
 ) -> None:
-    """Move all four axes of each quadruple at random, and keep moves that widen the cones.
-
-    Takes `cones` (q, 4, 3) or (q,) [rad]; `normals` (q, 4, 3); `thetas` (q, 4) [rad]; `frames` (2,
-    q, 4, 3); `moves` (moves, 4, 2); `pace` (4,).
-    """
+    """Move all four axes of each quadruple at random, and keep moves that widen the cones."""
     (axes, reached), moved = cones, np.empty((FINGERS, 3))
     for q in range(len(axes)):
         reached[q] = _half_angle(axes[q], normals[q], thetas[q], -np.inf)

@@ -69,7 +69,7 @@ MIXED_SIDES: tuple[Sides, ...] = tuple(
 
 
 def place_concurrent(
-    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least: float
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], least: float
 ) -> Placement | NoPlacement:
     """Place a focus before or behind all fingers, and the largest four equal discs."""
     widest = math.tan(max(cone.half_angle for cone in cones))
@@ -78,7 +78,7 @@ def place_concurrent(
 
 
 def place_on_mixed_sides(
-    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], *, least: float
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone], least: float
 ) -> Placement | NoPlacement:
     """Place a focus before some fingers and behind the others, with four discs.
 
@@ -94,10 +94,7 @@ def _best(
     patterns: Iterable[tuple[Sides, float]],
     least: float,
 ) -> Placement | NoPlacement:
-    """Place the largest discs over several patterns of sides.
-
-    Each pattern comes with an upper bound on its discs.
-    """
+    """Place the largest discs over patterns of sides, each with an upper bound on its discs."""
     best: Placement | None = None
     bound = -math.inf
     for sides, limit in patterns:
@@ -114,10 +111,7 @@ def _best(
 
 
 def _reaches(pieces: Sequence[FacePiece], cones: Sequence[ForceCone]) -> tuple[float, float]:
-    """Bound the weighted mean distance of contacts from a focus before or behind all fingers.
-
-    These are the s_i of (5).
-    """
+    """Bound the weighted mean of the s_i of (5) for a focus before and behind all fingers."""
     heights = [
         cone.axis @ (piece.origin[:, None] + piece.frame @ piece.corners.T)
         for piece, cone in zip(pieces, cones, strict=True)
@@ -136,20 +130,15 @@ def place_on_sides(
     discs = largest_discs(A, b, RADII, SMALLEST, least)
     if isinstance(discs, NoPlacement):
         return discs
-    x = discs.x
-    y = x[3:11].reshape(FINGERS, 2)
+    x, merit = discs
+    y, focus = x[3:11].reshape(FINGERS, 2), x[:3]
     positions = np.array([piece.point(at) for piece, at in zip(pieces, y, strict=True)])
-    focus, radii = x[:3], x[RADII]
     forces = balanced_forces(pieces, np.array(sides)[:, None] * (focus - positions))
-    return Placement(positions, forces, focus[None], radii, discs.merit)
+    return Placement(positions, forces, focus[None], x[RADII], merit)
 
 
 def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array, contact: Array) -> Array:
-    """Cut a piece to where a line in the force cone meets the focus, (k, 3).
-
-    The result is the inverted cone of section 3.1 on the contact's side of the focus, inscribed by
-    the same pyramid as in the program.
-    """
+    """Cut a piece to the inverted cone of section 3.1 on the contact's side of a focus, (k, 3)."""
     side = 1.0 if float(cone.axis @ (focus - contact)) > 0.0 else -1.0
     G = side * inscribed_facets(cone, piece.frame[:, 0])
     # (1) and (3) with r = 0 and x0 fixed bound the point y alone
@@ -162,8 +151,6 @@ def concurrent_radius_bounds(reaches: Array, _: Array, half_angles: Array) -> Ar
     """Bound the disc radii of concurrent grasps from above, (..., 1).
 
     The bound is (5), as the least s_i is at most the weighted mean of all s_i.
-
-    Takes `reaches` [object radii]; `half_angles` [rad].
     """
     bounds: Array = reaches * np.tan(half_angles)
     return bounds[..., None]

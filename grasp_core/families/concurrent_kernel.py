@@ -2,7 +2,8 @@
 
 Numbers in comments are those of its derivation. Regions are cut as its `cone_footprint` does.
 Bounds are those of the program with one common radius, over (x0, y_1 .. y_4, r), for a focus before
-and behind all fingers; `discs_kernel` says why one radius is enough.
+and behind all fingers; `discs_kernel` says why one radius is enough. `turns` (m, 2) are the
+directions of a pyramid's facets.
 """
 
 import numpy as np
@@ -51,10 +52,7 @@ def place(
     least: Array,
     placed: Placed,
 ) -> None:
-    """Place a focus and the largest four equal discs for each attempt.
-
-    Takes `turns` (m, 2); `patterns` (p, 4); `least` (a,).
-    """
+    """Place a focus and the largest four equal discs for each attempt."""
     x = np.empty(VARIABLES)
     for a in range(len(least)):
         count = FINGERS * (len(turns) + 1) + edges_of(faces, attempts, a)
@@ -126,7 +124,6 @@ def _finger_rows(
 def _take(
     faces: FaceTable, attempts: Attempts, a: int, sides: Array, x: Array, placed: Placed
 ) -> None:
-    """Fill in the placement of one attempt from its program's variables."""
     ways, weights, pushes = np.empty((FINGERS, 3)), np.empty(FINGERS), 0.0
     for finger in range(FINGERS):
         face, y = attempts.faces[a, finger], 3 + 2 * finger
@@ -148,16 +145,9 @@ def _take(
 
 @loop("numpy")
 def footprints(
-    faces: FaceTable,
-    attempts: Attempts,
-    turns: Array,
-    placed: Placed,
-    cut: Footprints,
+    faces: FaceTable, attempts: Attempts, turns: Array, placed: Placed, cut: Footprints
 ) -> None:
-    """Cut the faces of each placed attempt to where a line in the force cone meets the focus.
-
-    Takes `turns` (m, 2).
-    """
+    """Cut the faces of each placed attempt to where a line in the force cone meets the focus."""
     polygons, counts, radii = cut
     most = polygons.shape[2]
     flat, heights = np.empty((2, most, 2)), np.empty(most)
@@ -266,10 +256,7 @@ def _inscribed_radius(polygon: Array, count: int) -> float:
 def concurrent_bounds(
     faces: FaceTable, attempts: Attempts, turns: Array, least: float, bounds: Array
 ) -> None:
-    """Bound the discs of concurrent grasps, with the focus before or behind all fingers.
-
-    Takes `turns` (m, 2); `bounds` (a,).
-    """
+    """Bound the discs of concurrent grasps, with the focus before or behind all fingers."""
     corners = Corners(faces.corners, faces.edges)
     room = np.empty((BOUND_VARIABLES + 2) * FINGERS * (len(turns) + faces.E.shape[1]))
     for a in range(len(bounds)):

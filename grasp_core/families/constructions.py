@@ -2,20 +2,16 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
-from grasp_core.families.concurrent import (
-    cone_footprint,
-    place_concurrent,
-    place_on_mixed_sides,
-)
+from grasp_core.families.concurrent import cone_footprint, place_concurrent, place_on_mixed_sides
 from grasp_core.families.pencil import place_pencil
-from grasp_core.families.placements import NoPlacement, Placement
+from grasp_core.families.placements import LEAST_RADIUS, NoPlacement, Placement
 from grasp_core.families.regulus import nearly_symmetric, place_regulus
 from grasp_core.objects.face_pieces import FacePiece, inscribed_disc_radius
 from grasp_core.values import ContactRegion, Family, ForceCone
@@ -26,9 +22,6 @@ Region: TypeAlias = Callable[[FacePiece, ForceCone, Placement, int], ContactRegi
 AS_LISTED: tuple[FingerOrder, ...] = ((0, 1, 2, 3),)
 PAIRINGS: tuple[FingerOrder, ...] = ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))
 """The three ways to group four faces into the pairs (first, second) and (third, fourth)."""
-LEAST_RADIUS = 1e-3
-"""Least radius, relative to the object's, of a disc that counts as a region to stand in; foci of a
-pencil that are closer than this count as one point."""
 DISC_CORNERS = 64
 """Number of points that are listed on the border of a disc."""
 
@@ -67,9 +60,14 @@ def _cone_region(
     return ContactRegion("cone", polygon, inscribed_disc_radius(polygon, piece))
 
 
-def _disc_region(piece: FacePiece, _: ForceCone, placed: Placement, finger: int) -> ContactRegion:
+def circle() -> Array:
+    """Return points on the border of a disc of radius one, (n, 2)."""
     turns = 2.0 * np.pi * np.arange(DISC_CORNERS) / DISC_CORNERS
-    ring = np.column_stack([np.cos(turns), np.sin(turns)]) @ piece.frame.T
+    return np.column_stack([np.cos(turns), np.sin(turns)])
+
+
+def _disc_region(piece: FacePiece, _: ForceCone, placed: Placement, finger: int) -> ContactRegion:
+    ring = circle() @ piece.frame.T
     radius = float(placed.radii[finger])
     return ContactRegion("disc", placed.positions[finger] + radius * ring, radius)
 
@@ -89,37 +87,17 @@ def point_region(_: FacePiece, __: ForceCone, placed: Placement, finger: int) ->
     return ContactRegion("point", placed.positions[finger][None], 0.0)
 
 
-MIXED = Construction(
-    "concurrent",
-    AS_LISTED,
-    lambda pieces, cones, least: place_on_mixed_sides(pieces, cones, least=least),
-    slice(0, 1),
-    _always_admitted,
-    _cone_region,
-)
-"""Construction of concurrent grasps with the focus before some fingers and behind the others."""
-
 CONSTRUCTIONS: dict[Family, Construction] = {
     "concurrent": Construction(
-        "concurrent",
-        AS_LISTED,
-        lambda pieces, cones, least: place_concurrent(pieces, cones, least=least),
-        slice(0, 1),
-        _always_admitted,
-        _cone_region,
+        "concurrent", AS_LISTED, place_concurrent, slice(0, 1), _always_admitted, _cone_region
     ),
     "pencil": Construction(
-        "pencil",
-        PAIRINGS,
-        lambda pieces, cones, least: place_pencil(
-            pieces, cones, least=least, least_gap=LEAST_RADIUS
-        ),
-        slice(1, 4),
-        _always_admitted,
-        _disc_region,
+        "pencil", PAIRINGS, place_pencil, slice(1, 4), _always_admitted, _disc_region
     ),
     "regulus": Construction(
         "regulus", PAIRINGS, lambda pieces, cones, _: place_regulus(pieces, cones), None,
         nearly_symmetric, point_region,
     ),
 }  # fmt: skip
+MIXED = replace(CONSTRUCTIONS["concurrent"], place=place_on_mixed_sides)
+"""Construction of concurrent grasps with the focus before some fingers and behind the others."""

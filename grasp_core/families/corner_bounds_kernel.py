@@ -22,17 +22,9 @@ NO_LEAN = 1e-6
 
 @loop()
 def fill(
-    corners: Corners,
-    normals: Array,
-    faces: Indices,
-    axes: Array,
-    half_angles: Array,
-    limits: Array,
+    corners: Corners, normals: Array, faces: Indices, axes: Array, half_angles: Array, limits: Array
 ) -> None:
-    """Bound the discs of many quadruples from above (see `disc_limits`).
-
-    Takes `normals` (f, 3); `faces`, `limits` (q, 4); `axes` (q, 4, 3); `half_angles` (q,) [rad].
-    """
+    """Bound the discs of many quadruples from above (see `disc_limits`)."""
     for q in range(len(faces)):
         if half_angles[q] <= 0.0:  # there are no such cones, and so no discs
             limits[q] = 0.0

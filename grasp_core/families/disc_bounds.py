@@ -47,9 +47,10 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
 from grasp_core.families.concurrent import concurrent_radius_bounds
-from grasp_core.families.constructions import LEAST_RADIUS, PAIRINGS, Construction
+from grasp_core.families.constructions import PAIRINGS, Construction
 from grasp_core.families.kernel_tables import Attempts, Corners, FaceTable, face_table
 from grasp_core.families.pencil import pencil_radius_bounds
+from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.families.regulus import regulus_bounds
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.objects.polyhedron import Polyhedron
@@ -66,10 +67,7 @@ KERNELS: dict[Family, str] = {
 
 
 def corners_of(body: Polyhedron) -> Corners:
-    """Return the corners of each face at object size one, the first corner repeated.
-
-    Lengths are divided by the object's radius and counted from its centre of mass.
-    """
+    """Return the corners of each face, padded, about the centre of mass and over the radius."""
     corners = [
         (np.vstack([face.polygon, *face.holes]) - body.center_of_mass) / body.radius
         for face in body.faces
@@ -83,11 +81,9 @@ def corners_of(body: Polyhedron) -> Corners:
 def disc_limits(
     corners: Corners, normals: Array, faces: Indices, axes: Array, half_angles: Array
 ) -> Array:
-    """Bound the radius of the smallest disc of many quadruples from above, (q, 4).
+    """Bound the smallest disc of quadruples (q, 4) with axes (q, 4, 3) from above, (q, 4).
 
-    Takes `normals` (f, 3); `faces` (q, 4); `axes` (q, 4, 3); `half_angles` (q,) [rad]. Gives upper
-    bounds on the smallest of four discs: in a concurrent grasp, then in a pencil in each of the
-    `PAIRINGS`. They are in units of the corners.
+    Columns: a concurrent grasp, a pencil in each of the `PAIRINGS`; in units of the corners.
     """
     limits = np.empty((len(faces), 1 + len(PAIRINGS)))
     compiled(KERNEL).fill(
@@ -98,10 +94,7 @@ def disc_limits(
 
 
 def angle_limits(extent: float, widths: Array, half_angles: Array) -> Array:
-    """Bound the discs from above where only the cones' half-angles are known, (q, 4).
-
-    Takes `widths` (q, 4, 4); `half_angles` (q,) [rad].
-    """
+    """Bound the discs from above where only the cones' half-angles are known, (q, 4)."""
     reaches = np.full(len(half_angles), extent)
     concurrent = concurrent_radius_bounds(reaches, widths, half_angles)
     return np.hstack([concurrent, pencil_radius_bounds(reaches, widths, half_angles, PAIRINGS)])
@@ -119,11 +112,9 @@ def distances(corners: Corners) -> Array:
 def widths_apart(faces: Indices, apart: Array, halves: Array, leaning: Array) -> Array:
     """Bound the sum of two contacts' distances from a common focus, (q, 4, 4).
 
-    These are the s_i + s_j of (2), for axes that lean from the normals. The vector d of (2) has the
-    length 2 / |a_i - a_j|, and the angle between the axes differs from the angle between the
-    normals by at most the sum of both leans.
-
-    Takes `faces` (q, 4); `apart` (f, f); `halves` (f, f) [rad]; `leaning` (q,) [rad].
+    These are the s_i + s_j of (2), for axes that lean from the normals by up to `leaning`. The
+    vector d of (2) has the length 2 / |a_i - a_j|, and the angle between the axes differs from the
+    angle between the normals, twice `halves` (f, f) [rad], by at most the sum of both leans.
     """
     widths = np.full((len(faces), FINGERS, FINGERS), np.inf)
     for i, j in combinations(range(FINGERS), 2):
@@ -168,5 +159,4 @@ class AttemptBounds:
 
     @cached_property
     def _table(self) -> FaceTable:
-        """Put the hulls of all faces into one table."""
         return face_table([shape.hull if shape else None for shape in self.shapes])

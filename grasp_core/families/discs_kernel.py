@@ -100,10 +100,7 @@ class Program(NamedTuple):
 
 @loop("numpy")
 def largest_discs(program: Program, least: float, x: Array) -> tuple[int, float]:
-    """Find the largest four equal discs, then enlarge each.
-
-    Takes `x` (n,). Gives how it ended, and the largest value of the smallest radius.
-    """
+    """Find the largest four equal discs, then enlarge each; return the end and the radius."""
     A, b, radii, smallest = program
     count, n = len(b) - 2, len(x)
     c = np.zeros(n)
@@ -132,8 +129,7 @@ def largest_discs(program: Program, least: float, x: Array) -> tuple[int, float]
 def optimum(c: Array, A: Array, b: Array, cutoff: float, x: Array) -> tuple[int, float]:
     """Maximise c.x subject to A x <= b, with the checks of `solvers.lp`.
 
-    Takes `c`, `x` (n,); `A` (rows, n); `b` (rows,). Gives `PLACED` and the optimum; `NONE` where a
-    bound below the cutoff is proved; or `LEFT`.
+    Gives `PLACED` and the optimum; `NONE` where a bound below the cutoff is proved; or `LEFT`.
     """
     count, n = A.shape
     rows = Rows(np.empty((n, count)), np.empty(count), np.empty(count), 0)

@@ -50,7 +50,7 @@ is that of Omata's virtual fingers (1991), the rest is this project's.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 from typing import Any
@@ -103,18 +103,6 @@ SAME_CORNERS = 1e-12
 """Distance of a proof's contacts from the corners of its part that counts as rounding."""
 
 
-def random_parts(
-    pieces: Sequence[FacePiece], rng: np.random.Generator, count: int
-) -> Iterator[Corners]:
-    """Yield the four pieces, each shrunk about a random point of it."""
-    for _ in range(count):
-        parts: list[Array] = []
-        for piece in pieces:
-            about = rng.dirichlet(np.ones(len(piece.corners))) @ piece.corners
-            parts.append(about + SMALLER * (piece.corners - about))
-        yield tuple(parts)
-
-
 def corner_contacts(pieces: Sequence[FacePiece], part: Corners) -> tuple[Array, Array]:
     """Put contacts at all corners of a part; return positions and normals, each (k, 3)."""
     points = [p.origin + corners @ p.frame.T for p, corners in zip(pieces, part, strict=True)]
@@ -128,18 +116,17 @@ def part_at(pieces: Sequence[FacePiece], path: Path) -> Corners:
     for half in path:
         spans = [_longest(corners) for corners in part]
         widest = first_best([length for length, _ in spans])
-        part[widest] = _half(part[widest], spans[widest][1], half)
+        along, sign = spans[widest][1], 1.0 if half == 0 else -1.0
+        heights = part[widest] @ along
+        middle = 0.5 * float(heights.min() + heights.max())
+        part[widest] = clip(part[widest], sign * along[None], np.array([sign * middle]))
     return tuple(part)
 
 
-def is_path(value: Any) -> bool:
-    """Return whether a value is a path: a tuple of halves that is not too long."""
-    return is_tuple_of(value, int) and len(value) <= DEEPEST and set(value) <= {0, 1}
-
-
-def cover_everything(paths: Sequence[Path]) -> bool:
-    """Return whether parts, none of them inside another, together make up the whole."""
-    halves = all(half in {0, 1} for path in paths for half in path)
+def _cover_everything(paths: Sequence[Any]) -> bool:
+    """Return whether paths name parts, none inside another, that together make up the whole."""
+    if not all(is_tuple_of(p, int) and len(p) <= DEEPEST and set(p) <= {0, 1} for p in paths):
+        return False
     apart = not any(
         two[: len(one)] == one
         for i, one in enumerate(paths)
@@ -149,7 +136,7 @@ def cover_everything(paths: Sequence[Path]) -> bool:
     # a part after k cuts is 2^-k of the whole; whole numbers keep the sum exact
     deepest = max((len(path) for path in paths), default=0)
     shares = sum(1 << (deepest - len(path)) for path in paths)
-    return halves and apart and shares == 1 << deepest
+    return apart and shares == 1 << deepest
 
 
 def _longest(corners: Array) -> tuple[float, Array]:
@@ -158,13 +145,6 @@ def _longest(corners: Array) -> tuple[float, Array]:
     lengths = np.linalg.norm(between, axis=1)
     far = first_best(lengths)
     return float(lengths[far]), between[far] / lengths[far]
-
-
-def _half(corners: Array, along: Array, half: int) -> Array:
-    heights = corners @ along
-    middle = 0.5 * float(heights.min() + heights.max())
-    sign = 1.0 if half == 0 else -1.0
-    return clip(corners, sign * along[None], np.array([sign * middle]))
 
 
 def grasp_from_patch(
@@ -186,11 +166,9 @@ def grasp_from_patch(
     # (9): pressed harder, a corner draws the contact nearer
     pushes, _ = normal_and_tangential(at_corners, patch.normals)
     weights = np.maximum(pushes, ROUNDED)
+    at = [owner == i for i in range(FINGERS)]
     centers = np.array(
-        [
-            np.average(patch.positions[owner == i], axis=0, weights=weights[owner == i])
-            for i in range(FINGERS)
-        ]
+        [np.average(patch.positions[own], axis=0, weights=weights[own]) for own in at]
     )
     inset = min(piece.inset(at) for piece, at in zip(pieces, centers, strict=True))
     if inset < LEAST_INSET or _on_one_line(centers):
@@ -201,10 +179,7 @@ def grasp_from_patch(
 def smallest_forces(
     pieces: Sequence[FacePiece], points: Array, normals: Array, friction: float, depth: float
 ) -> Array | None:
-    """Find the smallest balanced forces at points of pieces, (k, 3), or None if there are none.
-
-    Takes `points`, `normals` (k, 3).
-    """
+    """Find the smallest balanced forces at points of pieces, (k, 3), or None if there are none."""
     # (4): f_0 is the least-squares solution, Z spans what it leaves free
     conditions = np.vstack([grasp_map(points), normals.reshape(1, -1)])
     left, sizes, right = np.linalg.svd(conditions)
@@ -221,11 +196,7 @@ def smallest_forces(
 
 
 def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | None:
-    """Place contacts at which given forces balance, as far from the edges as possible.
-
-    Takes `forces` (4, 3). Gives the placement; None if the contacts would be too near an edge or on
-    one line.
-    """
+    """Place contacts where forces balance, far from the edges; None near one or on one line."""
     A_eq = np.zeros((3, 2 * FINGERS + 1))
     b_eq = np.zeros(3)
     rows: list[Array] = []
@@ -347,8 +318,7 @@ class Absence(ByValue):
                 and all(piece.sound() for piece in self.pieces)
                 and is_tuple_of(self.leaves, tuple)
                 and all(len(leaf) == len(("path", "proof")) for leaf in self.leaves)
-                and all(is_path(path) for path, _ in self.leaves)
-                and cover_everything([path for path, _ in self.leaves])
+                and _cover_everything([path for path, _ in self.leaves])
                 and all(self._separated(path, proof) for path, proof in self.leaves)
             )
 
@@ -433,10 +403,7 @@ def close_patch(
 def close_patches(
     quadruples: Sequence[Sequence[FacePiece]], friction: float
 ) -> list[ClosureCertificate | None]:
-    """Decide force closure of contacts at all corners of many sets of four pieces, at once.
-
-    Gives a certificate for each, or None where `close_patch` has to decide.
-    """
+    """Decide `close_patch` for many sets of whole pieces; None where it has to decide alone."""
     contacts = [corner_contacts(pieces, part_at(pieces, ())) for pieces in quadruples]
     sizes = np.array([len(points) for points, _ in contacts], dtype=np.int64)
     found: list[ClosureCertificate | None] = [None] * len(quadruples)
@@ -451,7 +418,13 @@ def close_patches(
 def _restarted(
     pieces: Sequence[FacePiece], friction: float, rng: np.random.Generator, restarts: int
 ) -> Placement | None:
-    for part in random_parts(pieces, rng, restarts):
+    """Try patches of the four pieces, each shrunk about a random point of it."""
+    for _ in range(restarts):
+        parts: list[Array] = []
+        for piece in pieces:
+            about = rng.dirichlet(np.ones(len(piece.corners))) @ piece.corners
+            parts.append(about + SMALLER * (piece.corners - about))
+        part = tuple(parts)
         patch = close_patch(pieces, part, friction)
         if patch is not None and (found := grasp_from_patch(pieces, part, patch, friction)):
             return found

@@ -56,6 +56,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.cones.spanning import angles_between
 from grasp_core.families.placements import (
+    LEAST_RADIUS,
     NoPlacement,
     Placement,
     balanced_forces,
@@ -77,20 +78,15 @@ VARIABLES = 10
 def place_pencil(
     pieces: Sequence[FacePiece],
     cones: Sequence[ForceCone],
-    *,
     least: float,
-    least_gap: float,
+    least_gap: float = LEAST_RADIUS,
     cells: Sequence[Cell] = (CELL_A, CELL_B),
 ) -> Placement | NoPlacement:
-    """Place two foci and the largest four equal discs, for the better order of the foci.
-
-    Takes `pieces` (0, 1) or (2, 3).
-    """
+    """Place two foci and the largest four equal discs, for the better order of the foci."""
     u = focus_direction(np.array([cone.axis for cone in cones]))
-    discs = _discs(pieces, cones, u)
     best, bound = None, -math.inf
     for cell in cells:
-        found = _place_in_cell(pieces, cones, discs.in_cell(cell), u, cell, least, least_gap)
+        found = _place_in_cell(pieces, cones, u, cell, least, least_gap)
         if isinstance(found, Placement):
             best, least = found, surpassing(found.merit)
         else:
@@ -110,8 +106,6 @@ def pencil_radius_bounds(
     With positive weights of sum lam a = 0, (1) gives sum lam_ij s_ij = -sum lam_ij a_ij.q_ij - (c_2
     - c_1).w. In cell A the last term only lowers it. In cell B it is 2 k |w|, at most half of the
     left side, which can therefore double.
-
-    Takes `widths` (..., 4, 4); `half_angles` [rad].
     """
     depths = [
         np.minimum(2.0 * reaches, 0.5 * np.minimum(widths[..., i, j], widths[..., k, m]))
@@ -134,22 +128,16 @@ class _Discs:
     q: Array
     """Constant part of the centres, (4, 2)."""
 
-    def in_cell(self, cell: Cell) -> "_Discs":
-        """Return the discs in another cell, given those of cell A; in cell B k changes its sign."""
-        turn = np.ones(VARIABLES)
-        turn[K] = cell[0] * CELL_A[0]
-        return _Discs(self.C * turn, self.s * turn, self.s0, self.Q * turn, self.q)
-
 
 def _place_in_cell(
     pieces: Sequence[FacePiece],
     cones: Sequence[ForceCone],
-    discs: _Discs,
     u: Array,
     cell: Cell,
     least: float,
     least_gap: float,
 ) -> Placement | NoPlacement:
+    discs = _discs(pieces, cones, u, cell)
     rows, limits = _rows(pieces, cones, discs, least_gap)
     if cell == CELL_B:
         near, ends = _near_rows(pieces, cones, discs, u)
@@ -157,26 +145,26 @@ def _place_in_cell(
     found = largest_discs(rows, limits, RADII, SMALLEST, least)
     if isinstance(found, NoPlacement):
         return found
-    v = found.x
+    v, merit = found
     centers = discs.Q @ v + discs.q
     return Placement(
         positions=np.array([p.point(y) for p, y in zip(pieces, centers, strict=True)]),
         forces=balanced_forces(pieces, np.array([cone.axis for cone in cones])),
         foci=discs.C[[0, 2]] @ v,
         radii=v[RADII],
-        merit=found.merit,
+        merit=merit,
     )
 
 
-def _discs(pieces: Sequence[FacePiece], cones: Sequence[ForceCone], u: Array) -> _Discs:
-    """Express disc centres and depths for cell A as linear functions of the variables."""
+def _discs(pieces: Sequence[FacePiece], cones: Sequence[ForceCone], u: Array, cell: Cell) -> _Discs:
+    """Express disc centres and depths as linear functions of the variables."""
     n = np.array([piece.normal for piece in pieces])
     o = np.array([piece.origin for piece in pieces])
     T = np.array([piece.frame for piece in pieces])
     a = np.array([cone.axis for cone in cones])
     C = np.zeros((FINGERS, 3, VARIABLES))
     C[:, :, X0] = np.eye(3)
-    C[:, :, K] = np.repeat(CELL_A, 2)[:, None] * u
+    C[:, :, K] = np.repeat(cell, 2)[:, None] * u
     along = np.einsum("fi,fi->f", n, a)[:, None]
     s = np.einsum("fi,fiv->fv", n, C) / along
     s0 = -np.einsum("fi,fi->f", n, o)[:, None] / along
@@ -195,7 +183,10 @@ def _rows(
     ball, inside, below = (np.zeros((FINGERS, VARIABLES)) for _ in range(3))
     # (2): R + kappa r - sin(psi) s <= 0, eps off the limit by (6)
     ball[:, BALL] = 1.0
-    ball[fingers, RADII.start + fingers] = list(map(_kappa, pieces, cones))
+    for finger, (piece, cone) in enumerate(zip(pieces, cones, strict=True)):
+        # kappa: how far a disc of radius one reaches towards a cone's facets
+        lean, psi = float(angles_between(piece.normal, cone.axis)), cone.half_angle
+        ball[finger, RADII.start + finger] = 1.0 if lean >= psi else math.cos(psi - lean)
     ball -= sines[:, None] * discs.s
     # (3), and r <= r_ij
     inside[fingers, RADII.start + fingers], inside[:, BALL] = 1.0, -1.0
@@ -225,9 +216,3 @@ def _near_rows(
     # eps |n.u| off the limit by (6)
     depths = np.array([piece.depth for piece in pieces])
     return rows, toward * discs.s0 - depths * across
-
-
-def _kappa(piece: FacePiece, cone: ForceCone) -> float:
-    """Compute kappa in (2), how far a disc of radius one reaches towards a cone's facets."""
-    lean = float(angles_between(piece.normal, cone.axis))
-    return 1.0 if lean >= cone.half_angle else math.cos(cone.half_angle - lean)

@@ -33,10 +33,7 @@ BOUND_VARIABLES = 5
 def place(
     faces: FaceTable, attempts: Attempts, least_gap: float, least: Array, placed: Placed
 ) -> None:
-    """Place two foci and the largest four equal discs for each attempt.
-
-    Takes `attempts` (0, 1) or (2, 3); `least` (a,).
-    """
+    """Place two foci and the largest four equal discs for each attempt."""
     x = np.empty(VARIABLES)
     C, s = np.zeros((FINGERS, 2, VARIABLES)), np.zeros((FINGERS, VARIABLES + 1))
     q = np.empty((FINGERS, 2))
@@ -173,7 +170,6 @@ def _take(
     x: Array,
     placed: Placed,
 ) -> None:
-    """Fill in the placement of one attempt from its program's variables."""
     (a, sign, u), (C, q), weights, pushes = place, centers, np.empty(FINGERS), 0.0
     axes = attempts.axes[a]
     balancing_weights(axes, weights)
@@ -199,10 +195,7 @@ def _take(
 def pencil_bounds(
     faces: FaceTable, attempts: Attempts, least_gap: float, least: float, bounds: Array
 ) -> None:
-    """Bound the discs of pencil grasps from above, for both orders of the foci.
-
-    Takes `attempts` (0, 1) or (2, 3); `bounds` (a,).
-    """
+    """Bound the discs of pencil grasps from above, for both orders of the foci."""
     room = np.empty((BOUND_VARIABLES + 2) * (1 + FINGERS * (2 + faces.E.shape[1])))
     for a in range(len(bounds)):
         u, edges = focus_direction(attempts.axes[a]), edges_of(faces, attempts, a)
@@ -227,10 +220,7 @@ def pencil_bounds(
 def _depth_along(
     faces: FaceTable, attempts: Attempts, place: tuple[int, int], cell: float, u: Array
 ) -> tuple[Array, float, float]:
-    """Express a finger's distance s from its focus by (1), as a linear function.
-
-    Gives its slopes in (x0, k), its constant, and the sign of k u.
-    """
+    """Return a finger's s by (1): slopes in (x0, k), constant, and the sign of k u."""
     a, finger = place
     face, s = attempts.faces[a, finger], np.empty(K + 1)
     n, o = faces.normals[face], faces.origins[face]

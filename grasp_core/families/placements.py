@@ -30,6 +30,9 @@ from grasp_core.solvers.lp import (
 )
 from grasp_core.solvers.ties import nearest_optimum
 
+LEAST_RADIUS = 1e-3
+"""Least radius, relative to the object's, of a disc that counts as a region to stand in; foci of a
+pencil that are closer than this count as one point."""
 KEPT = 1e-6
 """Share of the smallest radius that the second program may give up. With less, its optima would
 form slivers, in which rounding moves the nearest point a thousand times as far."""
@@ -78,32 +81,19 @@ def focus_direction(axes: Array) -> Array:
     The first focus belongs to fingers 0 and 1, the second to fingers 2 and 3. The direction lies in
     the planes of both pairs, and the first pair pushes along it: with positive weights lam of sum
     lam a = 0, u points along w = lam_0 a_0 + lam_1 a_1 = -lam_2 a_2 - lam_3 a_3.
-
-    Takes `axes` (..., 4, 3).
     """
     first = np.einsum("...i,...ij->...j", balancing_weights(axes)[..., :2], axes[..., :2, :])
     w = np.asarray(first, dtype=np.float64)
     return w / np.linalg.norm(w, axis=-1, keepdims=True)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LargestDiscs:
-    """The variables of the disc program, and the radius that it maximised."""
-
-    x: Array
-    """Variables, (n,); the radii among them are reduced by the error of a program's answer."""
-    merit: float
-    """Largest value of the smallest radius: the same on every machine except for the last digits.
-    """
-
-
 def largest_discs(
     A: Array, b: Array, radii: slice, smallest: int, least: float
-) -> LargestDiscs | NoPlacement:
+) -> tuple[Array, float] | NoPlacement:
     """Find the largest four equal discs, then enlarge each, subject to rows A x <= b.
 
-    Takes `A` (rows, n); `b` (rows,). Gives the discs, or a proved bound below `least` on their
-    common radius.
+    Gives the variables (n,), whose radii are reduced by the error of a program's answer, and the
+    largest value of the smallest radius; or a proved bound below `least` on it.
     """
     n = A.shape[1]
     common = np.eye(n)[smallest]
@@ -112,10 +102,8 @@ def largest_discs(
         raise SolverError(
             "the solver called a disc program infeasible, though small discs always fit"
         )
-    if isinstance(first, Below):
-        return NoPlacement(first.bound)
-    if first.value < least:
-        return NoPlacement(first.value)
+    if isinstance(first, Below) or first.value < least:
+        return NoPlacement(first.bound if isinstance(first, Below) else first.value)
     kept = LinearProgram(
         np.eye(n)[radii].sum(axis=0),
         np.vstack([A, -common]),
@@ -125,7 +113,6 @@ def largest_discs(
         second = maximize(kept)
     except SolverError:
         second = first  # within rounding of infeasible where discs are tiny
-    x = nearest_optimum(kept, second) if isinstance(second, Optimum) else first.x
-    x = np.array(x)
+    x = np.array(nearest_optimum(kept, second) if isinstance(second, Optimum) else first.x)
     x[radii] = np.maximum(x[radii] - RESIDUAL, 0.0)
-    return LargestDiscs(x, first.value - RESIDUAL)
+    return x, first.value - RESIDUAL

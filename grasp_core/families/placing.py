@@ -1,18 +1,16 @@
 """Places contacts for many attempts of one construction, with the regions of the fingers.
 
-Convex pieces in the order of the fingers are taken with a force cone each. Compiled code
-solves the programs of the concurrent and the pencil construction and checks its answers by their
-residuals; what it does not prove is left to the construction itself, one attempt at a time.
-
-An attempt may have several choices of force cones, and its faces several convex pieces each. The
-contacts with the largest discs count, moved to the true surface where faces are curved.
+Compiled code solves the programs of the concurrent and the pencil construction and checks its
+answers by their residuals; what it does not prove is left to the construction itself, one attempt
+at a time. Of several choices of cones and pieces the contacts with the largest discs count, moved
+to the true surface where faces are curved.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -22,13 +20,7 @@ from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
 from grasp_core.errors import SolverError
 from grasp_core.families.concurrent import BEFORE, BEHIND, MIXED_SIDES
-from grasp_core.families.constructions import (
-    DISC_CORNERS,
-    LEAST_RADIUS,
-    MIXED,
-    Construction,
-    regions_of,
-)
+from grasp_core.families.constructions import DISC_CORNERS, MIXED, Construction, circle, regions_of
 from grasp_core.families.kernel_tables import (
     LEFT,
     PLACED,
@@ -39,18 +31,11 @@ from grasp_core.families.kernel_tables import (
     face_table,
     room_for,
 )
-from grasp_core.families.placements import Placement
+from grasp_core.families.placements import LEAST_RADIUS, Placement
 from grasp_core.families.true_surface import on_true_surface
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.solvers.ties import surpassing
-from grasp_core.values import (
-    FINGERS,
-    ContactRegion,
-    FaceQuadruple,
-    ForceCone,
-    RegionKind,
-    four,
-)
+from grasp_core.values import FINGERS, ContactRegion, FaceQuadruple, ForceCone, RegionKind, four
 
 Ask: TypeAlias = tuple[FaceQuadruple, Sequence[ForceCone], float]
 """One attempt: faces in finger order, a force cone on each, and the least radius that counts."""
@@ -59,17 +44,15 @@ MOST_CHOICES = 8
 `max_face_parts`."""
 
 Cones: TypeAlias = tuple[ForceCone, ForceCone, ForceCone, ForceCone]
+Settled: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...]]
+"""Convex pieces of four faces, force cones, contacts, and the regions of the fingers."""
 Planned: TypeAlias = tuple[
     tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...] | None
 ]
-"""Convex pieces of four faces, their force cones, the contacts placed on them, and the regions of
-the fingers where they are known."""
-Settled: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...]]
-"""Pieces of the true surface, force cones, contacts, and the regions of the fingers."""
+"""The same; None for regions that are left to the construction."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Known:
+class Known(NamedTuple):
     """What compiled code says about one attempt: contacts with regions, or that there are none."""
 
     placement: Placement | None
@@ -115,7 +98,6 @@ class ManyPlacements:
         ]
 
     def _discs(self, attempts: Attempts, placed: Placed) -> list[tuple[ContactRegion, ...] | None]:
-        """Make the discs of pencils, as `constructions` makes them one by one."""
         rings = placed.positions[:, :, None] + (
             placed.radii[:, :, None, None] * self._rings[attempts.faces]
         )
@@ -125,7 +107,6 @@ class ManyPlacements:
     def _footprints(
         self, attempts: Attempts, turns: Array, placed: Placed
     ) -> list[tuple[ContactRegion, ...] | None]:
-        """Cut the regions of concurrent grasps out of their faces."""
         most = self._table.E.shape[1] + len(turns) + 1
         shape = placed.radii.shape
         cut = Footprints(
@@ -142,13 +123,10 @@ class ManyPlacements:
     @cached_property
     def _rings(self) -> Array:
         """Border points of a disc of radius one on each face, about its centre, (f, n, 3)."""
-        turns = 2.0 * np.pi * np.arange(DISC_CORNERS) / DISC_CORNERS
-        circle = np.column_stack([np.cos(turns), np.sin(turns)])
-        return np.array([circle @ frame.T for frame in self._table.frames])
+        return np.array([circle() @ frame.T for frame in self._table.frames])
 
 
 def _placement(placed: Placed, place: int, construction: Construction) -> Placement | None:
-    """Return the placement of one attempt; None where there is none."""
     if placed.ends[place] != PLACED:
         return None
     foci = 2 if construction.family == "pencil" else 1
@@ -163,23 +141,17 @@ def _regions(
 ) -> list[tuple[ContactRegion, ...] | None]:
     """Make the regions of each attempt; None where a polygon has no corners."""
     cut.polygons.setflags(write=False)
-    found: list[tuple[ContactRegion, ...] | None] = []
-    for place, (corners, sizes, end) in enumerate(
-        zip(cut.counts.tolist(), cut.radii.tolist(), ends.tolist(), strict=True)
-    ):
-        known = end == PLACED and min(corners) > 0
-        found.append(
-            four(
-                trusted(
-                    ContactRegion,
-                    kind=kind,
-                    polygon=cut.polygons[place, finger, : corners[finger]],
-                    inscribed_radius=sizes[finger],
-                )
-                for finger in range(FINGERS)
+    found: list[tuple[ContactRegion, ...] | None] = [None] * len(ends)
+    counts, radii = cut.counts.tolist(), cut.radii.tolist()
+    for place in np.flatnonzero((ends == PLACED) & (cut.counts.min(axis=1) > 0)).tolist():
+        found[place] = four(
+            trusted(
+                ContactRegion,
+                kind=kind,
+                polygon=cut.polygons[place, finger, : counts[place][finger]],
+                inscribed_radius=radii[place][finger],
             )
-            if known
-            else None
+            for finger in range(FINGERS)
         )
     return found
 
@@ -253,7 +225,6 @@ class Settling:
             end.planned, end.least = found, surpassing(found[2].merit)
 
     def _settle(self, attempt: Attempt, end: End) -> None:
-        """Enter the contacts of an attempt, moved to the true surface."""
         if end.planned is None or end.failed:
             return
         chosen, cones, placement, known = end.planned

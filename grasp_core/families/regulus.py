@@ -43,9 +43,8 @@ Source: Sudsang & Ponce 1995, section 3.3; the pitch equation and its use are th
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import product
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,20 +89,13 @@ CHOICES: tuple[Choice, ...] = tuple(
 
 
 def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
-    """Return whether both pairs of each quadruple leave their slopes an interval (3), (q,).
-
-    Takes `axes` (q, 4, 3); `half_angles` (q,) [rad].
-    """
+    """Return whether both pairs of each quadruple leave their slopes an interval (3), (q,)."""
     least, largest = _slope_angles(axes, half_angles[:, None])
     return np.all(least < largest, axis=1)
 
 
 def _slope_angles(axes: Array, half_angles: Array) -> tuple[Array, Array]:
-    """Return the ends of (3): the least and largest angle of each pair's forces [rad].
-
-    Takes `axes` (..., 4, 3); `half_angles` (..., 1) or (..., 4) [rad]. Gives two arrays, each (...,
-    2).
-    """
+    """Return the least and largest angle of (3) for both pairs of axes (..., 4, 3), (..., 2)."""
     resultants = focus_direction(axes)[..., None, :] * RESULTANTS[:, None]
     phi = angles_between(axes, resultants)
     in_pairs = (*phi.shape[:-1], 2, 2)
@@ -112,8 +104,7 @@ def _slope_angles(axes: Array, half_angles: Array) -> tuple[Array, Array]:
     return least, np.minimum(largest, np.pi / 2.0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Pair:
+class Pair(NamedTuple):
     """Frame (u, v, N) of one pair, each (3,), and the angles (3) that its slope may have [rad]."""
 
     u: Array
@@ -125,8 +116,7 @@ class Pair:
     largest_angle: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Line:
+class Line(NamedTuple):
     """Force direction F v and contact D v - F v as functions of the variables v, each (3, 10)."""
 
     D: Array
@@ -186,20 +176,9 @@ def regulus_program(
     for piece, G, line in zip(pieces, facets, lines, strict=True):
         flat, middle = piece.frame.T @ (line.D - line.F), piece.frame.T @ piece.origin
         # (4), (5) with both signs, (6) and (7)
-        rows += [
-            piece.E @ flat,
-            flat - offset,
-            -flat - offset,
-            -G @ line.F,
-            -piece.normal @ line.F,
-        ]
-        limits += [
-            piece.b - LEAST_INSET + piece.E @ middle,
-            middle,
-            -middle,
-            np.zeros(len(G)),
-            -LEAST_DEPTH,
-        ]
+        rows += [piece.E @ flat, flat - offset, -flat - offset, -G @ line.F, -piece.normal @ line.F]
+        inside = piece.b - LEAST_INSET + piece.E @ middle
+        limits += [inside, middle, -middle, np.zeros(len(G)), -LEAST_DEPTH]
     # contacts lie in the planes of their faces
     normals = np.array([piece.normal for piece in pieces])
     A_eq = np.array([n @ (line.D - line.F) for n, line in zip(normals, lines, strict=True)])
@@ -231,15 +210,17 @@ def place_regulus(
 ) -> Placement | NoPlacement:
     """Place four contacts on the lines of one regulus, near the centres of the faces.
 
-    Takes `pieces` (0, 1) or (2, 3). Gives the placement, with minus the largest offset t as its
-    merit, or its absence for the slopes tried.
+    The merit is minus the largest offset t; no placement means none for the slopes tried.
     """
-    known = _best_choice(pieces, cones)
-    if known is not None:
-        merit, choices = known
-        best = _best_of(pieces, cones, choices)
+    half_angle = cones[0].half_angle
+    if all(cone.half_angle == half_angle for cone in cones):
+        axes = np.array([[cone.axis for cone in cones]])
+        attempt = Attempts(np.arange(FINGERS)[None], axes, np.array([half_angle]))
+        (merit,), (chosen,) = regulus_bounds(face_table(pieces), attempt)
+        first, second, side = (int(each) for each in chosen)
+        best = _best_of(pieces, cones, [(first, second, side)] if first >= 0 else [])
         # whole programs, solved again, have to confirm what compiled code chose
-        if _merit(best) == merit or abs(_merit(best) - merit) <= RESIDUAL:
+        if _merit(best) == merit or abs(_merit(best) - float(merit)) <= RESIDUAL:
             return best
     return _best_of(pieces, cones, CHOICES)
 
@@ -258,21 +239,6 @@ def regulus_bounds(
     chosen = np.empty((len(bounds), 3), dtype=np.int64)
     compiled(KERNEL).regulus_bounds(table, attempts, terms, bounds, chosen)
     return bounds, chosen
-
-
-def _best_choice(
-    pieces: Sequence[FacePiece], cones: Sequence[ForceCone]
-) -> tuple[float, tuple[Choice, ...]] | None:
-    """Find the best choices of slopes and side, with their merit; None if half-angles differ."""
-    half_angle = cones[0].half_angle
-    if any(cone.half_angle != half_angle for cone in cones):
-        return None
-    attempt = Attempts(
-        np.arange(FINGERS)[None], np.array([[cone.axis for cone in cones]]), np.array([half_angle])
-    )
-    (merit,), (chosen,) = regulus_bounds(face_table(pieces), attempt)
-    first, second, side = (int(each) for each in chosen)
-    return float(merit), ((first, second, side),) if first >= 0 else ()
 
 
 def _best_of(

@@ -116,10 +116,7 @@ def _facets(
 
 @loop()
 def _tightest(facets: Array, resultant: float, tau: float, tight: Array) -> bool:
-    """Find the rows alpha x + beta z >= 0 that bound z / |x|, for x on the resultant's side.
-
-    Gives whether the two rows leave anything between them.
-    """
+    """Find the rows alpha x + beta z >= 0 that bound z / |x|, for x on the resultant's side."""
     lower, upper = -np.inf, np.inf
     tight[:] = 0.0
     for each, side in ((0, 1.0), (1, -1.0)):
@@ -155,16 +152,9 @@ class _Line(NamedTuple):
 
 @loop()
 def regulus_bounds(
-    faces: FaceTable,
-    attempts: Attempts,
-    terms: RegulusTerms,
-    bounds: Array,
-    chosen: Indices,
+    faces: FaceTable, attempts: Attempts, terms: RegulusTerms, bounds: Array, chosen: Indices
 ) -> None:
-    """Bound the merit, minus the largest offset t, over slopes until one is good enough.
-
-    Takes `attempts` (0, 1) or (2, 3); `bounds` (a,); `chosen` (a, 3).
-    """
+    """Bound the merit, minus the largest offset t, over slopes until one is good enough."""
     others = 1 + FINGERS * (4 + 1 + 1) + 4  # gap; offsets, depth, equality; bounds on z / x
     room = np.empty((VARIABLES + 2) * (others + FINGERS * faces.E.shape[1]))
     slopes, vertex = len(terms.shares), vertex_of(VARIABLES)

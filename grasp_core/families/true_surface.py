@@ -40,23 +40,15 @@ def on_true_surface(
     regions: Sequence[ContactRegion],
     place: OnFacets,
 ) -> tuple[tuple[FacePiece, ...], Placement] | None:
-    """Move a placement to the true surface; None if no contacts there hold the same grasp.
-
-    Gives the pieces that the contacts are on, and the placement.
-    """
+    """Move a placement to the true surface; None if no contacts there hold the same grasp."""
     if all(shape.facets is None for shape in shapes):
         return pieces, planned
     along = [np.array([piece.normal for piece in pieces]), np.array([c.axis for c in cones])]
     for directions in along:
-        facets = [
-            _facet(shape, piece, at, direction, region)
-            for shape, piece, at, direction, region in zip(
-                shapes, pieces, planned.positions, directions, regions, strict=True
-            )
-        ]
-        if any(facet is None for facet in facets):
+        given = zip(shapes, pieces, planned.positions, directions, regions, strict=True)
+        chosen = tuple(facet for each in given if (facet := _facet(*each)) is not None)
+        if len(chosen) < len(pieces):
             continue
-        chosen = tuple(facet for facet in facets if facet is not None)
         found = _aimed(chosen, cones, planned, directions) or place(chosen)
         if found is not None:
             return chosen, replace(found, radii=planned.radii, merit=planned.merit)
@@ -64,10 +56,7 @@ def on_true_surface(
 
 
 def _aimed(
-    facets: Sequence[FacePiece],
-    cones: Sequence[ForceCone],
-    planned: Placement,
-    directions: Array,
+    facets: Sequence[FacePiece], cones: Sequence[ForceCone], planned: Placement, directions: Array
 ) -> Placement | None:
     """Aim from contacts above or below the planned ones at the planned focus; None on failure."""
     if len(planned.foci) != 1:

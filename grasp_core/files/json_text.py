@@ -1,10 +1,8 @@
 """Reads JSON text as plain values or checked records, and writes it with a line for each item.
 
 Cases that JSON leaves open are refused: a key twice in one object, numbers that are too large or
-not finite, very deep nesting, and characters that cannot be encoded. A file of another kind that
-graspproof writes is refused by its name. What pydantic finds wrong with a record becomes a
-sentence: field, expected, found value. In a text that is written, lines can be counted, searched
-and compared.
+not finite, very deep nesting, and characters that cannot be encoded. What pydantic finds wrong with
+a record becomes a sentence: field, expected, found value.
 """
 
 import json
@@ -13,13 +11,14 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
 DEEPEST = 64
 """Largest number of objects and lists inside each other; files of graspproof have less than ten."""
+TOO_DEEP = f"objects and lists are nested more than {DEEPEST} deep; flatten the file"
 LARGEST_WHOLE = 2**64 - 1
 """Largest whole number: larger ones are no seeds, counts or indices, and arrays cannot hold them.
 """
@@ -61,7 +60,7 @@ def value_of(text: str, *, nulls: bool = True) -> Any:
     try:
         found = json.loads(text, object_pairs_hook=_without_twins)
     except RecursionError as error:
-        raise InputError(_too_deep()) from error
+        raise InputError(TOO_DEEP) from error
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
         said = error.msg if error.msg.isprintable() else "unexpected text"
@@ -78,34 +77,18 @@ def value_of(text: str, *, nulls: bool = True) -> Any:
 
 def check_values(document: object, *, nulls: bool = True) -> None:
     """Refuse plain values that no file of graspproof may hold, whatever its format."""
-    try:
-        _check([document], nulls, DEEPEST)
-    except _FaultError as found:
-        raise InputError(f"{place(found.trail[-2::-1])}: {found}") from None
+    _check([document], nulls, ())
 
 
-class _FaultError(Exception):
-    """Raised when a value is wrong; the keys that lead to the value are added on the way out."""
-
-    def __init__(self, fault: str) -> None:
-        super().__init__(fault)
-        self.trail: list[object] = []
-        """Keys that lead to the value, innermost first; the last is the document's own, 0."""
-
-
-def _check(holder: Any, nulls: bool, deeper: int) -> None:
-    if deeper < 0:
-        raise InputError(_too_deep())
+def _check(holder: Any, nulls: bool, where: tuple[object, ...]) -> None:
+    if len(where) > DEEPEST:
+        raise InputError(TOO_DEEP)
     for key, value in _items(holder):
-        try:
-            if isinstance(value, dict | list):
-                if not _all_plain(value):
-                    _check(value, nulls, deeper - 1)
-            elif fault := _fault(value, nulls=nulls):
-                raise _FaultError(fault)
-        except _FaultError as found:
-            found.trail.append(key)
-            raise
+        if isinstance(value, dict | list):
+            if not _all_plain(value):
+                _check(value, nulls, (*where, key))
+        elif fault := _fault(value, nulls=nulls):
+            raise InputError(f"{place([*where, key][1:])}: {fault}")
 
 
 def check_kind(found: Mapping[str, Any], wanted: str) -> None:
@@ -223,14 +206,9 @@ def _has_no_encoding(text: str) -> bool:
     return False
 
 
-def _too_deep() -> str:
-    return f"objects and lists are nested more than {DEEPEST} deep; flatten the file"
-
-
 Record = TypeVar("Record")
 BOUNDS = {"too_short": ("at least", "min_length"), "too_long": ("at most", "max_length")}
 """Wording and key of the limit in errors about the number of items, by type of error."""
-UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 OURS = {
     "float_type": "a number", "int_type": "a whole number", "int_from_float": "a whole number",
     "string_type": "text", "bool_type": "true or false", "list_type": "a list",
@@ -262,11 +240,10 @@ def settings_of(
     from pydantic import TypeAdapter, ValidationError
 
     try:
-        return TypeAdapter(kind).validate_json(json.dumps(given), strict=True)
+        with about(place(inside)):  # for the settings' own checks
+            return TypeAdapter(kind).validate_json(json.dumps(given), strict=True)
     except ValidationError as error:
         raise InputError(complaint(error, kind, inside)) from error
-    except InputError as error:  # raised by the settings' own checks
-        raise InputError(f"{place(inside)}: {error}") from error
 
 
 def complaint(error: "ValidationError", kind: Any, inside: Sequence[str | int] = ()) -> str:
@@ -274,7 +251,7 @@ def complaint(error: "ValidationError", kind: Any, inside: Sequence[str | int] =
     first = error.errors(include_url=False)[0]
     loc, fault, came = first["loc"], first["type"], first["input"]
     where = place([*inside, *loc])
-    if fault in UNKNOWN:
+    if fault in ("extra_forbidden", "unexpected_keyword_argument"):
         return f"{where}: unknown key; known keys are {', '.join(_fields_at(kind, loc[:-1]))}"
     if fault == "missing":
         return f"{where}: missing; add it"

@@ -32,32 +32,23 @@ def write_parts(path: Path, parts: Iterable[bytes]) -> Path:
 def replacing(path: Path) -> Generator[Path]:
     """Yield another path with the same suffix to write to; afterwards that file replaces `path`."""
     path.parent.mkdir(parents=True, exist_ok=True)
+    prefix = f".{path.name[:SHOWN]}{UNFINISHED}"
     try:
-        with _beside(path) as temporary:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
+        temporary = Path(name)
+        try:
+            os.close(handle)
             yield temporary
             temporary.chmod(0o644)
             temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
     except OSError as error:
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 
 
-@contextmanager
-def _beside(path: Path) -> Generator[Path]:
-    """Yield the path of an empty file in the same folder; the file is removed afterwards."""
-    prefix = f".{path.name[:SHOWN]}{UNFINISHED}"
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
-    try:
-        os.close(handle)
-        yield Path(name)
-    finally:
-        Path(name).unlink(missing_ok=True)
-
-
 def remove_unfinished(folder: Path) -> None:
-    """Remove the files and folders that killed processes left unfinished in a folder.
-
-    Nothing else may be writing to the folder meanwhile.
-    """
+    """Remove what killed processes left unfinished in a folder to which nothing is writing now."""
     for path in folder.glob(f".*{UNFINISHED}*"):
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path, ignore_errors=True)
@@ -66,10 +57,7 @@ def remove_unfinished(folder: Path) -> None:
 
 
 def bounded_bytes(path: Path, most: int) -> bytes:
-    """Read the bytes of a file, or its first `most + 1` bytes if it is longer.
-
-    Named pipes are refused, so reading never blocks.
-    """
+    """Read a regular file, or its first `most + 1` bytes; pipes, which could block, are refused."""
     try:
         handle = os.open(
             path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)

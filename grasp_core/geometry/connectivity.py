@@ -26,8 +26,6 @@ def close_pairs(points: Array, reach: float) -> Indices:
 
     Close points have close projections on a line, so only neighbours there are compared. Equal
     points are linked in a row, and only one of them is compared with other points.
-
-    Takes `points` (n, 3).
     """
     shadows = ((points - points[0]) * GENERAL).sum(axis=1)
     order = np.argsort(shadows, kind="stable")
@@ -69,8 +67,6 @@ def components(count: int, links: Indices) -> Indices:
 
     Source:
         Liu and Tarjan, "Simple concurrent labeling algorithms for connected components", SOSA 2019.
-
-    Takes `links` (k, 2).
     """
     least = np.arange(count)
     apart = links

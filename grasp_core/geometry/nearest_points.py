@@ -24,10 +24,7 @@ from grasp_core.solvers.ties import first_best
 
 
 def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Array:
-    """Find the surface point nearest to each of several points, (n, 3) [m].
-
-    Takes `vertices` (v, 3) [m]; `triangles` (t, 3); `points` (n, 3) [m].
-    """
+    """Find the surface point nearest to each of several points, (n, 3) [m]."""
     candidates = nearest_on_triangles(vertices[triangles], points)
     distances = np.linalg.norm(candidates - points[:, None], axis=2)
     chosen = [first_best(-own) for own in distances]
@@ -35,10 +32,7 @@ def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Ar
 
 
 def nearest_on_triangles(corners: Array, points: Array) -> Array:
-    """Find the point of each of several triangles nearest to points, (..., t, 3) [m].
-
-    Takes `corners` (t, 3, 3) [m]; `points` (..., 3) [m].
-    """
+    """Find the point of each triangle (t, 3, 3) nearest to points (..., 3), (..., t, 3) [m]."""
     points = points[..., None, :]
     candidates = np.stack([*_on_edges(corners, points), _foot(corners, points)])
     nearest = np.linalg.norm(candidates - points, axis=-1).argmin(axis=0)
@@ -75,10 +69,7 @@ def _dots(a: Array, b: Array) -> Array:
 
 
 def _divided(a: Array, b: Array) -> Array:
-    """Divide arrays, with zero where the divisor is zero.
-
-    The divisor is zero for a triangle or an edge without size, whose corners are candidates anyway.
-    """
+    """Divide arrays, with zero where the divisor is zero: there corners are the candidates."""
     return np.divide(a, b, out=np.zeros_like(a), where=np.broadcast_to(b > 0.0, a.shape))
 
 
@@ -99,13 +90,7 @@ class Surface:
         self._inward = -outward / np.where(lengths > 0.0, lengths, 1.0)
 
     def holds(self, point: Array, normal: Array | None, slack: float) -> bool:
-        """Return whether a point is on a triangle whose normal agrees with the given one.
-
-        Args:
-            point: The point, (3,) [m].
-            normal: Unit vector into the solid, (3,); None accepts every triangle.
-            slack: How far the point may be from a triangle [m].
-        """
+        """Return whether a point is within `slack` of a triangle with such a normal, if given."""
         near = np.linalg.norm(nearest_on_triangles(self._corners, point) - point, axis=1) <= slack
         if normal is None:
             return bool(near.any())

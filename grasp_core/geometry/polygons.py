@@ -32,11 +32,7 @@ TRIMMED = 1e-3
 
 
 def plane_frame(normal: Array) -> Array:
-    """Return two orthonormal columns spanning the plane with this normal, (3, 2).
-
-    (column 0, column 1, normal) is right-handed. The choice is deterministic and
-    depends on the normal only, so that all figures on one face share it.
-    """
+    """Return two orthonormal columns, (3, 2), right-handed with the normal, which decides them."""
     return np.array(plane_tangents(*normal.tolist())).T
 
 
@@ -91,10 +87,8 @@ def with_fewer_corners(polygon: Array) -> Array:
     """Drop corners that add little area to a convex polygon (k, 2); the result is inside it."""
     left = TRIMMED * signed_area(polygon)
     while len(polygon) > 3:  # noqa: PLR2004 - a triangle has no corner to spare
-        before, after = (
-            np.roll(polygon, 1, axis=0) - polygon,
-            np.roll(polygon, -1, axis=0) - polygon,
-        )
+        before = np.roll(polygon, 1, axis=0) - polygon
+        after = np.roll(polygon, -1, axis=0) - polygon
         areas = 0.5 * np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
         least = first_best(-areas, ON_LINE)
         left -= areas[least]
@@ -116,10 +110,7 @@ def nearest_point(polygon: Array, point: Array) -> Array:
 
 
 def convex_hull(points: Array) -> Array:
-    """Return the corners of the convex hull of points (n, 2), counter-clockwise, (k, 2).
-
-    The first corner is the one that comes first among the points, however the figure is turned.
-    """
+    """Return the corners of a convex hull, counter-clockwise from the first point on, (k, 2)."""
     ordered = points[np.lexsort(points.T[::-1])]
 
     def lower(run: Array) -> list[Array]:
@@ -176,8 +167,6 @@ def merge_into_convex_pieces(points: Array, triangles: Indices) -> list[Array]:
     Source:
         Hertel & Mehlhorn, "Fast triangulation of the plane with respect to simple
         polygons", Information and Control 64, 1985.
-
-    Takes `points` (n, 2); `triangles` (t, 3).
     """
     edges = {edge for triangle in triangles.tolist() for edge in _edges(triangle)}
     diagonals = sorted(edge for edge in edges if edge[0] < edge[1] and edge[::-1] in edges)
@@ -193,7 +182,10 @@ def _merged(points: Array, triangles: Indices, diagonals: list[tuple[int, int]])
         one, two = owner[tail, head], owner[head, tail]
         if one == two:
             continue
-        joined = _join(pieces[one], pieces[two], tail, head)
+        # along the common edge: walk one from head to tail, then the other back
+        start, other = pieces[one].index(head), pieces[two].index(tail)
+        back = pieces[two][other:] + pieces[two][:other]
+        joined = pieces[one][start:] + pieces[one][:start] + back[1:-1]
         if len(set(joined)) == len(joined) and is_convex(points[joined]):
             pieces[one] = joined
             del pieces[two]
@@ -203,14 +195,6 @@ def _merged(points: Array, triangles: Indices, diagonals: list[tuple[int, int]])
 
 def _edges(loop: list[int]) -> list[tuple[int, int]]:
     return list(zip(loop, loop[1:] + loop[:1], strict=True))
-
-
-def _join(one: list[int], two: list[int], tail: int, head: int) -> list[int]:
-    """Join two polygons along a common edge: walk `one` from head to tail, then `two` back."""
-    start, other = one.index(head), two.index(tail)
-    first = one[start:] + one[:start]
-    second = two[other:] + two[:other]
-    return first + second[1:-1]
 
 
 FEWEST_CORNERS, MOST_CORNERS = 3, 5000
@@ -241,12 +225,9 @@ class FlatPolygon:
 
 
 def flat_polygon(arms: Array, normal: Array, slack: float) -> FlatPolygon | None:
-    """Make a convex polygon from points (k, 3) in the plane through zero, or None.
+    """Make a convex polygon from points (k, 3) in the plane through zero, counter-clockwise.
 
-    The polygon is counter-clockwise about its normal.
-
-    Gives the polygon; None if the points are off the plane, or not corners of a convex polygon in
-    order.
+    Gives None if the points are off the plane, or not corners of a convex polygon in order.
     """
     if float(np.abs(arms @ normal).max()) > slack:
         return None
@@ -254,24 +235,19 @@ def flat_polygon(arms: Array, normal: Array, slack: float) -> FlatPolygon | None
 
 
 def convex_polygon(corners: Array, slack: float) -> FlatPolygon | None:
-    """Make a convex polygon from corners (k, 2); None if they are not its corners in order.
-
-    A corner that coincides with the corner before it, as cutting leaves them, counts once.
-    """
+    """Make a polygon of corners (k, 2), repeats left out; None if not convex and in order."""
     corners = tidy(corners)
     if len(corners) < FEWEST_CORNERS:
         return None
     E, b = edge_rows(corners)
     found = FlatPolygon(corners, E, b)
-    turning = np.isfinite(E).all() and signed_area(corners) > 0.0 and _turns_once(E)
-    return found if turning and found.holds(corners, slack) else None
-
-
-def _turns_once(E: Array) -> bool:
-    """Return whether normals of a polygon's edges, (k, 2), turn around once, not more often."""
+    if not (np.isfinite(E).all() and signed_area(corners) > 0.0):
+        return None
+    # the normals turn around once, not more often
     following = np.roll(E, -1, axis=0)
     turns = E[:, 0] * following[:, 1] - E[:, 1] * following[:, 0]
-    return abs(float(np.arctan2(turns, (E * following).sum(axis=1)).sum())) < 3.0 * np.pi
+    once = abs(float(np.arctan2(turns, (E * following).sum(axis=1)).sum())) < 3.0 * np.pi
+    return found if once and found.holds(corners, slack) else None
 
 
 def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
@@ -285,10 +261,7 @@ def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
 
 
 def holds_disc(polygon: FlatPolygon, border: FlatPolygon, center: Array, radius: float) -> bool:
-    """Return whether a polygon covers a disc within a border, but for a share `LEFT_OUT`.
-
-    The share refers to the polygon's own area.
-    """
+    """Return whether a polygon covers a disc in a border, but for `LEFT_OUT` of its own area."""
     turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
     rows = np.column_stack([np.cos(turns), np.sin(turns)])
     disc = clip(border.corners, rows, rows @ center + radius)

@@ -52,7 +52,6 @@ def read_glb(data: bytes, most: int) -> tuple[Array, Indices]:
 
 
 def _tree(data: bytes) -> Tree:
-    """Return the JSON part of a GLB file."""
     _, version, length, size, chunk = struct.unpack_from(HEAD, data)
     start = struct.calcsize(HEAD)
     if version != 2 or length != len(data) or chunk != JSON_CHUNK:  # noqa: PLR2004
@@ -151,7 +150,6 @@ def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
 
 
 def _matrix(node: Tree) -> Array:
-    """Return the matrix of a node, (4, 4)."""
     matrix = np.eye(4)
     if "matrix" in node:
         matrix = _numbers(node["matrix"], 16).reshape(4, 4).T  # glTF lists matrices by columns
@@ -182,13 +180,11 @@ def _numbers(given: list[Any], count: int) -> Array:
 
 
 def _roots(tree: Tree) -> list[int]:
-    """Return the indices of the top nodes of the default scene."""
     scenes = tree.get("scenes")
     return _item(scenes, tree.get("scene", 0)).get("nodes", []) if scenes else []
 
 
 def _item(listed: list[Tree], place: object) -> Tree:
-    """Return an item of a list by an index that must be a whole number from 0."""
     if type(place) is not int or not 0 <= place < len(listed):
         raise ValueError(f"it refers to item {str(place)[:40]} of a list of {len(listed)}")
     return listed[place]

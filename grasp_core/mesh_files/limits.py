@@ -1,7 +1,4 @@
-"""Limits a mesh file's bytes, triangles, planar faces and bodies.
-
-Nothing heavy is imported here, so that command-line flags can show the same values.
-"""
+"""Limits a mesh file's bytes, triangles, planar faces and bodies."""
 
 from dataclasses import dataclass
 

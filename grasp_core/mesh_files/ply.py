@@ -199,7 +199,6 @@ class _Binary:
         return np.stack([rows[axis].astype(np.float64) for axis in POINT], axis=1)
 
     def _plain_rows(self, table: Table) -> "NDArray[Any]":
-        """Read a table without lists at once."""
         fields = [(column.name, self.order + column.kind) for column in table.columns]
         rows = np.frombuffer(self.data, np.dtype(fields), table.rows, self.place)
         self.place += rows.nbytes

@@ -5,13 +5,13 @@ takes time and memory in proportion to the bytes of the file, and no more triang
 allowed are kept: `MeshLimits` bounds both.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.errors import MeshError, MeshRefusal
+from grasp_core.errors import MeshError, MeshRefusal, about
 from grasp_core.files.text_files import bounded_bytes
 from grasp_core.mesh_files.glb import read_glb
 from grasp_core.mesh_files.limits import MeshLimits
@@ -30,45 +30,36 @@ SHOWN = 100
 """Largest number of characters of a fault that a message quotes."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MeshFile:
+class MeshFile(NamedTuple):
     """The surface that a mesh file holds, in the file's unit of length."""
 
     vertices: Array
-    """Vertices, (n, 3)."""
     triangles: Indices
-    """Vertex indices, (t, 3)."""
     rounding: float
     """Largest rounding error of a coordinate that the numbers of the file show; 0 if they show
     none."""
     data: bytes
-    """The bytes of the file."""
-
-    def __post_init__(self) -> None:
-        self.vertices.setflags(write=False)
-        self.triangles.setflags(write=False)
 
 
 def read_triangles(path: Path, limits: MeshLimits) -> MeshFile:
     """Read a mesh file."""
-    try:
+    with about(path):
         kind = path.suffix.lower().lstrip(".")
         if kind not in FORMATS:
             message = f"the file's ending must be one of {', '.join(FORMATS)}, got {kind!r}"
             raise MeshError(MeshRefusal.FORMAT, message)
-        data = bounded_bytes(path, limits.max_bytes)
-        if len(data) > limits.max_bytes:
-            message = f"the file is over the limit of {limits.max_bytes} bytes; simplify the mesh"
-            raise MeshError(MeshRefusal.TOO_MANY, message)
-        return mesh_of_bytes(kind, data, limits.max_triangles)
-    except MeshError as error:
-        raise MeshError(error.reason, f"{path}: {error.message}") from error
-    except OSError as error:
-        message = f"{path}: the file cannot be read ({error.strerror}); check the path"
-        raise MeshError(MeshRefusal.UNREADABLE, message) from error
-    except MemoryError as error:
-        message = f"{path}: reading it needs more memory than there is; simplify the mesh"
-        raise MeshError(MeshRefusal.LIMIT, message) from error
+        try:
+            data = bounded_bytes(path, limits.max_bytes)
+            if len(data) > limits.max_bytes:
+                message = f"the file is over the limit of {limits.max_bytes} bytes; simplify it"
+                raise MeshError(MeshRefusal.TOO_MANY, message)
+            return mesh_of_bytes(kind, data, limits.max_triangles)
+        except OSError as error:
+            message = f"the file cannot be read ({error.strerror}); check the path"
+            raise MeshError(MeshRefusal.UNREADABLE, message) from error
+        except MemoryError as error:
+            message = "reading it needs more memory than there is; simplify the mesh"
+            raise MeshError(MeshRefusal.LIMIT, message) from error
 
 
 def mesh_of_bytes(kind: str, data: bytes, most: int) -> MeshFile:

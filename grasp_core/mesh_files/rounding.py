@@ -81,10 +81,7 @@ class TextPoints:
 
 
 def most_digits(words: Iterable[bytes]) -> int:
-    """Return the largest number of significant digits of some decimal numbers.
-
-    Zeros at the end count behind a decimal point, as a writer of fixed length leaves them there.
-    """
+    """Return the most significant digits of some numbers, zeros at the end of decimals included."""
     plain = EXPONENT.sub(b"", b" ".join(words)).split()
     plain = [word if b"." in word else word.rstrip(b"0") for word in plain]
     digits = b" ".join(plain).translate(None, SIGNS).split()

@@ -49,11 +49,7 @@ STL_END = re.compile(rb"\s*endsolid[^\n]*", re.IGNORECASE)
 
 
 def plain_text(data: bytes) -> bytes:
-    """Convert the bytes of a text file to ASCII with line-feed line ends.
-
-    Letters outside ASCII, as in comments and names, become `?`, and so does the `#` of a number
-    such as `1.#QNAN`, which begins no comment.
-    """
+    """Convert a text to ASCII and line feeds; other letters and the `#` of `1.#QNAN` become `?`."""
     text = data.rstrip(PADDING)
     if found := CONTROL.search(text):
         raise ValueError(f"expected text, got the control character {found[0]!r}")

@@ -30,7 +30,6 @@ class Solid:
     """Vertex indices, (t, 3)."""
 
     def __add__(self, other: "Solid") -> "Solid":
-        """Return the union of two solids."""
         return _solid(_manifold(self) + _manifold(other))
 
     def __sub__(self, other: "Solid") -> "Solid":
@@ -73,25 +72,21 @@ def triangulate(loops: Sequence[Array]) -> Indices:
 
 
 def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
-    """Cut off everything nearer than a margin to the border of a plane figure.
+    """Cut off everything nearer than a margin to the border of a plane figure of loops (k, 2).
 
     At corners that turn inwards a little more is cut off, so that the remaining parts have few
-    corners.
-
-    Takes `loops` (k, 2). Gives outer border and holes of each part; an empty list if the figure is
-    too narrow.
+    corners. Gives outer border and holes of each part; nothing if the figure is too narrow.
     """
     kernel = _kernel()
     size = float(np.ptp(np.vstack(loops), axis=0).max())
     figure = kernel.CrossSection([loop / size for loop in loops], kernel.FillRule.EvenOdd)
     inset = figure.offset(-(margin / size + GRID), kernel.JoinType.Miter)
     parts = [[np.asarray(loop) * size for loop in part.to_polygons()] for part in inset.decompose()]
-    return [_outer_first(part) for part in parts if part]
-
-
-def _outer_first(loops: Sequence[Array]) -> list[Array]:
-    """Put the largest loop first, and keep the order of the others."""
-    return [loops[place] for place in largest_first([signed_area(loop) for loop in loops])]
+    return [
+        [part[place] for place in largest_first([signed_area(loop) for loop in part])]
+        for part in parts
+        if part
+    ]
 
 
 def intersection_volume(one: Solid, two: Solid) -> float:
@@ -100,10 +95,7 @@ def intersection_volume(one: Solid, two: Solid) -> float:
 
 
 def union(solids: Sequence[tuple[Solid, Indices]]) -> tuple[Solid, Indices]:
-    """Unite solids whose triangles are numbered, and number the triangles of the union, (t,).
-
-    A triangle of the union has the number of the triangle that it is a part of.
-    """
+    """Unite solids whose triangles are numbered; parts of triangles keep their numbers, (t,)."""
     kernel = _kernel()
     parts = [_manifold(solid, numbers) for solid, numbers in solids]
     body = kernel.Manifold.batch_boolean(parts, kernel.OpType.Add)

@@ -15,7 +15,7 @@ Source: Eberly, "Polyhedral mass properties (revisited)", 2002.
 import hashlib
 import math
 from dataclasses import dataclass, replace
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,8 +32,9 @@ from grasp_core.objects.planar_faces import (
     PLANAR,
     Flatness,
     coplanar_groups,
-    planar_faces,
+    planar_face,
 )
+from grasp_core.objects.sheets import check_bounds
 from grasp_core.objects.solid_checks import check_volume
 from grasp_core.objects.sound_surface import SoundSurface, sound_surface
 from grasp_core.objects.surface import Face, FaceKind, PatchLimits, Surface
@@ -77,41 +78,6 @@ class MeshChoices:
 DEFAULT_CHOICES = MeshChoices()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MassProperties:
-    """Mass properties of a solid at density 1 kg/m^3."""
-
-    volume: float
-    """Volume [m^3]."""
-    center: Array
-    """Centre of mass, (3,) [m]."""
-    inertia: Array
-    """Inertia about the centre, (3, 3) [kg m^2]."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen(self.center, (3,), "center"))
-        object.__setattr__(self, "inertia", frozen(self.inertia, (3, 3), "inertia"))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Parts:
-    """The parts of a polyhedron: mesh, faces, mass properties and notes."""
-
-    vertices: Array
-    """Welded vertices, (n, 3) [m]."""
-    triangles: Indices
-    """Vertex indices, (t, 3), counter-clockwise seen from outside."""
-    faces: tuple[Face, ...]
-    mass: MassProperties
-    content_sha256: str
-    """Hash of the mesh with vertices and triangles in sorted order."""
-    patches: PatchLimits | None
-    """Limits of flatness for patches that replace faces; None where faces are exactly planar."""
-    surface: Surface
-    notes: tuple[str, ...]
-    """Notes, for people to read, on what was changed in the mesh."""
-
-
 def build(
     vertices: ArrayLike,
     triangles: ArrayLike,
@@ -120,35 +86,28 @@ def build(
     rounding: float | None = None,
     center_of_mass: ArrayLike | None = None,
     known: Surface | None = None,
-) -> Parts:
-    """Check a triangle mesh and find its faces.
-
-    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `rounding` [m]; `center_of_mass` (3,) [m].
-    """
+) -> dict[str, Any]:
+    """Check a triangle mesh and find its faces; return the fields of a `Polyhedron`."""
     points, corners = _checked_arrays(vertices, triangles, choices.limits.max_triangles)
     extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
     off = single_rounding(points) if rounding is None else rounding
     blur = known.flatness_m if known else _flatness(off, choices.flatness_m, extent)
-    found = sound_surface(
-        points,
-        corners,
-        blur,
-        most_parts=choices.limits.max_parts,
-        largest_part=choices.largest_part,
-        known=known,
-    )
+    most, largest = choices.limits.max_parts, choices.largest_part
+    found = sound_surface(points, corners, blur, most_parts=most, largest_part=largest, known=known)
     flatness = Flatness.of(extent, blur)
     groups = _planar_groups(found, flatness, choices)
     if groups is None:
-        found = found.outward(largest_part=choices.largest_part)
+        found = found.outward(largest_part=largest)
         patches = choices.patches or PatchLimits()
         faces, said = _patched(found, patches)
     elif found.fault:
         raise found.fault
     else:
-        found.check_bounds()
+        check_bounds(found.points, found.corners)
         patches = None
-        faces = planar_faces(found.points, found.corners, groups, flatness)
+        faces = tuple(
+            planar_face(found.points, found.corners[group], flatness.distance) for group in groups
+        )
         said = _uneven(found, groups, faces, PLANAR * extent)
     center = _given_center(found.points, center_of_mass)
     surface = found.surface
@@ -156,16 +115,19 @@ def build(
         surface = replace(surface, center_given=center is not None)
     solid = Solid(found.points, found.corners) if surface.closed else hull(found.points)
     check_volume(solid)
-    return Parts(
-        found.points,
-        found.corners,
-        faces,
-        mass_properties(solid, center),
-        content_hash(found.points, found.corners),
-        patches,
-        surface,
-        (*surface.notes(), *said),
-    )
+    volume, middle, inertia = mass_properties(solid, center)
+    return {
+        "vertices": found.points,
+        "triangles": found.corners,
+        "faces": faces,
+        "volume": volume,
+        "center_of_mass": middle,
+        "inertia": inertia,
+        "content_sha256": content_hash(found.points, found.corners),
+        "patches": patches,
+        "surface": surface,
+        "notes": (*surface.notes(), *said),
+    }
 
 
 def _uneven(
@@ -190,7 +152,6 @@ def _flatness(rounding: float, asked: float | None, extent: float) -> float:
 
 
 def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | None:
-    """Check the centre of mass that a user gave, (3,) [m]; None if none was given."""
     if center_of_mass is None:
         return None
     center = frozen(center_of_mass, (3,), "center_of_mass")
@@ -207,7 +168,6 @@ def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | No
 def _planar_groups(
     found: SoundSurface, flatness: Flatness, choices: MeshChoices
 ) -> list[Indices] | None:
-    """Group triangles into planar faces; None where patches are used instead."""
     if choices.faces == "patches":
         return None
     groups = coplanar_groups(found.points, found.corners, flatness, found.surface.caps)
@@ -223,7 +183,6 @@ def _planar_groups(
 
 
 def _patched(found: SoundSurface, limits: PatchLimits) -> tuple[tuple[Face, ...], list[str]]:
-    """Find the patches of a surface, and write notes about them."""
     patches = flat_patches(found.points, found.corners, limits, found.surface.caps)
     if len(patches) < FINGERS:
         raise MeshError(
@@ -295,10 +254,10 @@ def content_hash(points: Array, corners: Indices) -> str:
     return digest.hexdigest()
 
 
-def mass_properties(solid: Solid, center: Array | None = None) -> MassProperties:
-    """Compute the mass properties of a solid of uniform density.
+def mass_properties(solid: Solid, center: Array | None = None) -> tuple[float, Array, Array]:
+    """Compute volume [m^3], centre (3,) [m], inertia (3, 3) [kg m^2] about it, at 1 kg/m^3.
 
-    Takes `center` (3,) [m].
+    The centre is that of uniform density, unless it is given.
     """
     a, b, c = solid.vertices[solid.triangles].transpose(1, 0, 2)
     areas = np.cross(b - a, c - b)  # normals, as long as twice the area
@@ -307,11 +266,8 @@ def mass_properties(solid: Solid, center: Array | None = None) -> MassProperties
     squares = a**2 + b**2 + a * b + c * total
     uniform = np.ascontiguousarray((areas * squares).T).sum(axis=1) / 24.0 / volume
     about: Array = uniform if center is None else center
-    return MassProperties(volume, about, _inertia(a - about, b - about, c - about))
-
-
-def _inertia(a: Array, b: Array, c: Array) -> Array:
-    """Sum the inertias of tetrahedra between triangles and the origin, (3, 3)."""
+    # the inertias of the tetrahedra between the triangles and the centre
+    a, b, c = a - about, b - about, c - about
     sizes = np.einsum("ti,ti->t", a, np.cross(b, c))[:, None]
     moments = sum(part.T @ (sizes * part) for part in (a, b, c, a + b + c)) / 120.0
-    return np.trace(moments) * np.eye(3) - moments
+    return volume, about, np.trace(moments) * np.eye(3) - moments

@@ -26,6 +26,7 @@ through semidefinite programming", 2015), with the ellipse of the polygon's seco
 import math
 from bisect import insort
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,10 +60,7 @@ object's extent."""
 def flat_patches(
     vertices: Array, triangles: Indices, limits: PatchLimits, caps: Indices = NO_CAPS
 ) -> tuple[Face, ...]:
-    """Find the largest nearly flat patches of a surface, those with the largest discs first.
-
-    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `caps` (c,).
-    """
+    """Find the largest nearly flat patches of a surface, those with the largest discs first."""
     surface = _Surface.of(vertices, triangles)
     depth = limits.depth * surface.extent
     found: list[tuple[float, Face]] = []
@@ -83,8 +81,6 @@ def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) ->
 
     A ring has dozens of equal patches, and without this rule the first ones would all be on one
     side.
-
-    Takes `found`, `extent` [m].
     """
     sizes = ranks([-radius for radius, _ in found])
     places = np.array([[*face.normal, *(face.centroid / extent)] for _, face in found])
@@ -123,8 +119,7 @@ class _Surface:
         return cls(corners, normals, 0.5 * lengths, triangle_neighbours(triangles), extent)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Group:
+class _Group(NamedTuple):
     """Connected triangles, with the outward normal of their plane and their area [m^2]."""
 
     triangles: Indices
@@ -133,7 +128,6 @@ class _Group:
 
 
 def _groups(surface: _Surface, spread: float, depth: float, caps: Indices) -> list[_Group]:
-    """Divide the triangles into disjoint nearly flat groups, the largest first."""
     smooth = _smoothed(surface)
     flatness: Array = np.einsum("ti,ti->t", smooth, surface.normals)
     flat_first = np.argsort(-graded(flatness, FLATNESS_DIGITS), kind="stable")
@@ -169,7 +163,6 @@ def _grown(
     depth: float,
     free: NDArray[np.bool_],
 ) -> Indices:
-    """Return the free triangles near a plane that connect to the seed across edges, (g,)."""
     normal, origin = plane
     seen = ~free
     seen[seed] = True
@@ -206,8 +199,11 @@ def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Fac
     tails, heads = flat, np.roll(flat, -1, axis=1)
     border = np.stack([tails[~inside], heads[~inside]], axis=1)
     start, room = clearest_point(flat.mean(axis=1), border)
+    along, away = heads - tails, start - tails
+    turns = along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0]
+    over = (turns > 0.0).all(axis=1) | (turns < 0.0).all(axis=1)
     # the derivation needs one triangle over the point from which the polygon grows
-    if room <= 0.0 or _sheets(flat, start) != 1:
+    if room <= 0.0 or over.sum() != 1:
         return None
     polygon = clearing(start, border, BORDER_GAP * surface.extent)
     if polygon is None:
@@ -220,26 +216,19 @@ def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Fac
     leans = angles_between(-surface.normals[facets], normal)
     area, centroid = area_and_centroid([polygon])
     plane = origin + middle * normal
+    corners = plane + polygon @ frame.T
     face = Face(
         normal=normal,
         centroid=plane + frame @ centroid,
         area=area,
-        polygon=plane + polygon @ frame.T,
+        polygon=corners,
         holes=(),
-        pieces=(plane + polygon @ frame.T,),
+        pieces=(corners,),
         spread=float(leans.max()),
         depth=0.5 * float(np.ptp(heights)),
         facets=facets,
     )
     return float((b - E @ centroid).min()), face
-
-
-def _sheets(flat: Array, point: Array) -> int:
-    """Count the triangles (t, 3, 2) that cover a point."""
-    tails, heads = flat, np.roll(flat, -1, axis=1)
-    along, away = heads - tails, point - tails
-    turns = along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0]
-    return int(((turns > 0.0).all(axis=1) | (turns < 0.0).all(axis=1)).sum())
 
 
 ROUNDS = 5
@@ -254,10 +243,7 @@ CANDIDATES = 400
 
 
 def clearest_point(points: Array, segments: Array) -> tuple[Array, float]:
-    """Find the point farthest from all segments, (2,), and its distance from them.
-
-    Takes `points` (n, 2); `segments` (m, 2, 2).
-    """
+    """Find the point farthest from all segments, (2,), and its distance from them."""
     tried = points[:: 1 + len(points) // CANDIDATES]
     room = np.array([_nearest(point, segments)[1].min() for point in tried])
     best = first_best(room)
@@ -265,12 +251,7 @@ def clearest_point(points: Array, segments: Array) -> tuple[Array, float]:
 
 
 def clearing(start: Array, segments: Array, gap: float) -> Array | None:
-    """Find a convex polygon around a point that no segment enters, (k, 2).
-
-    The polygon is counter-clockwise; None if there is no room for one.
-
-    Takes `start` (2,); `segments` (m, 2, 2).
-    """
+    """Find a convex polygon around a point that no segment (m, 2, 2) enters; None without room."""
     low, high = segments.min(axis=(0, 1)), segments.max(axis=(0, 1))
     box = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
     best, middle, stretch = None, start, np.eye(2)

@@ -68,10 +68,7 @@ class FacePiece(ByValue):
     """Largest distance of the true surface from the plane."""
 
     def sound(self) -> bool:
-        """Return whether the fields describe one convex polygon, at about unit size.
-
-        `face`, `spread` and `depth` are not checked, because they refer to the object.
-        """
+        """Return whether the fields describe one polygon; spread and depth are not checked."""
         with np.errstate(all="ignore"):
             count = len(self.corners) if is_array(self.corners, None, 2) else 0
             rows = len(self.E) if are_units(self.E, None, 2) else 0
@@ -155,22 +152,15 @@ def shape_of(pieces: Sequence[FacePiece]) -> FaceShape:
 def choices_near(
     shapes: Sequence[FaceShape], positions: Array, most: int
 ) -> list[tuple[FacePiece, ...]]:
-    """List choices of one piece per face, those nearest to given points of the planes first.
-
-    Takes `positions` (k, 3).
-    """
-    ranked = [
-        _nearest_first(shape.pieces, at)[:most] for shape, at in zip(shapes, positions, strict=True)
-    ]
+    """List choices of one piece per face, those nearest to given points of the planes first."""
+    ranked: list[list[FacePiece]] = []
+    for shape, at in zip(shapes, positions, strict=True):
+        apart = [graded(-piece.inset(at), SAME_PLACE) for piece in shape.pieces]
+        order = sorted(range(len(apart)), key=apart.__getitem__)
+        ranked.append([shape.pieces[place] for place in order[:most]])
     every = product(*(range(len(each)) for each in ranked))
     ranks = sorted(every, key=lambda rank: (sum(rank), rank))[:most]
     return [tuple(each[place] for each, place in zip(ranked, rank, strict=True)) for rank in ranks]
-
-
-def _nearest_first(pieces: Sequence[FacePiece], at: Array) -> list[FacePiece]:
-    """Order pieces of a face, the nearest to a point of its plane first."""
-    apart = [graded(-piece.inset(at), SAME_PLACE) for piece in pieces]
-    return [pieces[place] for place in sorted(range(len(pieces)), key=apart.__getitem__)]
 
 
 def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
@@ -182,10 +172,7 @@ def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
 
 
 def unit_pieces(body: Polyhedron) -> tuple[FacePiece, ...]:
-    """List all convex pieces large enough for a contact, at object size one.
-
-    Lengths are divided by the object's radius and counted from its centre of mass.
-    """
+    """List convex pieces with room for a contact, about the centre of mass, over the radius."""
     pieces = [
         replace(
             piece_of(index, face.normal, (polygon - body.center_of_mass) / body.radius),
@@ -207,10 +194,7 @@ def pieces_by_face(body: Polyhedron) -> tuple[tuple[FacePiece, ...], ...]:
 
 
 def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
-    """Make the `FacePiece` of a convex polygon.
-
-    Takes `normal` (3,); `polygon` (k, 3).
-    """
+    """Make the `FacePiece` of a convex polygon (k, 3)."""
     edge = polygon[1] - polygon[0]
     along = np.asarray(edge / np.linalg.norm(edge), dtype=np.float64)
     frame = np.column_stack([along, np.cross(normal, along)])
@@ -235,10 +219,7 @@ def inscribed_disc_radius(polygon: Array, piece: FacePiece) -> float:
 
 
 def inscribed_disc_radius_of(polygon: Array, normal: Array) -> float:
-    """Compute the radius of the largest disc in a convex polygon (k, 3).
-
-    Its corners are counter-clockwise about the normal.
-    """
+    """Compute the radius of the largest disc in a convex polygon (k, 3), wound about the normal."""
     return inscribed_radius(*edge_rows((polygon - polygon[0]) @ plane_frame(normal)))
 
 

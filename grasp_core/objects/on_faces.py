@@ -48,10 +48,7 @@ def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
 
 @lru_cache(maxsize=32)
 def face_under(body: Polyhedron, contact: Contact) -> Face | None:
-    """Find the face on which a contact lies with the surface's normal; None if there is none.
-
-    What was found last is kept, as the controls of a grasp have many of its contacts.
-    """
+    """Find the face on which a contact lies with its normal; kept, as controls repeat it."""
     slack = ON_FACE * body.radius
     # planar faces that lean otherwise are left out at once; patches have many normals
     turned = np.abs(body.normals - contact.normal).max(axis=1)
@@ -82,10 +79,7 @@ def _on_surface(body: Polyhedron, face: Face, contact: Contact) -> bool:
 
 
 def within(point: Array, polygon: Array, normal: Array, slack: float) -> bool:
-    """Return whether a point is inside a convex polygon, or outside by at most `slack`.
-
-    Takes `point` (3,) [m]; `polygon` (n, 3) [m]; `normal` (3,); `slack` [m].
-    """
+    """Return whether a point is inside a convex polygon, or outside by at most `slack`."""
     edges = np.concatenate((polygon[1:], polygon[:1])) - polygon
     inward = cross(normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)
     return bool((np.einsum("ki,ki->k", inward, point - polygon) >= -slack).all())

@@ -5,7 +5,6 @@ own plane, never from neighbour to neighbour, so that the facets of a fine spher
 creep into one "face".
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,13 +56,6 @@ class Flatness:
         return cls(max(PLANAR * extent, flatness_m), 0.5 * flatness_m)
 
 
-def planar_faces(
-    vertices: Array, triangles: Indices, groups: Sequence[Indices], flatness: Flatness
-) -> tuple[Face, ...]:
-    """Outline one planar face for each group of coplanar triangles of an outward mesh."""
-    return tuple(_face(vertices, triangles[group], flatness.distance) for group in groups)
-
-
 def coplanar_groups(
     vertices: Array, triangles: Indices, flatness: Flatness, caps: Indices = NO_CAPS
 ) -> list[Indices]:
@@ -74,8 +66,6 @@ def coplanar_groups(
     Groups grow from the largest triangles first, whose planes are the least affected by rounding.
     Where coordinates are rounded, the plane is fitted again to what has grown. A triangle thinner
     than the distance limit has no meaningful normal, so only its distance counts.
-
-    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `caps` (c,).
     """
     table = _Triangles.of(vertices[triangles], triangle_neighbours(triangles), flatness)
     group_of = np.full(len(triangles), -1)
@@ -148,10 +138,7 @@ class _Triangles:
 
 
 def triangle_neighbours(triangles: Indices) -> Indices:
-    """Find the triangle across each edge (k, k+1) of each triangle, (t, 3).
-
-    An entry is -1 unless the edge has exactly one other triangle.
-    """
+    """Find the one triangle across each edge (k, k+1), (t, 3); -1 if there is none, or several."""
     tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     edges = np.sort(np.column_stack([tail, head]), axis=1)
     _, place, uses = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
@@ -162,42 +149,35 @@ def triangle_neighbours(triangles: Indices) -> Indices:
     return across.reshape(-1, 3)
 
 
-def _face(vertices: Array, triangles: Indices, slack: float) -> Face:
+def planar_face(vertices: Array, triangles: Indices, slack: float) -> Face:
+    """Outline the planar face of a group of coplanar triangles of an outward mesh."""
     corners = vertices[triangles]
-    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    outward = crosses.sum(axis=0)
     normal = -outward / np.linalg.norm(outward)
-    weights = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
+    weights = np.linalg.norm(crosses, axis=1)
     origin = (weights[:, None] * corners.mean(axis=1)).sum(axis=0) / weights.sum()
     frame = plane_frame(normal)
 
-    def flat(loop: list[int]) -> Array:
-        return without_straight_corners((vertices[loop[::-1]] - origin) @ frame, slack)
-
-    def lift(loop: Array) -> Array:
-        return origin + loop @ frame.T
-
-    found = [flat(loop) for loop in border_loops(triangles)]
+    found = [
+        without_straight_corners((vertices[loop[::-1]] - origin) @ frame, slack)
+        for loop in border_loops(triangles)
+    ]
     loops = [found[place] for place in largest_first([signed_area(loop) for loop in found])]
-    outer, holes = loops[0], loops[1:]
-    pieces = convex_pieces(loops, slack)
     area, centroid = area_and_centroid(loops)
+    polygon, *holes = (origin + loop @ frame.T for loop in loops)
     return Face(
         normal=normal,
         centroid=origin + frame @ centroid,
         area=area,
-        polygon=lift(outer),
-        holes=tuple(lift(hole) for hole in holes),
-        pieces=tuple(lift(piece) for piece in pieces),
+        polygon=polygon,
+        holes=tuple(holes),
+        pieces=tuple(origin + piece @ frame.T for piece in convex_pieces(loops, slack)),
     )
 
 
 def convex_pieces(loops: list[Array], slack: float) -> list[Array]:
-    """Split a plane figure into convex polygons, (k, 2) each.
-
-    Takes `loops` (k, 2).
-    """
+    """Split a plane figure of loops (k, 2) into convex polygons."""
     if len(loops) == 1 and is_convex(loops[0]):
         return loops
     pieces = merge_into_convex_pieces(np.vstack(loops), triangulate(loops))
@@ -222,18 +202,20 @@ def border_loops(triangles: Indices) -> list[list[int]]:
             del unseen[edge]
             loop.append(edge[0])
             edge = _next_on_border(inside, edge)
-        loops += _cut_at_repeats(loop)
+        loops += cut_at_repeats(loop)
     return loops
 
 
-def _cut_at_repeats(walk: list[int]) -> list[list[int]]:
-    loops: list[list[int]] = []
-    current: list[int] = []
+def cut_at_repeats(walk: list[int]) -> list[list[int]]:
+    """Cut a closed walk into loops, one wherever a vertex is met again."""
+    loops, current, place = list[list[int]](), list[int](), dict[int, int]()
     for vertex in walk:
-        if vertex in current:
-            start = current.index(vertex)
-            loops.append(current[start:])
-            current = current[:start]
+        if vertex in place:
+            loops.append(current[place[vertex] :])
+            del current[place[vertex] :]
+            for passed in loops[-1]:
+                del place[passed]
+        place[vertex] = len(current)
         current.append(vertex)
     return [*loops, current]
 

@@ -29,7 +29,7 @@ from grasp_core.checked import (
     shown,
     text,
 )
-from grasp_core.errors import InputError, MeshError
+from grasp_core.errors import InputError, about
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.notebooks import InNotebooks
@@ -37,6 +37,7 @@ from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, MeshChoice
 from grasp_core.objects.surface import Face, FaceKind, PatchLimits, Surface
 
 UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+SHAPES = {"vertices": (None, 3), "center_of_mass": (3,), "inertia": (3, 3)}
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -71,12 +72,10 @@ class Polyhedron(ByValue, InNotebooks):
     lengths and asked for very often."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))
         triangles = frozen_indices(self.triangles, (None, 3), "triangles")
         object.__setattr__(self, "triangles", triangles)
-        center = frozen(self.center_of_mass, (3,), "center_of_mass")
-        object.__setattr__(self, "center_of_mass", center)
-        object.__setattr__(self, "inertia", frozen(self.inertia, (3, 3), "inertia"))
+        for name, shape in SHAPES.items():
+            object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
         for name in ("name", "content_sha256", "source_sha256"):
             text(getattr(self, name), name)
         number(self.volume, "volume", above=0.0, most=LARGEST)
@@ -84,7 +83,8 @@ class Polyhedron(ByValue, InNotebooks):
             raise InputError(
                 f"triangles must hold vertex numbers from 0 to {len(self.vertices) - 1}"
             )
-        reach = np.linalg.norm(self.vertices - center, axis=1).max(initial=0.0)
+        away = self.vertices - self.center_of_mass
+        reach = np.linalg.norm(away, axis=1).max(initial=0.0)
         object.__setattr__(self, "radius", float(reach))
         several(self.faces, partial(instance, kind=Face, name="faces"), "faces", "Face values")
         several(self.notes, partial(text, name="notes"), "notes", "texts")
@@ -127,7 +127,10 @@ class Polyhedron(ByValue, InNotebooks):
 
     def to_trimesh(self) -> Any:
         """Return the surface as a `trimesh.Trimesh` with the same vertices and triangles [m]."""
-        return mesh_of(self.vertices, self.triangles, self.name)
+        trimesh: Any = importlib.import_module("trimesh")
+        return trimesh.Trimesh(
+            self.vertices, self.triangles, metadata={"name": self.name}, process=False
+        )
 
     def mass_at(self, density_kg_m3: float) -> float:
         """Return the mass of the object at a uniform density [kg], to nine digits.
@@ -185,9 +188,13 @@ def from_trimesh(
         InputError: The value is not a mesh, or an option is refused.
         MeshError: The mesh is not a solid; its `reason` says why.
     """
-    vertices, triangles = triangles_of(mesh)
+    if not (hasattr(mesh, "vertices") and hasattr(mesh, "faces")):
+        raise InputError(
+            f"mesh must be a trimesh.Trimesh, got {type(mesh).__name__}; for a trimesh.Scene, "
+            "pass scene.to_mesh()"
+        )
     choices = MeshChoices(faces, patches, flatness_m, largest_part)
-    return polyhedron_from_mesh(vertices, triangles, choices, name=name)
+    return polyhedron_from_mesh(mesh.vertices, mesh.faces, choices, name=name)
 
 
 AnyPolyhedron = TypeVar("AnyPolyhedron", bound=Polyhedron)
@@ -234,7 +241,7 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
     size = UNITS_M[unit] * positive(scale, "scale")
     path = path_of(path, "path")
     mesh = read_triangles(path, limits)
-    try:
+    with about(path):
         return polyhedron_from_mesh(
             mesh.vertices * size,
             mesh.triangles,
@@ -244,10 +251,6 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
             center_of_mass=center_of_mass,
             rounding=mesh.rounding * size,
         )
-    except MeshError as error:
-        raise MeshError(error.reason, f"{path}: {error.message}") from error
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def polyhedron_from_mesh(  # noqa: PLR0913 - what is known of a mesh, a keyword each
@@ -262,46 +265,12 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - what is known of a mesh, a keyword 
     known: Surface | None = None,
     kind: type[AnyPolyhedron] = Polyhedron,
 ) -> AnyPolyhedron:
-    """Check a triangle mesh and build the polyhedron of its faces.
-
-    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `rounding` [m].
-    """
+    """Check a triangle mesh and build the polyhedron of its faces."""
     text(name, "name")
-    parts = build(
+    made = build(
         vertices, triangles, choices, rounding=rounding, center_of_mass=center_of_mass, known=known
     )
-    return kind(
-        name=name,
-        vertices=parts.vertices,
-        triangles=parts.triangles,
-        faces=parts.faces,
-        volume=parts.mass.volume,
-        center_of_mass=parts.mass.center,
-        inertia=parts.mass.inertia,
-        content_sha256=parts.content_sha256,
-        source_sha256=source_sha256 or parts.content_sha256,
-        patches=parts.patches,
-        surface=parts.surface,
-        notes=parts.notes,
-    )
-
-
-def triangles_of(mesh: Any) -> tuple[Any, Any]:
-    """Return the vertices and the triangles of a `trimesh.Trimesh`, unchecked."""
-    if not (hasattr(mesh, "vertices") and hasattr(mesh, "faces")):
-        raise InputError(
-            f"mesh must be a trimesh.Trimesh, got {type(mesh).__name__}; for a trimesh.Scene, "
-            "pass scene.to_mesh()"
-        )
-    return mesh.vertices, mesh.faces
-
-
-def mesh_of(vertices: Array, triangles: Indices, name: str) -> Any:
-    """Return a `trimesh.Trimesh` with given vertices (n, 3) [m] and triangles (t, 3)."""
-    module: Any = importlib.import_module("trimesh")
-    return module.Trimesh(
-        vertices=vertices, faces=triangles, metadata={"name": name}, process=False
-    )
+    return kind(name=name, source_sha256=source_sha256 or made["content_sha256"], **made)
 
 
 FLUSH = 1e-6

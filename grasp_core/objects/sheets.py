@@ -45,11 +45,13 @@ def check_bounds(points: Array, corners: Indices) -> None:
 
 
 def outward_sheets(points: Array, corners: Indices, *, largest_part: bool) -> Shells:
-    """Orient the parts of an open surface outwards.
-
-    Takes `points` (n, 3) [m]; `corners` (t, 3).
-    """
-    areas, label, said = triangle_areas(points, corners), _labels(corners), list[str]()
+    """Orient the parts of an open surface outwards."""
+    # parts connect across edges of two triangles
+    across = triangle_neighbours(corners)
+    here = np.repeat(np.arange(len(corners)), SIDES + 1)
+    links = np.column_stack([here, across.ravel()])[across.ravel() >= 0]
+    _, label = np.unique(components(len(corners), links), return_inverse=True)
+    areas, said = triangle_areas(points, corners), list[str]()
     whole, count = float(areas.sum()), int(label.max()) + 1
     if largest_part:
         kept = label == np.bincount(label, weights=areas).argmax()
@@ -85,10 +87,7 @@ def outward_sheets(points: Array, corners: Indices, *, largest_part: bool) -> Sh
 
 
 def _winding_of_parts(points: Array, corners: Indices, areas: Array, label: Indices) -> Array:
-    """Average the winding number over samples of each part, (parts,).
-
-    Parts that are too small and too many to be looked at count as lying on no solid.
-    """
+    """Average the winding number over samples of each part, (parts,); 0 for parts not looked at."""
     places = sampled(areas)
     _, first = np.unique(label, return_index=True)
     unseen = first[~np.isin(np.arange(len(first)), label[places])]
@@ -99,15 +98,6 @@ def _winding_of_parts(points: Array, corners: Indices, areas: Array, label: Indi
         for weight in (found, np.ones(len(places)))
     )
     return sums / np.maximum(counts, 1.0)
-
-
-def _labels(corners: Indices) -> Indices:
-    """Number the part of each triangle; parts connect across edges of two triangles, (t,)."""
-    across = triangle_neighbours(corners)
-    here = np.repeat(np.arange(len(corners)), SIDES + 1)
-    links = np.column_stack([here, across.ravel()])[across.ravel() >= 0]
-    _, label = np.unique(components(len(corners), links), return_inverse=True)
-    return label
 
 
 def _crossing(share: float) -> MeshError:
@@ -127,10 +117,7 @@ BLOCK = 20_000
 
 
 def sampled(areas: Array) -> Indices:
-    """Choose triangles that stand for equal shares of a surface each, (s,).
-
-    Takes `areas` (t,).
-    """
+    """Choose triangles that stand for equal shares of a surface each, (s,)."""
     count = min(max(MOST_ANGLES // len(areas), FEWEST_SAMPLES), MOST_SAMPLES, len(areas))
     upto: Array = np.cumsum(areas)
     middles = np.linspace(0.0, float(upto[-1]), 2 * count + 1)[1::2]
@@ -138,10 +125,7 @@ def sampled(areas: Array) -> Indices:
 
 
 def winding_on(corners: Array, places: Indices) -> Array:
-    """Compute the mean of the winding numbers on both sides of triangles, at their middles, (s,).
-
-    Takes `corners` (t, 3, 3); `places` (s,).
-    """
+    """Compute the mean winding number of both sides of triangles, at their middles, (s,)."""
     found = np.zeros(len(places))
     step = max(BLOCK // len(corners), 1)
     axes = np.ascontiguousarray(corners.transpose(2, 1, 0))
@@ -154,10 +138,6 @@ def winding_on(corners: Array, places: Indices) -> Array:
 
 
 def _solid_angles(axes: Array, points: Array) -> Array:
-    """Compute the solid angles of triangles as seen from points, (p, t).
-
-    Takes `axes` (3, 3, t); `points` (p, 3).
-    """
     x, y, z = (axes[k] - points[:, k, None, None] for k in range(3))
     lengths = np.sqrt(x * x + y * y + z * z)
     (ax, bx, cx), (ay, by, cy), (az, bz, cz), (a, b, c) = (
@@ -177,15 +157,24 @@ def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.boo
     """Wind triangles like their neighbours; None if the surface has only one side.
 
     In each part that connects across edges of two triangles, the larger area keeps its winding.
-
-    Takes `corners` (t, 3); `areas` (t,). Gives the triangles, and which of them were turned.
+    Gives the triangles, and which of them were turned.
     """
     across = triangle_neighbours(corners)
-    against = _against(corners, across)
+    # across these edges the neighbour runs along the edge in the same direction, (t, 3)
+    heads, others = np.roll(corners, -1, axis=1), corners[across]
+    same = (others == corners[..., None]) & (np.roll(others, -1, axis=2) == heads[..., None])
+    against = same.any(axis=2) & (across >= 0)
     turned, part = np.zeros(len(corners), dtype=np.bool_), np.full(len(corners), -1)
     for seed in range(len(corners)):
-        if part[seed] < 0:
-            _spread(seed, across, against, turned, part)
+        if part[seed] >= 0:
+            continue
+        part[seed], front = seed, [seed]
+        while front:  # each triangle that connects with the seed is reached once
+            here = front.pop()
+            for side, other in enumerate(across[here].tolist()):
+                if other >= 0 and part[other] < 0:
+                    part[other], turned[other] = seed, turned[here] ^ against[here, side]
+                    front.append(other)
     inner = across >= 0
     if (inner & ((turned[:, None] ^ turned[across]) != against)).any():
         return None
@@ -195,31 +184,3 @@ def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.boo
     )
     turned ^= (swept > 0.5 * size)[part]
     return np.where(turned[:, None], corners[:, ::-1], corners), turned
-
-
-def _spread(
-    seed: int,
-    across: Indices,
-    against: NDArray[np.bool_],
-    turned: NDArray[np.bool_],
-    part: Indices,
-) -> None:
-    """Carry the winding of one triangle to all that connect with it; each is reached once."""
-    part[seed] = seed
-    front = [seed]
-    while front:
-        here = front.pop()
-        for side in range(3):
-            other = int(across[here, side])
-            if other >= 0 and part[other] < 0:
-                part[other], turned[other] = seed, turned[here] ^ against[here, side]
-                front.append(other)
-
-
-def _against(corners: Indices, across: Indices) -> NDArray[np.bool_]:
-    """Tell across which edges the neighbour runs along the edge in the same direction, (t, 3)."""
-    tails, heads = corners, np.roll(corners, -1, axis=1)
-    others = corners[across]
-    ahead = np.roll(others, -1, axis=2)
-    same = (others == tails[..., None]) & (ahead == heads[..., None])
-    return same.any(axis=2) & (across >= 0)

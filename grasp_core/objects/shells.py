@@ -78,17 +78,20 @@ class _Body:
 def one_solid(
     points: Array, corners: Indices, caps: Indices, *, most: int, largest_part: bool
 ) -> Shells:
-    """Orient the shells of a mesh outwards, and make one solid of them.
-
-    Takes `points` (n, 3) [m]; `corners` (t, 3); `caps` (c,).
-    """
+    """Orient the shells of a mesh outwards, and make one solid of them."""
     whole = Solid(points, corners)
     check_volume(whole)
     said = list[str]()
     if whole.volume < 0.0:
         corners = corners[:, ::-1]
         said.append("the mesh was inside out; its triangles were turned")
-    bodies = _shells(points, corners, most)
+    label = _labels(corners)
+    if label.max() >= most:
+        raise MeshError(
+            MeshRefusal.SEPARATE,
+            f"the mesh has {label.max() + 1} parts, more than the limit of {most}; give one solid",
+        )
+    bodies = _split(_Body(Solid(points, corners), np.arange(len(corners))), label)
     as_it_is = Shells(points, corners, caps, 0.0, tuple(said))
     if len(bodies) == 1:
         return as_it_is
@@ -182,18 +185,13 @@ def _sorted_out(
 def _is_inside_another(place: int, bodies: list[_Body], slack: float) -> bool:
     """Tell whether a larger body, or an equal one before it, holds a body in its material."""
     inner = bodies[place].solid
+    low, high = inner.vertices.min(axis=0), inner.vertices.max(axis=0)
     return any(
         (other.solid.volume, place) > (inner.volume, k)
-        and _boxes_meet(other.solid, inner)
+        and bool((other.solid.vertices.min(axis=0) <= high).all())
+        and bool((low <= other.solid.vertices.max(axis=0)).all())
         and intersection_volume(other.solid, inner) >= inner.volume - slack
         for k, other in enumerate(bodies)
-    )
-
-
-def _boxes_meet(one: Solid, two: Solid) -> bool:
-    return bool(
-        (one.vertices.min(axis=0) <= two.vertices.max(axis=0)).all()
-        and (two.vertices.min(axis=0) <= one.vertices.max(axis=0)).all()
     )
 
 
@@ -216,7 +214,6 @@ def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
 
 
 def _with_cavities(shells: list[_Body], slack: float) -> list[_Body]:
-    """Give the cavities of a union to their bodies."""
     bodies = [shell for shell in shells if shell.solid.volume > 0.0]
     for shell in shells:
         if shell.solid.volume <= 0.0:
@@ -226,17 +223,6 @@ def _with_cavities(shells: list[_Body], slack: float) -> list[_Body]:
             if shared[host] > slack:
                 bodies[host] = bodies[host].joined(shell)
     return bodies
-
-
-def _shells(points: Array, corners: Indices, most: int) -> list[_Body]:
-    """Split a mesh into shells."""
-    label = _labels(corners)
-    if label.max() >= most:
-        raise MeshError(
-            MeshRefusal.SEPARATE,
-            f"the mesh has {label.max() + 1} parts, more than the limit of {most}; give one solid",
-        )
-    return _split(_Body(Solid(points, corners), np.arange(len(corners))), label)
 
 
 def _split(body: _Body, label: Indices) -> list[_Body]:

@@ -21,11 +21,7 @@ THIN = 4e-6
 def welded(
     points: Array, corners: Indices, reach: float | None = None
 ) -> tuple[Array, Indices, int]:
-    """Join close vertices, and drop unused vertices and collapsed triangles.
-
-    Takes `points` (n, 3) [m]; `corners` (t, 3); `reach` [m]. Gives vertices, triangles, and the
-    number of triangles that were dropped.
-    """
+    """Join close vertices, drop unused ones and collapsed triangles; also count the latter."""
     used, corners = np.unique(corners, return_inverse=True)
     points, corners = points[used], corners.reshape(-1, 3)
     if reach is None:
@@ -50,10 +46,7 @@ def _links(points: Array, reach: float) -> Indices:
 
 
 def edges_of(corners: Indices) -> tuple[Indices, NDArray[np.bool_]]:
-    """Number the edges of triangles, and tell which run from the lower vertex to the higher.
-
-    Gives the number of the edge (k, k+1) of each triangle, and its direction, (3 t,) each.
-    """
+    """Number the edge (k, k+1) of each triangle, and tell if it runs to a higher vertex, (3 t,)."""
     tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
     names = np.minimum(tail, head) * (int(corners.max()) + 1) + np.maximum(tail, head)
     return np.unique(names, return_inverse=True)[1].ravel(), tail < head
@@ -94,10 +87,7 @@ def surface_fault(corners: Indices) -> MeshError | None:
 
 
 def balanced(corners: Indices) -> bool:
-    """Return whether as many triangles run along each edge in one direction as in the other.
-
-    Such triangles have a whole winding number everywhere, so that they enclose a volume.
-    """
+    """Return whether edges are run along as often in both directions: a volume is enclosed then."""
     place, forward = edges_of(corners)
     return not np.bincount(place, weights=np.where(forward, 1.0, -1.0)).any()
 

@@ -9,6 +9,7 @@ width d is off by at most A d / 3 if the true surface stays within the half-ball
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.geometry.connectivity import components
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.booleans import Solid, triangulate
+from grasp_core.objects.planar_faces import cut_at_repeats
 from grasp_core.objects.sheets import check_bounds, outward_sheets, wound_alike
 from grasp_core.objects.shells import Shells, one_solid
 from grasp_core.objects.solid_checks import (
@@ -30,8 +32,9 @@ from grasp_core.objects.surface import Surface
 
 KNOWN = 0.02
 """Largest share of the volume that closed holes may hide, for the volume to count as known."""
-NONE = -1.0
-"""Distance within which no two vertices are."""
+FLAT = 1e-9
+"""Area of a loop in the plane that fits it, relative to its width squared, below which it is a
+crack between triangles that meet."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,14 +49,10 @@ class SoundSurface:
     fault: MeshError | None
     """Why the triangles do not bound a solid with planar faces; None if they do."""
 
-    def check_bounds(self) -> None:
-        """Refuse a closed surface if parts of it do not bound the solid."""
-        check_bounds(self.points, self.corners)
-
     def outward(self, *, largest_part: bool) -> "SoundSurface":
         """Return this surface with an open one oriented outwards; a closed one is so already."""
         if self.surface.closed:
-            self.check_bounds()
+            check_bounds(self.points, self.corners)
             return self
         found = outward_sheets(self.points, self.corners, largest_part=largest_part)
         return _with_shells(self, found)
@@ -68,17 +67,14 @@ def sound_surface(
     largest_part: bool,
     known: Surface | None = None,
 ) -> SoundSurface:
-    """Make one surface of triangles.
-
-    Takes `vertices` (n, 3) [m]; `triangles` (t, 3); `flatness_m` [m].
-    """
+    """Make one surface of triangles."""
     if known is None:
         points, corners, said = _joined(vertices, triangles, flatness_m, most_parts)
         surface = Surface(flatness_m=flatness_m, repairs=tuple(said))
         if surface_fault(corners):
             corners, surface = _capped(points, corners, surface)
     else:  # vertices that were kept apart may be equal, where a united solid touches itself
-        points, corners, _ = welded(vertices, triangles, NONE)
+        points, corners, _ = welded(vertices, triangles, reach=-1.0)
         surface = known
         if len(known.caps) and known.caps.max() >= len(corners):
             raise InputError(
@@ -100,8 +96,15 @@ def _joined(
     said = [f"dropped {dropped} triangles without area"] if dropped else []
     fault = surface_fault(corners)
     if fault and fault.reason is MeshRefusal.WINDING:
-        corners, turned = _wound(points, corners)
-        said.append(f"triangles wound against their neighbours were turned, {turned} in all")
+        wound = wound_alike(corners, triangle_areas(points, corners))
+        if wound is None:
+            raise MeshError(
+                MeshRefusal.WINDING,
+                "the surface has only one side, so its triangles cannot be wound alike; repair it "
+                "in a modelling program",
+            )
+        corners, turned = wound
+        said.append(f"triangles wound against their neighbours were turned, {turned.sum()} in all")
         fault = surface_fault(corners)
     if fault and fault.reason is MeshRefusal.NON_MANIFOLD:
         apart = _welded_apart(vertices, triangles, most_parts)
@@ -147,20 +150,7 @@ def _with_shells(found: SoundSurface, made: Shells) -> SoundSurface:
     return SoundSurface(made.points, made.corners, surface, fault)
 
 
-def _wound(points: Array, corners: Indices) -> tuple[Indices, int]:
-    """Wind triangles like their neighbours; also return how many were turned."""
-    found = wound_alike(corners, triangle_areas(points, corners))
-    if found is None:
-        raise MeshError(
-            MeshRefusal.WINDING,
-            "the surface has only one side, so its triangles cannot be wound alike; repair it in a "
-            "modelling program",
-        )
-    return found[0], int(found[1].sum())
-
-
 def _capped(points: Array, corners: Indices, surface: Surface) -> tuple[Indices, Surface]:
-    """Close the holes of a surface if they are small, and say so."""
     caps = caps_of(points, corners)
     if caps is None:
         return corners, surface
@@ -186,8 +176,7 @@ def _capped(points: Array, corners: Indices, surface: Surface) -> tuple[Indices,
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Caps:
+class Caps(NamedTuple):
     """Triangles that close all holes of a surface, (c, 3), with the sizes of the holes."""
 
     triangles: Indices
@@ -201,16 +190,13 @@ class Caps:
 
 
 def caps_of(points: Array, corners: Indices) -> Caps | None:
-    """Close the holes of a surface; None if it has none, or its open edges do not form loops.
-
-    Takes `points` (n, 3) [m]; `corners` (t, 3).
-    """
+    """Close the holes of a surface; None if it has none, or its open edges do not form loops."""
     loops = _loops(corners)
     if not loops:
         return None
     triangles = [_cap(points, loop) for loop in loops]
     widths = np.array([_width(points[loop]) for loop in loops])
-    areas = np.array([_area(points[each]) for each in triangles])
+    areas = np.array([triangle_areas(points, each).sum() for each in triangles])
     hole_of = np.repeat(np.arange(len(loops)), [len(each) for each in triangles])
     return Caps(np.concatenate(triangles), widths, hole_of, float(areas @ widths) / 3.0)
 
@@ -233,24 +219,11 @@ def _loops(corners: Indices) -> list[list[int]] | None:
     loops = list[list[int]]()
     for start in list(leaving):
         while leaving[start]:
-            loops += _walked(start, leaving)
+            walk = [start]
+            while (vertex := leaving[walk[-1]].pop()) != start:  # each step uses up an edge
+                walk.append(vertex)
+            loops += cut_at_repeats(walk)
     return loops
-
-
-def _walked(start: int, leaving: dict[int, list[int]]) -> list[list[int]]:
-    """Walk until the start is reached; where a vertex is met again, a loop is complete."""
-    loops, walk, place = list[list[int]](), [start], {start: 0}
-    while True:  # each step uses up an edge
-        vertex = leaving[walk[-1]].pop()
-        if vertex in place:
-            loops.append(walk[place[vertex] :])
-            del walk[place[vertex] :]
-            for passed in loops[-1]:
-                del place[passed]
-        place[vertex] = len(walk)
-        walk.append(vertex)
-        if vertex == start:
-            return loops
 
 
 def _cap(points: Array, loop: list[int]) -> Indices:
@@ -269,11 +242,6 @@ def _cap(points: Array, loop: list[int]) -> Indices:
     return numbers[found if _covers(found, len(loop)) else fan]
 
 
-FLAT = 1e-9
-"""Area of a loop in the plane that fits it, relative to its width squared, below which it is a
-crack between triangles that meet."""
-
-
 def _covers(triangles: Indices, count: int) -> bool:
     """Tell whether triangles have the edges of a loop of `count` corners as their border."""
     if len(triangles) != count - 2:
@@ -288,8 +256,3 @@ def _width(places: Array) -> float:
     if len(places) > 500:  # noqa: PLR2004 - the diagonal of the box is at most 1.8 times as long
         return float(np.linalg.norm(np.ptp(places, axis=0)))
     return float(np.linalg.norm(places[:, None] - places[None], axis=2).max())
-
-
-def _area(corners: Array) -> float:
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return 0.5 * float(np.linalg.norm(crosses, axis=1).sum())

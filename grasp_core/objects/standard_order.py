@@ -100,30 +100,34 @@ def standard(body: Polyhedron) -> Standard:
 
 def mirror_image(body: Polyhedron) -> Polyhedron:
     """Make the mirror image of an object; its faces keep their numbers."""
+    faces = tuple(
+        replace(
+            face,
+            normal=face.normal * FLIP,
+            centroid=face.centroid * FLIP,
+            polygon=(face.polygon * FLIP)[::-1],
+            holes=tuple((hole * FLIP)[::-1] for hole in face.holes),
+            pieces=tuple((piece * FLIP)[::-1] for piece in face.pieces),
+        )
+        for face in body.faces
+    )
     return replace(
         body,
         vertices=body.vertices * FLIP,
         triangles=body.triangles[:, ::-1],
-        faces=tuple(_mirrored(face) for face in body.faces),
+        faces=faces,
         center_of_mass=body.center_of_mass * FLIP,
         inertia=body.inertia * np.outer(FLIP, FLIP),
     )
 
 
-def _mirrored(face: Face) -> Face:
-    return replace(
-        face,
-        normal=face.normal * FLIP,
-        centroid=face.centroid * FLIP,
-        polygon=(face.polygon * FLIP)[::-1],
-        holes=tuple((hole * FLIP)[::-1] for hole in face.holes),
-        pieces=tuple((piece * FLIP)[::-1] for piece in face.pieces),
-    )
-
-
 def _rarest_flags(body: Polyhedron) -> Iterator[tuple[int, int]]:
     """Yield the flags (face, corner) that may define the standard order, in the file's order."""
-    kinds = [_kind_of_face(body, face) for face in body.faces]
+    kinds: list[Cells] = []
+    for face in body.faces:
+        away = (face.centroid - body.center_of_mass) / body.radius
+        lengths = float(face.normal @ away), float(np.linalg.norm(away))
+        kinds.append(_graded((face.area / body.radius**2, *lengths)))
     rarest = _rarest([kind for kind in kinds if kind])
     flags = [
         (place, corner)
@@ -141,17 +145,8 @@ def _rarest(kinds: Sequence[Cells]) -> Cells:
     return min(((count, kind) for kind, count in Counter(kinds).items()), default=(0, ()))[1]
 
 
-def _kind_of_face(body: Polyhedron, face: Face) -> Cells:
-    away = (face.centroid - body.center_of_mass) / body.radius
-    numbers = face.area / body.radius**2, float(face.normal @ away), float(np.linalg.norm(away))
-    return _graded(numbers)
-
-
 def _kind_of_corner(body: Polyhedron, face: int, corner: int) -> Cells:
-    """Describe a corner by its distances from the centres of face and object.
-
-    The result is empty if the corner gives no direction.
-    """
+    """Describe a corner by its distances from both centres; empty if it gives no direction."""
     at = body.faces[face].polygon[corner]
     middles = body.faces[face].centroid, body.center_of_mass
     lengths = [float(np.linalg.norm(at - middle)) / body.radius for middle in middles]
@@ -216,11 +211,7 @@ taken, so that rounding decides nothing."""
 
 
 def with_halves(body: Polyhedron, apart: float) -> tuple[Polyhedron, tuple[int, ...]]:
-    """Add two half faces to an object for each face that is long enough for two contacts.
-
-    Takes `apart` [m]. Gives the object, and for each of its faces the whole face that it is or is a
-    part of.
-    """
+    """Add halves of faces that are long enough for two contacts; also list each face's owner."""
     faces, owners = list(body.faces), list(range(len(body.faces)))
     for index, face in enumerate(body.faces):
         halves = _halves(face, apart)
@@ -250,7 +241,11 @@ def _halves(face: Face, apart: float) -> list[Face]:
     pieces = [(piece - face.centroid) @ frame for piece in face.pieces]
     if not pieces:
         return []
-    along = _longest((face.polygon - face.centroid) @ frame)
+    # along the line between the two corners that are farthest apart
+    border = (face.polygon - face.centroid) @ frame
+    gaps = np.linalg.norm(border[:, None] - border[None], axis=2)
+    i, j = np.argwhere(gaps >= SAME_LENGTH * gaps.max())[0]
+    along = (border[j] - border[i]) / gaps[i, j]
     heights = np.concatenate(pieces) @ along
     middle = 0.5 * float(heights.min() + heights.max())
     halves: list[Face] = []
@@ -259,38 +254,21 @@ def _halves(face: Face, apart: float) -> list[Face]:
         parts = [clip(piece, side * along[None], limit) for piece in pieces]
         parts = [part for part in parts if len(part) > 2]  # noqa: PLR2004 - else not a polygon
         if parts:
-            border = convex_hull(np.vstack(parts))
-            halves.append(
-                replace(
-                    face,
-                    polygon=face.centroid + border @ frame.T,
-                    holes=(),
-                    pieces=tuple(face.centroid + part @ frame.T for part in parts),
-                )
+            polygon, *pieces_here = (
+                face.centroid + part @ frame.T for part in (convex_hull(np.vstack(parts)), *parts)
             )
+            halves.append(replace(face, polygon=polygon, holes=(), pieces=tuple(pieces_here)))
     return halves if len(halves) == 2 else []  # noqa: PLR2004 - both or none
 
 
-def _longest(border: Array) -> Array:
-    """Return the unit vector between the two corners that are farthest apart, (2,)."""
-    gaps = np.linalg.norm(border[:, None] - border[None], axis=2)
-    i, j = np.argwhere(gaps >= SAME_LENGTH * gaps.max())[0]
-    return (border[j] - border[i]) / gaps[i, j]
-
-
 def clear_of_edges(body: Polyhedron, margin: float) -> Polyhedron:
-    """Shrink an object's faces so that contacts keep a distance from all edges and holes.
-
-    Takes `margin` [m].
-    """
-    return replace(body, faces=tuple(_without_margin(face, margin) for face in body.faces))
-
-
-def _without_margin(face: Face, margin: float) -> Face:
-    frame = plane_frame(face.normal)
-    loops = [(loop - face.centroid) @ frame for loop in (face.polygon, *face.holes)]
-    pieces: list[Array] = []
-    for figure in inset_figure(loops, margin):
-        convex = merge_into_convex_pieces(np.vstack(figure), triangulate(figure))
-        pieces += [face.centroid + piece @ frame.T for piece in convex]
-    return replace(face, pieces=tuple(pieces))
+    """Shrink an object's faces so that contacts keep a distance from all edges and holes."""
+    faces: list[Face] = []
+    for face in body.faces:
+        frame, pieces = plane_frame(face.normal), list[Array]()
+        loops = [(loop - face.centroid) @ frame for loop in (face.polygon, *face.holes)]
+        for figure in inset_figure(loops, margin):
+            convex = merge_into_convex_pieces(np.vstack(figure), triangulate(figure))
+            pieces += [face.centroid + piece @ frame.T for piece in convex]
+        faces.append(replace(face, pieces=tuple(pieces)))
+    return replace(body, faces=tuple(faces))

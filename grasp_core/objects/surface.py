@@ -1,9 +1,7 @@
 """Defines faces of objects, and what is known of the surface that an object was made from.
 
-Whatever depends on how far a mesh can be trusted asks here: planning puts no finger on a cap, a
-density gives a mass only where the volume is known, commands and pages show the notes, and files of
-grasps, baselines and datasets keep all of it beside the mesh. An orientation that is not certain
-has no field, because such meshes are refused.
+Whatever depends on how far a mesh can be trusted asks here. An orientation that is not certain has
+no field, because such meshes are refused.
 """
 
 from collections.abc import Iterator

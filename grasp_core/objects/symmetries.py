@@ -89,9 +89,19 @@ def symmetries(body: Polyhedron) -> Symmetries:
         return alone
     turns = [each @ flags[0].T for each in flags]
     mirrors = [each @ np.diag([1.0, -1.0, 1.0]) @ flags[0].T for each in flags]
-    marks = _marks(body)
-    found = [[turn for turn in candidates if _maps(turn, marks)] for candidates in (turns, mirrors)]
-    rotations, reflections = (np.reshape(each, (-1, 3, 3)) for each in found)
+    # vertices (v, 3), and centres and normals of faces (f, 6), which symmetries keep
+    vertices = (body.vertices - body.center_of_mass) / body.radius
+    centres = np.array([face.centroid for face in body.faces]) - body.center_of_mass
+    faces = np.hstack([centres / body.radius, body.normals])
+
+    def is_kept(turn: Array) -> bool:
+        turned = np.hstack([faces[:, :3] @ turn.T, faces[:, 3:] @ turn.T])
+        return _is_matched(vertices @ turn.T, vertices) and _is_matched(turned, faces)
+
+    rotations, reflections = (
+        np.reshape([turn for turn in candidates if is_kept(turn)], (-1, 3, 3))
+        for candidates in (turns, mirrors)
+    )
     return Symmetries(rotations, reflections)
 
 
@@ -170,7 +180,11 @@ def _near(points: Array) -> Array:
 
 def _flags(body: Polyhedron) -> list[Array]:
     """Return the frames of flags that may be images of the first one, which comes first."""
-    kinds = np.array([_kind(body, face) for face in range(len(body.faces))])
+    # numbers that no symmetry changes, at object radius one
+    sizes = [math.sqrt(face.area) / body.radius for face in body.faces]
+    aways = [(face.centroid - body.center_of_mass) / body.radius for face in body.faces]
+    heights = [float(face.normal @ away) for face, away in zip(body.faces, aways, strict=True)]
+    kinds = np.column_stack([sizes, heights, [float(np.linalg.norm(away)) for away in aways]])
     alike = np.abs(kinds[:, None] - kinds[None]).max(axis=2) <= SAME_BODY
     chosen = min(range(len(kinds)), key=lambda face: int(alike[face].sum()))
     corners = [
@@ -185,14 +199,6 @@ def _flags(body: Polyhedron) -> list[Array]:
     ]
 
 
-def _kind(body: Polyhedron, face: int) -> tuple[float, float, float]:
-    """Describe a face by numbers that no symmetry changes, at object radius one."""
-    found = body.faces[face]
-    away = (found.centroid - body.center_of_mass) / body.radius
-    size = math.sqrt(found.area) / body.radius
-    return size, float(found.normal @ away), float(np.linalg.norm(away))
-
-
 def _corners(body: Polyhedron, face: int) -> Iterator[tuple[int, tuple[float, float]]]:
     """Yield a face's corners that give a direction, with their distances from both centres."""
     centroid = body.faces[face].centroid
@@ -200,20 +206,6 @@ def _corners(body: Polyhedron, face: int) -> Iterator[tuple[int, tuple[float, fl
         inner = float(np.linalg.norm(at - centroid)) / body.radius
         if inner > SHORTEST:
             yield corner, (inner, float(np.linalg.norm(at - body.center_of_mass)) / body.radius)
-
-
-def _marks(body: Polyhedron) -> tuple[Array, Array]:
-    """Return vertices (v, 3), and centres and normals of faces (f, 6), which symmetries keep."""
-    vertices = (body.vertices - body.center_of_mass) / body.radius
-    centres = np.array([face.centroid for face in body.faces]) - body.center_of_mass
-    return vertices, np.hstack([centres / body.radius, body.normals])
-
-
-def _maps(turn: Array, marks: tuple[Array, Array]) -> bool:
-    """Return whether a matrix maps each vertex near another, and each face near another."""
-    vertices, faces = marks
-    turned = np.hstack([faces[:, :3] @ turn.T, faces[:, 3:] @ turn.T])
-    return _is_matched(vertices @ turn.T, vertices) and _is_matched(turned, faces)
 
 
 def _is_matched(images: Array, rows: Array) -> bool:

@@ -7,12 +7,11 @@ friction cones and whose lines form the claimed family.
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
 from grasp_core.arrays import Array, frozen_copy
-from grasp_core.by_value import trusted
+from grasp_core.by_value import kept, trusted
 from grasp_core.closure.contacts import grasp_map, normal_and_tangential
 from grasp_core.closure.critical_friction import critical_friction, critical_frictions
 from grasp_core.closure.force_closure import closing_margins, force_closure
@@ -29,12 +28,10 @@ from grasp_core.values import (
     ContactRegion,
     FaceQuadruple,
     Family,
-    Figures,
     ForceCone,
     Grasp,
     Method,
     Witness,
-    fill_in,
     four,
 )
 
@@ -44,18 +41,23 @@ object of size one: forces written with six digits meet it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Certified:
-    """A certified grasp at unit object size, before it is converted to the object's frame."""
+class Candidate:
+    """Contacts that a method placed on four faces at unit object size, not certified yet."""
 
     id: str
     faces: FaceQuadruple
     family: Family
-    span_angle: float
     pieces: tuple[FacePiece, ...]
     cones: tuple[ForceCone, ...]
-    regions: tuple[ContactRegion, ...]
-    """Contact regions, one per finger, in the pieces' units."""
     placement: Placement
+    regions: tuple[ContactRegion, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Certified(Candidate):
+    """A certified grasp at unit object size, before it is converted to the object's frame."""
+
+    span_angle: float
     margin: float
     method: Method
     """The method whose search found it: `free` may find grasps of any family."""
@@ -73,19 +75,6 @@ def named(letter: str, faces: FaceQuadruple) -> str:
     return f"{letter}-" + "-".join(str(face) for face in faces)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Candidate:
-    """Contacts that a method placed on four faces, which are not certified yet."""
-
-    id: str
-    faces: FaceQuadruple
-    family: Family
-    pieces: tuple[FacePiece, ...]
-    cones: tuple[ForceCone, ...]
-    placement: Placement
-    regions: tuple[ContactRegion, ...]
-
-
 def certify(candidate: Candidate, friction: float) -> Certified | None:
     """Certify placed contacts; None if the witness or the exact closure test rejects them."""
     return certify_each([candidate], friction)[0]
@@ -100,20 +89,18 @@ def certify_each(candidates: Sequence[Candidate], friction: float) -> list[Certi
     forces = np.array([each.placement.forces for each in candidates])
     families: list[Family] = [each.family for each in candidates]
     certified: list[Certified | None] = []
-    for each, fits, known, angle in zip(
-        candidates,
-        witnesses_fit(points, normals, forces, friction, families),
-        closing_margins(points, normals, friction).tolist(),
-        span_angles(normals).tolist(),
-        strict=True,
-    ):
+    all_fit = witnesses_fit(points, normals, forces, friction, families)
+    margins = closing_margins(points, normals, friction).tolist()
+    angles = span_angles(normals).tolist()
+    for i, (each, fits, angle) in enumerate(zip(candidates, all_fit, angles, strict=True)):
+        margin = margins[i]
         # where arrays of contacts leave closure open, it is decided for these contacts alone
-        open_yet = fits and math.isnan(known)
-        margin = closure_margin(each.pieces, each.placement, friction) if open_yet else known
+        if fits and math.isnan(margin):
+            margin = _closure_margin(points[i], normals[i], friction)
         certified.append(
             Certified(
-                each.id, each.faces, each.family, angle, each.pieces, each.cones, each.regions,
-                each.placement, margin, method=each.family,
+                each.id, each.faces, each.family, each.pieces, each.cones, each.placement,
+                each.regions, angle, margin, method=each.family,
             )
             if fits and margin is not None
             else None
@@ -121,13 +108,10 @@ def certify_each(candidates: Sequence[Candidate], friction: float) -> list[Certi
     return certified
 
 
-def closure_margin(
-    pieces: Sequence[FacePiece], placement: Placement, friction: float
-) -> float | None:
+def _closure_margin(points: Array, normals: Array, friction: float) -> float | None:
     """Return the margin of the exact force-closure test; None unless it finds closure."""
-    normals = np.array([piece.normal for piece in pieces])
     try:
-        certificate = force_closure(placement.positions, normals, friction)
+        certificate = force_closure(points, normals, friction)
     except UndecidedError:
         return None
     return certificate.margin if certificate.closed else None
@@ -136,10 +120,7 @@ def closure_margin(
 def witness_fault(
     points: Array, normals: Array, forces: Array, friction: float, family: Family
 ) -> str | None:
-    """Return why witness forces are wrong (unbalanced, outside a cone, another family), or None.
-
-    Takes `points`, `normals`, `forces` (4, 3).
-    """
+    """Return why witness forces are wrong (unbalanced, outside a cone, another family), or None."""
     along, across = normal_and_tangential(forces, normals)
     if abs(float(along.sum()) - 1.0) > BALANCED:
         return "the normal parts of the witness forces do not sum to one"
@@ -154,10 +135,7 @@ def witness_fault(
 def witnesses_fit(
     points: Array, normals: Array, forces: Array, friction: float, families: Sequence[Family]
 ) -> list[bool]:
-    """Return for each of many sets of contacts whether `witness_fault` finds no fault.
-
-    Takes `points`, `normals`, `forces` (g, 4, 3); `families` (g,).
-    """
+    """Return for each of many sets of contacts whether `witness_fault` finds no fault."""
     along, across = normal_and_tangential(forces, normals)
     stacked = forces.reshape(len(forces), -1)
     missed = np.linalg.norm(np.einsum("gwj,gj->gw", grasp_map(points), stacked), axis=-1)
@@ -213,18 +191,14 @@ class LateFigures:
 
 def find_critical_frictions(grasps: Iterable[Grasp]) -> None:
     """Find the critical friction of planned grasps that lack it, all in one batch."""
-    fill_in(grasps, "critical_friction", _frictions)
-
-
-def _frictions(late: Sequence[Figures]) -> Sequence[float]:
-    if not all(isinstance(each, LateFigures) for each in late):
-        return [each.critical_friction() for each in late]
-    planned = cast("Sequence[LateFigures]", late)
-    sets = (
-        np.array([getattr(each, name) for each in planned]) for name in ("positions", "normals")
-    )
-    found = critical_frictions(*sets) if planned else np.empty(0)
-    return np.minimum(found, [each.friction for each in planned]).tolist()
+    late = [grasp for grasp in grasps if kept(grasp, "critical_friction") is None]
+    if not late:
+        return
+    figures: list[LateFigures] = [kept(grasp, "_figures") for grasp in late]
+    positions, normals = zip(*((each.positions, each.normals) for each in figures), strict=True)
+    every = critical_frictions(np.array(positions), np.array(normals)).tolist()
+    for grasp, each, found in zip(late, figures, every, strict=True):
+        object.__setattr__(grasp, "critical_friction", min(found, each.friction))
 
 
 def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:

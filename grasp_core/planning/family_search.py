@@ -407,7 +407,6 @@ class Tries:
     def _spanning(
         certified: Sequence[Certified | None], candidates: Sequence[Candidate]
     ) -> list[Certified | None]:
-        """Replace grasps whose force cones do not positively span by None."""
         if not candidates:
             return []
         axes = np.array([[cone.axis for cone in each.cones] for each in candidates])

@@ -196,7 +196,6 @@ def _on_triangles(
 
 
 def _friction(pieces: Pieces, request: PlanRequest) -> float:
-    """Return the friction coefficient to plan with on pieces that may be curved."""
     spread = max(piece.spread for piece in pieces)
     return math.tan(request.theta - spread if spread < request.theta else LEAST_SPAN_ANGLE)
 
@@ -247,7 +246,6 @@ def _certified(
 def _upgraded(
     faces: FaceQuadruple, pieces: Pieces, construction: Construction, cones: Cones, friction: float
 ) -> Certified | None:
-    """Find the best grasp of a construction on the same pieces with given cones, or None."""
     shapes: list[FaceShape | None] = [None] * (max(faces) + 1)
     for face, piece in zip(faces, pieces, strict=True):
         shapes[face] = FaceShape((piece,), piece)

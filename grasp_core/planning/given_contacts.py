@@ -62,32 +62,33 @@ class Seated:
 
 
 def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
-    """Move four contacts to the nearest faces of an object with fitting normals.
-
-    Takes `positions` (4, 3) [m]; `normals` (4, 3).
-    """
+    """Move four contacts to the nearest faces of an object with fitting normals."""
     points = frozen(positions, (FINGERS, 3), "positions")
     inward = frozen_units(normals, (FINGERS, 3), "normals")
     parts = flat_parts(body)
-    found = [
-        _nearest(body, parts, i, p, n) for i, (p, n) in enumerate(zip(points, inward, strict=True))
-    ]
-    faces = [each.part.face for each in found]
+    found = list[Nearest]()
+    reach, margin = LARGEST_MOVE * body.radius, NEARER * body.radius
+    for finger, (point, normal) in enumerate(zip(points, inward, strict=True)):
+        nearest = nearest_like(parts, point, normal, lean=LARGEST_LEAN, reach=reach, margin=margin)
+        if nearest is None:
+            raise InputError(
+                f"contact {finger} is on no face: expected one within {reach:.3g} m whose inward "
+                f"normal is within {math.degrees(LARGEST_LEAN):.0f} deg of the given one"
+            )
+        found.append(nearest)
+    faces = four(each.part.face for each in found)
     if body.patches is not None:
         around = [_around(body, each.part, each.contact) for each in found]
-        faces = [len(body.faces) + finger for finger in range(FINGERS)]
+        faces = four(len(body.faces) + finger for finger in range(FINGERS))
         body = replace(body, faces=(*body.faces, *around))
-    a, b, c, d = faces
     contacts = four(each.contact for each in found)
-    return Seated(body, (a, b, c, d), contacts, max(each.distance for each in found))
+    return Seated(body, faces, contacts, max(each.distance for each in found))
 
 
 def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCertificate:
-    """Make a grasp of four contacts, or prove that they are not in force closure.
+    """Make a grasp of four contacts, or return the proof that they are not in force closure.
 
     The grasp has no contact regions, and its family is `regulus`, the most general one.
-
-    Gives the grasp, or the certificate with a separating wrench.
     """
     body = seated.body
     positions = np.array([contact.position for contact in seated.contacts])
@@ -159,11 +160,7 @@ def nearest_like(
     parts: Sequence[FlatPart], point: Array, normal: Array, *, lean: float, reach: float,
     margin: float,
 ) -> Nearest | None:  # fmt: skip
-    """Find the point nearest to a given one on parts whose normals lean little from a given one.
-
-    Takes `point` (3,) [m]; `normal` (3,); `lean` [rad]; `reach`, `margin` [m]. Gives the point,
-    with its part's normal; None if no such part is within reach.
-    """
+    """Find the point nearest to a given one on parts that lean little; None beyond reach."""
     normals = np.array([part.normal for part in parts])
     firsts = np.array([part.polygon[0] for part in parts])
     heights = np.einsum("ti,ti->t", normals, point - firsts)
@@ -176,22 +173,6 @@ def nearest_like(
         if distance <= reach and (best is None or distance < best.distance - margin):
             best = Nearest(part, Contact(at, part.normal), distance)
     return best
-
-
-def _nearest(
-    body: Polyhedron, parts: Sequence[FlatPart], finger: int, point: Array, normal: Array
-) -> Nearest:
-    """Find the nearest part with a fitting normal, and the contact on it."""
-    reach = LARGEST_MOVE * body.radius
-    found = nearest_like(
-        parts, point, normal, lean=LARGEST_LEAN, reach=reach, margin=NEARER * body.radius
-    )
-    if found is None:
-        raise InputError(
-            f"contact {finger} is on no face: expected one within {reach:.3g} m whose inward "
-            f"normal is within {math.degrees(LARGEST_LEAN):.0f} deg of the given one"
-        )
-    return found
 
 
 def _around(body: Polyhedron, part: FlatPart, contact: Contact) -> Face:

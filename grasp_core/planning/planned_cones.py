@@ -6,6 +6,9 @@ the region around a contact in which it may move while the grasp stays good.
 Cones around the normals, as in the paper, are planned at theta_plan = min(theta, just below the
 span angle theta*): these smaller cones lie inside the real ones, so what holds for them holds at
 the friction asked for. Tilted cones are an alternative, and for most quadruples the only one.
+
+Quadruples are rows: faces (q, 4), axes of both choices of cones (q, 2, 4, 3), angles [rad]; bounds
+on discs are in object radii.
 """
 
 import math
@@ -18,7 +21,6 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.cones.spanning import span_sines
 from grasp_core.cones.tilting import tilted_cones, toward, widened, widest_half_angles
-from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.families.disc_bounds import (
     angle_limits,
     corners_of,
@@ -27,7 +29,7 @@ from grasp_core.families.disc_bounds import (
     widths_apart,
 )
 from grasp_core.families.kernel_tables import Corners
-from grasp_core.families.placements import Placement
+from grasp_core.families.placements import LEAST_RADIUS, Placement
 from grasp_core.families.placing import Cones
 from grasp_core.objects.face_pieces import FacePiece, Shapes
 from grasp_core.objects.polyhedron import Polyhedron
@@ -63,10 +65,7 @@ class PlannedCones:
         )
 
     def widest(self, quads: Indices) -> Array:
-        """Return upper bounds on the half-angles of any choice of force cones, (q,) [rad].
-
-        Takes `quads` (q, 4).
-        """
+        """Return upper bounds on the half-angles of any choice of force cones, (q,) [rad]."""
         normals, thetas = self.normals[quads], self._thetas[quads]
         sines = span_sines(normals)
         around = _around(sines, thetas)
@@ -83,9 +82,6 @@ class PlannedCones:
         1 / sin(psi) is above cot(h - theta + psi). Where h < theta, cones that positively span (P3)
         still never overlap: half the angle between their axes is above psi, so the true bound is
         below tan(psi / 2) / sin(psi) = 1 / (2 cos^2(psi / 2)), and the bound of w is above this.
-
-        Takes `quads` (q, 4); `widest` (q,) [rad]. Gives bounds in object radii, for cones that
-        positively span.
         """
         extent = float(np.linalg.norm(self._corners.points, axis=-1).max(initial=0.0))
         leaning = np.maximum(self._thetas[quads].max(axis=1, initial=0.0) - widest, 0.0)
@@ -93,11 +89,7 @@ class PlannedCones:
         return angle_limits(extent, widths, widest)
 
     def chosen(self, quads: Indices) -> tuple[Array, Array]:
-        """Choose force cones for face quadruples, around the normals and tilted.
-
-        Takes `quads` (q, 4). Gives unit axes of both choices, (q, 2, 4, 3), and their half-angles,
-        (q, 2) [rad], which are not positive where the choice does not exist.
-        """
+        """Choose cones around normals and tilted: axes (q, 2, 4, 3), half-angles or 0 (q, 2)."""
         normals, thetas = self.normals[quads], self._thetas[quads]
         axes = [normals, normals]
         half_angles = [_around(span_sines(normals), thetas), np.zeros(len(quads))]
@@ -108,11 +100,7 @@ class PlannedCones:
         return np.stack(axes, axis=1), np.stack(half_angles, axis=1)
 
     def limits_of(self, quads: Indices, axes: Array, half_angles: Array) -> Array:
-        """Return upper bounds on the discs for chosen cones, (q, 2, 4), see `disc_limits`.
-
-        Takes `quads` (q, 4); `axes` (q, 2, 4, 3); `half_angles` (q, 2) [rad]. Gives bounds in
-        object radii.
-        """
+        """Return upper bounds on the discs for chosen cones, (q, 2, 4), see `disc_limits`."""
         limits = [
             disc_limits(self._corners, self.normals, quads, axes[:, kind], half_angles[:, kind])
             for kind in range(1 + self.tilted)
@@ -145,21 +133,14 @@ class PlannedCones:
 
 
 def usable_half_angles(theta: float, spreads: Array) -> Array:
-    """Compute half-angles that stay inside the friction cones all over a curved patch [rad].
-
-    Takes `theta`, `spreads` [rad]. Gives half-angles shaped like `spreads`; where the patch leans
-    too far, a positive one too small for any construction.
-    """
+    """Compute half-angles inside friction cones all over a patch, too small where it leans."""
     return np.maximum(INSIDE_FRICTION * theta - spreads, 0.5 * LEAST_SPAN_ANGLE)
 
 
 def cones_around(
     placed: Sequence[tuple[Sequence[FacePiece], Placement]], theta: float
 ) -> list[tuple[Cones, ...]]:
-    """Choose tilted force cones: towards the faces' or the object's middle, or around the forces.
-
-    Takes `theta` [rad].
-    """
+    """Choose tilted cones: towards the faces' or the object's middle, or around the forces."""
     normals = np.array([[piece.normal for piece in pieces] for pieces, _ in placed])
     spreads = np.array([[piece.spread for piece in pieces] for pieces, _ in placed])
     thetas = usable_half_angles(theta, spreads)

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices, frozen_copy
 from grasp_core.by_value import trusted
 from grasp_core.cones.spanning import SpanningTable
-from grasp_core.families.constructions import LEAST_RADIUS, Construction
+from grasp_core.families.constructions import Construction
+from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.families.placing import Attempt, Cones
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
 from grasp_core.solvers.ties import coarse, graded
@@ -95,10 +96,7 @@ class ConedQuadruples:
         return np.where(usable[:, :, None] & (bounds >= LEAST_RADIUS), bounds, -np.inf)
 
     def attempts(self, row: int, construction: Construction, bounds: Array) -> tuple[Attempt, ...]:
-        """List the attempts to make on the quadruple in one row.
-
-        Takes `bounds` (2, orders).
-        """
+        """List the attempts to make on the quadruple in one row."""
         found: list[Attempt] = []
         made = cache(partial(self._cones, row))
         for column, order in enumerate(construction.orders):
@@ -112,7 +110,6 @@ class ConedQuadruples:
         return tuple(found)
 
     def _cones(self, row: int, kind: int) -> Cones:
-        """Return one choice of force cones, in the order of the faces."""
         half_angle = float(self.half_angles[row, kind])
         axes = frozen_copy(self.axes[row, kind])
         return four(trusted(ForceCone, axis=axis, half_angle=half_angle) for axis in axes)
@@ -183,10 +180,7 @@ def kept(blocks: Blocks, count: int) -> Blocks:
 
 
 def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
-    """Split all face quadruples of an object into blocks.
-
-    Takes `shared` (s, 4).
-    """
+    """Split all face quadruples of an object into blocks."""
     order = _by_room(cones, whole)
     order = order[cones.rooms[order] > 0.0]
     ends = _range_ends(math.comb(len(order), FINGERS))

@@ -66,11 +66,7 @@ class Reach:
 def reach(
     body: Polyhedron, faces: FaceQuadruple, positions: Array, normals: Array, finger: Finger
 ) -> Reach:
-    """Find straight lines on which all fingers reach their contacts without a collision.
-
-    Takes `positions` (k, 3) [m]; `normals` (k, 3). Gives directions that are free together, or the
-    reason why none were found.
-    """
+    """Find straight lines on which all fingers reach their contacts without a collision."""
     slack = TOUCHING * body.radius
     tips = positions - finger.radius_m * normals
     for i, j in combinations(range(len(tips)), 2):
@@ -167,10 +163,7 @@ def _apart(tips: Array, ways: list[list[Array]], finger: Finger, slack: float) -
 
 
 def segment_distances(start: Array, end: Array, triangles: Array) -> Array:
-    """Compute the distance of a segment from each triangle, (t,) [m].
-
-    Takes `start`, `end` (3,) [m]; `triangles` (t, 3, 3) [m].
-    """
+    """Compute the distance of a segment from each triangle (t, 3, 3), (t,) [m]."""
     after = np.roll(triangles, -1, axis=1)
     edges = [_between(start, end, triangles[:, k], after[:, k]) for k in range(3)]
     found = np.minimum(np.minimum(edges[0], edges[1]), edges[2])

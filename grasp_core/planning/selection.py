@@ -5,7 +5,6 @@ from itertools import chain, zip_longest
 
 import numpy as np
 
-from grasp_core.arrays import Array
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.errors import NoForcesError
 from grasp_core.execution.best_squeeze import GAP, best_squeeze, searched
@@ -50,38 +49,31 @@ def chosen(
 def _measure(body: Polyhedron, request: PlanRequest) -> tuple[Callable[[Certified], float], float]:
     """Return what makes grasps better the smaller it is, and the share of it that is none."""
     if request.rank_by == "friction-margin":
-        return lambda found: critical_friction(*_contacts(found)), SAME_SHARE
+        return lambda found: critical_friction(found.placement.positions, found.normals), SAME_SHARE
     if request.rank_by == "ferrari-canny":
         mu = request.friction
-        return (
-            lambda found: -ferrari_canny(*_contacts(found), mu, torque_scale=1.0).lower
-        ), SAME_SHARE
+
+        def quality(found: Certified) -> float:
+            positions, normals = found.placement.positions, found.normals
+            return -ferrari_canny(positions, normals, mu, torque_scale=1.0).lower
+
+        return quality, SAME_SHARE
     # the best squeeze is searched to a gap, so equal grasps may come out as far apart
     return _looseness(body, request, _mass(body, request.rank_by)), 2.0 * GAP
 
 
-def _contacts(found: Certified) -> tuple[Array, Array]:
-    """Return positions and normals of a grasp's contacts at unit object size, (4, 3) each."""
-    return found.placement.positions, found.normals
-
-
 def _mass(body: Polyhedron, rank_by: RankBy) -> float:
-    """Return the mass whose weight grows until a contact slips [kg]."""
     return 1.0 if rank_by == "payload" else DENSITY_KG_PER_M3 * body.volume
 
 
 def _tip_radius(body: Polyhedron, finger: Finger | None) -> float:
-    """Return the radius of the fingertips [m]."""
     return TIP_RADIUS * body.radius if finger is None else finger.radius_m
 
 
 def carried(
     body: Polyhedron, grasp: Grasp, friction: float, rank_by: RankBy, finger: Finger | None = None
 ) -> float:
-    """Return what a planned grasp carries under one squeeze, as grasps are ranked by it.
-
-    Takes `rank_by` [kg]. Gives the mass or the multiple; 0 if no squeeze holds the object stably.
-    """
+    """Return the mass [kg] or multiple of the weight that ranks a grasp; 0 if none is held."""
     loads = any_direction(_mass(body, rank_by))
     tip = _tip_radius(body, finger)
     try:

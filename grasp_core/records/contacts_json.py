@@ -54,8 +54,7 @@ class _GivenContact(_Strict):
 
 
 GivenContacts = Annotated[
-    list[_GivenContact],
-    Field(min_length=FEWEST_CONTACTS, max_length=MOST_CONTACTS, fail_fast=True),
+    list[_GivenContact], Field(min_length=FEWEST_CONTACTS, max_length=MOST_CONTACTS, fail_fast=True)
 ]
 
 
@@ -135,14 +134,6 @@ def contact_sets_from_json(text: str, overrides: Overrides = Overrides()) -> tup
         return (_contact_set(file, file.contacts, "0", "contacts", overrides),)
     listed = file.grasps or ()
     ids = [str(i) if grasp.id is None else grasp.id for i, grasp in enumerate(listed)]
-    _check_ids(ids)
-    return tuple(
-        _contact_set(file, grasp.contacts, ids[i], f"grasps[{i}].contacts", overrides)
-        for i, grasp in enumerate(listed)
-    )
-
-
-def _check_ids(ids: list[str]) -> None:
     first: dict[str, int] = {}
     for i, name in enumerate(ids):
         if first.setdefault(name, i) != i:
@@ -150,10 +141,13 @@ def _check_ids(ids: list[str]) -> None:
                 f"grasps[{i}].id: {name!r} is also that of grasps[{first[name]}]; ids must differ, "
                 "and a grasp without one gets its index"
             )
+    return tuple(
+        _contact_set(file, grasp.contacts, ids[i], f"grasps[{i}].contacts", overrides)
+        for i, grasp in enumerate(listed)
+    )
 
 
 def _planned(text: str, overrides: Overrides) -> tuple[ContactSet, ...]:
-    """Read the contacts of a `grasps.json`."""
     if overrides.outward:
         raise InputError("the normals of a grasps.json point into the object: leave out --outward")
     saved = grasps_from_json(text)
@@ -182,7 +176,13 @@ def _contact_set(
     positions = np.array([contact.position_m for contact in contacts])
     given = file.center_m
     center = positions.mean(axis=0) if given is None else np.array(given)
-    _check_apart(positions, center, where)
+    extent = float(np.linalg.norm(positions - positions.mean(axis=0), axis=1).max())
+    largest = float(max(np.abs(positions).max(), np.abs(center).max()))
+    if extent <= SAME_POINT * largest:
+        raise InputError(
+            f"{where}: all contacts lie within {extent:.2g} m of one point, at coordinates of "
+            f"{largest:.2g} m; move the contacts apart or the frame's origin nearer"
+        )
     farthest = float(np.linalg.norm(positions - center, axis=1).max())
     scale, source = _first(
         (overrides.torque_scale, "flag"),
@@ -205,16 +205,6 @@ def _contact_set(
         center_from="mean contact" if given is None else "file",
         torque_scale_from=source,
     )
-
-
-def _check_apart(positions: Array, center: Array, where: str) -> None:
-    extent = float(np.linalg.norm(positions - positions.mean(axis=0), axis=1).max())
-    largest = float(max(np.abs(positions).max(), np.abs(center).max()))
-    if extent <= SAME_POINT * largest:
-        raise InputError(
-            f"{where}: all contacts lie within {extent:.2g} m of one point, at coordinates of "
-            f"{largest:.2g} m; move the contacts apart or the frame's origin nearer"
-        )
 
 
 def _unit_normals(contacts: list[_GivenContact], where: str) -> Array:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from grasp_core.checked import instance, path_of
-from grasp_core.errors import InputError
+from grasp_core.errors import about
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import plan_from_json, plan_to_json
@@ -46,7 +46,5 @@ def load_grasps(path: str | Path) -> Plan:
     """
     path = path_of(path, "path")
     text = read_text(path)
-    try:
+    with about(path):
         return plan_from_json(text)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error

@@ -7,11 +7,11 @@ imported only where a file is read: plans are written without it.
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import text_of
 from grasp_core.frames import radians_of
 from grasp_core.mesh_files.limits import MeshLimits
@@ -58,10 +58,7 @@ def plan_to_json(body: Polyhedron, plan: Plan) -> str:
             "name": body.name,
             "source_sha256": body.source_sha256,
             "content_sha256": body.content_sha256,
-            "mesh": {
-                "vertices_m": body.vertices.tolist(),
-                "triangles": body.triangles.tolist(),
-            },
+            "mesh": {"vertices_m": body.vertices.tolist(), "triangles": body.triangles.tolist()},
             "center_of_mass_m": body.center_of_mass.tolist(),
             "surface": surface_record(body.surface),
             "patches": None if body.patches is None else asdict(body.patches),
@@ -96,17 +93,9 @@ def surface_record(surface: Surface) -> dict[str, object]:
 
 def surface_of_record(record: "SurfaceRecord") -> Surface:
     """Return what a record says of a surface."""
-    return Surface(
-        closed=record.closed,
-        caps=np.array(record.caps, dtype=np.int64),
-        holes=record.holes,
-        largest_hole_m=record.largest_hole_m,
-        volume_error=record.volume_error,
-        dropped=record.dropped,
-        flatness_m=record.flatness_m,
-        center_given=record.center_given,
-        repairs=tuple(record.repairs),
-    )
+    fields: dict[str, Any] = record.model_dump()
+    fields["repairs"] = tuple(record.repairs)
+    return Surface(**fields)
 
 
 def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:
@@ -149,11 +138,8 @@ def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:
 
 def grasps_from_json(text: str) -> SavedGrasps:
     """Read the text of a `grasps.json`."""
-    record = _record_of(text)
-    body = _body_of(record)
-    return SavedGrasps(
-        body, record.friction, record.seed, _grasps_of(body, record), _finger_of(record)
-    )
+    plan = plan_from_json(text)
+    return SavedGrasps(plan.body, plan.friction, plan.seed, plan.grasps, plan.finger)
 
 
 def plan_from_json(text: str) -> Plan:
@@ -162,7 +148,10 @@ def plan_from_json(text: str) -> Plan:
     A file keeps neither times nor what is known of face quadruples without grasps: `absences`,
     `undecided` and `unreached` are empty. Written again, the plan gives the same text.
     """
-    record = _record_of(text)
+    from grasp_core.files.json_text import record_of
+    from grasp_core.records.grasps_schema import GraspsRecord
+
+    record = record_of(GraspsRecord, text, "grasps.json", schema=SCHEMA)
     body, counts = _body_of(record), record.counts
     return Plan(
         body=body,
@@ -178,26 +167,10 @@ def plan_from_json(text: str) -> Plan:
         ),
         outcomes=Outcomes(**record.outcomes.model_dump()),
         absence=record.absence,
-        finger=_finger_of(record),
-        moves=tuple(
-            Moved(
-                move.id,
-                move.moved_from,
-                move.ferrari_canny_before,
-                move.ferrari_canny_after,
-                move.ferrari_canny_ceiling,
-            )
-            for move in record.optimization
-        ),
+        finger=None if record.finger is None else Finger(**record.finger.model_dump()),
+        moves=tuple(Moved(*move.model_dump().values()) for move in record.optimization),
         versions=record.versions,
     )
-
-
-def _record_of(text: str) -> "GraspsRecord":
-    from grasp_core.files.json_text import record_of
-    from grasp_core.records.grasps_schema import GraspsRecord
-
-    return record_of(GraspsRecord, text, "grasps.json", schema=SCHEMA)
 
 
 def _body_of(record: "GraspsRecord") -> Polyhedron:
@@ -223,25 +196,14 @@ def _body_of(record: "GraspsRecord") -> Polyhedron:
     return body
 
 
-def _finger_of(record: "GraspsRecord") -> Finger | None:
-    return None if record.finger is None else Finger(**record.finger.model_dump())
-
-
 def _grasps_of(body: Polyhedron, record: "GraspsRecord") -> tuple[Grasp, ...]:
-    grasps = tuple(
-        _named_grasp(body, grasp, record.friction, i) for i, grasp in enumerate(record.grasps)
-    )
+    grasps = list[Grasp]()
+    for place, each in enumerate(record.grasps):
+        with about(f"grasps[{place}]"):
+            grasps.append(_grasp_from_record(body, each, record.friction))
     if len({grasp.id for grasp in grasps}) < len(grasps):
         raise InputError("grasps: two grasps have the same id; ids must differ")
-    return grasps
-
-
-def _named_grasp(body: Polyhedron, record: "GraspRecord", friction: float, number: int) -> Grasp:
-    """Read a grasp from its record; a refusal names the grasp's place in the file."""
-    try:
-        return _grasp_from_record(body, record, friction)
-    except InputError as error:
-        raise InputError(f"grasps[{number}]: {error}") from error
+    return tuple(grasps)
 
 
 def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float) -> Grasp:

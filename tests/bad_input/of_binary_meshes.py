@@ -204,9 +204,6 @@ GLBS = {
         "tree"),
 }  # fmt: skip
 GOODS = {
-    "name.stl": STL_TEXT.replace("hand", "a vertex 1 2 3").encode(),
-    "lines.stl": STL_TEXT.replace("\nouter", " outer").encode(),
-    "normals.off": off().replace("OFF", "NOFF").replace(" 0.0\n", " 0.0 0 0 1\n").encode(),
     "good.glb": GOOD,
     "normals.stl": STL[:84] + 3 * NAN + STL[96:],
     "solid.stl": stl(head=b"solid but binary"),

@@ -10,6 +10,7 @@ import trimesh
 
 import grasp_core as gc
 from grasp_core.mesh_files.reading import FORMATS, mesh_of_bytes
+from tests.bad_input.of_binary_meshes import glb
 from tests.fuzzing.plain_meshes import PLAIN
 from tests.fuzzing.targets import Target
 
@@ -115,21 +116,12 @@ def moved_scene():
          "children": tree["scenes"][0]["nodes"]}
     )  # fmt: skip
     tree["scenes"][0]["nodes"] = [len(tree["nodes"]) - 1]
-    return glb_of(tree, binary)
+    return glb(tree, binary)
 
 
 def glb_parts(data):
     size = struct.unpack_from("<I", data, 12)[0]
     return json.loads(data[20 : 20 + size]), data[28 + size :]
-
-
-def glb_of(tree, binary):
-    """A GLB file with right lengths."""
-    text = tree if isinstance(tree, bytes) else json.dumps(tree).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text
-    chunks += struct.pack("<I4s", len(binary), b"BIN\0") + binary
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
 SEEDS = {

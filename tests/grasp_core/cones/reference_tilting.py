@@ -6,16 +6,16 @@ import numpy as np
 
 from grasp_core.cones.spanning import OTHERS, angles_between, span_sines
 from grasp_core.cones.tilting import (
-    DECAY,
-    FIRST_MOVE,
-    GROWTH,
     MOVES,
+    PACE,
     SLIGHT,
     SWEEPS,
     _aside,
     _into_cap,
 )  # fmt: skip
 from grasp_core.values import FINGERS
+
+FIRST_MOVE, GROWTH, DECAY, _ = PACE
 
 
 def lowest_heights(normals):

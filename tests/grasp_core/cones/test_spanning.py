@@ -1,23 +1,26 @@
 import math
+from collections import Counter
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
 from grasp_core.cones.spanning import (
-    LARGEST_SPAN_ANGLE,
     count_spanning,
+    each_cones_positively_span,
     positively_span,
+    span_angle,
+    span_angles,
     spanning_quadruples,
 )
 from scenes.example_objects import example_object
 from tests.grasp_core.cones.reference_spanning import spanning_by_pairs
-from tests.judges import TETRA_NORMALS, picks_positively_span, random_rotation
+from tests.grasp_core.regular_solids import SOLIDS, quadruples, units
+from tests.judges import TETRA_NORMALS, picks_positively_span
 
 
 def test_the_regular_tetrahedron_has_the_largest_span_angle():
     assert gc.span_angle(TETRA_NORMALS) == pytest.approx(math.asin(1 / 3), abs=1e-12)
-    assert math.asin(1 / 3) == LARGEST_SPAN_ANGLE
 
 
 def test_the_corner_tetrahedron_has_its_closed_form():
@@ -48,11 +51,6 @@ def test_platonic_solids_have_the_known_counts(name):
     found = spanning_quadruples(example_object(name).normals, math.radians(0.1))
     angles, counts = np.unique(np.degrees(found.span_angles).round(4), return_counts=True)
     assert dict(zip(angles.tolist(), counts.tolist(), strict=True)) == PLATONIC[name]
-
-
-@pytest.mark.parametrize("name", ["box", "prism", "hex-nut", "l-bracket", "cross"])
-def test_boxes_prisms_and_extrusions_never_span(name):
-    assert not len(spanning_quadruples(example_object(name).normals, 1e-6).indices)
 
 
 def test_the_enumeration_lists_exactly_the_quadruples_that_span():
@@ -115,10 +113,11 @@ def test_random_picks_below_the_angle_always_span():
 
 
 def test_cones_of_unequal_angles_generalise_the_span_angle():
-    angles = [0.99 * LARGEST_SPAN_ANGLE] * 4
+    largest = math.asin(1 / 3)
+    angles = [0.99 * largest] * 4
     assert gc.cones_positively_span(TETRA_NORMALS, angles)
-    assert not gc.cones_positively_span(TETRA_NORMALS, [*angles[:3], 1.5 * LARGEST_SPAN_ANGLE])
-    assert gc.cones_positively_span(TETRA_NORMALS, [*np.zeros(3), 1.5 * LARGEST_SPAN_ANGLE])
+    assert not gc.cones_positively_span(TETRA_NORMALS, [*angles[:3], 1.5 * largest])
+    assert gc.cones_positively_span(TETRA_NORMALS, [*np.zeros(3), 1.5 * largest])
     assert not gc.cones_positively_span(TETRA_NORMALS[[0, 0, 1, 2]], np.zeros(4))
 
 
@@ -126,16 +125,6 @@ def test_cones_of_unequal_angles_generalise_the_span_angle():
 def test_angles_that_are_no_half_angles_are_refused(angle):
     with pytest.raises(gc.InputError, match="half_angles"):
         gc.cones_positively_span(TETRA_NORMALS, [0.1, 0.1, 0.1, angle])
-
-
-def test_the_span_angle_does_not_depend_on_frame_or_order():
-    rng = np.random.default_rng(5)
-    normals = example_object("random-12-1").normals
-    found = spanning_quadruples(normals, math.radians(1.0))
-    assert len(found.indices) > 50
-    for faces, angle in zip(found.indices, found.span_angles, strict=True):
-        turned = normals[rng.permutation(faces)] @ random_rotation(rng).T
-        assert gc.span_angle(turned) == pytest.approx(angle, abs=1e-12)
 
 
 def test_directions_in_a_half_space_do_not_span():
@@ -158,3 +147,96 @@ def test_spanning_quadruples_are_counted_without_being_listed(name):
     expected = spanning_by_pairs(normals, math.sin(least))
     np.testing.assert_array_equal(spanning_quadruples(normals, least).indices, expected.indices)
     assert bool(listed) == (name != "prism")
+
+
+MANY = 2000
+
+
+def vector_sets(rng):
+    """Random unit vectors, and some in planes, doubled, or opposite to each other."""
+    vectors = rng.normal(size=(MANY, 4, 3))
+    vectors[::10, :, 2] = 0.0
+    vectors[1::10, 1] = vectors[1::10, 0]
+    vectors[2::10, 1] = -vectors[2::10, 0]
+    vectors[3::10, 3] = -vectors[3::10, :3].sum(axis=1)
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def test_span_angles_are_those_of_one_quadruple():
+    units = vector_sets(np.random.default_rng(1))
+    found, spans = span_angles(units), positively_span(units)
+    for each, angle in zip(units, found, strict=True):
+        assert angle == pytest.approx(span_angle(each), rel=1e-12, abs=1e-15)
+    assert 200 <= spans.sum() <= MANY - 200
+    assert span_angles(units[:0]).shape == (0,)
+
+
+def test_cones_of_equal_width_span_below_the_span_angle():
+    rng = np.random.default_rng(2)
+    units = vector_sets(rng)
+    units = units[positively_span(units)]
+    shares = rng.choice([0.5, 0.999999, 1.000001, 1.5], size=len(units))
+    angles = (span_angles(units) * shares)[:, None] * np.ones(4)
+    assert (each_cones_positively_span(units, angles) == (shares < 1.0)).all()
+    flat = vector_sets(rng)[::10]
+    assert not each_cones_positively_span(flat, np.full((len(flat), 4), 0.01)).any()
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("tetrahedron", {19.4712: 1}),
+        ("cube", {0.0: 15}),
+        ("octahedron", {19.4712: 2, 0.0: 68}),
+        ("dodecahedron", {10.8123: 30, 0.0: 465}),
+        ("icosahedron", {19.4712: 10, 10.8123: 80, 5.4547: 330, 0.0: 4425}),
+    ],
+)
+def test_span_angles_of_all_quadruples_of_a_regular_solid(name, expected):
+    angles = [math.degrees(gc.span_angle(normals)) for normals in quadruples(SOLIDS[name])]
+    assert Counter(round(angle, 4) for angle in angles) == expected
+
+
+def test_the_dodecahedron_spans_at_ten_degrees_but_not_at_eleven():
+    angles = np.array([gc.span_angle(normals) for normals in quadruples(SOLIDS["dodecahedron"])])
+    assert (angles > math.radians(10.0)).sum() == 30
+    assert not (angles > math.radians(11.0)).any()
+    assert math.tan(angles.max()) == pytest.approx((3.0 - math.sqrt(5.0)) / 4.0, abs=1e-12)
+
+
+def test_the_one_parameter_family_contains_the_regular_tetrahedron():
+    phi = math.atan(math.sqrt(2.0))
+    c, s = math.cos(phi), math.sin(phi)
+    normals = [[c, s, 0], [c, -s, 0], [-c, 0, s], [-c, 0, -s]]
+    assert gc.span_angle(normals) == pytest.approx(math.asin(1.0 / 3.0), abs=1e-12)
+
+
+@pytest.mark.parametrize("slope", [0.1, 0.5, 1.0, 3.0, 20.0])
+def test_square_pyramids_never_span(slope):
+    """Two opposite sides and the base have normals in one plane."""
+    sides = [[1, 0, -slope], [-1, 0, -slope], [0, 1, -slope], [0, -1, -slope]]
+    normals = units([*sides, [0, 0, 1]])
+    assert [gc.span_angle(chosen) for chosen in quadruples(normals)] == [0.0] * 5
+
+
+@pytest.mark.parametrize("sides", [3, 4, 5, 6, 7, 8])
+def test_right_prisms_never_span(sides):
+    """A spanning quadruple needs both ends, and the other two are in a plane with them."""
+    turns = 2.0 * np.pi * np.arange(sides) / sides
+    around = np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])
+    angles = [gc.span_angle(q) for q in quadruples(np.vstack([around, [[0, 0, 1], [0, 0, -1]]]))]
+    assert not any(angles)
+    assert len(angles) == math.comb(sides + 2, 4)
+
+
+def test_no_four_directions_span_at_more_than_those_of_the_regular_tetrahedron():
+    rng, spanning, widest = np.random.default_rng(0), 0, 0.0
+    for _ in range(3000):
+        normals = units(rng.normal(size=(4, 3)))
+        near = units(TETRA_NORMALS + 0.05 * rng.normal(size=(4, 3)))
+        for angle in (gc.span_angle(normals), gc.span_angle(near)):
+            assert angle <= math.asin(1.0 / 3.0) + 1e-12
+            spanning += angle > 0.0
+            widest = max(widest, angle)
+    assert spanning >= 3300
+    assert widest > math.radians(19.0)

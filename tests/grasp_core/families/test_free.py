@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.families import free
-from grasp_core.families.free import Absence, Undecided, close_patch
+from grasp_core.families.free import Absence, Undecided, close_patch, part_at, place_by_forces
 from grasp_core.families.placements import Placement
 from grasp_core.objects.booleans import extrusion
 from grasp_core.objects.face_pieces import unit_pieces
@@ -194,17 +197,6 @@ def test_splitting_proves_absence_where_the_patch_of_the_whole_faces_is_closed()
     climb(np.random.default_rng(5), pieces, friction, samples=400, steps=200)
 
 
-@pytest.mark.parametrize("restarts", [0, free.RESTARTS])
-def test_splitting_finds_a_grasp_that_restarts_miss(monkeypatch, restarts):
-    monkeypatch.setattr(free, "RESTARTS", restarts)
-    name, indices, friction = NEEDS_A_SPLIT
-    pieces = quadruple(name, indices)
-    assert place(pieces, friction) == Undecided(1.0)
-    found = place(pieces, friction, cells=100)
-    assert isinstance(found, Placement)
-    assert gc.force_closure(found.positions, normals_of(pieces), friction).closed
-
-
 def test_restarts_and_splits_stand_in_for_the_first_try(monkeypatch):
     """With the forces of the whole patch unused, half of the ways still lead to a grasp."""
     tried = free.grasp_from_patch
@@ -229,23 +221,6 @@ def test_restarts_and_splits_stand_in_for_the_first_try(monkeypatch):
     assert len(cases) >= 50
 
 
-def test_the_same_seed_gives_the_same_answer():
-    name, indices, friction = NEEDS_A_SPLIT
-    cases = [(pieces, mu, 1) for pieces, mu, _ in answers()[::20]]
-    cases.append((quadruple(name, indices), friction, 100))
-    for pieces, mu, cells in cases:
-        one, two = (place(pieces, mu, cells, seed=9) for _ in range(2))
-        assert type(one) is type(two)
-        if isinstance(one, Placement):
-            assert (one.positions == two.positions).all()
-            assert (one.forces == two.forces).all()
-            assert one.merit == two.merit
-        if isinstance(one, Absence):
-            twists = [[proof.separating_wrench for _, proof in x.leaves] for x in (one, two)]
-            assert np.array_equal(*twists)
-    assert len(cases) >= 20
-
-
 def test_a_grasp_of_two_parallel_slabs_is_not_along_one_line():
     """Forces across two slabs on a base balance at contacts in a row through their middles,
     which resist no turning about it: contacts on a line are never in force closure, and within
@@ -268,7 +243,156 @@ def test_a_grasp_of_two_parallel_slabs_is_not_along_one_line():
     assert spread[1] > free.LEAST_INSET
 
 
-def test_friction_must_be_positive():
-    """Four normals span at most four dimensions of wrenches; the corners of a face span more."""
-    with pytest.raises(gc.InputError, match="greater than 0"):
-        place(quadruple("tetrahedron", range(4)), 0.0)
+def test_the_parts_reached_by_cutting_cover_the_faces_without_overlap():
+    rng = np.random.default_rng(6)
+    tested = 0
+    for name in OBJECTS:
+        pieces = quadruple(name, rng.choice(len(faces_of(name)), 4, replace=False))
+        paths = [()]
+        for _ in range(12):
+            path = paths.pop(rng.integers(len(paths)))
+            paths += [(*path, 0), (*path, 1)]
+        parts = [part_at(pieces, path) for path in paths]
+        for _ in range(50):
+            points = [rng.dirichlet(np.ones(len(p.corners))) @ p.corners for p in pieces]
+            inside = [
+                all(holds(corners, at) for corners, at in zip(part, points, strict=True))
+                for part in parts
+            ]
+            assert sum(inside) == 1
+            tested += 1
+    assert tested == 200
+
+
+def holds(corners, point):
+    """Whether a convex counter-clockwise polygon holds a point."""
+    edges, arms = np.roll(corners, -1, axis=0) - corners, point - corners
+    return bool((edges[:, 0] * arms[:, 1] >= edges[:, 1] * arms[:, 0]).all())
+
+
+def halves(absence):
+    """Return an absence whose first part is proved by its two halves instead of as a whole."""
+    leaves = []
+    for path in ((0,), (1,)):
+        part = part_at(absence.pieces, path)
+        leaves.append((path, close_patch(absence.pieces, part, absence.friction)))
+    return replace(absence, leaves=tuple(leaves))
+
+
+@pytest.mark.slow
+def test_halves_prove_what_the_whole_proves():
+    absent = of_kind(Absence)[:40]
+    assert len(absent) >= 10
+    assert all(halves(absence).verify() for _, _, absence in absent)
+    assert len(absent) == 40
+
+
+def test_leaves_that_do_not_cover_the_faces_prove_nothing():
+    one, two = halves(of_kind(Absence)[0][2]).leaves
+    absence = of_kind(Absence)[0][2]
+    (whole,) = absence.leaves
+    for leaves in ((), (one,), (two,), (one, two, whole), (one, whole), (one, two, two)):
+        assert not replace(absence, leaves=leaves).verify()
+    many = split_absence()
+    for left_out in range(len(many.leaves)):
+        kept = many.leaves[:left_out] + many.leaves[left_out + 1 :]
+        assert not replace(many, leaves=kept).verify()
+
+
+def test_a_half_proved_twice_does_not_prove_the_other_half():
+    absence = of_kind(Absence)[0][2]
+    one, two = halves(absence).leaves
+    assert not replace(absence, leaves=(one, one)).verify()
+    assert not replace(absence, leaves=(two, two)).verify()
+
+
+def test_a_half_under_another_name_does_not_prove_the_other_half():
+    """Only 0 and 1 name halves."""
+    absence = of_kind(Absence)[0][2]
+    _, (path, proof) = halves(absence).leaves
+    assert path == (1,)
+    assert not replace(absence, leaves=(((1,), proof), ((2,), proof))).verify()
+
+
+def test_a_proof_for_other_pieces_or_more_friction_proves_nothing():
+    cases = of_kind(Absence)[:40]
+    for pieces, friction, absence in cases:
+        swapped = (pieces[1], pieces[0], *pieces[2:])
+        shifted = (replace(pieces[0], origin=pieces[0].origin + 1e-6), *pieces[1:])
+        turned = (replace(pieces[0], normal=-pieces[0].normal), *pieces[1:])
+        grown = (replace(pieces[0], corners=1.1 * pieces[0].corners), *pieces[1:])
+        for others in (swapped, shifted, turned, grown):
+            assert not replace(absence, pieces=others).verify()
+        assert not replace(absence, friction=friction + 1e-9).verify()
+        assert replace(absence, friction=0.5 * friction).verify()
+    assert len(cases) == 40
+
+
+def test_a_leaf_with_an_altered_twist_proves_nothing():
+    rng = np.random.default_rng(7)
+    cases = of_kind(Absence)[:40]
+    for _, _, absence in cases:
+        ((path, proof),) = absence.leaves
+        wrong = [-proof.separating_wrench, np.zeros(6), np.full(6, np.nan), rng.normal(size=6)]
+        for twist in wrong:
+            altered = replace(proof, separating_wrench=twist)
+            assert not replace(absence, leaves=((path, altered),)).verify()
+        stronger = ClosureCertificate(
+            False, proof.margin, proof.positions, proof.normals, 50.0 + proof.friction, None,
+            proof.separating_wrench,
+        )  # fmt: skip
+        assert not replace(absence, leaves=((path, stronger),)).verify()
+        assert not replace(absence, leaves=((path, replace(proof, closed=True)),)).verify()
+    assert len(cases) == 40
+
+
+def test_a_cover_with_a_hole_too_small_for_floating_point_is_refused():
+    """All leaves of a comb of depth 60 but the last: their shares add up to one in floats."""
+    pieces = [piece for piece in faces_of("octahedron") if piece.normal[2] < 0.0]
+    absence = place(pieces, 0.6)
+    comb = [(*([0] * depth), 1) for depth in range(60)]
+    leaves = tuple((path, close_patch(pieces, part_at(pieces, path), 0.6)) for path in comb)
+    last = (*([0] * 59), 0)
+    whole = replace(absence, leaves=leaves[:-1] + tuple(
+        (path, close_patch(pieces, part_at(pieces, path), 0.6)) for path in (comb[-1], last)
+    ))  # fmt: skip
+    assert whole.verify()
+    assert sum(0.5 ** len(path) for path in comb) == pytest.approx(1.0, abs=1e-16)
+    assert not replace(absence, leaves=leaves).verify()
+
+
+def test_contacts_for_given_forces_balance_them_nearly_as_far_inside_as_any():
+    """Forces that balance at some contacts are given back contacts that are not much nearer to the
+    edges than those, and no nearer than they say.
+    """
+    rng = np.random.default_rng(8)
+    tested = 0
+    for name in OBJECTS:
+        for _ in range(25):
+            pieces = quadruple(name, rng.choice(len(faces_of(name)), 4, replace=False))
+            points = [rng.dirichlet(2.0 * np.ones(len(p.corners))) @ p.corners for p in pieces]
+            known = np.array([p.point(at) for p, at in zip(pieces, points, strict=True)])
+            balance = np.vstack(
+                [np.tile(np.eye(3), 4), np.hstack([-np.cross(np.eye(3), at) for at in known])]
+            )
+            forces = np.linalg.svd(balance)[2][6:].T @ rng.normal(size=6)
+            forces = forces.reshape(4, 3)
+            assert np.abs(wrench(known, forces)).max() < 1e-12
+            placed = place_by_forces(pieces, forces)
+            if insets(pieces, known).min() < free.LEAST_INSET + TOLERANCE:
+                continue
+            assert isinstance(placed, Placement)
+            assert np.abs(wrench(placed.positions, forces)).max() < TOLERANCE
+            assert placed.merit >= free.INSET_KEPT * insets(pieces, known).min() - TOLERANCE
+            assert insets(pieces, placed.positions).min() >= placed.merit - TOLERANCE
+            tested += 1
+    assert tested >= 90
+
+
+def test_forces_that_balance_nowhere_on_the_faces_get_no_contacts():
+    """A couple of forces across a face, while the other two faces push nothing."""
+    for pieces, _, _ in answers()[::40]:
+        across = pieces[0].frame[:, 0]
+        far = replace(pieces[0], origin=pieces[0].origin + 5.0 * pieces[0].frame[:, 1])
+        couple = np.array([across, -across, 0.0 * across, 0.0 * across])
+        assert place_by_forces([far, *pieces[1:]], couple) is None

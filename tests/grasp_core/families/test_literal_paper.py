@@ -261,26 +261,6 @@ def test_lines_of_the_printed_regulus_program_are_independent_and_often_open():
     assert corrected >= 80
 
 
-def test_without_a_least_depth_the_printed_regulus_program_accepts_the_zero_force():
-    """Zero lies in every friction cone. The two forces of a pair then vanish together, the other
-    two cannot balance, and the program calls that a grasp.
-    """
-    theta, vanishing = math.radians(10.0), 0
-    for quad, cones in paired_quadruples("random-16-1", theta):
-        found = printed_regulus(quad, cones, 0.0)
-        if found is None:
-            continue
-        lengths = np.linalg.norm(found.forces, axis=1)
-        if lengths.min() < TOLERANCE:
-            assert (lengths < TOLERANCE).sum() == 2
-            assert printed_regulus(quad, cones, LEAST_DEPTH) is None
-            normals = [piece.normal for piece in quad]
-            assert not gc.force_closure(found.positions, normals, math.tan(theta)).closed
-            assert not isinstance(place_regulus(quad, cones), Placement)
-            vanishing += 1
-    assert vanishing >= 1
-
-
 def regulus_lines(rng):
     """Random parameters of section 3.3: u, (v_i, n_i), c_i, l_i and (x_i, y_i, z_i)."""
     frame = np.linalg.qr(rng.normal(size=(3, 3)))[0]

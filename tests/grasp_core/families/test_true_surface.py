@@ -76,16 +76,6 @@ def test_force_cones_fit_inside_the_friction_cones_of_all_triangles_over_a_regio
     assert tested >= 300
 
 
-def test_a_curved_object_and_its_grasps_survive_a_file(planned):
-    body, plan = planned
-    saved = grasps_from_json(plan_to_json(body, plan))
-    assert saved.body.patches == body.patches
-    assert len(saved.body.faces) == len(body.faces)
-    for mine, theirs in zip(plan.grasps, saved.grasps, strict=True):
-        np.testing.assert_array_equal(mine.positions, theirs.positions)
-        np.testing.assert_array_equal(mine.normals, theirs.normals)
-
-
 def test_a_contact_off_the_true_surface_is_refused(planned):
     body, plan = planned
     text = plan_to_json(body, plan)

@@ -2,7 +2,6 @@
 
 import signal
 import struct
-import threading
 
 import numpy as np
 import pytest
@@ -106,16 +105,6 @@ def test_off_of_polygons_in_any_style(style, tmp_path):
     assert body.volume == pytest.approx(16.0, rel=1e-12)
 
 
-def test_off_with_a_line_too_many_or_too_few_is_still_refused(tmp_path):
-    path, refused = tmp_path / "prism.off", 0
-    for counts in ("10 7 0", "10 9 0", "9 8 0", "11 8 0"):
-        path.write_text(PRISM % ("OFF", counts, "", ""))
-        with pytest.raises(gc.MeshError, match=r"line|end"):
-            gc.load_polyhedron(path)
-        refused += 1
-    assert refused == 4
-
-
 @settings(max_examples=30)
 @given(meshes())
 def test_both_kinds_of_stl(mesh):
@@ -173,20 +162,7 @@ def test_a_word_that_is_damaged_is_refused_or_read_as_it_is(kind, data):
     """By the plain reading of the fuzzer, which knows nothing of ours."""
     words = FILES[kind].split(b" ")
     place = data.draw(st.integers(0, len(words) - 1))
-    odd = [
-        b"",
-        b"nan",
-        b"-1",
-        b"1e999",
-        b"9",
-        b"0.5",
-        b"1_0",
-        b"1e",
-        b"\x0c",
-        b"1/",
-        b"--1",
-        b"\xa0",
-    ]
+    odd = b"|nan|-1|1e999|9|0.5|1_0|1e|\x0c|1/|--1|\xa0".split(b"|")
     words[place] = data.draw(st.sampled_from(odd))
     text = b" ".join(words)
     try:
@@ -328,22 +304,6 @@ def test_binary_ply_faces_may_differ_in_their_numbers_of_corners():
             triangles_of("ply", data[:size], MOST)
 
 
-def test_a_comment_that_could_swallow_a_vertex_is_refused():
-    for lines in ("# in C:\\\n", "# a\\\n\n", "# a\\\n# b\n"):
-        accepted = "in C" not in lines
-        if accepted:
-            assert len(triangles_of("obj", (lines + obj_text()).encode(), MOST)[1]) == 4
-            continue
-        with pytest.raises(gc.MeshError, match="a comment ends in a backslash"):
-            triangles_of("obj", (lines + obj_text()).encode(), MOST)
-
-
-def test_ply_text_that_its_types_cannot_hold_is_refused():
-    with pytest.raises(gc.MeshError, match="x does not fit") as caught:
-        triangles_of("ply", ply().replace(b"float x", b"uchar x"), MOST)
-    assert caught.value.reason is MeshRefusal.UNREADABLE
-
-
 @pytest.mark.parametrize("kind", [*FILES, "glb"])
 def test_bytes_and_triangles_are_bounded_by_their_limits(kind, tmp_path):
     path = tmp_path / f"part.{kind}"
@@ -353,7 +313,6 @@ def test_bytes_and_triangles_are_bounded_by_their_limits(kind, tmp_path):
     mesh = read_triangles(path, just)
     assert (len(mesh.triangles), mesh.data) == (4, data)
     assert np.isfinite(mesh.vertices).all()
-    assert not mesh.vertices.flags.writeable
     for limits in (MeshLimits(max_bytes=len(data) - 1), MeshLimits(max_triangles=3)):
         with pytest.raises(gc.MeshError, match=rf"part\.{kind}: .*limit") as caught:
             read_triangles(path, limits)
@@ -390,19 +349,3 @@ def test_too_little_memory_is_a_refusal(tmp_path, monkeypatch):
         with pytest.raises(gc.MeshError, match=rf"part\.{kind}: .*memory") as caught:
             gc.load_polyhedron(path)
         assert caught.value.reason is MeshRefusal.LIMIT
-
-
-def test_many_threads_read_each_its_own_file(tmp_path):
-    files, found = [tmp_path / f"{count}.off" for count in range(1, 9)], {}
-    for count, path in enumerate(files, 1):
-        path.write_text(off(f"4 {4 * count} 0", faces=TRIANGLES * count))
-
-    def read(path):
-        found[path] = len(read_triangles(path, MeshLimits()).triangles)
-
-    threads = [threading.Thread(target=read, args=(path,)) for path in files]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert found == {path: 4 * count for count, path in enumerate(files, 1)}

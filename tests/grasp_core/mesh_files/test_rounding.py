@@ -44,6 +44,13 @@ def texts(points, faces, form):
     }
 
 
+def shows_its_rounding(kind, data, corners):
+    mesh = mesh_of_bytes(kind, data, MOST)
+    off_by = np.abs(mesh.vertices[mesh.triangles] - corners).max()
+    assert 0.0 < off_by <= 1.0001 * mesh.rounding, kind
+    assert mesh.rounding <= LOOSEST * off_by, kind
+
+
 @pytest.mark.parametrize("offset", [0.0, 0.1, 0.3, 2.0])
 @pytest.mark.parametrize("unit", [1.0, 1000.0])
 @pytest.mark.parametrize("form", FORMATS)
@@ -51,10 +58,7 @@ def test_a_text_shows_its_own_rounding(form, unit, offset):
     points, faces = shape(12)
     points = (points + np.multiply(offset, [1.0, -0.2, 0.0])) * unit
     for kind, text in texts(points, faces, form).items():
-        mesh = mesh_of_bytes(kind, text.encode(), MOST)
-        off_by = np.abs(mesh.vertices[mesh.triangles] - points[faces]).max()
-        assert 0.0 < off_by <= 1.0001 * mesh.rounding, kind
-        assert mesh.rounding <= LOOSEST * off_by, kind
+        shows_its_rounding(kind, text.encode(), points[faces])
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.1, 0.3, 2.0])
@@ -66,10 +70,7 @@ def test_a_binary_file_shows_that_of_single_precision(unit, offset):
     files = {"stl": stl(points.tolist(), faces.tolist()),
              "ply": held.export(file_type="ply"), "glb": held.export(file_type="glb")}  # fmt: skip
     for kind, data in files.items():
-        mesh = mesh_of_bytes(kind, data, MOST)
-        off_by = np.abs(mesh.vertices[mesh.triangles] - points[faces]).max()
-        assert 0.0 < off_by <= 1.0001 * mesh.rounding, kind
-        assert mesh.rounding <= LOOSEST * off_by, kind
+        shows_its_rounding(kind, data, points[faces])
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.3, 2.0])
@@ -78,10 +79,7 @@ def test_a_text_of_single_precision_shows_that(form, offset):
     points, faces = shape(12)
     points = points + np.multiply(offset, [1.0, -0.2, 0.0])
     for kind, text in texts(points.astype(np.float32).astype(float), faces, form).items():
-        mesh = mesh_of_bytes(kind, text.encode(), MOST)
-        off_by = np.abs(mesh.vertices[mesh.triangles] - points[faces]).max()
-        assert 0.0 < off_by <= 1.0001 * mesh.rounding, kind
-        assert mesh.rounding <= LOOSEST * off_by, kind
+        shows_its_rounding(kind, text.encode(), points[faces])
 
 
 def test_a_fixed_number_of_decimals_shows_on_small_objects():

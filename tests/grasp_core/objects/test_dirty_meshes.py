@@ -68,7 +68,3 @@ def test_a_dirty_shape_is_grasped_where_it_is_or_refused(name, tmp_path):
     read, fingers, has_grasps = check(name, tmp_path)
     assert read >= WHOLE_WAYS
     assert fingers >= 4 * read or not has_grasps
-
-
-def test_there_are_sixty_shapes():
-    assert len(shapes()) == 60

@@ -63,11 +63,6 @@ def test_a_face_with_a_hole_is_tiled_by_convex_pieces():
         assert sum(_area(piece, face.normal) for piece in face.pieces) == pytest.approx(face.area)
 
 
-def test_two_coplanar_but_separate_parts_are_two_faces():
-    body = example_object("cross")
-    assert len(body.faces) == 30
-
-
 def test_borders_that_touch_in_a_corner_stay_simple_loops():
     """A square whose triangular hole shares its first corner: 4-5-0 is open."""
     triangles = np.array([[0, 1, 4], [1, 2, 4], [2, 5, 4], [2, 3, 5], [3, 0, 5]])

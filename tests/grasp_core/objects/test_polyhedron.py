@@ -3,9 +3,10 @@ import pytest
 import trimesh
 
 import grasp_core as gc
+import scenes
 from grasp_core.errors import MeshRefusal
 from grasp_core.mesh_files.reading import FORMATS
-from grasp_core.objects.polyhedron import polyhedron_from_mesh
+from grasp_core.objects.polyhedron import is_convex, polyhedron_from_mesh
 
 
 @pytest.fixture
@@ -81,11 +82,6 @@ def test_a_cavity_is_part_of_a_solid(box):
     assert len(body.faces) == 12
 
 
-def arrays(box, change):
-    vertices, triangles = box.vertices.copy(), box.faces.copy()
-    return change(vertices, triangles)
-
-
 BAD_ARRAYS = {
     "not finite": (lambda v, t: (np.where(v == v[0, 0], np.nan, v), t), MeshRefusal.NON_FINITE),
     "index too large": (lambda v, t: (v, np.where(t == 7, 99, t)), MeshRefusal.INDEX),
@@ -113,7 +109,7 @@ BAD_ARRAYS = {
 def test_bad_arrays_are_refused_with_their_reason(box, case):
     change, reason = BAD_ARRAYS[case]
     with pytest.raises(gc.MeshError) as caught:
-        polyhedron_from_mesh(*arrays(box, change))
+        polyhedron_from_mesh(*change(box.vertices.copy(), box.faces.copy()))
     assert caught.value.reason is reason
     assert reason.value in str(caught.value)
 
@@ -122,43 +118,6 @@ def test_too_many_triangles_are_refused_before_any_work():
     with pytest.raises(gc.MeshError) as caught:
         polyhedron_from_mesh(np.zeros((3, 3)), np.zeros((200_001, 3), dtype=int))
     assert caught.value.reason is MeshRefusal.TOO_MANY
-
-
-def obj(box):
-    return box.export(file_type="obj")
-
-
-BAD_FILES = {
-    "empty.stl": (lambda _: b"", MeshRefusal.EMPTY),
-    "comments.obj": (lambda _: b"# nothing\n" * 5, MeshRefusal.EMPTY),
-    "noise.stl": (lambda _: bytes(range(256)) * 3, MeshRefusal.UNREADABLE),
-    "noise.ply": (lambda _: b"garbage" * 30, MeshRefusal.UNREADABLE),
-    "noise.off": (lambda _: b"garbage" * 30, MeshRefusal.UNREADABLE),
-    "noise.glb": (lambda _: b"garbage" * 30, MeshRefusal.UNREADABLE),
-    "short.stl": (lambda b: b.export(file_type="stl")[:-100], MeshRefusal.UNREADABLE),
-    "short.ply": (lambda b: b.export(file_type="ply")[:-20], MeshRefusal.UNREADABLE),
-    "short.glb": (lambda b: b.export(file_type="glb")[:-20], MeshRefusal.UNREADABLE),
-    "short.off": (lambda b: b.export(file_type="off")[:-30].encode(), MeshRefusal.UNREADABLE),
-    "short.obj": (lambda b: obj(b)[:-30].encode(), MeshRefusal.UNREADABLE),
-    "vertices.obj": (lambda b: obj(b).split("f ")[0].encode(), MeshRefusal.EMPTY),
-    "nan.obj": (lambda b: obj(b).replace("0.05000000", "nan").encode(), MeshRefusal.NON_FINITE),
-    "huge.obj": (lambda b: obj(b).replace("0.05000000", "1e400").encode(), MeshRefusal.NON_FINITE),
-    "words.obj": (lambda b: obj(b).replace("0.05000000", "wide").encode(), MeshRefusal.UNREADABLE),
-    "zero.obj": (lambda b: obj(b).replace("f 1", "f 0").encode(), MeshRefusal.INDEX),
-    "beyond.obj": (lambda b: obj(b).replace("f 2", "f 99").encode(), MeshRefusal.INDEX),
-    "part.step": (lambda _: b"ISO-10303-21;", MeshRefusal.FORMAT),
-}
-
-
-@pytest.mark.parametrize("name", BAD_FILES)
-def test_bad_files_are_refused_with_their_reason(box, name, tmp_path):
-    content, reason = BAD_FILES[name]
-    path = tmp_path / name
-    path.write_bytes(content(box))
-    with pytest.raises(gc.MeshError) as caught:
-        gc.load_polyhedron(path)
-    assert caught.value.reason is reason, str(caught.value)
-    assert name in str(caught.value)
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
@@ -175,3 +134,51 @@ def test_a_density_gives_a_mass(box):
     for wrong in (0.0, -1.0, float("nan"), float("inf"), "1", True):
         with pytest.raises(gc.InputError, match="density_kg_m3 must be a number"):
             body.mass_at(wrong)
+
+
+@pytest.mark.parametrize("name", ["wedge", "hex-nut"])
+def test_a_polyhedron_comes_back_from_trimesh_as_it_was(name):
+    body = scenes.example_object(name)
+    mesh = body.to_trimesh()
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(body.volume, rel=1e-12)
+    np.testing.assert_allclose(mesh.center_mass, body.center_of_mass, atol=1e-12)
+    again = gc.from_trimesh(mesh, name=name)
+    assert again.content_sha256 == body.content_sha256
+    assert len(again.faces) == len(body.faces)
+
+
+def test_meshes_of_trimesh_are_checked_like_files():
+    box = trimesh.creation.box((0.1, 0.2, 0.3))
+    assert len(gc.from_trimesh(box).faces) == 6
+    box.faces = box.faces[:-1]
+    with pytest.raises(gc.MeshError, match="OPEN"):
+        gc.from_trimesh(box)
+    with pytest.raises(gc.InputError, match="Trimesh, got str"):
+        gc.from_trimesh("part.stl")
+
+
+@pytest.mark.parametrize("subdivisions", [1, 2, 3])
+def test_a_ball_is_convex_however_fine(subdivisions):
+    """The finer ones are planned on patches, whose planes cut through the ball."""
+    mesh = trimesh.creation.icosphere(subdivisions=subdivisions, radius=0.05)
+    ball = gc.Polyhedron.from_mesh(mesh.vertices, mesh.faces, name="ball")
+    assert is_convex(ball)
+    single = mesh.vertices.astype(np.float32).astype(np.float64)
+    assert is_convex(gc.Polyhedron.from_mesh(single, mesh.faces, name="ball"))
+
+
+def test_a_dent_in_a_ball_is_seen():
+    mesh = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+    vertices = np.array(mesh.vertices)
+    vertices[7] *= 0.98
+    assert not is_convex(gc.Polyhedron.from_mesh(vertices, mesh.faces, name="dented"))
+
+
+@pytest.mark.parametrize(
+    ("name", "convex"),
+    [("box", True), ("random-40-1", True), ("dodecahedron", True), ("wedge", True),
+     ("l-bracket", False), ("cross", False), ("hex-nut", False), ("mug", False)],
+)  # fmt: skip
+def test_examples_are_what_they_are(name, convex):
+    assert is_convex(scenes.example_object(name)) is convex

@@ -77,28 +77,6 @@ def test_boxes_in_one_file_become_the_solid_that_cells_count(seed):
     assert body.notes == ("3 parts that overlap or touch were united",)
 
 
-@pytest.mark.parametrize(
-    ("other", "faces", "volume"),
-    [
-        (((3, 1, 2), (9, 4, 5)), 11, 216 + 54 - 27),
-        (((3, 2, 1), (9, 8, 7)), 12, 216 + 216 - 3 * 4 * 5),
-        (((3, 0, 0), (9, 6, 6)), 6, 9 * 36),
-        (((6, 1, 2), (9, 4, 5)), 11, 216 + 27),
-        (((6, 0, 0), (9, 6, 6)), 6, 9 * 36),
-    ],
-    ids=["an arm", "a corner", "the same sides", "touching", "touching with the same sides"],
-)
-def test_two_boxes_that_overlap_or_touch_are_united(other, faces, volume):
-    body = load(box(*WHOLE), box(*other))
-    assert body.volume == pytest.approx(volume * UNIT**3, rel=1e-9)
-    assert len(body.faces) == faces
-    assert body.surface.closed
-    assert body.surface.dropped == 0.0
-    assert body.surface.volume_source == "surface"
-    assert body.notes == ("2 parts that overlap or touch were united",)
-    assert np.abs(body.normals).max(axis=1) == pytest.approx(1.0)
-
-
 def turned_about(seed, precision, *parts):
     """Parts that are turned out of the axes together, and then rounded."""
     turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]

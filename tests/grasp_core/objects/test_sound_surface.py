@@ -9,6 +9,10 @@ import trimesh
 
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
+from grasp_core.objects.booleans import Solid
+from grasp_core.objects.planar_faces import triangle_neighbours
+from grasp_core.objects.solid_checks import balanced, surface_fault
+from grasp_core.objects.sound_surface import caps_of
 from tests.bad_input import mesh_texts
 
 TURN = trimesh.transformations.rotation_matrix(0.7, [3.0, 1.0, 2.0])[:3, :3]
@@ -186,7 +190,227 @@ def test_a_missing_triangle_and_a_wrong_winding_are_mended_together():
     assert len(body.notes) == 3
 
 
-def test_triangles_without_area_alone_are_no_solid():
-    with pytest.raises(gc.MeshError, match="no triangle has an area") as caught:
-        gc.Polyhedron.from_mesh([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], [[0, 1, 1], [2, 2, 2]])
-    assert caught.value.reason is gc.MeshRefusal.ZERO_VOLUME
+SIZE = (0.1, 0.2, 0.3)
+FRICTION = 0.5
+
+
+def grid(times):
+    """A box whose triangles are each cut in four, some times, and its volume."""
+    box = trimesh.creation.box(SIZE)
+    for _ in range(times):
+        box = box.subdivide()
+    return box
+
+
+def around(mesh, place):
+    """Numbers of the triangles around the vertex that is nearest to a place."""
+    vertex = np.linalg.norm(mesh.vertices - place, axis=1).argmin()
+    return np.flatnonzero((mesh.faces == vertex).any(axis=1))
+
+
+def shared(one, two):
+    return len(set(one.tolist()) & set(two.tolist()))
+
+
+def ring(outline, height):
+    """The side walls and bottom of a prism over a star-shaped outline; the top is missing."""
+    count = len(outline)
+    points = [(x, y, z) for z in (0.0, height) for x, y in outline] + [(0.0, 0.0, 0.0)]
+    after = [(k + 1) % count for k in range(count)]
+    walls = [t for k, n in enumerate(after) for t in ((k, n, count + n), (k, count + n, count + k))]
+    return np.array(points), np.array([*walls, *((n, k, 2 * count) for k, n in enumerate(after))])
+
+
+def star(count, dent):
+    """An outline whose every other corner is dented."""
+    angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    reach = np.where(np.arange(count) % 2, dent, 1.0)
+    return np.column_stack([reach * np.cos(angle), reach * np.sin(angle)])
+
+
+def outline_area(outline):
+    x, y = outline.T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def check_whole(body, missing):
+    """Check that a box has volume, centre, moments and faces of the whole one."""
+    whole = trimesh.creation.box(SIZE)
+    assert body.surface.closed
+    assert body.surface.volume_source == "capped surface"
+    assert body.volume == pytest.approx(0.006, rel=1e-12)
+    np.testing.assert_allclose(body.center_of_mass, 0.0, atol=1e-15)
+    np.testing.assert_allclose(body.inertia, whole.moment_inertia, rtol=1e-9, atol=1e-15)
+    assert body.mass_at(1000.0) == pytest.approx(6.0)
+    assert len({tuple(np.round(face.normal)) for face in body.faces}) == 6
+    assert len(body.surface.caps) == missing
+    caps = body.vertices[body.triangles[body.surface.caps]]
+    crosses = np.cross(caps[:, 1] - caps[:, 0], caps[:, 2] - caps[:, 0])
+    assert (np.einsum("ki,ki->k", crosses, caps.mean(axis=1)) > 0.0).all(), "wound inwards"
+    lost = 0.5 * float(np.linalg.norm(crosses, axis=1).sum())
+    assert sum(face.area for face in body.faces) == pytest.approx(whole.area - lost)
+    return lost
+
+
+@pytest.mark.parametrize("gone", range(0, 192, 31))
+def test_one_missing_triangle_does_not_change_volume_centre_and_moments(gone):
+    mesh = grid(2)
+    body = gc.Polyhedron.from_mesh(mesh.vertices, np.delete(mesh.faces, gone, axis=0))
+    lost = check_whole(body, 1)
+    assert lost == pytest.approx(mesh.area_faces[gone])
+    sides = mesh.triangles[gone] - np.roll(mesh.triangles[gone], 1, axis=0)
+    assert body.surface.holes == 1
+    assert body.surface.largest_hole_m == pytest.approx(np.linalg.norm(sides, axis=1).max())
+    assert 0.0 < body.surface.volume_error <= 0.02
+    (note,) = body.notes
+    assert note.startswith("1 hole in the surface")
+    assert "no finger is placed there" in note
+
+
+def test_a_hole_of_many_corners_is_closed():
+    mesh = grid(3)
+    gone = around(mesh, [0.05, 0.0, 0.0])
+    assert len(gone) >= 6
+    body = gc.Polyhedron.from_mesh(mesh.vertices, np.delete(mesh.faces, gone, axis=0))
+    check_whole(body, len(gone) - 2)
+    assert body.surface.holes == 1
+
+
+def test_holes_that_meet_in_a_corner_are_closed_one_by_one():
+    mesh = grid(2)
+    found = around(mesh, [0.05, 0.0, 0.0])
+    pairs = [(a, b) for a in found for b in found
+             if a < b and shared(mesh.faces[a], mesh.faces[b]) == 1]  # fmt: skip
+    assert len(pairs) >= 6
+    closed = 0
+    for pair in pairs:
+        left = np.delete(mesh.faces, pair, axis=0)
+        caps = caps_of(mesh.vertices, left)
+        assert len(caps.widths) == len(caps.triangles) == 2
+        assert {frozenset(t) for t in caps.triangles.tolist()} == {
+            frozenset(t) for t in mesh.faces[list(pair)].tolist()
+        }
+        if caps.hidden < 0.02 * mesh.volume:
+            check_whole(gc.Polyhedron.from_mesh(mesh.vertices, left), 2)
+            closed += 1
+    assert closed >= 3
+
+
+def test_a_hole_that_may_hide_more_than_two_hundredths_of_the_volume_stays_open():
+    mesh = grid(2)
+    gone = around(mesh, [0.05, 0.0, 0.0])
+    left = np.delete(mesh.faces, gone, axis=0)
+    assert caps_of(mesh.vertices, left).hidden > 0.02 * mesh.volume
+    with pytest.raises(gc.MeshError, match="belong to one triangle only") as caught:
+        gc.Polyhedron.from_mesh(mesh.vertices, left)
+    assert caught.value.reason is MeshRefusal.OPEN
+    assert not gc.Polyhedron.from_mesh(mesh.vertices, left, faces="patches").surface.closed
+
+
+@pytest.mark.parametrize(("count", "dent"), [(6, 1.0), (64, 1.0), (12, 0.4), (90, 0.6)])
+def test_a_plane_border_of_any_shape_is_filled_without_overlap(count, dent):
+    outline = star(count, dent)
+    points, faces = ring(outline, 0.7)
+    caps = caps_of(points, faces)
+    whole = np.concatenate([faces, caps.triangles])
+    assert surface_fault(whole) is None
+    assert len(caps.triangles) == count - 2
+    assert caps.widths == pytest.approx([2.0], abs=0.002)
+    area = outline_area(outline)
+    assert Solid(points, whole).volume == pytest.approx(0.7 * area, rel=1e-12)
+    a, b, c = (points[caps.triangles[:, k]] for k in range(3))
+    crosses = np.cross(b - a, c - a)
+    assert (crosses[:, 2] >= 0.0).all()
+    assert 0.5 * np.linalg.norm(crosses, axis=1).sum() == pytest.approx(area)
+    assert caps.hidden == pytest.approx(area * caps.widths[0] / 3.0)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_crooked_holes_are_closed_and_hide_no_more_than_they_say(seed):
+    rng = np.random.default_rng(seed)
+    mesh = trimesh.creation.icosphere(subdivisions=3)
+    across, gone = triangle_neighbours(mesh.faces), [int(rng.integers(len(mesh.faces)))]
+    while len(gone) < 40:
+        gone.append(int(rng.choice(np.setdiff1d(across[gone], gone))))
+    for wound in (mesh.faces, mesh.faces[:, ::-1]):
+        left = np.delete(wound, gone, axis=0)
+        caps = caps_of(mesh.vertices, left)
+        whole = np.concatenate([left, caps.triangles])
+        assert balanced(whole)
+        assert abs(abs(Solid(mesh.vertices, whole).volume) - mesh.volume) <= caps.hidden
+
+
+def test_edges_of_three_triangles_are_not_closed():
+    mesh = grid(1)
+    edge = mesh.faces[0][:2]
+    points = np.vstack([mesh.vertices, [0.3, 0.3, 0.3]])
+    fin = [*edge, len(mesh.vertices)]
+    for added in (fin, fin[::-1]):
+        assert caps_of(points, np.vstack([mesh.faces, added])) is None
+        with pytest.raises(gc.MeshError) as caught:
+            gc.Polyhedron.from_mesh(points, np.vstack([mesh.faces, added]), faces="planar")
+        assert caught.value.reason in {MeshRefusal.OPEN, MeshRefusal.NON_MANIFOLD}
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-9, 1e-8])
+def test_a_vertex_on_the_edge_of_a_neighbour_costs_no_face_a_place(off):
+    mesh = trimesh.creation.box(SIZE)
+    a, b, c = mesh.faces[0]
+    middle = 0.5 * (mesh.vertices[a] + mesh.vertices[b]) + off * np.array([1.0, -1.0, 1.0])
+    points = np.vstack([mesh.vertices, middle])
+    faces = np.vstack([mesh.faces[1:], [a, 8, c], [8, b, c]])
+    body, whole = (
+        gc.Polyhedron.from_mesh(points, faces), gc.Polyhedron.from_mesh(mesh.vertices, mesh.faces)
+    )  # fmt: skip
+    assert body.surface.volume_source == "surface"
+    assert body.surface.holes == len(body.surface.caps) == 0
+    assert body.notes == ("cracks between triangles that meet were closed",)
+    assert len(body.faces) == 6
+    assert body.volume == pytest.approx(0.006, rel=1e-6)
+    key = [tuple(np.round(face.normal).astype(int)) for face in whole.faces]
+    for face in body.faces:
+        clean = whole.faces[key.index(tuple(np.round(face.normal).astype(int)))]
+        assert face.area == pytest.approx(clean.area, rel=1e-6)
+        assert len(face.pieces) == len(clean.pieces) == 1
+        np.testing.assert_allclose(face.centroid, clean.centroid, atol=1e-8)
+
+
+def nearest(body, places):
+    """Number of the triangle that is nearest to each place."""
+    mesh = trimesh.Trimesh(body.vertices, body.triangles, process=False)
+    return trimesh.proximity.closest_point_naive(mesh, places)[2]
+
+
+def contacts(body):
+    """Contacts of the best grasps, (n, 3) [m]."""
+    grasps = gc.plan(body, FRICTION, families="concurrent", limit=10).grasps
+    return np.concatenate([grasp.positions for grasp in grasps])
+
+
+@pytest.mark.parametrize("kind", ["planar", "patches"])
+def test_no_finger_stands_on_a_cap(kind):
+    """Triangles are missing just where the best grasps of the whole body have their fingers."""
+    mesh = grid(3) if kind == "planar" else trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+    whole = gc.Polyhedron.from_mesh(mesh.vertices, mesh.faces, faces=kind)
+    gone = np.unique(nearest(whole, contacts(whole)[:8]))
+    left = np.delete(whole.triangles, gone, axis=0)
+    body = gc.Polyhedron.from_mesh(whole.vertices, left, faces=kind)
+    assert len(body.surface.caps) == len(gone) >= 5
+    fingers = contacts(body)
+    assert len(fingers) == 40
+    assert not np.isin(nearest(body, fingers), body.surface.caps).any()
+    assert np.isin(nearest(body, contacts(whole)), body.surface.caps).any()
+
+
+def test_a_crack_is_not_counted_as_a_hole_beside_one():
+    mesh = grid(2)
+    a, b, c = mesh.faces[0]
+    points = np.vstack([mesh.vertices, 0.5 * (mesh.vertices[a] + mesh.vertices[b])])
+    middle = len(mesh.vertices)
+    left = np.vstack([mesh.faces[1:-1], [a, middle, c], [middle, b, c]])
+    body = gc.Polyhedron.from_mesh(points, left)
+    assert body.surface.holes == len(body.surface.caps) == 1
+    cap = body.vertices[body.triangles[body.surface.caps[0]]]
+    np.testing.assert_allclose(sorted(cap.tolist()), sorted(mesh.triangles[-1].tolist()))
+    assert body.volume == pytest.approx(0.006, rel=1e-12)
+    assert len(body.notes) == 2

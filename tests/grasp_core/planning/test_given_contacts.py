@@ -138,16 +138,3 @@ def test_a_grasp_or_the_proof_that_there_is_none():
     assert not isinstance(flat, gc.Grasp)
     assert not flat.closed
     assert flat.verify()
-
-
-@pytest.mark.parametrize(
-    ("points", "normals", "message"),
-    [
-        (np.zeros((3, 3)), np.eye(3), "positions"),
-        (np.full((4, 3), np.nan), np.eye(4, 3), "finite"),
-        (np.zeros((4, 3)), np.zeros((4, 3)), "length 1"),
-    ],
-)
-def test_what_is_not_four_contacts_is_refused(points, normals, message):
-    with pytest.raises(gc.InputError, match=message):
-        seat(example_object("tetrahedron"), points, normals)

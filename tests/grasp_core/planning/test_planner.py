@@ -1,11 +1,18 @@
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.families.constructions import LEAST_RADIUS
+from grasp_core.families.constructions import CONSTRUCTIONS
+from grasp_core.families.placements import LEAST_RADIUS
+from grasp_core.objects.face_pieces import face_shapes
+from grasp_core.objects.standard_order import standard
+from grasp_core.planning.as_given import _place, faces_as_given
+from grasp_core.planning.planned_cones import PlannedCones
+from grasp_core.planning.quadruples import all_blocks
 from grasp_core.planning.request import METHODS
 from scenes.example_objects import example_object
 from tests.benchmarks.objects import sphere_hull
@@ -47,16 +54,6 @@ def test_the_tetrahedron_is_held_at_its_face_centres():
     np.testing.assert_allclose(grasp.focus_points, [[0.0, 0, 0]], atol=1e-7 * body.radius)
     centers = [body.faces[face].centroid for face in grasp.faces]
     np.testing.assert_allclose(grasp.positions, centers, atol=1e-7 * body.radius)
-
-
-def test_a_bar_whose_ends_are_far_apart_has_no_concurrent_grasp_at_ten_degrees():
-    """Nine quadruples span at ten degrees or more, and no focus serves any of them."""
-    found = gc.plan(
-        example_object("double-wedge-bar"), TEN_DEGREES, families=("concurrent",), cones="normal"
-    )
-    assert found.counts.spanning == 9
-    assert found.counts.families["concurrent"].infeasible == 9
-    assert "9 face quadruples span" in found.absence
 
 
 TILTED = [(name, "tilted") for name in ("wedge", "chamfered-box", "random-10-1", "random-12-1")]
@@ -156,54 +153,6 @@ def test_a_smaller_theta_is_allowed_and_gives_smaller_discs():
     assert narrow.grasps[0].force_cones[0].half_angle <= math.radians(5.0)
 
 
-@pytest.mark.parametrize("friction", [0.01, 0.05, 0.144])
-def test_symmetric_objects_are_planned_at_small_friction(friction):
-    found = gc.plan(
-        example_object("dodecahedron"), friction, families=("concurrent",), cones="normal"
-    )
-    assert len(found.grasps) == 30
-    assert {grasp.critical_friction for grasp in found.grasps} == {0.0}
-
-
-@pytest.mark.parametrize(
-    ("name", "family"),
-    [
-        ("random-10-1", "concurrent"),
-        ("octahedron", "pencil"),
-        pytest.param("random-10-1", "pencil", marks=MORE),
-        pytest.param("octahedron", "concurrent", marks=MORE),
-    ],
-)
-def test_a_limit_returns_the_best_of_all_grasps(name, family):
-    """Also where symmetry makes many grasps equally good."""
-    body = example_object(name)
-    everything = gc.plan(body, 0.3, families=family, cones="tilted")
-    few = gc.plan(body, 0.3, limit=7, families=family, cones="tilted")
-    assert len(few.grasps) == 7
-    assert [g.id for g in few.grasps] == [g.id for g in everything.grasps[:7]]
-    fewer = everything.counts.families[family].tried - few.counts.families[family].tried
-    assert fewer > 0 or name == "octahedron"
-
-
-@pytest.mark.parametrize("name", ["wedge", "l-bracket"])
-def test_a_larger_limit_only_adds_grasps(name):
-    kept = [
-        {grasp.id for grasp in gc.plan(example_object(name), 0.5, limit=limit).grasps}
-        for limit in (5, 15, 40)
-    ]
-    assert [len(ids) for ids in kept] == [5, 15, 40]
-    assert kept[0] < kept[1] < kept[2]
-
-
-def test_plans_are_the_same_every_time():
-    one, two = (gc.plan(example_object("box"), 0.4) for _ in range(2))
-    assert len(one.grasps) >= 20
-    assert [g.id for g in one.grasps] == [g.id for g in two.grasps]
-    assert len({g.id for g in one.grasps}) == len(one.grasps)
-    for a, b in zip(one.grasps, two.grasps, strict=True):
-        np.testing.assert_array_equal(a.positions, b.positions)
-
-
 def test_progress_is_reported_as_quadruples_are_tried():
     seen = []
     gc.plan(example_object("wedge"), progress=lambda *numbers: seen.append(numbers))
@@ -279,14 +228,214 @@ def test_grasps_are_streamed_as_they_are_found():
     assert everything == {grasp.id for grasp in gc.plan(body, 0.4).grasps}
 
 
-@pytest.mark.parametrize("name", ["hexagonal-pyramid", *more("l-bracket")])
-def test_turned_scaled_and_shaken_objects_have_the_same_faces_and_families(name):
-    """All methods, where much is symmetric and faces are not convex."""
-    rng, body = np.random.default_rng(5), example_object(name)
-    extent = np.ptp(body.vertices, axis=0).max()
-    expected = {(*sorted(g.faces), g.family) for g in gc.plan(body, 0.8).grasps}
-    for size in (1e-3, 0.03, 1.0):
-        noise, R = 1e-9 * rng.uniform(-1.0, 1.0, body.vertices.shape), random_rotation(rng)
-        there = remade(body, lambda v, n=noise, R=R, s=size: s * (v / extent + n) @ R.T + s)
-        assert {(*sorted(g.faces), g.family) for g in gc.plan(there, 0.8).grasps} == expected
-    assert len(expected) >= 35
+@pytest.mark.parametrize(("name", "absent"), [("box", 0), ("prism", 0), ("random-10-1", 55)])
+def test_the_free_method_decides_every_four_faces(name, absent):
+    """With a grasp in force closure, or a proof of absence that checks."""
+    body = example_object(name)
+    found = gc.plan(body, 0.3, families=("free",))
+    counts = found.counts.families["free"]
+    assert counts.tried == found.counts.quadruples == counts.found + counts.infeasible
+    assert counts.infeasible == len(found.absences) >= absent
+    assert all(proof.verify() for proofs in found.absences.values() for proof in proofs)
+    for grasp in found.grasps:
+        assert gc.force_closure(grasp, friction=0.3).verify()
+        assert grasp.critical_friction < 0.3
+    assert found.grasps
+
+
+def test_a_smaller_theta_binds_the_free_method_too():
+    found = gc.plan(example_object("wedge"), 0.5, theta_deg=8.0, families="free")
+    assert found.grasps
+    for grasp in found.grasps:
+        f, n = grasp.witness.forces, grasp.normals
+        angles = np.arctan2(np.linalg.norm(np.cross(f, n), axis=1), np.einsum("ki,ki->k", f, n))
+        assert np.degrees(angles).max() <= 8.0 + 1e-6
+        assert grasp.critical_friction < math.tan(math.radians(8.0))
+
+
+def test_every_face_quadruple_is_held_absent_or_named_undecided():
+    found = gc.plan(example_object("l-bracket"), 0.001, families="free")
+    held = {tuple(sorted(grasp.faces)) for grasp in found.grasps}
+    assert len(held) + len(found.absences) + len(found.undecided) == found.counts.quadruples == 70
+    assert not held & set(found.absences)
+    assert found.counts.families["free"].undecided == len(found.undecided)
+
+
+@pytest.mark.parametrize("name", ["box", "wedge", *more("prism", "l-bracket")])
+def test_every_four_faces_are_held_or_proved_to_hold_nothing(name):
+    """Also where no normals span: with tilted cones most grasps have regions."""
+    for friction in (0.3, 0.8):
+        found = gc.plan(example_object(name), friction, families=METHODS, cones="tilted")
+        known, held = found.outcomes, {tuple(sorted(g.faces)) for g in found.grasps}
+        assert (known.held, known.absent, known.open) == (len(held), len(found.absences), 0)
+        assert known.held + known.absent == found.counts.quadruples
+        regions = {tuple(sorted(g.faces)) for g in found.grasps if g.radius > 0.0}
+        assert len(regions) >= 0.7 * len(held)
+        for counts in found.counts.families.values():
+            assert counts.rejected == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "least"),
+    [
+        ("box", 25),
+        pytest.param("wedge", 70, marks=MORE),
+        pytest.param("octahedron", 100, marks=MORE),
+    ],
+)
+def test_what_less_friction_holds_more_friction_holds(name, least):
+    tested = 0
+    plans = [
+        gc.plan(example_object(name), friction, families=METHODS, cones="tilted")
+        for friction in (0.1, 0.3, 0.7)
+    ]
+    for pair in pairwise(plans):
+        held = [{tuple(sorted(g.faces)) for g in plan.grasps} for plan in pair]
+        assert held[0] <= held[1]
+        tested += len(held[0])
+    assert tested >= least
+
+
+def test_what_is_left_open_is_decided_when_asked_and_the_gap_is_said_before():
+    """Long faces on which whole patches balance though no contacts do, or only few."""
+    body = example_object("double-wedge-bar")
+    quick, complete = (gc.plan(body, 0.3, complete=whole) for whole in (False, True))
+    assert quick.outcomes.open == len(quick.undecided) == 8
+    assert all(0.0 < share <= 1.0 for share in quick.undecided.values())
+    assert complete.outcomes.open == len(complete.undecided) == 0
+    assert complete.counts.families["free"].undecided == 0
+    settled = set(complete.absences) - set(quick.absences)
+    settled |= {tuple(sorted(g.faces)) for g in complete.grasps} - {
+        tuple(sorted(g.faces)) for g in quick.grasps
+    }
+    assert settled == set(quick.undecided)
+    assert all(proof.verify() for faces in settled for proof in complete.absences.get(faces, ()))
+
+
+@pytest.mark.parametrize("name", ["box", "prism", "l-bracket", "cross", "hex-nut"])
+def test_objects_without_spanning_quadruples_say_why(name):
+    found = gc.plan(example_object(name), 0.5, families=FAMILIES, cones="normal")
+    assert not found.grasps
+    assert found.counts.spanning == 0
+    assert "positively spanning" in found.absence
+
+
+def test_every_family_is_planned_and_every_witness_is_of_its_family():
+    found = gc.plan(example_object("chamfered-box"), TEN_DEGREES, families=FAMILIES, cones="normal")
+    assert list(found.counts.families) == list(FAMILIES)
+    assert {grasp.family for grasp in found.grasps} == set(FAMILIES)
+    for grasp in found.grasps:
+        x, f = grasp.witness.points, grasp.witness.forces
+        assert gc.classify_lines(x, grasp.witness.directions) == grasp.family
+        np.testing.assert_array_equal(x, grasp.positions)
+        np.testing.assert_allclose(f.sum(axis=0), 0.0, atol=1e-9)
+        assert np.einsum("ki,ki->", f, grasp.normals) == pytest.approx(1.0)
+        assert len(grasp.focus_points) == (1 if grasp.family == "concurrent" else 2)
+
+
+@pytest.mark.parametrize("name", ["chamfered-box", "double-wedge-bar", "random-12-1"])
+def test_counts_add_up_and_nothing_is_rejected(name):
+    found = gc.plan(example_object(name), TEN_DEGREES, limit=30, families=FAMILIES, cones="normal")
+    for family, counts in found.counts.families.items():
+        ended = counts.infeasible + counts.found + counts.duplicates + counts.rejected
+        assert counts.tried == ended
+        assert counts.rejected == counts.undecided == 0
+        orders = 1 if family == "concurrent" else 3
+        assert counts.tried + counts.pruned == orders * found.counts.quadruples
+
+
+def test_an_elongated_object_has_pencils_where_it_has_no_concurrent_grasp():
+    found = gc.plan(
+        example_object("double-wedge-bar"), TEN_DEGREES, families=FAMILIES, cones="normal"
+    )
+    families = [grasp.family for grasp in found.grasps]
+    assert families.count("concurrent") == 0
+    assert families.count("pencil") == 9
+    assert found.grasps[0].radius == pytest.approx(0.113774 * 0.02, rel=1e-5)
+    needing_friction = [g for g in found.grasps if g.critical_friction > 0.05]
+    assert {grasp.family for grasp in needing_friction} == {"regulus"}
+
+
+def test_pairings_that_lead_to_the_same_contacts_are_kept_once():
+    counts = gc.plan(example_object("tetrahedron"), 0.3).counts.families["regulus"]
+    assert (counts.tried, counts.duplicates, counts.found) == (3, 2, 1)
+
+
+def test_a_limit_is_shared_between_the_families():
+    found = gc.plan(example_object("icosahedron"), TEN_DEGREES, limit=9)
+    assert [g.family for g in found.grasps].count("regulus") == 3
+    assert [g.family for g in found.grasps].count("pencil") == 3
+    radii = np.array([g.radius for g in found.grasps])
+    assert (np.diff(radii) < 1e-12).all()
+
+
+def test_radii_stay_below_the_bounds_that_prune():
+    given, theta = example_object("random-12-1"), math.radians(8.0)
+    planned = standard(given)
+    body = planned.body
+    cones = PlannedCones(body, face_shapes(body), theta, tilted=True)
+    ((room,), make), tested = all_blocks(cones, len(body.faces), np.empty((0, 4), dtype=int)), 0
+    for family in DISCS:
+        wide, loose = make(0).ranked(CONSTRUCTIONS[family], LEAST_RADIUS)
+        coned, tight = wide.coned(slice(None)).ranked(CONSTRUCTIONS[family])
+        coarse = dict(zip(map(tuple, wide.faces.tolist()), loose, strict=True))
+        limits = [coarse[tuple(each)] for each in coned.faces.tolist()]
+        best = tight.max(axis=(1, 2))
+        assert (best <= limits).all()
+        bounds = {
+            tuple(sorted(planned.faces[face] for face in faces)): bound
+            for faces, bound in zip(coned.faces.tolist(), best, strict=True)
+        }
+        assert max(bounds.values()) <= room
+        for grasp in gc.plan(given, 1.0, theta_deg=8.0, families=family, cones="tilted").grasps:
+            assert grasp.radius <= bounds[tuple(sorted(grasp.faces))] * body.radius * (1 + 1e-6)
+            tested += 1
+    assert tested >= 80
+
+
+def test_tilted_cones_never_make_discs_smaller():
+    tested = larger = 0
+    for name in ("wedge", "random-10-1"):
+        body = example_object(name)
+        paper, ours = (
+            {g.id: g.radius for g in gc.plan(body, 0.3, families="concurrent", cones=cones).grasps}
+            for cones in ("normal", "tilted")
+        )
+        assert set(paper) <= set(ours)
+        for name_, radius in paper.items():
+            assert ours[name_] >= 0.8 * radius
+            larger += ours[name_] > 1.01 * radius
+            tested += 1
+    assert tested >= 30
+    assert larger > 0.5 * tested
+
+
+def test_a_focus_before_some_fingers_and_behind_others_gives_regions_where_nothing_else_does():
+    body, mixed = example_object("l-bracket"), 0
+    for grasp in gc.plan(body, 0.5).grasps:
+        if grasp.family != "concurrent":
+            continue
+        heights = np.einsum(
+            "ki,ki->k", grasp.focus_points[0] - grasp.positions,
+            np.array([cone.axis for cone in grasp.force_cones]),
+        )  # fmt: skip
+        if heights.min() < 0.0 < heights.max():
+            rng = np.random.default_rng(0)
+            for _ in range(20):
+                points = [
+                    rng.dirichlet(np.full(len(region.polygon), 0.3)) @ region.polygon
+                    for region in grasp.regions
+                ]
+                assert gc.force_closure(np.array(points), grasp.normals, 0.5).closed
+            mixed += 1
+    assert mixed >= 4
+
+
+def test_halves_are_named_in_order_also_where_only_the_last_face_has_any():
+    on = standard(example_object("box"))
+    for halved in (5, 2):
+        here = replace(on, faces=(3, 5, 0, 1, 2, 4), owners=(0, 1, 2, 3, 4, 5, halved, halved))
+        given = here.faces[halved]
+        assert [_place(here, face) for face in range(6)] == [(face, "") for face in here.faces]
+        assert [_place(here, face) for face in (6, 7)] == [(given, "a"), (given, "b")]
+        assert faces_as_given((0, 1, 6, 7), here) == tuple(sorted((3, 5, given, given)))

@@ -8,8 +8,8 @@ import pytest
 
 from grasp_core.cones.spanning import span_sines
 from grasp_core.cones.tilting import SLIGHT, tilted_cones, widest_half_angles
-from grasp_core.families.constructions import LEAST_RADIUS
 from grasp_core.families.disc_bounds import corners_of, widths_apart
+from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, TILTED, PlannedCones
 from grasp_core.planning.quadruples import LARGEST_BLOCK, all_blocks, spanning_blocks

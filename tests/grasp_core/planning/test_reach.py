@@ -155,9 +155,3 @@ def test_the_patch_that_is_touched_is_not_in_the_way_but_the_rest_is():
         for grasp in plan.grasps
     ]
     assert sum(blocked) >= 3
-
-
-@pytest.mark.parametrize("lengths", [(0.0, 0.1), (0.01, -1.0), (np.nan, 0.1)])
-def test_fingers_without_size_are_refused(lengths):
-    with pytest.raises(gc.InputError):
-        Finger(*lengths)

@@ -121,8 +121,3 @@ def test_with_everything_found_families_take_turns_largest_first():
         kept = [grasp.radius for grasp in few if grasp.family == family]
         assert len(kept) >= 2
         np.testing.assert_allclose(kept, sorted(radii, reverse=True)[: len(kept)], rtol=1e-5)
-
-
-def test_an_unknown_order_is_refused(body):
-    with pytest.raises(gc.InputError, match="rank_by must be one of radius"):
-        gc.plan(body, 0.5, rank_by="beauty")

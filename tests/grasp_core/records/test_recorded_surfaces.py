@@ -124,5 +124,5 @@ def test_planar_faces_of_an_open_surface_that_a_file_calls_closed_are_refused(tm
     document["object"]["patches"] = None
     document["object"]["surface"]["closed"] = True
     path.write_text(json.dumps(document))
-    with pytest.raises(gc.InputError, match="GP-MESH-OPEN: 28 edges belong to one triangle only"):
+    with pytest.raises(gc.InputError, match=r"GP-MESH-OPEN: .*: 28 edges belong"):
         gc.load_grasps(path)

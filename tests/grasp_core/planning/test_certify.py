@@ -93,13 +93,6 @@ def test_copies_have_the_figures_of_the_original(copied):
         np.testing.assert_array_equal(other.positions, grasp.positions)
 
 
-def test_a_changed_copy_keeps_the_change():
-    _, grasps = planned()
-    changed = replace(grasps[0], critical_friction=0.25, ferrari_canny=(0.1, 0.2))
-    assert changed.critical_friction == 0.25
-    assert changed.ferrari_canny == (0.1, 0.2)
-
-
 def test_planned_values_pass_the_checks_of_values_that_users_make():
     """They are made without checks, so here they are made once more with them."""
     _, grasps = planned()
