@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from grasp_core.arrays import Array
 from grasp_core.errors import UnfaithfulError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
@@ -57,14 +58,17 @@ def worst_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> 
     depth = DEPTH * body.radius
     fingers = replace(rigid.fingers, indentation=depth / size)
     normals, depths = first_touch(replace(rigid, fingers=fingers).scene(body, contacts, 1.0))
-    faces = np.array([contact.normal for contact in contacts])
-    turned = np.arctan2(
-        np.linalg.norm(np.cross(normals, faces), axis=1), np.einsum("ki,ki->k", normals, faces)
-    )
+    turned = angles(normals, np.array([contact.normal for contact in contacts]))
     off = np.abs(depths / depth - 1.0)
     errors = np.nan_to_num(np.maximum(turned / NORMAL_ERROR, off / DEPTH_ERROR), nan=np.inf)
     finger = int(np.argmax(errors))
     return Touch(finger, float(turned[finger]), float(off[finger]))
+
+
+def angles(normals: Array, faces: Array) -> Array:
+    """Return the angles between normals and those of their faces, (k,) [rad]."""
+    across = np.linalg.norm(np.cross(normals, faces), axis=1)
+    return np.arctan2(across, np.einsum("ki,ki->k", normals, faces))
 
 
 def require_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> None:
@@ -88,12 +92,19 @@ def mesh_touches(case: Case) -> tuple[Check, Check]:
     contacts = [Contact(face.centroid, face.normal) for face in body.faces]
     groups = [contacts[start : start + FINGERS] for start in range(0, len(contacts), FINGERS)]
     touches = [worst_touch(body, group, case.setup) for group in groups]
-    # the maximum is NaN if one angle is
-    turned = np.max([touch.normal_error_rad for touch in touches])
-    deep = np.max([touch.depth_error for touch in touches])
+    return touch_checks(
+        np.array([touch.normal_error_rad for touch in touches]),
+        np.array([touch.depth_error for touch in touches]),
+    )
+
+
+def touch_checks(turned: Array, off: Array, where: str = "") -> tuple[Check, Check]:
+    """Check the largest errors of contacts' normals [rad] and depths; NaN if one is."""
+    normal = f"angle between a contact's normal and its face's{where}"
+    depth = f"error of a contact's depth, relative to it{where}"
     return (
-        Check("angle between a contact's normal and its face's", float(turned), 0.0, NORMAL_ERROR),
-        Check("error of a contact's depth, relative to it", float(deep), 0.0, DEPTH_ERROR),
+        Check(normal, float(np.max(turned)), 0.0, NORMAL_ERROR),
+        Check(depth, float(np.max(off)), 0.0, DEPTH_ERROR),
     )
 
 
@@ -115,6 +126,15 @@ class Gate:
         """Whether all checks passed."""
         return all(check.passed for check in self.checks)
 
+    def require(self, so: str) -> None:
+        """Refuse settings under which a check failed, and say what is `so` not done with them."""
+        if not self.passed:
+            failed = "; ".join(str(check) for check in self.checks if not check.passed)
+            raise UnfaithfulError(
+                f"the simulator is not faithful with these settings, so {so}; these checks failed: "
+                f"{failed}"
+            )
+
 
 _KNOWN: dict[Case, Gate] = {}
 """Results of the settings that were measured last."""
@@ -125,12 +145,7 @@ def require_faithful(
 ) -> Gate:
     """Check the simulator on known cases, and refuse settings under which a check fails."""
     gate = measured_gate(setup, friction, radius_m)
-    if not gate.passed:
-        failed = "; ".join(str(check) for check in gate.checks if not check.passed)
-        raise UnfaithfulError(
-            "the simulator is not faithful with these settings, so no grasp is certified; these "
-            f"checks failed: {failed}"
-        )
+    gate.require("no grasp is certified")
     return gate
 
 
@@ -139,7 +154,14 @@ def measured_gate(
 ) -> Gate:
     """Check the simulator on known cases, once per process for the same settings."""
     case = _case(setup, friction, radius_m)
-    return _KNOWN.get(case) or _kept(case, _measured(case))
+    if case in _KNOWN:
+        return _KNOWN[case]
+    pads = replace(case, setup=replace(case.setup, surface="pads"))  # controls are always on pads
+    checks = known_answers(pads)
+    if setup.surface == "mesh":
+        meshes = (*mesh_touches(case), *known_answers(case))
+        checks += tuple(replace(check, name=f"on a mesh: {check.name}") for check in meshes)
+    return _kept(case, Gate(checks, versions()["mujoco"]))
 
 
 def remember_gate(gate: Gate, setup: Setup, friction: float, radius_m: float) -> None:
@@ -159,12 +181,3 @@ def _kept(case: Case, gate: Gate) -> Gate:
     if len(_KNOWN) > MOST_KNOWN:
         del _KNOWN[next(iter(_KNOWN))]
     return gate
-
-
-def _measured(case: Case) -> Gate:
-    pads = replace(case, setup=replace(case.setup, surface="pads"))  # controls are always on pads
-    checks = known_answers(pads)
-    if case.setup.surface == "mesh":
-        meshes = (*mesh_touches(case), *known_answers(case))
-        checks += tuple(replace(check, name=f"on a mesh: {check.name}") for check in meshes)
-    return Gate(checks, versions()["mujoco"])
