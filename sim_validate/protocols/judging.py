@@ -16,13 +16,11 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue, summary
-from grasp_core.checked import coefficient, instance, one_of, several
-from grasp_core.closure.contacts import FEWEST
+from grasp_core.checked import coefficient, instance, one_of
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
-from grasp_core.objects.on_faces import check_body, check_on_faces
+from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.values import Contact, Grasp
@@ -30,6 +28,7 @@ from scenes.hands.hand_scene import build_hand_scene
 from scenes.mjcf import Scene
 from scenes.tested import HandServos, fingertip_scene, hand_scene, planned_postures
 from sim_validate.dexgraspbench import RecordedReach, hand_file, recorded_postures
+from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.hands.validate_hand import hand_setup
 from sim_validate.parallel.processes import each
@@ -128,8 +127,8 @@ def judge_by(
     check_body(body)
     coefficient(friction)
     setup = Setup() if setup is None else instance(setup, Setup, "setup")
-    given = _given(body, grasp)
-    contacts = given.contacts if isinstance(given, Grasp) else given
+    contacts = given_contacts(body, grasp)
+    given = grasp if isinstance(grasp, Grasp) else contacts
     require_faithful(setup, friction, body.radius)
     scene = fingertip_scene(
         body, given, found.friction, found.mass_of(body), found.physics, setup.fingers
@@ -230,17 +229,6 @@ def _protocol(given: str | PublishedProtocol) -> PublishedProtocol:
         return given
     one_of(given, PROTOCOLS, "protocol")
     return PROTOCOLS[given]
-
-
-def _given(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> Grasp | tuple[Contact, ...]:
-    if isinstance(grasp, Grasp):
-        check_on_faces(body, grasp)
-        return grasp
-    each = partial(instance, kind=Contact, name="grasp", remedy="or give a Grasp")
-    contacts = several(grasp, each, "grasp", "Contact values")
-    if len(contacts) < FEWEST:
-        raise InputError(f"grasp: at least two contacts are needed, got {len(contacts)}")
-    return contacts
 
 
 def our_verdict(

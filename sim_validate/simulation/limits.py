@@ -88,7 +88,7 @@ def _onset(trace: Trace, shares: Array, threshold: float) -> SimulatedLimit | No
     """
     moved = trace.displacements_m
     passed = np.flatnonzero(moved >= threshold)
-    if not passed.size or passed[0] == 0 or trace.fault:
+    if not passed.size or passed[0] == 0 or trace.health.fault:
         return None
     first = int(passed[0])
     before, after = shares[first - 1], shares[first]

@@ -20,9 +20,8 @@ STILL = Noise(shift=0.0, turn_deg=0.0, normal_deg=0.0, friction=0.0, mass=0.0)
 POSE = dataclasses.replace(STILL, shift=0.01, turn_deg=2.0)
 
 
-def pose(body, noise, draw):
+def pose(body, noise, seed, number):
     """Where the object stands, by another way: a rotation about its centre of mass, and a shift."""
-    seed, number = draw
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1, number)))
     shift = noise.shift * body.radius * rng.normal(size=3)
     return Rotation.from_rotvec(math.radians(noise.turn_deg) * rng.normal(size=3)), shift
@@ -47,7 +46,7 @@ def test_contacts_are_on_their_faces_and_on_the_lines_of_the_fingers(name):
             case = disturbed(body, grasp, 0.5, POSE, 3, place)
             missed += len(case.missed)
             fingers = [finger for finger in range(4) if finger not in case.missed]
-            turned, shift = pose(body, POSE, (3, place))
+            turned, shift = pose(body, POSE, 3, place)
             for finger, contact in zip(fingers, case.contacts, strict=True):
                 face = body.faces[grasp.faces[finger]]
                 assert face_under(body, contact) is face
@@ -126,18 +125,9 @@ def test_a_draw_depends_on_seed_and_number_only():
     )
     assert one.friction == same.friction
     assert len({one.friction, other.friction, seed.friction}) == 3
-    twice = disturbed(body, grasp, 0.5, dataclasses.replace(Noise(), friction=0.1), (0, 1))
+    twice = disturbed(body, grasp, 0.5, dataclasses.replace(Noise(), friction=0.1), 0, 1)
     assert math.log(twice.friction / 0.5) == pytest.approx(2.0 * math.log(one.friction / 0.5))
     assert twice.mass == one.mass
-
-
-@pytest.mark.parametrize(
-    "wrong", [{"shift": -0.1}, {"shift": math.nan}, {"turn_deg": 46.0}, {"friction": 1.1}]
-)
-def test_noise_out_of_range_is_refused(wrong):
-    (name,) = wrong
-    with pytest.raises(gc.InputError, match=name):
-        Noise(**wrong)
 
 
 def test_the_flags_are_the_same_noise():
