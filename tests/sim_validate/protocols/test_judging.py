@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import scenes
 import sim_validate as sv
 from grasp_core.errors import InputError
 from grasp_core.values import Contact
-from sim_validate.protocols.judging import GraspCase, judge_by, judge_hand_by, judged
+from sim_validate.protocols.judging import judge_by, judge_hand_by, judged
 from sim_validate.protocols.published import protocol, protocol_names
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
@@ -70,7 +71,7 @@ def test_a_test_without_loads_has_no_margin():
 def test_judgements_do_not_depend_on_processes_or_threads():
     setup = sv.Setup()
     cases = [
-        GraspCase(name, BODY, GRASP, FRICTION, used)
+        partial(judge_by, name, BODY, GRASP, FRICTION, setup=used)
         for name in ("mj-grasp-sim", "dexgraspbench")
         for used in (setup, replace(setup, threads=2))
     ] * 4

@@ -134,9 +134,3 @@ def test_contacts_that_no_friction_closes_are_refused():
     bad = replace(grasp, faces=(face,) * 4, contacts=contacts)
     with pytest.raises(gc.InputError, match="no friction gives force closure"):
         sv.simulated_critical_friction(body, bad)
-
-
-def test_a_grasp_of_another_object_is_refused():
-    _, (grasp, *_) = grasps("wedge", 0.5, 1)
-    with pytest.raises(gc.InputError, match=r"names face|does not lie on face"):
-        sv.simulated_critical_friction(scenes.example_object("octahedron"), grasp)
