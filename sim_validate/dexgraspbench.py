@@ -270,7 +270,6 @@ class HandFile:
 
     servo_n_m_per_rad: float = 5.0
     damping_n_m_s_per_rad: float = 0.1
-    """Damping of each joint, with that of its servo."""
     root: Array = field(default_factory=lambda: np.eye(4))
     """Pose of the palm in the world of the file, (4, 4)."""
     inertials: Mapping[str, Mapping[str, object]] = field(default_factory=dict[str, Any])

@@ -53,7 +53,6 @@ class Wanted:
     """Which contact set of a file is to be simulated again."""
 
     grasp: str | None = None
-    """Id of the grasp; None if the file has only one."""
     control: str | None = None
     """Name of a negative control (contacts that must fail) made from the grasp."""
     trial: int | None = None
@@ -73,13 +72,10 @@ class Recorded:
     setup: Setup
     agenda: Agenda
     control: str | None = None
-    """Name of the negative control (contacts that must fail); None for a grasp."""
     grasp: Grasp | None = None
     """The planned grasp that has these contacts; None if it is not known."""
     trial: int | None = None
-    """Number of the repeat with noise; None for trials without noise."""
     outcomes: Mapping[str, str] = field(default_factory=dict[str, str])
-    """How trials ended, by name of the wrench."""
     others: str | None = None
     """How all trials that `outcomes` does not name ended; None if the file does not say."""
 
@@ -101,7 +97,6 @@ class Replayed:
     """Friction that the planned forces need; None if no forces balance the wrench."""
     friction: float
     hold: HoldVerdict
-    """The verdict on the trial, which ends when its answer is known."""
     watched: Watched
     scene: Scene
 

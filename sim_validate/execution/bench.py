@@ -59,7 +59,6 @@ class HeldMotion:
     states: Array
     """Complete state of the simulator, from which a trial can go on, (n, size)."""
     faults: tuple[str, ...]
-    """What went wrong in the simulator, in words."""
 
     @property
     def joints(self) -> Array:
@@ -92,9 +91,7 @@ class Lost:
     """How far from its planned place in the hand an object is lost, where its trial ends."""
 
     away_m: float
-    """Distance of its centre of mass [m]."""
     turned_rad: float = math.inf
-    """Angle by which it is turned [rad]."""
 
 
 class HeldBench:

@@ -54,7 +54,6 @@ class Enough:
     predicted_loss: float | None = None
     """Least multiple of a trial's load at which the object is then lost, predicted."""
     reason: str | None = None
-    """Why no push was found, where none was."""
 
     def __post_init__(self) -> None:
         missing = (self.push_n, self.stiffness_n_per_m, self.predicted_loss).count(None)

@@ -85,20 +85,14 @@ def cases_of(
     Gravity points down the box's free axis, whatever its direction in the scene.
     """
     upright = replace(physics, gravity=tuple(WEIGHT.tolist()))
-    return tuple(
-        HeldCase(
-            mass_kg=_rounded(layout.mass_kg),
-            stiffness_n_per_m=_rounded(layout.stiffest),
-            push_n=_rounded(push_n),
-            friction=friction,
-            radius_m=_rounded(layout.radius_m),
-            tip_radius_m=_rounded(float(layout.tip_radius_m.max())),
-            tip_mass_kg=_rounded(hand.tip_mass_kg),
-            damping_ratio=_rounded(hand.damping_ratio),
-            physics=upright,
-        )
-        for friction in sorted({_rounded(each) for each in layout.friction.tolist()})
-    )
+    numbers = {
+        "mass_kg": layout.mass_kg, "stiffness_n_per_m": layout.stiffest, "push_n": push_n,
+        "radius_m": layout.radius_m, "tip_radius_m": float(layout.tip_radius_m.max()),
+        "tip_mass_kg": hand.tip_mass_kg, "damping_ratio": hand.damping_ratio,
+    }  # fmt: skip
+    rounded = {name: _rounded(value) for name, value in numbers.items()}
+    frictions = sorted({_rounded(each) for each in layout.friction.tolist()})
+    return tuple(HeldCase(**rounded, friction=each, physics=upright) for each in frictions)
 
 
 @lru_cache(maxsize=256)

@@ -56,7 +56,6 @@ class HeldCase:
     tip_mass_kg: float
     damping_ratio: float
     physics: PhysicsSettings
-    """Settings of the simulator, with gravity along -z."""
 
     @property
     def halves(self) -> tuple[float, float, float]:

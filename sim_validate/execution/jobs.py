@@ -37,7 +37,6 @@ class ExecutionJob:
     """Settings of the simulator that differ from the usual ones, by name."""
     threads: int = 1
     enough: bool = True
-    """Whether to find the push that would be enough where the object is lost."""
 
 
 def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[ExecutedGrasp]:

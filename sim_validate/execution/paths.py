@@ -33,7 +33,6 @@ class Pose:
     """Where the object lies, against its planned place in the hand."""
 
     moved: Array
-    """Displacement of the centre of mass, (3,) [m]."""
     quaternion: Array
     """Orientation (w, x, y, z), (4,)."""
 
@@ -53,7 +52,6 @@ class Drive:
     accelerations: Array
     """Acceleration of the palm (linear, angular about its middle), (n, 6) [m/s^2, rad/s^2]."""
     gravity: Array
-    """(n, 3) [m/s^2]."""
     wrenches: Array
     """Wrench on the object beside its weight, (n, 6) [N, N m]."""
     grasping: Array

@@ -102,7 +102,6 @@ class Expected:
     slipping: Array
     """Motion x in the sample of the first slip, under the load at multiple one, (6,)."""
     moved_m: float
-    """Largest displacement under the load at multiple one, and below the largest turn."""
     turn_rad: float
 
 

@@ -182,7 +182,6 @@ class Trial:
     name: str
     drive: Drive
     begun: int
-    """Sample after which the load comes."""
     apart: bool = False
     """Whether the trial starts with open fingers, not from the squeezed object."""
     weighing: int = 0

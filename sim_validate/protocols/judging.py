@@ -55,7 +55,6 @@ class OurVerdict:
     """Least multiple of the loads that is resisted according to the analysis; 0 without closure,
     and infinite without a load."""
     reason: str
-    """Why it was not held; empty if it was."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -43,7 +43,6 @@ class Timeline:
     wrenches: Array
     """Force and torque on the object, along the world's axes, (n, 6) [N, N m]."""
     looks: tuple[int, ...]
-    """Samples after which the object is looked at."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +52,6 @@ class Motion:
     poses: Array
     """Position of the object's centre of mass and its orientation (w, x, y, z), (n, 7)."""
     touching: tuple[frozenset[int], ...]
-    """For each look, the fingers that touch the object."""
     fault: str
 
 
@@ -64,7 +62,6 @@ class RunVerdict:
     number: int
     passed: bool
     reason: str
-    """Why it did not pass; empty if it did."""
     displacement_m: float
     """Largest displacement at a look, up to the first that did not pass [m]."""
     turn_deg: float

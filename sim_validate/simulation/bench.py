@@ -105,7 +105,6 @@ class Health:
     """Whether the simulator did what it was told in a trial."""
 
     finite: bool = True
-    """Whether every number of the simulator's state stayed finite."""
     warnings: int = 0
     clock_error_s: float = 0.0
     """Simulated time minus the time stepped [s]; it is not zero after a silent reset."""
@@ -144,7 +143,6 @@ class Motion:
     """Where object and fingertips were in each of the n samples of a trial, in the world frame."""
 
     times_s: Array
-    """Times of the samples, (n,) [s]."""
     joints: Array
     """Joint positions, (n, 7 + 3k), or (n, 7) for rigid fingertips [m]: position (3) and quaternion
     (4) of the object's frame, then the slides (3) of each fingertip along its contact's axes."""

@@ -33,26 +33,14 @@ MANY_FACED, FINGERS = "random-100-1", 20
 """An example mesh with many faces, and how many fingertips touch it at a time."""
 
 
-@dataclass(frozen=True, slots=True)
-class Touch:
-    """The contact between fingertips and a mesh that differs most from the mesh's faces.
+def worst_touch(
+    body: Polyhedron, contacts: Sequence[Contact], setup: Setup
+) -> tuple[int, float, float]:
+    """Put fingertips a little into a mesh and find the contact that differs most from its face.
 
-    The errors are NaN where a fingertip has no contact, or several.
+    Gives the finger, the error of its normal [rad], and the relative one of its depth; NaN where a
+    fingertip has no contact, or several.
     """
-
-    finger: int
-    normal_error_rad: float
-    depth_error: float
-    """Error of the contact's depth, relative to the right depth."""
-
-    @property
-    def right(self) -> bool:
-        """Whether the errors of normal and depth are within their limits."""
-        return self.normal_error_rad <= NORMAL_ERROR and self.depth_error <= DEPTH_ERROR
-
-
-def worst_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> Touch:
-    """Put fingertips a little into a mesh and find the contact that differs most from its face."""
     rigid = replace(setup, fingers=replace(setup.fingers, drive="rigid", indentation=0.0))
     size = rigid.scene(body, contacts, 1.0).layout.grasp_size_m
     depth = DEPTH * body.radius
@@ -62,7 +50,7 @@ def worst_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> 
     off = np.abs(depths / depth - 1.0)
     errors = np.nan_to_num(np.maximum(turned / NORMAL_ERROR, off / DEPTH_ERROR), nan=np.inf)
     finger = int(np.argmax(errors))
-    return Touch(finger, float(turned[finger]), float(off[finger]))
+    return finger, float(turned[finger]), float(off[finger])
 
 
 def angles(normals: Array, faces: Array) -> Array:
@@ -75,14 +63,13 @@ def require_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -
     """Check that fingertips touch a mesh as its faces lie, where no pads are put between."""
     if setup.surface != "mesh":
         return
-    worst = worst_touch(body, contacts, setup)
-    if not worst.right:
+    finger, turned, off = worst_touch(body, contacts, setup)
+    if not (turned <= NORMAL_ERROR and off <= DEPTH_ERROR):
         raise UnfaithfulError(
-            f"in simulation, fingertip {worst.finger} does not touch the mesh as planned: the "
-            f"contact normal is off by {worst.normal_error_rad:.3g} rad (at most "
-            f"{NORMAL_ERROR:g} is allowed), the depth by a share of {worst.depth_error:.3g} (at "
-            f"most {DEPTH_ERROR:g}; nan means no contact); use --surface pads, or raise "
-            "ccd_iterations in the settings of the physics"
+            f"in simulation, fingertip {finger} does not touch the mesh as planned: the contact "
+            f"normal is off by {turned:.3g} rad (at most {NORMAL_ERROR:g} is allowed), the depth "
+            f"by a share of {off:.3g} (at most {DEPTH_ERROR:g}; nan means no contact); use "
+            "--surface pads, or raise ccd_iterations in the settings of the physics"
         )
 
 
@@ -91,11 +78,8 @@ def mesh_touches(case: Case) -> tuple[Check, Check]:
     body = case.body(MANY_FACED)
     contacts = [Contact(face.centroid, face.normal) for face in body.faces]
     groups = [contacts[start : start + FINGERS] for start in range(0, len(contacts), FINGERS)]
-    touches = [worst_touch(body, group, case.setup) for group in groups]
-    return touch_checks(
-        np.array([touch.normal_error_rad for touch in touches]),
-        np.array([touch.depth_error for touch in touches]),
-    )
+    _, turned, off = np.transpose([worst_touch(body, group, case.setup) for group in groups])
+    return touch_checks(turned, off)
 
 
 def touch_checks(turned: Array, off: Array, where: str = "") -> tuple[Check, Check]:
@@ -115,11 +99,10 @@ MOST_KNOWN = 256
 
 @dataclass(frozen=True, slots=True)
 class Gate:
-    """The results of checking the simulator on cases with known answers."""
+    """The results of checking a version of MuJoCo on cases with known answers."""
 
     checks: tuple[Check, ...]
     mujoco: str
-    """Version of MuJoCo that was checked."""
 
     @property
     def passed(self) -> bool:
@@ -137,7 +120,6 @@ class Gate:
 
 
 _KNOWN: dict[Case, Gate] = {}
-"""Results of the settings that were measured last."""
 
 
 def require_faithful(

@@ -54,9 +54,9 @@ from sim_validate.simulation.limits import (
     released_friction,
 )
 from sim_validate.simulation.rig import Rig, squeezed
-from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.schedules import Load, Schedule
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.traces import Trace, holds
+from sim_validate.simulation.traces import holds
 
 LEAST_OFFSET, LARGEST_OFFSET = 0.01, 1.0
 """Least and largest critical friction that two offset fingers on the box can be made to need."""
@@ -289,9 +289,16 @@ def _creep(case: Case) -> Check:
     """Check how fast a tetrahedron held at its face centres creeps under twelve loads."""
     rig, limits = tetrahedron(case)
     traces = rig.hold([part(rig.idle, limit, CREEP_LOAD) for limit in limits])
+    speeds = list[float]()
+    for trace in traces:  # the mean speed in the second half; NaN if the trial is not valid
+        half = len(trace.times_s) // 2
+        if trace.health.fault or not half:
+            speeds.append(math.nan)
+        else:
+            moved = trace.displacements_m[-1] - trace.displacements_m[half - 1]
+            speeds.append(float(moved / (trace.times_s[-1] - trace.times_s[half - 1])))
     # the maximum is NaN if one speed is
-    fastest = np.abs([_speed(trace) for trace in traces]).max()
-    speed = float(fastest) / rig.bench.scene.layout.grasp_size_m
+    speed = float(np.abs(speeds).max()) / rig.bench.scene.layout.grasp_size_m
     noticed = case.setup.hold.hold_threshold / case.setup.hold.hold_s
     limit = min(CREEP_LIMIT, CREEP_SHARE * noticed)
     return Check("creep under load, in grasp sizes per second", speed, 0.0, limit)
@@ -309,15 +316,6 @@ def _hidden(case: Case) -> Check:
     share = hidden / setup.fingers.max_normal_force_n
     name = "force hidden below the thresholds, over the largest normal force"
     return Check(name, share, 0.0, HIDDEN_LIMIT)
-
-
-def _speed(trace: Trace) -> float:
-    """Return the mean speed in a trace's second half [m/s]; NaN if the trial is not valid."""
-    half = len(trace.times_s) // 2
-    if trace.health.fault or not half:
-        return math.nan
-    moved = trace.displacements_m[-1] - trace.displacements_m[half - 1]
-    return float(moved / (trace.times_s[-1] - trace.times_s[half - 1]))
 
 
 def _blow_up(case: Case) -> Check:
@@ -373,11 +371,11 @@ def _gap(motions: Sequence[Array], others: Sequence[Array]) -> float:
 def _held(case: Case) -> Array:
     """Simulate the held tetrahedron; return joint positions (trials, n, q) in grasp sizes."""
     rig, limits = tetrahedron(case)
-    held = rig.motions_of_holds([part(rig.idle, limit, SHARE) for limit in limits])
-    return _in_sizes(held, rig)
+    return _in_sizes(rig, rig.holds([part(rig.idle, limit, SHARE) for limit in limits]))
 
 
-def _in_sizes(joints: Array, rig: Rig) -> Array:
+def _in_sizes(rig: Rig, trials: Sequence[Schedule]) -> Array:
+    joints = rig.joints(trials)
     scale = np.full(joints.shape[-1], rig.bench.scene.layout.grasp_size_m)
     scale[3:7] = 1.0  # a quaternion
     return joints / scale
@@ -402,4 +400,4 @@ def _released(case: Case, needed: float) -> Array:
     pushes[:2, 0] = needed * np.array([1.0, -1.0])
     box = case.squeezed(body, contacts, case.push * pushes, needed)
     settling = case.setup.friction.settling_friction * needed
-    return _in_sizes(box.motions_of_releases(settling, [above * needed for above in ABOVE]), box)
+    return _in_sizes(box, box.releases(settling, [above * needed for above in ABOVE]))

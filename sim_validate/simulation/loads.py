@@ -34,7 +34,6 @@ class PlannedLoad:
     load: Load
     """The wrench that is applied, and the finger forces planned for it."""
     predicted_limit: float
-    """Largest multiple of the wrench that the grasp resists, according to the analysis."""
     limit: Load
     """The wrench at its predicted limit, and the finger forces that balance it."""
     required_friction: float

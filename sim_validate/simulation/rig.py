@@ -22,7 +22,6 @@ class Watched:
     joints: Array
     """Joint positions as in `Motion.joints`, (n, 7 + 3k)."""
     trace: Trace
-    """The trace from the moment friction was lowered."""
     times_s: Array
     """Times of the samples, zero at the moment friction was lowered, (n,) [s]."""
     pushes_n: Array
@@ -54,11 +53,11 @@ class Rig:
         """Simulate a hold under each load, and trace it from the moment friction is lowered."""
         protocol, size = self.setup.hold, self.bench.scene.layout.grasp_size_m
         limits = Thresholds(protocol.hold_threshold * size, protocol.total_threshold * size)
-        return self._traces(self._holds(loads, settling_frictions), limits)
+        return self._traces(self.holds(loads, settling_frictions), limits)
 
     def watch(self, load: Load, settling_frictions: Sequence[float] | None = None) -> Watched:
         """Simulate one whole hold, and keep all motion since the fingers closed."""
-        (schedule,) = self._holds([load], settling_frictions)
+        (schedule,) = self.holds([load], settling_frictions)
         (motion,) = self.bench.run([schedule], self.closed and self.closed.state)
         (found,) = self._traced([schedule], [motion])
         before = [] if self.closed is None else [self.closed.joints[-1:]]
@@ -72,9 +71,10 @@ class Rig:
             friction=schedule.friction[:count],
         )
 
-    def _holds(
-        self, loads: Sequence[Load], settling_frictions: Sequence[float] | None
+    def holds(
+        self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None
     ) -> list[Schedule]:
+        """Schedule a hold under each load."""
         protocol = self.setup.hold
         usual = protocol.settling_friction * self.friction
         settling = settling_frictions or [usual] * len(loads)
@@ -107,9 +107,10 @@ class Rig:
     ) -> tuple[Trace, ...]:
         """Lower the friction of the unloaded object to several values, and trace its motion."""
         limits = None if threshold_m is None else Thresholds(threshold_m)
-        return self._traces(self._releases(settling_friction, frictions), limits)
+        return self._traces(self.releases(settling_friction, frictions), limits)
 
-    def _releases(self, settling_friction: float, frictions: Sequence[float]) -> list[Schedule]:
+    def releases(self, settling_friction: float, frictions: Sequence[float]) -> list[Schedule]:
+        """Schedule a release to each friction."""
         sample_s, protocol = self.bench.sample_s, self.setup.friction
         return [
             schedules.release(self.idle, (settling_friction, friction), sample_s, protocol,
@@ -117,15 +118,8 @@ class Rig:
             for friction in frictions
         ]  # fmt: skip
 
-    def motions_of_holds(self, loads: Sequence[Load]) -> Array:
-        """Return joint positions under each load, from closed fingers on, (trials, n, 7 + 3k)."""
-        return self._joints(self._holds(loads, None))
-
-    def motions_of_releases(self, settling_friction: float, frictions: Sequence[float]) -> Array:
-        """Return joint positions after each release from closed fingers, (trials, n, 7 + 3k)."""
-        return self._joints(self._releases(settling_friction, frictions))
-
-    def _joints(self, trials: Sequence[Schedule]) -> Array:
+    def joints(self, trials: Sequence[Schedule]) -> Array:
+        """Return joint positions in trials, from closed fingers on, (trials, n, 7 + 3k)."""
         motions = self.bench.run(trials, self.closed and self.closed.state)
         return np.array([motion.joints for motion in motions])
 

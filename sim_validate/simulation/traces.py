@@ -171,7 +171,6 @@ class HoldVerdict(ByValue):
 
     outcome: Outcome
     reason: str
-    """What happened, in words; empty if the object was held."""
     displacement_m: float
     """Largest displacement while the object had to be held [m]: motion of the point between the
     contacts plus grasp size times rotation."""

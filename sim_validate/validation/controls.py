@@ -144,7 +144,6 @@ class ControlLoad:
     settling: float
     """Friction coefficient while the object settles, before the load is applied."""
     required_friction: float | None
-    """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -153,12 +152,10 @@ class ControlTrial(ByValue):
 
     name: str
     wrench: Array
-    """Applied external wrench, (6,) [N, N m], torque about the centre of mass."""
     required_friction: float | None
     """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
     hold: HoldVerdict
     trace: Trace | None
-    """Recorded motion in the trial; kept only if asked for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -167,7 +164,6 @@ class ControlVerdict(ByValue):
 
     control: Control
     tried: tuple[ControlTrial, ...]
-    """Trials of the loads that no contact forces can balance."""
 
     @property
     def held(self) -> bool:

@@ -55,7 +55,6 @@ class Disturbed:
     contacts: tuple[Contact, ...]
     """The contacts in `landed`, with surface normals tilted by the noise."""
     missed: tuple[int, ...]
-    """Fingers whose lines do not meet their faces."""
     friction: float
     mass: float
     """Mass of the trial, relative to the planned mass."""

@@ -30,11 +30,9 @@ class WrenchVerdict(ByValue):
 
     name: str
     wrench: Array
-    """Applied external wrench, (6,) [N, N m], torque about the centre of mass."""
     predicted_limit: float
     """Largest multiple of the applied wrench that the analysis says is resisted."""
     required_friction: float
-    """Friction that the planned forces need."""
     hold: HoldVerdict
     simulated_limit: SimulatedLimit | None = None
     """Where the object lets go, relative to the predicted limit; None if not measured, or not
