@@ -179,7 +179,7 @@ class Bench:
         self.scene, self.threads = scene, threads
         self.deadline = time.monotonic() + timeout_s
         self.model = compiled(scene.xml)
-        self.sample_s = CHUNK * self.model.opt.timestep
+        self.sample_s = CHUNK * float(self.model.opt.timestep)
         self.body = self.model.body("object").id
         self.parts = state_parts(self.model)
         touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)

@@ -129,8 +129,8 @@ def _load(
         share = min(share, 1.0)
         # the torques about the normals, of least norm, that balance the load at rest
         missing = idle.wrench[3:] + cross(positions - body.center_of_mass, idle.forces).sum(axis=0)
-        resting = np.linalg.lstsq(normals.T, -missing, rcond=None)[0]
-        torques = (1.0 - share) * np.asarray(resting, dtype=np.float64) + share * found.torques
+        resting = np.asarray(np.linalg.lstsq(normals.T, -missing, rcond=None)[0], dtype=np.float64)
+        torques = (1.0 - share) * resting + share * found.torques
         turning = np.abs(torques[pushing]) / torsion_m
         along = np.sqrt(np.maximum(along**2 - turning**2, (NO_PUSH * along) ** 2))
     required = float(to_digits((across / along).max()))

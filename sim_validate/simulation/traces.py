@@ -73,7 +73,7 @@ def traces(
         )
     ]  # fmt: skip
     return tuple(
-        Trace(motion.times_s[: len(measured[0])], *measured, start_m, motion.health)
+        Trace(motion.times_s[: len(measured[0])], *measured, start_m=start_m, health=motion.health)
         for motion, start_m, *measured in zip(
             motions, strayed(starts[:, :7], layout).tolist(), *each, strict=True
         )
