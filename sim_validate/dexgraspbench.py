@@ -34,7 +34,7 @@ from grasp_core.arrays import Array, frozen, real_array, to_digits
 from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import coefficient, instance, number, path_of, positive, text
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import shown, text_of
 from grasp_core.files.text_files import read_bytes, write_parts, write_text
 from grasp_core.hands.collisions import tip_gaps
@@ -45,6 +45,7 @@ from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact
+from scenes.execution.held import rotations
 from scenes.mjcf_text import quaternion
 from scenes.tested import Postures
 
@@ -52,9 +53,8 @@ FREE = 7
 """Numbers of a pose: position and quaternion."""
 UNIT = 1e-3
 """How far the length of a quaternion may be from 1: records have numbers of single precision."""
-CONFIGURATIONS = ("pregrasp_qpos", "grasp_qpos", "squeeze_qpos")
-WANTED = ("obj_path", "obj_scale", "obj_pose", *CONFIGURATIONS)
-"""Fields that a record must have."""
+WANTED = ("obj_path", "obj_scale", "obj_pose", "pregrasp_qpos", "grasp_qpos", "squeeze_qpos")
+"""Fields that a record must have, in the order of those of `DexRecord`."""
 MOST_BYTES = 16 * 2**20
 """Largest size of a file: a record has some thousand bytes."""
 DENSITY = 1000.0
@@ -128,10 +128,8 @@ def load_dex_record(path: str | Path) -> DexRecord:
     """
     place = path_of(path, "path")
     data = read_bytes(place, MOST_BYTES)
-    try:
+    with about(place):
         return _record(_unpickled(data))
-    except InputError as error:
-        raise InputError(f"{place}: {error}") from error
 
 
 class _Numbers:
@@ -168,14 +166,11 @@ def _scalar(kind: Any, data: Any) -> Array:
     return _filled(data, kind, (), "C")
 
 
-MAKERS: tuple[tuple[str, Any], ...] = (
-    ("multiarray._reconstruct", _Numbers), ("multiarray.scalar", _scalar),
-    ("numeric._frombuffer", _filled),
-)  # fmt: skip
-ALLOWED: dict[str, Any] = {
-    "numpy.ndarray": _Numbers, "numpy.dtype": _Kind,
-    **{f"numpy.{core}.{name}": make for core in ("core", "_core") for name, make in MAKERS},
-}  # fmt: skip
+ALLOWED: dict[str, Any] = {"numpy.ndarray": _Numbers, "numpy.dtype": _Kind}
+for core in ("numpy.core", "numpy._core"):
+    ALLOWED[f"{core}.multiarray._reconstruct"] = _Numbers
+    ALLOWED[f"{core}.multiarray.scalar"] = _scalar
+    ALLOWED[f"{core}.numeric._frombuffer"] = _filled
 """What makes plain values in place of the functions that NumPy 1 and 2 name in pickles. NumPy's own
 would trust the state that a file gives them."""
 
@@ -234,10 +229,8 @@ def _record(found: Any) -> DexRecord:
     scale = _numbers(fields, "obj_scale")
     if scale.size != 1:
         raise InputError(f"obj_scale: expected one number, got {scale.size}")
-    return DexRecord(
-        fields["obj_path"], float(scale.item()),
-        *(_numbers(fields, name) for name in ("obj_pose", *CONFIGURATIONS)),
-    )  # fmt: skip
+    arrays = (_numbers(fields, name) for name in WANTED[2:])
+    return DexRecord(fields["obj_path"], float(scale.item()), *arrays)
 
 
 def _numbers(fields: Mapping[str, Any], name: str) -> Array:
@@ -260,16 +253,11 @@ def write_dex_record(record: DexRecord, path: str | Path) -> Path:
         InputError: `record` is no record, or `path` no path.
     """
     instance(record, DexRecord, "record")
-    fields = {
-        "obj_path": record.object_path,
-        "obj_scale": record.object_scale,
-        "obj_pose": np.array(record.object_pose),
-        "pregrasp_qpos": np.array(record.pregrasp),
-        "grasp_qpos": np.array(record.grasp),
-        "squeeze_qpos": np.array(record.squeeze),
-    }
+    arrays = (record.object_pose, record.pregrasp, record.grasp, record.squeeze)
+    values = (record.object_path, record.object_scale, *map(np.array, arrays))
+    fields = np.array(dict(zip(WANTED, values, strict=True)), dtype=object)
     held = io.BytesIO()
-    np.save(held, np.array(fields, dtype=object), allow_pickle=True)
+    np.save(held, fields, allow_pickle=True)
     return write_parts(path_of(path, "path"), [held.getvalue()])
 
 
@@ -282,7 +270,6 @@ class HandFile:
 
     servo_n_m_per_rad: float = 5.0
     damping_n_m_s_per_rad: float = 0.1
-    """Damping of each joint, with that of its servo."""
     root: Array = field(default_factory=lambda: np.eye(4))
     """Pose of the palm in the world of the file, (4, 4)."""
     inertials: Mapping[str, Mapping[str, object]] = field(default_factory=dict[str, Any])
@@ -362,19 +349,10 @@ class RecordedReach(HandReach):
 
 def pose_of(seven: Array) -> Array:
     """Return the pose (4, 4) of a position and a quaternion (w, x, y, z) of any length."""
-    w, x, y, z = (seven[3:FREE] / np.linalg.norm(seven[3:FREE])).tolist()
     found = np.eye(4)
     found[:3, 3] = seven[:3]
-    found[:3, :3] = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
+    found[:3, :3] = rotations((seven[3:FREE] / np.linalg.norm(seven[3:FREE]))[None])[0]
     return found
-
-
-def _seven(pose: Array) -> Array:
-    return np.concatenate([pose[:3, 3], quaternion(pose[:3, :3])])
 
 
 def dex_record(
@@ -411,7 +389,8 @@ def dex_record(
     largest = float(np.einsum("ki,ki->k", stance.forces, normals).max())
     forces = push_n / largest * stance.forces
     told = levers @ forces.ravel() / servo
-    root = _seven(stance.palm_pose @ np.linalg.inv(hand_file(hand).root))
+    pose = stance.palm_pose @ np.linalg.inv(hand_file(hand).root)
+    root = np.concatenate([pose[:3, 3], quaternion(pose[:3, :3])])
     opened = stance.joints if reach.pregrasp is None else reach.pregrasp
     if gap_m is not None:
         opened = _opened_by(stance, opened, positive(gap_m, "gap_m"))
@@ -521,21 +500,14 @@ def _touched(
 ) -> tuple[list[int], tuple[Contact, ...]]:
     """Find the fingers that touch, and where."""
     found = tip_gaps(hand, body, joints, palm, np.arange(len(hand.fingers)))
-    fingers = np.flatnonzero(np.abs(found.gaps) <= touch_m).tolist()
-    contacts = tuple(
-        Contact(found.on_object[k], _inward(body, found.on_tips[k], found.on_object[k]))
-        for k in fingers
-    )
-    return fingers, contacts
-
-
-def _inward(body: Polyhedron, tip: Array, point: Array) -> Array:
-    """Return the inward normal at a surface point: of the face under it, or away from the tip."""
-    way = point - tip
-    length = float(np.linalg.norm(way))
-    guess = way / length
-    face = face_under(body, Contact(point, guess))
-    return guess if face is None else np.array(face.normal)
+    fingers, contacts = np.flatnonzero(np.abs(found.gaps) <= touch_m).tolist(), list[Contact]()
+    for finger in fingers:
+        point = found.on_object[finger]
+        way = point - found.on_tips[finger]
+        away = Contact(point, way / float(np.linalg.norm(way)))
+        face = face_under(body, away)
+        contacts.append(away if face is None else Contact(point, np.array(face.normal)))
+    return fingers, tuple(contacts)
 
 
 def write_dex_object(body: Polyhedron, folder: str | Path) -> Path:
@@ -556,16 +528,12 @@ def write_dex_object(body: Polyhedron, folder: str | Path) -> Path:
             f"body must be convex, but {body.name} is not: DexGraspBench simulates convex pieces, "
             "which its companion MeshProcess makes; give its folder as the object's path instead"
         )
-    mesh = obj_text(body)
+    # every digit, corners counted from 1
+    corners = ("v " + " ".join(map(repr, point)) for point in body.vertices.tolist())
+    faces = ("f " + " ".join(map(str, each)) for each in (body.triangles + 1).tolist())
+    mesh = "\n".join([*corners, *faces, ""])
     write_text(place / "urdf" / "meshes" / "convex_piece_000.obj", mesh)
     write_text(place / "mesh" / "simplified.obj", mesh)
     facts = {"mass": body.mass_at(DENSITY), "density": DENSITY, "scale": 1.0}
     write_text(place / "info" / "simplified.json", text_of(facts))
     return place
-
-
-def obj_text(body: Polyhedron) -> str:
-    """Return the object as an OBJ file with every digit, corners counted from 1."""
-    corners = ("v " + " ".join(map(repr, point)) for point in body.vertices.tolist())
-    faces = ("f " + " ".join(map(str, each)) for each in (body.triangles + 1).tolist())
-    return "\n".join([*corners, *faces, ""])

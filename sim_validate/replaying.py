@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from grasp_core.closure.contacts import contacts_sha256, stacked
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.text_files import read_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import seat
@@ -35,18 +35,15 @@ from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.loads import PlannedLoad, planned_loads
 from sim_validate.simulation.rig import Rig, Watched, squeezed
 from sim_validate.simulation.schedules import Load
-from sim_validate.simulation.setup import (
-    AXIS_NAMES,
-    RANDOM,
-    WEAKEST,
-    Agenda,
-    NamedWrench,
-    Noise,
-    Setup,
+from sim_validate.simulation.setup import WEAKEST, Agenda, NamedWrench, Noise, Setup, drawn_names
+from sim_validate.simulation.traces import HoldVerdict, Outcome, judge
+from sim_validate.validation.controls import (
+    Control,
+    ControlLoad,
+    control_case,
+    negative_controls,
 )
-from sim_validate.simulation.traces import HoldVerdict, Outcome, invalid_start, judge
-from sim_validate.validation.controls import Control, control_case, negative_controls
-from sim_validate.validation.noise import OPEN, disturbed_in, for_repeats, noisy_case
+from sim_validate.validation.noise import OPEN, disturbed, for_repeats, noisy_case
 
 GRASPS, VERDICTS = "grasps.json", "verdicts.json"
 
@@ -56,13 +53,12 @@ class Wanted:
     """Which contact set of a file is to be simulated again."""
 
     grasp: str | None = None
-    """Id of the grasp; None if the file has only one."""
     control: str | None = None
     """Name of a negative control (contacts that must fail) made from the grasp."""
     trial: int | None = None
     """Number of a repeat with noise; None for the trials without noise."""
     grasps: Path | None = None
-    """Path of the `grasps.json` that verdicts are about, if it is not beside them."""
+    """The `grasps.json` that verdicts are about, if it is not beside them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,15 +71,11 @@ class Recorded:
     friction: float
     setup: Setup
     agenda: Agenda
-    """Which trials were run, with the noise that was drawn."""
     control: str | None = None
-    """Name of the negative control (contacts that must fail); None for a grasp."""
     grasp: Grasp | None = None
     """The planned grasp that has these contacts; None if it is not known."""
     trial: int | None = None
-    """Number of the repeat with noise; None for trials without noise."""
     outcomes: Mapping[str, str] = field(default_factory=dict[str, str])
-    """How trials ended, by name of the wrench."""
     others: str | None = None
     """How all trials that `outcomes` does not name ended; None if the file does not say."""
 
@@ -97,18 +89,15 @@ class Replayed:
     """The motion and outcome of one trial that was simulated again."""
 
     name: str
-    """Name of the wrench that is applied."""
     load: Load
     predicted_limit: float | None
-    """Largest multiple of the wrench that is resisted, according to the analysis. It is None for
-    contacts without force closure, whose loads nothing resists."""
+    """Largest multiple of the wrench that is resisted by analysis; None for contacts without force
+    closure."""
     required_friction: float | None
-    """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
+    """Friction that the planned forces need; None if no forces balance the wrench."""
     friction: float
     hold: HoldVerdict
-    """The verdict on the trial, which ends when its answer is known."""
     watched: Watched
-    """The motion of the trial to its full length."""
     scene: Scene
 
 
@@ -122,10 +111,8 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
     if source.is_dir() and (source / MANIFEST).is_file():
         return _of_dataset(source, wanted)
     path = source / VERDICTS if source.is_dir() else source
-    try:
+    with about(path):
         record = verdicts_of(read_text(path))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
     saved = _grasps_behind(wanted.grasps or path.parent / GRASPS, record)
     verdicts = {each["id"]: each for each in record["verdicts"]}
     grasp = grasp_with_id(path, saved, wanted.grasp)
@@ -180,11 +167,10 @@ def _asked(path: Path, verdict: Mapping[str, Any]) -> tuple[Setup, Agenda]:
     settings = verdict["settings"]
     tables = {name: settings[name] for name in OF_USERS}
     setup = setup_from_tables(tables, Setup(surface=settings["surface"]), str(path))
-    count = settings["random_wrenches"]
-    ours = {*AXIS_NAMES, WEAKEST, *(RANDOM.format(place) for place in range(count))}
+    ours = drawn_names(settings["random_wrenches"])
     repeats = verdict.get("robustness")
     agenda = Agenda(
-        random_wrenches=count,
+        random_wrenches=settings["random_wrenches"],
         wrenches=tuple(
             NamedWrench(each["name"], each["wrench"])
             for each in verdict["wrenches"]
@@ -270,73 +256,59 @@ def _of_dataset(folder: Path, wanted: Wanted) -> Recorded:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Held:
-    """A load that can be simulated again, and how it is applied."""
-
-    load: Load
-    predicted_limit: float | None
-    required_friction: float | None
-    settling: float | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Case:
-    """Contacts squeezed by their fingers, and the loads that can be applied to them."""
-
-    rig: Rig
-    loads: Mapping[str, _Held]
-    overlap: tuple[str, ...] = ()
+Loads: TypeAlias = Sequence[PlannedLoad | ControlLoad]
 
 
 def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
     """Simulate one trial of a recorded contact set again."""
-    case = _case(recorded)
+    rig, loads, landed = _case(recorded)
+    limits = {
+        each.name: each.predicted_limit if isinstance(each, PlannedLoad) else None for each in loads
+    }
     usual = next((name for name, end in recorded.outcomes.items() if end != "held"), None)
     if usual is None:  # the wrench that is hardest to hold
-        limits = {name: held.predicted_limit or 0.0 for name, held in case.loads.items()}
         named = recorded.trial is None and WEAKEST in limits
-        usual = WEAKEST if named else min(limits, key=lambda name: limits[name])
+        usual = WEAKEST if named else min(limits, key=lambda name: limits[name] or 0.0)
     name = wrench or usual
-    if name not in case.loads:
-        known = ", ".join(case.loads)
+    held = next((each for each in loads if each.name == name), None)
+    if held is None:
+        known = ", ".join(limits)
         raise InputError(f"{recorded.name}: no wrench is named {name!r}; choose from {known}")
-    held, rig = case.loads[name], case.rig
-    watched = rig.watch(held.load, held.settling)
-    scene = rig.bench.scene
-    (ended,) = rig.hold([held.load], None if held.settling is None else [held.settling])
-    hold = judge(ended, scene.layout, recorded.setup.hold)
+    settling = [held.settling] if isinstance(held, ControlLoad) else None
+    watched = rig.watch(held.load, settling)
+    layout = rig.bench.scene.layout
+    overlap = clashes(recorded.body, *stacked(landed), layout.drive.radius_m) if landed else ()
+    (ended,) = rig.hold([held.load], settling)
     return Replayed(
         name=name,
         load=held.load,
-        predicted_limit=held.predicted_limit,
+        predicted_limit=limits[name],
         required_friction=held.required_friction,
         friction=rig.friction,
-        hold=invalid_start(hold, case.overlap) if case.overlap else hold,
+        hold=judge(ended, layout, recorded.setup.hold, overlap),
         watched=watched,
-        scene=scene,
+        scene=rig.bench.scene,
     )
 
 
-def _case(recorded: Recorded) -> _Case:
-    body, setup = recorded.body, recorded.setup
+def _case(recorded: Recorded) -> tuple[Rig, Loads, tuple[Contact, ...]]:
+    """Close fingers on the contacts, and plan the loads that can be applied to them.
+
+    Gives also where the fingertips stand; none for contacts without force closure, whose fingertips
+    may overlap.
+    """
+    body, contacts, friction = recorded.body, recorded.contacts, recorded.friction
+    setup = recorded.setup
     if recorded.control is not None:
-        return _opened(body, recorded.control, recorded.contacts, recorded.friction, setup)
-    scene = setup.scene(body, recorded.grasp or recorded.contacts, recorded.friction)
+        return _opened(body, recorded.control, contacts, friction, setup)
+    scene = setup.scene(body, recorded.grasp or contacts, friction)
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
-    rig = squeezed(bench, setup, scene.layout.squeeze_forces, recorded.friction)
-    contacts, friction = recorded.contacts, recorded.friction
+    rig = squeezed(bench, setup, scene.layout.squeeze_forces, friction)
     planned = planned_loads(body, contacts, friction, rig.idle, recorded.agenda, setup)
-    if recorded.trial is not None and recorded.grasp is not None:
-        return _noisy(recorded, recorded.grasp, recorded.trial, planned, scene)
-    return _Case(rig, _as_planned(planned), _overlap(body, contacts, scene))
-
-
-def _noisy(
-    recorded: Recorded, grasp: Grasp, trial: int, planned: Sequence[PlannedLoad], scene: Scene
-) -> _Case:
-    body, setup = recorded.body, for_repeats(recorded.setup, scene)
-    case = disturbed_in(body, grasp, recorded.friction, recorded.agenda, trial)
+    if recorded.trial is None or recorded.grasp is None:
+        return rig, planned, contacts
+    setup, agenda = for_repeats(setup, scene), recorded.agenda
+    case = disturbed(body, recorded.grasp, friction, agenda.noise, agenda.seed, recorded.trial)
     if case.missed:
         raise InputError(
             f"{recorded.name}: this repeat has no trial to simulate, because noise made finger "
@@ -344,14 +316,13 @@ def _noisy(
         )
     if not force_closure(*stacked(case.contacts), case.friction, torsion_m=setup.torsion_m).closed:
         return _opened(body, OPEN, case.contacts, case.friction, setup)
-    loads = [(each.name, each.load.wrench) for each in planned]
-    rig, heavy = noisy_case(body, case, loads, setup)
-    return _Case(rig, _as_planned(heavy), _overlap(body, case.landed, rig.bench.scene))
+    rig, heavy = noisy_case(body, case, [(each.name, each.load.wrench) for each in planned], setup)
+    return rig, heavy, case.landed
 
 
 def _opened(
     body: Polyhedron, name: str, contacts: tuple[Contact, ...], friction: float, setup: Setup
-) -> _Case:
+) -> tuple[Rig, Loads, tuple[Contact, ...]]:
     """Prepare contacts without force closure as a negative control."""
     certificate = force_closure(*stacked(contacts), friction, torsion_m=setup.torsion_m)
     if certificate.closed:
@@ -359,23 +330,4 @@ def _opened(
             f"{name}: expected contacts without force closure, but these are force-closed at "
             f"friction {friction}"
         )
-    control = Control(name, contacts, friction, certificate)
-    rig, loads = control_case(body, control, setup)
-    return _Case(
-        rig,
-        {
-            each.name: _Held(each.load, None, each.required_friction, each.settling)
-            for each in loads
-        },
-    )
-
-
-def _as_planned(planned: Sequence[PlannedLoad]) -> dict[str, _Held]:
-    return {
-        each.name: _Held(each.load, each.predicted_limit, each.required_friction)
-        for each in planned
-    }
-
-
-def _overlap(body: Polyhedron, contacts: Sequence[Contact], scene: Scene) -> tuple[str, ...]:
-    return clashes(body, *stacked(contacts), scene.layout.drive.radius_m)
+    return *control_case(body, Control(name, contacts, friction, certificate), setup), ()

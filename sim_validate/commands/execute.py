@@ -31,14 +31,13 @@ from sim_validate.records.executions import (
 from sim_validate.records.grasps import grasp_with_id
 from sim_validate.records.setup_toml import physics_from_file
 
-ABSENT, NEVER = "-", "never"
-"""Texts for a number that there is not, and for a load that nothing brings about."""
-LOSS_MEANS = (
+ABSENT = "-"
+COLUMNS_MEAN = (
     "least loss: least multiple of a trial's load at which the object is lost, predicted; the "
-    "number to choose by (docs/which-number.md)"
+    "number to choose by (docs/which-number.md)",
+    "load: multiple of the weight, in any direction, that the squeeze is certified for",
+    "payload kg: that multiple of the mass, for loads that grow slowly",
 )
-LOAD_MEANS = "load: multiple of the weight, in any direction, that the squeeze is certified for"
-PAYLOAD_MEANS = "payload kg: that multiple of the mass, for loads that grow slowly"
 ENOUGH_MEANS = (
     "enough: the least --push-n, with the --tip-stiffness-n-per-m that was used or the least that "
     "it takes; docs/execution.md says what it does not promise"
@@ -63,13 +62,9 @@ def execute_file(command: execution_flags.Execute, reporter: Reporter) -> int:
     physics = {} if command.setup is None else physics_from_file(command.setup)
     with alone_in(command.out):
         code, text = execute_grasps(
-            chosen,
-            settings,
-            jobs=command.jobs,
-            folder=command.out,
-            reporter=reporter,
+            chosen, settings, jobs=command.jobs, folder=command.out, reporter=reporter,
             physics=physics,
-        )
+        )  # fmt: skip
     reporter.text(text)
     return code
 
@@ -100,20 +95,16 @@ def execute_grasps(
             path = write_text(folder / EXECUTIONS, text)
             reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
     _show(found, settings, reporter)
-    return _code(found), text
-
-
-def _code(found: Sequence[ExecutedGrasp]) -> Exit:
     if not all(each.controls_let_go for each in found):
-        return Exit.INTERNAL
-    return Exit.GOOD if all(each.survived for each in found) else Exit.NEGATIVE
+        return Exit.INTERNAL, text
+    return (Exit.GOOD if all(each.survived for each in found) else Exit.NEGATIVE), text
 
 
 def _show(found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter: Reporter) -> None:
     kinds, shown = settings.trials, found[:TABLE_ROWS]
     columns = ("grasp", "survived", "least loss", "load", "payload kg", "mm moved", "controls")
     reporter.table("executions", columns, [_row(each) for each in shown])
-    for meaning in (LOSS_MEANS, LOAD_MEANS, PAYLOAD_MEANS):
+    for meaning in COLUMNS_MEAN:
         reporter.say(meaning)
     for title, cell in (("trials survived", _survived), (SLIPS, _slips)):
         rows = [(each.id, *(cell(each.execution, kind) for kind in kinds)) for each in shown]
@@ -130,15 +121,17 @@ def _show(found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter:
         )
     if any(each.enough for each in found):
         reporter.say(ENOUGH_MEANS)
-    if any(not trial.survived for each in found if each.execution
-           for trial in each.execution.of_kind("knock")):  # fmt: skip
-        reporter.warn(knock_in_words(settings))
+    if any(not trial.survived for each in found for trial in each.trials if trial.kind == "knock"):
+        reporter.warn(
+            f"a knock of {settings.impulse_n_s:g} N s would give a free object of "
+            f"{settings.mass_kg:g} kg {settings.impulse_n_s / settings.mass_kg:.3g} m/s; choose it "
+            "with --knock-n-s"
+        )
 
 
 def _say_totals(
     found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter: Reporter
 ) -> None:
-    """Say which trials were left out, and how many were survived."""
     left_out = Counter(
         (each.kind, each.reason) for one in found if one.execution for each in one.execution.skipped
     )
@@ -157,15 +150,6 @@ def _say_totals(
             f"times the loads of its worst trial; its squeeze carries "
             f"{best.execution.payload_kg:.3g} kg in any direction"
         )
-
-
-def knock_in_words(settings: ExecutionSettings) -> str:
-    """Say which speed a knock gives the object."""
-    return (
-        f"a knock of {settings.impulse_n_s:g} N s would give a free object of "
-        f"{settings.mass_kg:g} kg {settings.impulse_n_s / settings.mass_kg:.3g} m/s; choose it "
-        "with --knock-n-s"
-    )
 
 
 def _row(each: ExecutedGrasp) -> tuple[str, ...]:
@@ -199,7 +183,7 @@ def _slips(found: Execution | None, kind: str) -> str:
 def multiple_in_words(multiple: float) -> str:
     """Write the multiple of a load with three digits, and no more than two behind the point."""
     if math.isinf(multiple):
-        return NEVER
+        return "never"
     return f"{multiple:.{max(0, 2 - math.floor(math.log10(max(multiple, 1.0))))}f}"
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from grasp_core.by_value import counted
 from grasp_core.hands.couplings import Coupling
-from grasp_core.hands.hand import Hand, HandFinger
+from grasp_core.hands.hand import Hand
 from grasp_core.hands.named_hands import HANDS
 from scenes.hand_files.loading import load_hand
 from sim_validate.cli import hand_flags
@@ -14,11 +14,9 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.records.hand_model import couplings_record
 
 MM = 1e3
-NONE_STATED = "none stated"
 SMALL_RANGE = math.radians(10.0)
 """Fingers whose joints all turn by less hardly open [rad]."""
 SHAPES_WEIGH = "MuJoCo gives links without inertia in the file that of their shapes at 1,000 kg/m^3"
-IN_DEGREES = """MJCF counts angles in degrees unless it has <compiler angle="radian"/>"""
 
 
 def asked_hand(command: hand_flags.Hand | hand_flags.Reach) -> Hand:
@@ -32,9 +30,13 @@ def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
     hand = asked_hand(command)
     reporter.document(hand_facts(hand))
     fingers = [
-        (f.name, str(len(f.links)), f"{MM * f.tip.radius:.1f}", _kind(f), str(_shapes(f)))
+        (
+            f.name, str(len(f.links)), f"{MM * f.tip.radius:.1f}",
+            "ball" if f.tip.corners is None else f"block of {len(f.tip.corners)} corners",
+            str(sum(len(link.shapes) for link in f.links)),
+        )
         for f in hand.fingers
-    ]
+    ]  # fmt: skip
     reporter.table(
         f"fingers of {hand.name}", ("fingertip", "joints", "radius mm", "kind", "shapes"), fingers
     )
@@ -47,9 +49,12 @@ def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
     if hand.couplings:
         reporter.say(f"Joints that follow others: {', '.join(map(_follows, hand.couplings))}.")
     reporter.say(f"Torque limits: {hand.torque_source}.")
-    for line in (_weight(hand), _small_ranges(hand)):
-        if line:
-            reporter.say(line)
+    reporter.say(_weight(hand))
+    if all(joint.highest - joint.lowest < SMALL_RANGE for joint in hand.joints):
+        reporter.say(
+            f"Every joint turns by less than {math.degrees(SMALL_RANGE):g} degrees: MJCF counts "
+            'angles in degrees unless it has <compiler angle="radian"/>.'
+        )
     for note in hand.notes:
         reporter.say(f"Note: {note}.")
     for source in hand.sources:
@@ -58,7 +63,7 @@ def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
 
 
 def _weight(hand: Hand) -> str:
-    """Say what the links weigh and where their masses come from; nothing if it is unknown."""
+    """Say what the links weigh and where their masses come from."""
     masses = [link.mass_kg for link in hand.links]
     stated = [mass for mass in masses if mass is not None]
     if len(stated) < len(masses):
@@ -67,36 +72,15 @@ def _weight(hand: Hand) -> str:
     return said + ("." if hand.name in HANDS else f"; {SHAPES_WEIGH}.")
 
 
-def _small_ranges(hand: Hand) -> str:
-    """Say what may be wrong where no joint turns as far as joints of hands do; else nothing."""
-    joints = hand.joints
-    if any(joint.highest - joint.lowest >= SMALL_RANGE for joint in joints):
-        return ""
-    degrees = math.degrees(SMALL_RANGE)
-    return f"Every joint turns by less than {degrees:g} degrees: {IN_DEGREES}."
-
-
-def _kind(finger: HandFinger) -> str:
-    """Say what a fingertip is: a block has a ball only in simulation."""
-    return "ball" if finger.tip.corners is None else f"block of {len(finger.tip.corners)} corners"
-
-
-def _shapes(finger: HandFinger) -> int:
-    return sum(len(link.shapes) for link in finger.links)
-
-
 def _joints(hand: Hand) -> list[tuple[str, ...]]:
-    """Return the cells of a table with one row for each joint."""
-    links = [(finger, link) for finger in hand.fingers for link in finger.links]
+    links = [(finger, link.joint) for finger in hand.fingers for link in finger.links]
     return [
         (
-            link.joint.name,
-            finger.name,
-            f"{math.degrees(lowest):.1f} to {math.degrees(highest):.1f}",
-            _torque(link.joint.torque_limit_n_m),
+            joint.name, finger.name, f"{math.degrees(low):.1f} to {math.degrees(high):.1f}",
+            "none stated" if joint.torque_limit_n_m is None else f"{joint.torque_limit_n_m:g}",
         )
-        for (finger, link), (lowest, highest) in zip(links, hand.ranges.tolist(), strict=True)
-    ]
+        for (finger, joint), (low, high) in zip(links, hand.ranges.tolist(), strict=True)
+    ]  # fmt: skip
 
 
 def _follows(coupling: Coupling) -> str:
@@ -104,10 +88,6 @@ def _follows(coupling: Coupling) -> str:
     said = f"{coupling.joint} = {coupling.ratio:g} {coupling.driver}"
     offset = math.degrees(coupling.offset)
     return f"{said} {'-' if offset < 0.0 else '+'} {abs(offset):.4g} deg" if offset else said
-
-
-def _torque(limit: float | None) -> str:
-    return NONE_STATED if limit is None else f"{limit:g}"
 
 
 def hand_facts(hand: Hand) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from grasp_core.files.text_files import write_text
@@ -12,7 +13,7 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.files.result_folders import JUDGEMENTS, remove_judgements
 from sim_validate.protocols.judgements_json import judgements_summary, judgements_to_json
-from sim_validate.protocols.judging import GraspCase, HandCase, Judgement, judged
+from sim_validate.protocols.judging import Case, Judgement, judge_by, judge_hand_by, judged
 from sim_validate.simulation.setup import Setup
 
 COLUMNS = ("grasp", "test", "theirs", "ours", "margin", "moved mm", "deg")
@@ -28,7 +29,7 @@ def judge_grasps(
     Gives the exit code, and the text of judgements.json.
     """
     cases = [
-        GraspCase(name, saved.body, grasp, saved.friction, setup)
+        partial(judge_by, name, saved.body, grasp, saved.friction, setup=setup)
         for name in names
         for grasp in saved.grasps
     ]
@@ -44,7 +45,7 @@ def judge_hands(
     Gives the exit code, and the text of judgements.json.
     """
     cases = [
-        HandCase(name, hand, saved.body, each, saved.friction)
+        partial(judge_hand_by, name, hand, saved.body, each, saved.friction)
         for name in names
         for each in found
         if each.reached
@@ -53,8 +54,7 @@ def judge_hands(
 
 
 def _judged(
-    saved: SavedGrasps, cases: Sequence[GraspCase | HandCase], jobs: int, folder: Path | None,
-    reporter: Reporter,
+    saved: SavedGrasps, cases: Sequence[Case], jobs: int, folder: Path | None, reporter: Reporter
 ) -> tuple[Exit, str]:  # fmt: skip
     """Judge all cases, and write what is done even if the run is interrupted."""
     if folder:
@@ -72,14 +72,13 @@ def _judged(
         if folder and done:
             path = write_text(folder / JUDGEMENTS, text)
             reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
-    show_judgements(done, reporter)
+    if done:
+        _show(done, reporter)
     return (Exit.GOOD if all(each.good for each in done) else Exit.NEGATIVE), text
 
 
-def show_judgements(judgements: Sequence[Judgement], reporter: Reporter) -> None:
+def _show(judgements: Sequence[Judgement], reporter: Reporter) -> None:
     """Show their verdicts, ours and the predicted margins, and how often they agree."""
-    if not judgements:
-        return
     rows = [_row(each) for each in judgements[:TABLE_ROWS]]
     reporter.table("judged by published tests", COLUMNS, rows)
     say_cut(len(judgements), reporter)
@@ -89,8 +88,11 @@ def show_judgements(judgements: Sequence[Judgement], reporter: Reporter) -> None
     ]
     reporter.table("in all", TOTALS, totals)
     for each in judgements[:TABLE_ROWS]:
-        for told in _surprises(each):
-            reporter.warn(f"{each.grasp}: {each.protocol.name}: {told}")
+        about = f"{each.grasp}: {each.protocol.name}"
+        for run in [run for run in each.runs if not run.passed][:1]:
+            reporter.warn(f"{about}: run {run.number}: {run.reason}")
+        if not each.ours.held:
+            reporter.warn(f"{about}: ours: {each.ours.reason}")
 
 
 def _row(each: Judgement) -> tuple[str, ...]:
@@ -102,10 +104,3 @@ def _row(each: Judgement) -> tuple[str, ...]:
         each.grasp, each.protocol.name, theirs, "held" if each.ours.held else "not held", margin,
         f"{1e3 * moved:.2g}", f"{turned:.2g}",
     )  # fmt: skip
-
-
-def _surprises(each: Judgement) -> list[str]:
-    """Return why a test was not passed, and why our trials did not hold."""
-    failed = [run for run in each.runs if not run.passed]
-    found = [] if each.theirs or not failed else [f"run {failed[0].number}: {failed[0].reason}"]
-    return found if each.ours.held else [*found, f"ours: {each.ours.reason}"]

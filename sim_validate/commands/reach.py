@@ -6,6 +6,7 @@ poses are written as records of DexGraspBench.
 
 import shlex
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -43,7 +44,7 @@ from sim_validate.records.reaches import AskedRecord, HandTrials, reaches_summar
 from sim_validate.reports.run_folder import GRASPS
 
 ABSENT = "-"
-GIVEN = "given on the command line"
+
 PAYLOAD = "payload kg"
 HELD_COLUMNS = ("grasp", "weakest wrench N", "held", "controls let go")
 EXECUTED_COLUMNS = ("grasp", "survived", "least predicted loss", PAYLOAD, "controls let go")
@@ -93,16 +94,12 @@ def _reach(
         for grasp in saved.grasps
     ]  # fmt: skip
     asked: AskedRecord = {
-        "regions": not command.contacts_only,
-        "table_down": command.table,
-        "clearance_m": command.clearance_m,
-        "starts": command.starts,
-        "seed": command.seed,
-    }
+        "regions": not command.contacts_only, "table_down": command.table,
+        "clearance_m": command.clearance_m, "starts": command.starts, "seed": command.seed,
+    }  # fmt: skip
     if command.mass_kg is not None:
         asked["execution"] = asdict(hand_execution_settings(command.mass_kg).used)
-    found: list[HandReach] = []
-    tried = HandTrials()
+    found, tried = list[HandReach](), HandTrials()
     if jobs and must_compile(REACHING, command.jobs):
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
@@ -116,7 +113,10 @@ def _reach(
         simulated(command, hand, saved, found, reporter, tried.verdicts)
         executed(command, hand, saved, found, reporter, tried.executions)
     finally:
-        complete = len(found) == len(jobs) and _all_tried(command, found, tried)
+        stands = sum(each.reached for each in found)
+        held = len(tried.verdicts) == stands or not tries_ours(command)
+        lifted = len(tried.executions) == stands or command.mass_kg is None
+        complete = len(found) == len(jobs) and held and lifted
         text = reaches_to_json(
             hand, saved.body, saved.friction, asked, found, complete=complete,
             grasps=saved.grasps, tried=tried,
@@ -125,13 +125,6 @@ def _reach(
             path = write_text(command.out / REACHES, text)
             reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
     return found, tried, text
-
-
-def _all_tried(command: hand_flags.Reach, found: Sequence[HandReach], tried: HandTrials) -> bool:
-    """Return whether all that was asked for was done in each grasp that is reached."""
-    reached = sum(each.reached for each in found)
-    held = len(tried.verdicts) == reached or not tries_ours(command)
-    return held and (len(tried.executions) == reached or command.mass_kg is None)
 
 
 def _show(
@@ -147,7 +140,11 @@ def _show(
         rows = [(*row, cell) for row, cell in zip(rows, cells, strict=True)]
     reporter.table(f"grasps with the hand {hand.name}", columns, rows)
     say_cut(len(found), reporter)
-    say_what_it_means(payloads, reporter)
+    if payloads:
+        reporter.say(
+            f"{PAYLOAD}: the largest mass that the motors hold whichever way the hand is turned, "
+            "their links included, with forces chosen anew for each orientation"
+        )
     counts = reaches_summary(found, complete=True)
     said = f"{counts['reached']} of {counts['grasps']} grasps were reached"
     if counts["collision"] + counts["limit"] + counts["not_found"]:
@@ -188,50 +185,40 @@ def _row(hand: Hand, each: HandReach) -> tuple[str, ...]:
 def carried(hand: Hand, saved: SavedGrasps, found: Sequence[HandReach]) -> dict[str, HandPayload]:
     """Find the largest mass in any orientation, by the ids of the grasps that are reached.
 
-    Gives nothing for a hand whose motors or links are not known well enough, and none for grasps in
+    There is none for a hand whose motors or links are not known well enough, and for grasps in
     which motors cannot carry their links.
     """
     unknown = any(link.mass_kg is None or link.center_of_mass is None for link in hand.links)
     if unknown or any(joint.torque_limit_n_m is None for joint in hand.free_joints):
         return {}
-    each = ((reach.grasp, _payload(hand, saved, reach)) for reach in found if reach.reached)
-    return {grasp: payload for grasp, payload in each if payload is not None}
-
-
-def _payload(hand: Hand, saved: SavedGrasps, reach: HandReach) -> HandPayload | None:
-    try:
-        return hand_payload(hand, saved.body, reach, saved.friction, max_push_n=MOST_PUSH_N)
-    except (InputError, SolverError):  # a figure beside the poses, which are there without it
-        return None
-
-
-def say_what_it_means(payloads: Mapping[str, HandPayload], reporter: Reporter) -> None:
-    """Say what the column of the table about poses is."""
-    if payloads:
-        reporter.say(
-            f"{PAYLOAD}: the largest mass that the motors hold whichever way the hand is turned, "
-            "their links included, with forces chosen anew for each orientation"
-        )
+    payloads = dict[str, HandPayload]()
+    for reach in (each for each in found if each.reached):
+        # a figure beside the poses, which are there without it
+        with suppress(InputError, SolverError):
+            payloads[reach.grasp] = hand_payload(
+                hand, saved.body, reach, saved.friction, max_push_n=MOST_PUSH_N
+            )
+    return payloads
 
 
 def with_motors(hand: Hand, command: hand_flags.Reach) -> Hand:
     """Return the hand with the torque limits that the command gives."""
     if command.torque_limit_n_m is not None:
-        hand = hand.with_torque_limits(command.torque_limit_n_m, GIVEN)
+        hand = hand.with_torque_limits(command.torque_limit_n_m, "given on the command line")
     if command.protocol and not command.simulate:
         raise FlagsError(
             "--protocol judges a hand in simulation: give --simulate too, or leave --protocol out"
         )
-    missing = [joint.name for joint in hand.joints if joint.torque_limit_n_m is None]
-    asked = "--simulate" if command.simulate else "--mass-kg"
     if command.simulate or command.mass_kg is not None:
+        asked = "--simulate" if command.simulate else "--mass-kg"
         uncoupled(hand, asked)
-    if (command.simulate or command.mass_kg is not None) and missing:
-        raise InputError(
-            f"{asked} needs a torque limit for each joint, but {hand.name} has none for "
-            f"{missing[0]}; give one for all joints with --torque-limit-n-m, or each in the hand's "
-            "file (actuatorfrcrange of its joint)"
-        )
+        missing = [joint.name for joint in hand.joints if joint.torque_limit_n_m is None]
+        if missing:
+            raise InputError(
+                f"{asked} needs a torque limit for each joint, but {hand.name} has none for "
+                f"{missing[0]}; give one for all joints with --torque-limit-n-m, or each in the "
+                "hand's file (actuatorfrcrange of its joint)"
+            )
     return hand
 
 
@@ -263,7 +250,14 @@ def show_simulated(verdicts: Mapping[str, HandVerdict], reporter: Reporter) -> N
     if not verdicts:
         return
     ranked = sorted(verdicts.values(), key=lambda verdict: -verdict.weakest_n)
-    rows = [_held_row(verdict) for verdict in ranked[:TABLE_ROWS]]
+    rows = [
+        (
+            each.grasp, f"{each.weakest_n:.3g}",
+            "yes" if each.held else f"{len(each.failures)} of {len(each.wrenches)} not",
+            f"{sum(one.let_go for one in each.controls)} of {len(each.controls)}",
+        )
+        for each in ranked[:TABLE_ROWS]
+    ]  # fmt: skip
     reporter.table("what the hand holds with its motors, the strongest first", HELD_COLUMNS, rows)
     say_cut(len(ranked), reporter)
     held = sum(verdict.held for verdict in ranked)
@@ -276,13 +270,6 @@ def show_simulated(verdicts: Mapping[str, HandVerdict], reporter: Reporter) -> N
     for verdict in ranked:
         for sentence in verdict.mismatches:
             reporter.warn(f"{verdict.grasp}: {sentence}")
-
-
-def _held_row(verdict: HandVerdict) -> tuple[str, ...]:
-    held = "yes" if verdict.held else f"{len(verdict.failures)} of {len(verdict.wrenches)} not"
-    let_go = sum(control.let_go for control in verdict.controls)
-    controls = f"{let_go} of {len(verdict.controls)}"
-    return verdict.grasp, f"{verdict.weakest_n:.3g}", held, controls
 
 
 def executed(

@@ -1,14 +1,12 @@
 """Runs the command `transfer`, which carries grasps over to a part that has changed."""
 
 import math
-from pathlib import Path
 
 from grasp_core.by_value import counted
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.shells import SMALL
-from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.transferring.changed_part import SURE_GROWTH, given_center, growth
 from grasp_core.transferring.face_changes import check_planar
 from grasp_core.transferring.transfer import (
@@ -42,7 +40,13 @@ def transfer_file(command: transfer_flags.Transfer, reporter: Reporter) -> int:
     if saved is None:
         return Exit.NONE
     check_planar(saved.body, "the old part")
-    _check_elsewhere(command.grasps, command.out)
+    kept = None if command.out is None else command.out / GRASPS
+    # from which grasps can be carried again
+    if kept is not None and kept.exists() and kept.samefile(command.grasps):
+        raise InputError(
+            f"{command.out}: the grasps of the old part are in this folder and would be "
+            "overwritten; give another --out"
+        )
     new = _changed_part(command, saved.body)
     if not 1.0 / SURE_GROWTH <= (times := growth(saved.body, new)) <= SURE_GROWTH:
         reporter.warn(
@@ -52,17 +56,15 @@ def transfer_file(command: transfer_flags.Transfer, reporter: Reporter) -> int:
     friction = saved.friction if command.friction is None else command.friction
     with alone_in(command.out), reporter.progress("carrying over"):
         found = transfer(
-            saved.body,
-            new,
-            saved.grasps,
-            friction,
-            distance=command.carrying.distance_m,
-            angle_deg=command.carrying.angle_deg,
-            finger=saved.finger,
-        )
+            saved.body, new, saved.grasps, friction, distance=command.carrying.distance_m,
+            angle_deg=command.carrying.angle_deg, finger=saved.finger,
+        )  # fmt: skip
         text = transfer_to_json(found)
         if command.out is not None:
-            _write(command.out, found, saved, text, reporter)
+            remove_results(command.out)
+            grasps = write_text(command.out / GRASPS, carried_to_json(found, saved))
+            path = write_text(command.out / TRANSFER, text)
+            reporter.say(f"wrote {grasps} and {path}")
     reporter.text(text)
     _show(found, reporter)
     if not found.carried:
@@ -70,40 +72,16 @@ def transfer_file(command: transfer_flags.Transfer, reporter: Reporter) -> int:
     return Exit.NEGATIVE if any(map(found.count, BAD)) else Exit.GOOD
 
 
-def _check_elsewhere(grasps: Path, out: Path | None) -> None:
-    """Refuse to write the new grasps over the old ones, from which they can be carried again."""
-    if out is not None and (out / GRASPS).exists() and (out / GRASPS).samefile(grasps):
-        raise InputError(
-            f"{out}: the grasps of the old part are in this folder and would be overwritten; give "
-            "another --out"
-        )
-
-
 def _changed_part(command: transfer_flags.Transfer, old: Polyhedron) -> Polyhedron:
     center = command.center_of_mass_m
     if center is None and (kept := given_center(old)) is not None:
         x, y, z = kept.tolist()
         center = x, y, z
-    return load_object(
-        command.part,
-        flag_groups.Mesh(
-            command.lengths,
-            faces="planar",
-            center_of_mass_m=center,
-            largest_part=old.surface.dropped > SMALL,
-            limits=command.limits,
-        ),
-    )
-
-
-def _write(
-    folder: Path, found: Transfer, saved: SavedGrasps, text: str, reporter: Reporter
-) -> None:
-    """Write both files in place of the results of earlier commands."""
-    remove_results(folder)
-    grasps = write_text(folder / GRASPS, carried_to_json(found, saved))
-    path = write_text(folder / TRANSFER, text)
-    reporter.say(f"wrote {grasps} and {path}")
+    mesh = flag_groups.Mesh(
+        command.lengths, faces="planar", center_of_mass_m=center,
+        largest_part=old.surface.dropped > SMALL, limits=command.limits,
+    )  # fmt: skip
+    return load_object(command.part, mesh)
 
 
 def _show(found: Transfer, reporter: Reporter) -> None:

@@ -21,7 +21,7 @@ from sim_validate.simulation.gate import require_faithful
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.simulation.traces import Outcome
 from sim_validate.validation.validation import Job, validated
-from sim_validate.validation.verdict import Verdict, WrenchVerdict
+from sim_validate.validation.verdict import Verdict
 
 
 def validate_file(command: command_flags.Validate, reporter: Reporter) -> int:
@@ -95,16 +95,8 @@ def _show(
              verdict.outcome.value, f"{1e6 * worst:.2g}", f"{let_go} of {len(verdict.controls)}")
         )  # fmt: skip
     limits = ("limits",) if verdicts and verdicts[0].agenda.limits != "none" else ()
-    columns = (
-        "grasp",
-        "family",
-        "mu*",
-        "in sim",
-        *limits,
-        "outcome",
-        "um moved",
-        "controls let go",
-    )
+    ends = ("outcome", "um moved", "controls let go")
+    columns = ("grasp", "family", "mu*", "in sim", *limits, *ends)
     reporter.table("verdicts", columns, rows)
     say_cut(len(verdicts), reporter)
     _show_robustness(verdicts, reporter)
@@ -122,13 +114,11 @@ def _show(
 
 
 def _limit_range(verdict: Verdict) -> str:
-    """Give the least and largest simulated limit, relative to the predicted limits."""
     shares = [trial.simulated_limit.share for trial in verdict.wrenches if trial.simulated_limit]
     return f"{min(shares):.3f}-{max(shares):.3f}" if shares else "-"
 
 
 def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
-    """Show how often grasps held in repeats with noise, if asked for."""
     rows: list[tuple[str, ...]] = []
     for verdict in verdicts[:TABLE_ROWS]:
         if (found := verdict.robustness) is None:
@@ -145,20 +135,14 @@ def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
     reporter.table("repeats with noise", columns, rows)
 
 
-def _expected(trial: WrenchVerdict) -> str:
-    over = trial.predicted_limit < 1.0
-    return f" as predicted, the limit is {trial.predicted_limit:.3g} of this" if over else ""
-
-
 def _surprises(verdicts: Sequence[Verdict]) -> Iterable[str]:
     """Yield a line about each trial that did not end as it should."""
-    lines = [
-        f"{verdict.id}: {trial.name}: {trial.hold.outcome.value}{_expected(trial)}: "
-        f"{trial.hold.reason}"
-        for verdict in verdicts
-        for trial in verdict.wrenches
-        if trial.hold.outcome is not Outcome.HELD
-    ]
+    lines = list[str]()
+    for verdict in verdicts:
+        for trial in verdict.failures:
+            limit, ended = trial.predicted_limit, trial.hold.outcome.value
+            over = f" as predicted, the limit is {limit:.3g} of this" if limit < 1.0 else ""
+            lines.append(f"{verdict.id}: {trial.name}: {ended}{over}: {trial.hold.reason}")
     lines += [f"{verdict.id}: {what}" for verdict in verdicts for what in verdict.mismatches]
     lines += [
         f"{verdict.id}: control {control.control.name}: {trial.name}: {trial.hold.outcome.value}"

@@ -59,7 +59,6 @@ class HeldMotion:
     states: Array
     """Complete state of the simulator, from which a trial can go on, (n, size)."""
     faults: tuple[str, ...]
-    """What went wrong in the simulator, in words; empty if nothing did."""
 
     @property
     def joints(self) -> Array:
@@ -92,9 +91,7 @@ class Lost:
     """How far from its planned place in the hand an object is lost, where its trial ends."""
 
     away_m: float
-    """Distance of its centre of mass [m]."""
     turned_rad: float = math.inf
-    """Angle by which it is turned [rad]."""
 
 
 class HeldBench:
@@ -109,8 +106,7 @@ class HeldBench:
         self.model = compiled(scene.xml)
         if step_s is None:
             step_s = float(self.model.opt.timestep)
-        self.model.opt.timestep = step_s
-        self.step_s = step_s
+        self.model.opt.timestep = self.step_s = step_s
         self.chunk = max(1, round(sample_s / step_s))
         self.sample_s = self.chunk * step_s
         if sample_s == SAMPLE_S and abs(self.sample_s - SAMPLE_S) > WHOLE * SAMPLE_S:
@@ -130,9 +126,7 @@ class HeldBench:
         Takes `start` (size,) or (n, size); `friction` (k,) or (n, k).
         """
         trials = self._begun(drives, start, friction)
-        if lost is None:
-            lost = [Lost(self.lost_m)] * len(drives)
-        return self._stepped(trials, drives, lost)
+        return self._stepped(trials, drives, lost or [Lost(self.lost_m)] * len(drives))
 
     def settled(self, drive: Drive, start: Array | None = None) -> tuple[HeldMotion, Array]:
         """Simulate one trial; return its motion and the simulator's complete state at its end."""
@@ -140,11 +134,7 @@ class HeldBench:
         return motion, motion.states[-1]
 
     def touched(self, reached: Array) -> tuple[Array, Array]:
-        """Find what each fingertip touches before anything moves.
-
-        Takes `reached` (k, 3) [m]. Gives normals into the object, (k, 3), and depths, (k,) [m]; NaN
-        for a fingertip that has not exactly one contact.
-        """
+        """Find what each fingertip touches before anything moves, as `bench.touched` gives it."""
         data = mujoco.MjData(self.model)
         data.qpos[PALM + 1 :] = self.scene.layout.joints(reached)
         return touched(self.model, data, self.tips)
@@ -160,31 +150,22 @@ class HeldBench:
         joints, speeds = trials.bind("qpos"), trials.bind("qvel")
         for place, drive in enumerate(drives):
             if drive.pose is not None and start is None:
-                joints[place, :3] = drive.pose.moved
-                joints[place, 3:7] = drive.pose.quaternion
+                joints[place, :7] = [*drive.pose.moved, *drive.pose.quaternion]
             if drive.reached is not None and start is None:
                 joints[place, PALM + 1 :] = self.scene.layout.joints(drive.reached)
             speeds[place, :3] += drive.velocity
             speeds[place, FREE : FREE + 3] += drive.velocity
-        if any(drive.table for drive in drives):
-            self._lay_tables(trials, drives)
+            if drive.table is not None:  # where it touches: objects would fall, sink and rise
+                into = LAID * self.scene.layout.radius_m
+                trials.bind("mocap_pos")[place, 0] = drive.table.point + into * drive.table.normal
+                trials.bind("mocap_quat")[place, 0] = quaternion(facing(drive.table))
         if friction is not None:
             trials.expand("geom_friction")[:, self.tips, 0] = friction
         return trials
 
-    def _lay_tables(self, trials: batch.Batch, drives: Sequence[Drive]) -> None:
-        """Lay tables where they touch: objects would fall on others, and sink and rise again."""
-        into = LAID * self.scene.layout.radius_m
-        place, turn = trials.bind("mocap_pos"), trials.bind("mocap_quat")
-        for trial, drive in enumerate(drives):
-            if drive.table is not None:
-                place[trial, 0] = drive.table.point + into * drive.table.normal
-                turn[trial, 0] = quaternion(facing(drive.table))
-
     def _stepped(
         self, trials: batch.Batch, drives: Sequence[Drive], limits: Sequence["Lost"]
     ) -> tuple[HeldMotion, ...]:
-        """Step all trials to their ends and return their motions."""
         lengths = np.array([len(drive) for drive in drives])
         most = int(lengths.max())
         loads, motors, commands = self._applied(drives, most)
@@ -264,18 +245,9 @@ class HeldBench:
         contact = layout.fingers_seen(fingers + back[:, PALM:], forces[:, PALM:], pressed).forces
         finger_forces = np.einsum("kij,nkj->ni", layout.axes, contact)
         return HeldMotion(
-            moved=joints[:, :3],
-            turned=joints[:, 3:7],
-            palm=palm,
-            fingers=fingers,
-            tips=seen.tips,
-            tip_turns=seen.turns,
-            forces=contact,
-            pressed=pressed,
-            table=forces[:, :3] - finger_forces,
-            states=states,
-            faults=faults,
-        )
+            joints[:, :3], joints[:, 3:7], palm, fingers, seen.tips, seen.turns, contact, pressed,
+            table=forces[:, :3] - finger_forces, states=states, faults=faults,
+        )  # fmt: skip
 
 
 def _cosines(joints: Array) -> Array:

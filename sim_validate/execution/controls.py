@@ -52,11 +52,9 @@ class Weaker:
 
     name: str
     friction: Array
-    """Coulomb coefficients, (k,)."""
     pushing: Array
     """Share of its command that each finger pushes with, (k,)."""
     load: Array
-    """Load under which a contact must slip, (6,) [N, N m]."""
     idle: bool = False
     """Whether a finger does not push, so that a slide while the others close counts as well."""
 
@@ -72,21 +70,15 @@ def run_controls(
     rise_s = min(max(2.0 * paths.RISE_S, FOLLOWED / lowest_frequency), LONGEST_RISE_S)
     share = paths.smooth(paths.samples(rise_s))
     closing, loading = paths.closing(), paths.loaded(share, np.zeros(3))
-    weaker = tuple(weaker_grips(best, layout))
-    drives = [
-        _driven(closing, replace(loading, wrenches=share[:, None] * each.load), each)
-        for each in weaker
-    ]
+    weaker, drives = tuple(weaker_grips(best, layout)), list[Drive]()
+    for each in weaker:
+        drive = joined(closing, replace(loading, wrenches=share[:, None] * each.load))
+        drives.append(replace(drive, grasping=np.outer(drive.grasping, each.pushing)))
     motions = bench.run(drives, friction=np.array([each.friction for each in weaker]))
     return tuple(
         _judged(each, motion, layout, drive, len(closing) - 1)
         for each, motion, drive in zip(weaker, motions, drives, strict=True)
     )
-
-
-def _driven(closing: Drive, loading: Drive, weaker: Weaker) -> Drive:
-    whole = joined(closing, loading)
-    return replace(whole, grasping=np.outer(whole.grasping, weaker.pushing))
 
 
 def _judged(
@@ -106,20 +98,15 @@ def weaker_grips(best: BestSqueeze, layout: HeldLayout) -> Iterator[Weaker]:
     grip, load = best.grip, slipping_load(best)
     all_push = np.ones(len(grip.friction))
     little = replace(grip, friction=FRICTION * grip.friction)
-    yield Weaker(
-        f"friction {FRICTION:g}", little.friction, all_push, _sure(little, load) * load
-    )  # fmt: skip
-    loose = grip.squeezed(SQUEEZE * grip.squeeze)
-    yield Weaker(
-        f"squeeze {SQUEEZE:g}", grip.friction, SQUEEZE * all_push, _sure(loose, load) * load
-    )
+    yield Weaker(f"friction {FRICTION:g}", little.friction, all_push, _sure(little, load) * load)
+    loose, pushing = grip.squeezed(SQUEEZE * grip.squeeze), SQUEEZE * all_push
+    yield Weaker(f"squeeze {SQUEEZE:g}", grip.friction, pushing, _sure(loose, load) * load)
     strongest = first_best(layout.pushes.max(axis=1))
     others_push = all_push.copy()
     others_push[strongest] = 0.0
     left = idle(grip, strongest, layout.axes[strongest] @ layout.pushes[strongest])
-    yield Weaker(
-        "a finger that does not push", grip.friction, others_push, _sure(left, load) * load, True
-    )
+    name = "a finger that does not push"
+    yield Weaker(name, grip.friction, others_push, _sure(left, load) * load, True)
 
 
 def _sure(weaker: Grip, load: Array) -> float:
@@ -136,10 +123,7 @@ def _sure(weaker: Grip, load: Array) -> float:
 
 
 def idle(grip: Grip, finger: int, push: Array) -> Grip:
-    """Return the squeeze that is left by (1) where a finger does not push.
-
-    Takes `push` (3,) [N].
-    """
+    """Return the squeeze that is left by (1) where a finger does not push."""
     maps = grasp_map(grip.arms).reshape(len(grip.elastic_stiffness), -1, 3).transpose(1, 0, 2)
     motion = np.asarray(np.linalg.solve(grip.elastic_stiffness, -maps[finger] @ push), dtype=float)
     squeeze = grip.squeeze - np.einsum("kij,kmj,m->ki", grip.stiffness, maps, motion)

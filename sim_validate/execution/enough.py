@@ -54,7 +54,6 @@ class Enough:
     predicted_loss: float | None = None
     """Least multiple of a trial's load at which the object is then lost, predicted."""
     reason: str | None = None
-    """Why no push was found, where none was."""
 
     def __post_init__(self) -> None:
         missing = (self.push_n, self.stiffness_n_per_m, self.predicted_loss).count(None)
@@ -135,11 +134,9 @@ def accelerations_g(settings: ExecutionSettings) -> dict[str, float]:
     lift, _ = paths.lift(way, settings.lift_m, settings.lift_s)
     knock = paths.knock(gravity, settings.impulse_n_s * way, np.zeros(3))
     return {
-        "weight": 0.0,
-        "misplaced": 0.0,
+        **dict.fromkeys(("weight", "misplaced"), 0.0),
+        **dict.fromkeys(("shake along", "shake about"), settings.shake_g),
         "lift": _largest(lift.accelerations),
-        "shake along": settings.shake_g,
-        "shake about": settings.shake_g,
         "stop": _largest(stop.accelerations),
         "knock": _largest(knock.wrenches) / settings.mass_kg,
     }
@@ -170,7 +167,10 @@ def _stiff_enough(
             choose(own, None)  # refused where rounding makes the grip unstable
         except (InputError, NoForcesError, SolverError):
             return None
-        return own if _stays(best, own) else None
+        # the farthest that the loads move and turn the object
+        moves = np.linalg.solve(best.grip.grasp_stiffness, best.loads.axes)
+        moved, turned = (float(np.linalg.norm(part, 2)) for part in (moves[:3], moves[3:]))
+        return own if moved <= own.most_m and turned <= own.most_rad else None
 
     low, high = ends
     if (found := tried(low)) is not None:
@@ -183,13 +183,6 @@ def _stiff_enough(
         else:
             found, high = better, middle
     return found
-
-
-def _stays(best: BestSqueeze, settings: ExecutionSettings) -> bool:
-    """Return whether all loads move and turn the object by no more than counts as held."""
-    moves = np.linalg.solve(best.grip.grasp_stiffness, best.loads.axes)
-    moved, turned = (float(np.linalg.norm(part, 2)) for part in (moves[:3], moves[3:]))
-    return moved <= settings.most_m and turned <= settings.most_rad
 
 
 def _predicted(
@@ -210,5 +203,4 @@ def _predicted(
 
 
 def _rounded_up(value: float) -> float:
-    """Round up to three digits."""
     return float(f"{UP * value:.3g}")

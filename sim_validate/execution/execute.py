@@ -20,7 +20,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array
 from grasp_core.checked import instance, several, switch, whole
 from grasp_core.closure.contacts import FEWEST, contact_arrays, stacked
 from grasp_core.errors import InputError, NoForcesError
@@ -163,13 +162,19 @@ def execute(
         NoForcesError: No squeeze carries the weight, or the grip is unstable under the best one.
         UnfaithfulError: The simulator fails on a case with a known answer.
     """
-    settings = _settings(settings, mass_kg)
+    if settings is not None:
+        instance(settings, ExecutionSettings, "settings")
+        settings = settings if mass_kg is None else replace(settings, mass_kg=mass_kg)
+    elif mass_kg is not None:
+        settings = ExecutionSettings(mass_kg=mass_kg)
+    else:
+        raise InputError("execute: expected mass_kg or settings, got neither; give mass_kg=0.3")
     whole(threads, "threads", least=1, most=MOST_THREADS)
     switch(enough, "enough")
-    held = _contacts(body, grasp)
+    contacts = given_contacts(body, grasp)
     return executed(
         body, settings,
-        lambda own, loads: chosen_squeeze(body, held, friction, own, loads),
+        lambda own, loads: chosen_squeeze(body, contacts, friction, own, loads),
         lambda own, best: held_scene(body, best.grip, own, physics),
         threads=threads, enough=enough,
     )  # fmt: skip
@@ -219,29 +224,19 @@ def simulated(
     )
 
 
-def _settings(settings: ExecutionSettings | None, mass_kg: float | None) -> ExecutionSettings:
-    if settings is not None:
-        instance(settings, ExecutionSettings, "settings")
-        return settings if mass_kg is None else replace(settings, mass_kg=mass_kg)
-    if mass_kg is None:
-        raise InputError("execute: expected mass_kg or settings, got neither; give mass_kg=0.3")
-    return ExecutionSettings(mass_kg=mass_kg)
-
-
 def chosen_squeeze(
-    body: Polyhedron, grasp: Grasp | Iterable[Contact], friction: ArrayLike,
+    body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: ArrayLike,
     settings: ExecutionSettings, loads: LoadSet | None = None,
 ) -> BestSqueeze:  # fmt: skip
     """Choose the squeeze that carries the most of the weight in any direction.
 
     With loads it is the one of the least push that survives them, however hard fingers may push.
     """
-    contacts = _contacts(body, grasp)
-    radius = tip_radius(body, contacts, settings)
+    contacts = grasp.contacts if isinstance(grasp, Grasp) else grasp
     best = best_squeeze(
         body, contacts, friction, loads or any_direction(settings.mass_kg),
         max_push_n=settings.push_n if loads is None else None,
-        stiffness=settings.stiffness_n_per_m, tip_radius_m=radius,
+        stiffness=settings.stiffness_n_per_m, tip_radius_m=tip_radius(body, contacts, settings),
     )  # fmt: skip
     if best.scale == 0.0:
         raise NoForcesError(
@@ -251,8 +246,8 @@ def chosen_squeeze(
     return best
 
 
-def _contacts(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> tuple[Contact, ...]:
-    """Return the contacts of a grasp, or those that are given."""
+def given_contacts(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> tuple[Contact, ...]:
+    """Return the contacts of a grasp, or those that are given, checked."""
     check_body(body)
     if isinstance(grasp, Grasp):
         check_on_faces(body, grasp)
@@ -275,10 +270,7 @@ def held_scene(
     body: Polyhedron, grip: Grip, settings: ExecutionSettings,
     physics: PhysicsSettings | None = None,
 ) -> HeldScene:  # fmt: skip
-    """Build the scene in which a grip is executed.
-
-    A curved surface is there as far as fingertips come before the object counts as lost.
-    """
+    """Build the scene in which a grip is executed."""
     return build_held_scene(
         body, grip, settings.mass_kg, settings=settings.hand, physics=physics,
         reach_m=surface_reach(body, grip, settings),
@@ -286,7 +278,10 @@ def held_scene(
 
 
 def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> float | None:
-    """Return how far from the contacts a curved surface must be there [m]; None for all of it."""
+    """Return how far from the contacts a curved surface must be there [m]; None for all of it.
+
+    It is as far as fingertips come before the object counts as lost.
+    """
     if body.patches is None:
         return None
     turn = settings.most_rad + math.radians(settings.off_deg)
@@ -297,31 +292,22 @@ def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> 
 def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> tuple[HeldMotion, ...]:
     """Simulate trials: some with open fingers, others from a squeezed object or its weight."""
     _, squeezed = bench.settled(paths.closing())
-    weighing = [trial for trial in trials if trial.weighing]
+    found = dict[Trial, HeldMotion]()
+    if weighing := [trial for trial in trials if trial.weighing]:
+        # The weight comes once for all. Hand and object get the speed that they start with when it
+        # has come: uniform motion changes nothing.
+        parts = [parted(trial.drive, trial.weighing) for trial in weighing]
+        weight, state = bench.settled(replace(parts[0][0], velocity=np.zeros(3)), squeezed)
+        motions = bench.run([after for _, after in parts], state)
+        for trial, motion in zip(weighing, motions, strict=True):
+            found[trial] = motions_joined(weight, motion)
     apart = [trial for trial in trials if trial.apart]
     others = [trial for trial in trials if not (trial.weighing or trial.apart)]
-    found = dict(zip(weighing, _weighed(bench, weighing, squeezed), strict=True))
     for own, start in ((apart, None), (others, squeezed)):
         if own:
             motions = bench.run([trial.drive for trial in own], start)
             found |= dict(zip(own, motions, strict=True))
     return tuple(found[trial] for trial in trials)
-
-
-def _weighed(
-    bench: HeldBench, trials: Sequence[Trial], squeezed: Array
-) -> Iterator[HeldMotion]:  # fmt: skip
-    """Simulate trials of an object whose weight has come, which is simulated once for all.
-
-    Hand and object get the speed that they start with when it has come: uniform motion changes
-    nothing.
-    """
-    if not trials:
-        return
-    parts = [parted(trial.drive, trial.weighing) for trial in trials]
-    weight, state = bench.settled(replace(parts[0][0], velocity=np.zeros(3)), squeezed)
-    for motion in bench.run([after for _, after in parts], state):
-        yield motions_joined(weight, motion)
 
 
 def _judged_trials(

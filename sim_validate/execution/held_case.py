@@ -5,7 +5,7 @@ the middles of opposite faces, across x and across y. The axis z stays free.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from scenes.execution.held_mjcf import HeldScene, build_held_scene
 from scenes.physics import PhysicsSettings
 from sim_validate.execution.bench import HeldMotion
 from sim_validate.execution.paths import samples, smoother
-from sim_validate.simulation.known_cases import Check
+from sim_validate.simulation.known_cases import Check, near, sized
 
 DOWN = np.array(UPRIGHT)
 WEIGHT = GRAVITY_M_PER_S2 * DOWN
@@ -56,7 +56,6 @@ class HeldCase:
     tip_mass_kg: float
     damping_ratio: float
     physics: PhysicsSettings
-    """Settings of the simulator, with gravity along -z."""
 
     @property
     def halves(self) -> tuple[float, float, float]:
@@ -94,20 +93,9 @@ class HeldCase:
         """The natural frequency of the box along any axis, sqrt(4 k / (m + 4 m_t)) [rad/s]."""
         return math.sqrt(FINGERS * self.stiffness_n_per_m / self.moving_kg)
 
-    @property
-    def rise(self) -> Array:
-        """Shares of a load that grows so slowly that the box follows it, (n,)."""
-        return self.rise_of(SLOW)
-
-    def rise_of(self, slow: float) -> Array:
+    def rise(self, slow: float = SLOW) -> Array:
         """Return shares of a load that grows in a time given in reciprocal frequencies, (n,)."""
         return smoother(samples(max(SHORTEST_S, slow / self.frequency)))
-
-    def scaled(self, name: str) -> Polyhedron:
-        """Scale an example object to the size under test."""
-        example = example_object(name)
-        vertices = (example.vertices - example.center_of_mass) * self.radius_m / example.radius
-        return Polyhedron.from_mesh(vertices, example.triangles, name=name)
 
     def held_box(self) -> HeldScene:
         """Build the scene of the box between its fingers."""
@@ -125,7 +113,7 @@ class HeldCase:
             for x, y, out_x, out_y in places
         ]
         squeeze = self.push * np.array([contact.normal for contact in contacts])
-        return self.scene(self.scaled("box"), contacts, squeeze, self.tip_radius_m)
+        return self.scene(sized("box", self.radius_m), contacts, squeeze, self.tip_radius_m)
 
     def scene(
         self, body: Polyhedron, contacts: list[Contact], squeeze: Array, tip_radius_m: float
@@ -138,16 +126,12 @@ class HeldCase:
         settings = HeldSettings(self.tip_mass_kg, self.damping_ratio)
         return build_held_scene(body, held, self.mass_kg, settings=settings, physics=self.physics)
 
-    def lightly_damped(self, ratio: float) -> "HeldCase":
-        """Return the same case with another damping ratio."""
-        return replace(self, damping_ratio=ratio)
+
+def met(name: str, motion: HeldMotion, ratio: float) -> Check:
+    """Check that a figure of a motion, over what is known in closed form, is one."""
+    return near(name, None if motion.faults else ratio, TOLERANCE)
 
 
-def known(motion: HeldMotion, value: float) -> float:
-    """Return a measured value, or NaN where something went wrong in the simulator."""
-    return math.nan if motion.faults else value
-
-
-def near(name: str, ratio: float) -> Check:
-    """Check that a measured figure, over what is known in closed form, is one."""
-    return Check(name, ratio, 1.0 - TOLERANCE, 1.0 + TOLERANCE)
+def little(name: str, motion: HeldMotion, value: float, most: float = TOLERANCE) -> Check:
+    """Check that a figure of a motion is at most as large as it may be."""
+    return Check(name, math.nan if motion.faults else value, 0.0, most)

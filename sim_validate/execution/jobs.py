@@ -37,7 +37,6 @@ class ExecutionJob:
     """Settings of the simulator that differ from the usual ones, by name."""
     threads: int = 1
     enough: bool = True
-    """Whether to find the push that would be enough where the object is lost."""
 
 
 def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[ExecutedGrasp]:
@@ -53,14 +52,9 @@ def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
     about = grasp.id, grasp.family, contacts_sha256(grasp.contacts)
     try:
         found = execute(
-            job.body,
-            grasp,
-            job.friction,
-            job.settings,
-            physics=physics_of(job),
-            threads=job.threads,
-            enough=job.enough,
-        )
+            job.body, grasp, job.friction, job.settings,
+            physics=physics_of(job), threads=job.threads, enough=job.enough,
+        )  # fmt: skip
     except NoForcesError as error:
         answer = error.enough if isinstance(error, NoSqueezeError) else None
         return ExecutedGrasp(*about, None, str(error), answer)
@@ -70,8 +64,7 @@ def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
 def physics_of(job: ExecutionJob) -> PhysicsSettings | None:
     """Return the usual settings for the grasp's springs and masses with the job's changes.
 
-    Gives the settings; None where the job changes nothing, and the usual ones are taken, or where
-    no squeeze carries the weight.
+    It is None where the job changes nothing, or where no squeeze carries the weight.
     """
     if not job.physics:
         return None

@@ -24,7 +24,8 @@ from grasp_core.arrays import Array
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from scenes.execution.held_mjcf import SAMPLE_S
-from sim_validate.simulation.schedules import Clock, smooth
+from sim_validate.simulation import schedules
+from sim_validate.simulation.schedules import smooth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,19 +33,16 @@ class Pose:
     """Where the object lies, against its planned place in the hand."""
 
     moved: Array
-    """Displacement of the centre of mass, (3,) [m]."""
     quaternion: Array
     """Orientation (w, x, y, z), (4,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """A table under the object: a plane through a point, facing along a unit normal."""
+    """A table under the object: a plane through a point, facing the object along a unit normal."""
 
     point: Array
-    """A point of the plane, (3,) [m]."""
     normal: Array
-    """Unit normal towards the object, (3,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +52,6 @@ class Drive:
     accelerations: Array
     """Acceleration of the palm (linear, angular about its middle), (n, 6) [m/s^2, rad/s^2]."""
     gravity: Array
-    """Acceleration of gravity, (n, 3) [m/s^2]."""
     wrenches: Array
     """Wrench on the object beside its weight, (n, 6) [N, N m]."""
     grasping: Array
@@ -84,6 +81,10 @@ def idle(count: int) -> Drive:
     )  # fmt: skip
 
 
+SERIES = ("accelerations", "gravity", "wrenches", "grasping", "shares")
+"""Fields that have a row for each sample."""
+
+
 def joined(first: Drive, second: Drive) -> Drive:
     """Return one drive after another; start and table are those of the first."""
     both = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in SERIES}
@@ -95,10 +96,6 @@ def parted(drive: Drive, count: int) -> tuple[Drive, Drive]:
     first = {name: getattr(drive, name)[:count] for name in SERIES}
     second = {name: getattr(drive, name)[count:] for name in SERIES}
     return replace(drive, **first), replace(drive, **second)
-
-
-SERIES = ("accelerations", "gravity", "wrenches", "grasping", "shares")
-"""Fields that have a row for each sample."""
 
 
 CLOSE_S = 0.15
@@ -131,7 +128,7 @@ STOP_RISE_S = 0.02
 
 def samples(duration_s: float) -> int:
     """Return the whole number of samples nearest to a duration, at least one."""
-    return Clock(SAMPLE_S).samples(duration_s)
+    return schedules.samples(duration_s, SAMPLE_S)
 
 
 def smoother(count: int) -> Array:
@@ -155,9 +152,7 @@ def loaded(share: Array, gravity: Array) -> Drive:
 
     Takes `share` (n,); `gravity` (3,) or (n, 3) [m/s^2].
     """
-    count = len(share)
-    weight = share[:, None] * np.broadcast_to(gravity, (count, 3))
-    return replace(idle(count), gravity=weight, shares=share)
+    return replace(idle(len(share)), gravity=share[:, None] * gravity, shares=share)
 
 
 def turned_weight(slowest_rad_per_s: float) -> Drive:
@@ -190,10 +185,7 @@ def held_weight(gravity: Array, rest_s: float = RISE_S) -> Drive:
 
 
 def shake(gravity: Array, axis: Array, frequency_hz: float) -> Drive:
-    """Return the drive of a shake under weight.
-
-    Takes `gravity` (3,) [m/s^2]; `axis` (6,); `frequency_hz` [Hz].
-    """
+    """Return the drive of a shake under weight; `axis` (6,) is its acceleration."""
     rate = 2.0 * math.pi * frequency_hz
     grow, hold = 1.0 / frequency_hz, CYCLES / frequency_hz
     wave = samples(grow + hold)
@@ -209,10 +201,7 @@ def shake(gravity: Array, axis: Array, frequency_hz: float) -> Drive:
 
 
 def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive:
-    """Return the drive of a stop under weight.
-
-    Takes `gravity` (3,) [m/s^2]; `way` (3,); `deceleration` [m/s^2]; `speed` [m/s].
-    """
+    """Return the drive of a stop of a palm that moves in a direction, under weight."""
     rest = samples(REST_S)
     whole = speed / deceleration / SAMPLE_S  # samples at the full deceleration
     rise = max(1, int(min(STOP_RISE_S / SAMPLE_S, whole) + WHOLE))
@@ -230,10 +219,7 @@ def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive
 
 
 def knock(gravity: Array, impulse: Array, point: Array) -> Drive:
-    """Return the drive of a knock under weight.
-
-    Takes `gravity` (3,) [m/s^2]; `impulse` (3,) [N s]; `point` (3,) [m].
-    """
+    """Return the drive of a knock at a point under weight."""
     strike, rest = samples(STRIKE_S), samples(REST_S)
     wrenches = np.zeros((WEIGHING + strike + rest, 6))
     shape = np.sin(np.pi * (np.arange(strike) + 0.5) / strike)
@@ -245,10 +231,7 @@ def knock(gravity: Array, impulse: Array, point: Array) -> Drive:
 
 
 def lift(up: Array, height: float, duration_s: float, give_m: float = 0.0) -> tuple[Drive, int]:
-    """Return the drive of a lift from a table, and the sample at which it begins.
-
-    Takes `up` (3,); `height` [m]; `duration_s` [s].
-    """
+    """Return the drive of a lift from a table, and the sample at which it begins."""
     laid = samples(LAY_S)
     before, count, rest = laid + samples(CLOSE_S + REST_S), samples(duration_s), samples(REST_S)
     u = np.arange(count + 1) / count
@@ -262,8 +245,7 @@ def lift(up: Array, height: float, duration_s: float, give_m: float = 0.0) -> tu
     share = np.ones(total)
     share[:before] = 0.0
     share[before : before + count] = np.minimum(risen / max(min(give_m, height), TINY_M), 1.0)
-    still = idle(total)
     weight = np.concatenate([smooth(laid), np.ones(total - laid)])
     gravity = -GRAVITY_M_PER_S2 * weight[:, None] * up
-    drive = Drive(accelerations, gravity, still.wrenches, grasping, share, np.zeros(3))
+    drive = Drive(accelerations, gravity, np.zeros((total, 6)), grasping, share, np.zeros(3))
     return drive, before

@@ -100,11 +100,9 @@ class Expected:
     first_slip: float
     """Least multiple of the load at which a contact slips; infinite where none ever does."""
     slipping: Array
-    """Motion x in the sample of the first slip, under the load at multiple one, (6,) [m, rad]."""
+    """Motion x in the sample of the first slip, under the load at multiple one, (6,)."""
     moved_m: float
-    """Largest displacement under the load at multiple one [m]."""
     turn_rad: float
-    """Largest turn under the load at multiple one [rad]."""
 
 
 def predicted_losses(
@@ -113,7 +111,7 @@ def predicted_losses(
 ) -> tuple[Array, Array]:  # fmt: skip
     """Return the multiples of each drive's load of the first slip, and of loss, (drives,) each.
 
-    Takes `most_m` [m]; `most_rad` [rad]. Gives both, zero where the grip is unstable at rest.
+    Both are zero where the grip is unstable at rest.
     """
     if not drives or not dynamics.grip.stable:
         return np.zeros(len(drives)), np.zeros(len(drives))
@@ -136,24 +134,20 @@ def expected(dynamics: HeldDynamics, drives: Sequence[Drive]) -> list[Expected]:
     bases = np.zeros((len(drives), max(lengths), *dynamics.layout.contacts.shape))
     for place, drive in enumerate(drives):
         loads[place, : len(drive)], bases[place, : len(drive)] = _load(dynamics, drive)
-    motion, changes = _responses(dynamics, loads, bases)
-    return [
-        _expected(dynamics.grip, own[:length], change[:length])
-        for own, change, length in zip(motion, changes, lengths, strict=True)
-    ]
-
-
-def _expected(grip: Grip, motion: Array, changes: Array) -> Expected:
-    """Sum up the motion x, (n, 6), and the changes of the contact forces, (n, k, 3), of a drive."""
-    count = len(changes)
-    rest, friction = np.tile(grip.local_squeeze, (count, 1)), np.tile(grip.friction, count)
-    slips = slip_steps(rest, changes.reshape(-1, 3), friction).reshape(count, -1).min(axis=1)
-    return Expected(
-        first_slip=float(slips.min()),
-        slipping=motion[first_best(-slips)],
-        moved_m=float(np.linalg.norm(motion[:, :3], axis=1).max()),
-        turn_rad=float(np.linalg.norm(motion[:, 3:], axis=1).max()),
-    )
+    grip, found = dynamics.grip, list[Expected]()
+    for every, changes, count in zip(*_responses(dynamics, loads, bases), lengths, strict=True):
+        rest, friction = np.tile(grip.local_squeeze, (count, 1)), np.tile(grip.friction, count)
+        steps = slip_steps(rest, changes[:count].reshape(-1, 3), friction)
+        slips, motion = steps.reshape(count, -1).min(axis=1), every[:count]
+        found.append(
+            Expected(
+                first_slip=float(slips.min()),
+                slipping=motion[first_best(-slips)],
+                moved_m=float(np.linalg.norm(motion[:, :3], axis=1).max()),
+                turn_rad=float(np.linalg.norm(motion[:, 3:], axis=1).max()),
+            )
+        )
+    return found
 
 
 def _load(dynamics: HeldDynamics, drive: Drive) -> tuple[Array, Array]:
@@ -161,15 +155,16 @@ def _load(dynamics: HeldDynamics, drive: Drive) -> tuple[Array, Array]:
 
     A table carries the object until its share of the load is one.
     """
-    layout = dynamics.layout
-    angles = SAMPLE_S * np.cumsum(SAMPLE_S * np.cumsum(drive.accelerations[:, 3:], axis=0), axis=0)
+    layout, turning = dynamics.layout, drive.accelerations[:, 3:]
+    angles = SAMPLE_S * np.cumsum(SAMPLE_S * np.cumsum(turning, axis=0), axis=0)
     share = drive.shares if drive.table is not None else np.ones(len(drive))
-    weight = layout.mass_kg * share[:, None] * drive.gravity
-    weight = _turned_back(weight, angles)
     load = drive.wrenches.copy()
-    load[:, :3] += weight
-    bases = _bases(layout, drive.accelerations)
-    rates = _rates(drive.accelerations)
+    load[:, :3] += _turned_back(layout.mass_kg * share[:, None] * drive.gravity, angles)
+    # the palm's rate of turning in the middle of each sample
+    rates = SAMPLE_S * (np.cumsum(turning, axis=0) - 0.5 * turning)
+    inwards = cross(rates[:, None], cross(rates[:, None], layout.tip_centers))
+    sideways = cross(turning[:, None], layout.tip_centers)
+    bases = drive.accelerations[:, None, :3] + sideways + inwards
     load -= drive.accelerations @ dynamics.own.T
     load[:, 3:] -= cross(rates, rates @ layout.inertia_kg_m2)
     load -= np.einsum("kij,k,nkj->ni", dynamics.maps, dynamics.carried, bases)
@@ -183,20 +178,6 @@ def _turned_back(vectors: Array, angles: Array) -> Array:
     along = np.einsum("ni,ni->n", axis, vectors)[:, None] * axis
     turned = np.cos(size) * (vectors - along) - np.sin(size) * cross(axis, vectors) + along
     return np.where(size > 0.0, turned, vectors)
-
-
-def _bases(layout: HeldLayout, accelerations: Array) -> Array:
-    """Return the accelerations b_i of the fingers' bases in (2), (n, k, 3) [m/s^2]."""
-    turning = cross(accelerations[:, None, 3:], layout.tip_centers)
-    rates = _rates(accelerations)[:, None]
-    inwards = cross(rates, cross(rates, layout.tip_centers))
-    return accelerations[:, None, :3] + turning + inwards
-
-
-def _rates(accelerations: Array) -> Array:
-    """Return the palm's rate of turning in the middle of each sample, (n, 3) [rad/s]."""
-    turning = accelerations[:, 3:]
-    return SAMPLE_S * (np.cumsum(turning, axis=0) - 0.5 * turning)
 
 
 def _responses(dynamics: HeldDynamics, loads: Array, bases: Array) -> tuple[Array, Array]:

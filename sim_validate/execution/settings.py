@@ -9,6 +9,7 @@ from grasp_core.by_value import changed
 from grasp_core.checked import (
     BOUNDS,
     LARGEST,
+    SMALLEST,
     instance,
     number,
     one_of,
@@ -17,7 +18,7 @@ from grasp_core.checked import (
     several,
     whole,
 )
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.execution.grips import STIFFNESS_N_PER_M
 from grasp_core.files.json_text import settings_of, shown
 from grasp_core.objects.polyhedron import Polyhedron
@@ -31,8 +32,7 @@ KINDS: tuple[TrialKind, ...] = get_args(TrialKind)
 KNOCK_M_PER_S = 1.0 / 6.0
 """Speed that the usual knock gives a free object [m/s], 0.05 N s for 0.3 kg. So its load grows with
 the mass, as those of all other trials do, and a screw is not shot away."""
-KNOCK_DIGITS = 12
-"""Digits of the usual impulse."""
+
 LONGEST_S = 100.0
 """Longest duration of a lift or a stop [s]."""
 
@@ -90,21 +90,17 @@ class ExecutionSettings:
         return changed(self)
 
     def __post_init__(self) -> None:
-        for name in POSITIVE:
-            positive(getattr(self, name), name)
-        for name in NOT_NEGATIVE:
-            number(getattr(self, name), name, least=0.0, most=LARGEST)
-        if self.tip_radius_m is not None:
-            positive(self.tip_radius_m, "tip_radius_m")
-        if self.knock_n_s is not None:
-            number(self.knock_n_s, "knock_n_s", least=0.0, most=LARGEST)
+        for name, ends in RANGES.items():
+            value = getattr(self, name)
+            if value is not None or name not in ("tip_radius_m", "knock_n_s"):
+                number(value, name, **ends)
         instance(self.hand, HeldSettings, "hand")
-        kinds = several(self.trials, _trial_kind, "trials", "names of trials")
+        kinds = several(self.trials, lambda kind: kind, "trials", "names of trials")
+        for kind in kinds:
+            one_of(kind, KINDS, "trials")
         if not kinds:
             raise InputError(f"trials must name at least one of {', '.join(KINDS)}, got none")
         object.__setattr__(self, "trials", tuple(kind for kind in KINDS if kind in kinds))
-        for name in RANGES:
-            number(getattr(self, name), name, **BOUNDS[name])
         stopping = self.stop_from_m_per_s / self.stop_m_per_s2
         if stopping > LONGEST_S:
             raise InputError(
@@ -119,7 +115,7 @@ class ExecutionSettings:
         """Impulse of a knock: as given, or the usual one for the mass [N s]."""
         if self.knock_n_s is not None:
             return self.knock_n_s
-        return float(f"{KNOCK_M_PER_S * self.mass_kg:.{KNOCK_DIGITS}g}")
+        return float(f"{KNOCK_M_PER_S * self.mass_kg:.12g}")
 
     @property
     def used(self) -> "ExecutionSettings":
@@ -137,24 +133,22 @@ class ExecutionSettings:
         return math.radians(self.most_deg)
 
 
-def _trial_kind(value: TrialKind) -> TrialKind:
-    one_of(value, KINDS, "trials")
-    return value
-
-
-POSITIVE = (
+QUANTITIES = (
     "mass_kg", "push_n", "stiffness_n_per_m", "lift_m", "stop_m_per_s2", "stop_from_m_per_s",
-    "most_mm", "most_deg",
+    "most_mm", "most_deg", "tip_radius_m",
 )  # fmt: skip
-NOT_NEGATIVE = ("shake_g", "off_mm")
-RANGES = ("lift_s", "shake_hz", "off_deg")
-
+NOT_NEGATIVE = ("shake_g", "off_mm", "knock_n_s")
+RANGES = {
+    **{key: {"least": SMALLEST, "most": LARGEST} for key in QUANTITIES},
+    **{key: {"least": 0.0, "most": LARGEST} for key in NOT_NEGATIVE},
+    **{name: BOUNDS[name] for name in ("lift_s", "shake_hz", "off_deg")},
+}
+"""Least and largest value of each number."""
 
 TABLE = "execution"
 """Name of the table in a settings file."""
 MASS, DENSITY = "mass_kg", "density_kg_m3"
-KNOWN = (*(each.name for each in fields(ExecutionSettings)), DENSITY)
-KNOWN_OF_HAND = tuple(each.name for each in fields(HeldSettings))
+
 ANY_MASS_KG = 1.0
 """Mass that stands in the settings until a density gives each object its own."""
 
@@ -168,7 +162,6 @@ class AskedExecution:
     """
 
     settings: ExecutionSettings
-    """Settings of every execution; their mass does not count where a density is given."""
     density_kg_m3: float | None = None
     """Density of every object; None where all objects have the mass of the settings [kg/m^3]."""
 
@@ -188,20 +181,17 @@ def asked_execution(table: object) -> AskedExecution:
     if not isinstance(table, Mapping):
         raise InputError(f"{TABLE}: expected a table of settings, got {shown(table)}")
     given = {**cast("Mapping[str, Any]", table)}
-    _check_names(given, KNOWN, TABLE)
+    _check_names(given, (*(each.name for each in fields(ExecutionSettings)), DENSITY), TABLE)
     if isinstance(hand := given.get("hand"), dict):
-        _check_names(cast("dict[str, Any]", hand), KNOWN_OF_HAND, f"{TABLE}.hand")
+        known = tuple(each.name for each in fields(HeldSettings))
+        _check_names(cast("dict[str, Any]", hand), known, f"{TABLE}.hand")
     if (MASS in given) == (DENSITY in given):
         got = "both" if MASS in given else "neither"
         raise InputError(f"{TABLE}: expected one of {MASS} and {DENSITY}, got {got}")
     density = given.pop(DENSITY, None)
-    if density is not None and (isinstance(density, bool) or not isinstance(density, int | float)):
-        raise InputError(f"{TABLE}.{DENSITY}: expected a number, got {shown(density)}")
     settings = settings_of(ExecutionSettings, {MASS: ANY_MASS_KG, **given}, [TABLE])
-    try:
-        return AskedExecution(settings, None if density is None else float(density))
-    except InputError as error:
-        raise InputError(f"{TABLE}: {error}") from error
+    with about(TABLE):
+        return AskedExecution(settings, None if density is None else positive(density, DENSITY))
 
 
 def _check_names(given: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:

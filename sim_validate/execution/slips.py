@@ -53,7 +53,6 @@ class Seen:
     moved: Array
     """Displacement of the object's centre of mass, (n, 3) [m]."""
     turned: Array
-    """Orientation of the object, (n, 3, 3)."""
     spun: Array
     """Orientations of the fingertips in the object's frame, (n, k, 3, 3), or (n, 1, 3, 3) where
     they turn alike."""
@@ -66,16 +65,15 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of an object in one trial, against its place when the trial began."""
+    """What became of an object in one trial, against its place when the trial began.
+
+    The figures are those of `ExecutionTrial`.
+    """
 
     slip_m: float
-    """Farthest that a point of contact slid on the object [m]."""
     displacement_m: float
-    """Largest displacement of the centre of mass against the palm [m]."""
     turn_rad: float
-    """Largest turn against the palm [rad]."""
     dropped: bool
-    """Whether no fingertip touches the object at the end."""
     slipped: bool
     """Whether a contact slipped: one was on its cone, or slid by more than `SLID`."""
     first_slip: float
@@ -99,10 +97,7 @@ def seen(motion: HeldMotion, layout: HeldLayout) -> Seen:
 def outcome(
     motion: HeldMotion, layout: HeldLayout, drive: Drive, friction: Array, begun: int = 0
 ) -> Outcome:
-    """Say what became of the object since a sample of a trial.
-
-    Takes `friction` (k,).
-    """
+    """Say what became of the object since a sample of a trial."""
     found = seen(motion, layout)
     relative = found.turned[begun:] @ found.turned[begun].T
     cosines = 0.5 * (np.einsum("nii->n", relative) - 1.0)
@@ -147,8 +142,7 @@ def _slid(found: Seen, layout: HeldLayout, begun: int) -> Array:
 def first_trouble(motion: HeldMotion, layout: HeldLayout, friction: Array, begun: int) -> int:
     """Return the first sample in which a contact slips or opens, or the simulator fails.
 
-    It is the number of samples where there is none. Fingertips that hardly push at rest do not
-    count.
+    It is the number of samples where there is none.
     """
     found = seen(motion, layout)
     on_cone = _on_cone(found, friction, begun)[1].any(axis=1)
@@ -172,10 +166,6 @@ def _on_cone(
 def _first_slip(
     found: Seen, shares: Array, friction: Array, begun: int, leaving: Array | None = None
 ) -> float:
-    """Return the multiple of the load at first slip.
-
-    Takes `shares` (n,); `friction` (k,).
-    """
     pushing, on_cone = _on_cone(found, friction, begun)
     if not pushing.any():
         return 0.0
@@ -206,7 +196,7 @@ def _touches(on_cone: NDArray[np.bool_], shares: Array, slid: Array) -> NDArray[
 
 
 def _extrapolated(found: Seen, shares: Array, friction: Array, begun: int, at: Indices) -> Array:
-    """Return the multiple of the load at first slip as it is seen in some samples, (m,)."""
+    """Return the multiple of the load at first slip as it is seen in samples `at`, (m,)."""
     rest = found.forces[begun]
     changes = (found.forces[at] - rest).reshape(-1, 3)
     steps = slip_steps(np.tile(rest, (len(at), 1)), changes, np.tile(friction, len(at)))

@@ -14,7 +14,7 @@ the face, so faces are tried in this order.
 
 import importlib
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -114,7 +114,7 @@ class Rest:
     """A face of the convex hull on which the object can rest."""
 
     down: Array
-    """Unit normal out of the object, (3,)."""
+    """Unit normal out of the object."""
     height: float
     """Distance of the centre of mass from the table [m]."""
     likelihood: float
@@ -138,7 +138,8 @@ def rests(body: Polyhedron) -> tuple[Rest, ...]:
         own = [facet for facet in np.flatnonzero(alike) if facet in left]
         left -= set(own)
         triangles = points[hull.simplices[own]]
-        if _carries(triangles, normals[first]):
+        # the origin, dropped along the normal, falls into one of the triangles
+        if any(_is_inside(corners, normals[first]) for corners in triangles):
             share = float(sum(_solid_angle(corners) for corners in triangles) / (4.0 * np.pi))
             found.append(Rest(normals[first], float(offsets[first]) * body.radius, share))
     order = largest_first([rest.likelihood for rest in found])
@@ -146,19 +147,11 @@ def rests(body: Polyhedron) -> tuple[Rest, ...]:
 
 
 def resting(body: Polyhedron, tips: Array, radii: Array) -> Rest | None:
-    """Return the likeliest rest in which no fingertip meets the table; None if there is none.
-
-    Takes `tips` (k, 3) [m]; `radii` (k,) [m].
-    """
+    """Return the likeliest rest in which no fingertip meets the table; None if there is none."""
     for rest in rests(body):
         if (tips @ rest.down + radii).max() <= rest.height - CLEAR * body.radius:
             return rest
     return None
-
-
-def _carries(triangles: Array, normal: Array) -> bool:
-    """Return whether the origin, dropped along a normal, falls into one of the triangles."""
-    return any(_is_inside(corners, normal) for corners in triangles)
 
 
 def _is_inside(corners: Array, normal: Array) -> bool:
@@ -189,7 +182,6 @@ class Trial:
     name: str
     drive: Drive
     begun: int
-    """Index of the sample after which the load comes."""
     apart: bool = False
     """Whether the trial starts with open fingers, not from the squeezed object."""
     weighing: int = 0
@@ -211,39 +203,23 @@ class Skipped:
 def trials_of(
     body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings, lowest_frequency: float
 ) -> tuple[tuple[Trial, ...], tuple[Skipped, ...]]:
-    """Return the trials that are asked for, and the kinds that are left out with the reasons.
-
-    Takes `lowest_frequency` [rad/s].
-    """
-    every = [
-        each
-        for kind in settings.trials
-        for each in _of_kind(kind, body, layout, settings, lowest_frequency)
-    ]
-    return (
-        tuple(each for each in every if isinstance(each, Trial)),
-        tuple(each for each in every if isinstance(each, Skipped)),
-    )
-
-
-def _of_kind(
-    kind: TrialKind, body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings,
-    lowest_frequency: float,
-) -> Iterable[Trial | Skipped]:  # fmt: skip
-    """Return the trials of a kind, or why there is none."""
-    if kind in OF_NO_SIZE and getattr(settings, OF_NO_SIZE[kind]) == 0.0:
-        return [Skipped(kind, _no_size(OF_NO_SIZE[kind]))]
-    if kind == "weight":
-        return [Trial(kind, kind, paths.turned_weight(lowest_frequency), 0, turning=True)]
-    if kind == "lift":
-        return [_lift(body, layout, settings)]
+    """Return the trials that are asked for, and the kinds that are left out with the reasons."""
+    found, skipped = list[Trial](), list[Skipped]()
     sized = {"shake": _shakes, "stop": _stops, "knock": _knocks, "misplaced": _misplaced}
-    return sized[kind](layout, settings)
-
-
-def _no_size(setting: str) -> str:
-    """Say that a setting is zero, under its name in Python and as a flag."""
-    return f"its size is 0 ({setting}, --{setting.replace('_', '-')})"
+    for kind in settings.trials:
+        if (size := OF_NO_SIZE.get(kind)) and getattr(settings, size) == 0.0:
+            flag = size.replace("_", "-")
+            skipped.append(Skipped(kind, f"its size is 0 ({size}, --{flag})"))
+        elif kind == "weight":
+            drive = paths.turned_weight(lowest_frequency)
+            found.append(Trial(kind, kind, drive, 0, turning=True))
+        elif kind == "lift":
+            lift = _lift(body, layout, settings)
+            found += [lift] if isinstance(lift, Trial) else []
+            skipped += [lift] if isinstance(lift, Skipped) else []
+        else:
+            found += sized[kind](layout, settings)
+    return tuple(found), tuple(skipped)
 
 
 def _lift(body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings) -> Trial | Skipped:

@@ -79,9 +79,7 @@ class ExecutionControl:
     name: str
     """What is weaker than certified: friction, squeeze, or a finger that does not push."""
     let_go: bool
-    """Whether a contact slipped, as it must."""
     first_slip: float
-    """Multiple of the load at which the first contact slipped."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

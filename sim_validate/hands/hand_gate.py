@@ -151,7 +151,7 @@ def _displaced(scene: HandScene, setup: Setup) -> Check:
     patient = replace(setup, hold=replace(setup.hold, settle_s=SETTLE_S))
     rig = squeezed(Bench(smooth), patient, forces, SLIPPERY)
     size = GENTLE * TORQUE / HEIGHT
-    (poses,) = rig.motions_of_holds([Load(size * np.eye(6)[0], forces)])
+    (poses,) = rig.joints(rig.holds([Load(size * np.eye(6)[0], forces)]))
     exact = size * HEIGHT**2 / (2.0 * layout.servo_n_m_per_rad)
     return Check(
         "displacement by the servos, over the exact one", float(poses[-1, 0]) / exact, *SOFTER

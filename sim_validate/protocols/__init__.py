@@ -1,4 +1,1 @@
-"""What do other tools' tests say about a grasp, beside ours and the predicted margin?
-
-Each test is a value: loads, durations, thresholds, with the files that state them.
-"""
+"""Published tests of grasps, run as they are stated, and how their verdicts compare to ours."""

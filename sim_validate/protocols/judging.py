@@ -11,18 +11,17 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue, summary
-from grasp_core.checked import coefficient, instance, one_of, several
-from grasp_core.closure.contacts import FEWEST
+from grasp_core.checked import coefficient, instance, one_of
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
-from grasp_core.objects.on_faces import check_body, check_on_faces
+from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.values import Contact, Grasp
@@ -30,6 +29,7 @@ from scenes.hands.hand_scene import build_hand_scene
 from scenes.mjcf import Scene
 from scenes.tested import HandServos, fingertip_scene, hand_scene, planned_postures
 from sim_validate.dexgraspbench import RecordedReach, hand_file, recorded_postures
+from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.hands.validate_hand import hand_setup
 from sim_validate.parallel.processes import each
@@ -37,8 +37,8 @@ from sim_validate.protocols.published import PROTOCOLS, PublishedProtocol
 from sim_validate.protocols.runs import RunVerdict, their_verdict
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.gate import require_faithful
-from sim_validate.simulation.loads import PlannedLoad, loads_as_they_are
-from sim_validate.simulation.rig import Rig, squeezed
+from sim_validate.simulation.loads import loads_as_they_are
+from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.traces import Outcome, judge
 
@@ -55,7 +55,6 @@ class OurVerdict:
     """Least multiple of the loads that is resisted according to the analysis; 0 without closure,
     and infinite without a load."""
     reason: str
-    """Why it was not held; empty if it was."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -128,8 +127,8 @@ def judge_by(
     check_body(body)
     coefficient(friction)
     setup = Setup() if setup is None else instance(setup, Setup, "setup")
-    given = _given(body, grasp)
-    contacts = given.contacts if isinstance(given, Grasp) else given
+    contacts = given_contacts(body, grasp)
+    given = grasp if isinstance(grasp, Grasp) else contacts
     require_faithful(setup, friction, body.radius)
     scene = fingertip_scene(
         body, given, found.friction, found.mass_of(body), found.physics, setup.fingers
@@ -232,17 +231,6 @@ def _protocol(given: str | PublishedProtocol) -> PublishedProtocol:
     return PROTOCOLS[given]
 
 
-def _given(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> Grasp | tuple[Contact, ...]:
-    if isinstance(grasp, Grasp):
-        check_on_faces(body, grasp)
-        return grasp
-    each = partial(instance, kind=Contact, name="grasp", remedy="or give a Grasp")
-    contacts = several(grasp, each, "grasp", "Contact values")
-    if len(contacts) < FEWEST:
-        raise InputError(f"grasp: at least two contacts are needed, got {len(contacts)}")
-    return contacts
-
-
 def our_verdict(
     body: Polyhedron,
     contacts: Sequence[Contact],
@@ -252,67 +240,37 @@ def our_verdict(
     scene: Callable[[], Scene],
     motors: Motors | None = None,
 ) -> OurVerdict:
-    """Predict the least multiple of forces that contacts resist, and hold the forces in simulation.
-
-    Takes `forces` (3,) [N].
-    """
+    """Predict the least multiple of forces [N] that contacts resist, and hold the forces."""
     if not force_closure(contacts, friction=friction, torsion_m=setup.torsion_m).closed:
         told = f"the contacts are proved not to be in force closure at friction {friction:g}"
         return OurVerdict(False, False, 0.0, told)
     bench = Bench(scene(), threads=setup.threads, timeout_s=setup.timeout_s)
     layout = bench.scene.layout
     rig = squeezed(bench, setup, layout.squeeze_forces, friction)
-    named = [(_name(force), np.concatenate([force, np.zeros(3)])) for force in forces]
+    named = [
+        (" ".join(f"{part:.3g}" for part in force.tolist()) + " N",
+         np.concatenate([force, np.zeros(3)]))
+        for force in forces
+    ]  # fmt: skip
     loads = loads_as_they_are(body, contacts, friction, rig.idle, named, setup, motors=motors)
     margin = min((load.predicted_limit for load in loads), default=math.inf)
-    reason = _not_held(rig, loads, setup)
-    return OurVerdict(True, not reason, margin, reason)
-
-
-def _name(force: Array) -> str:
-    x, y, z = force.tolist()
-    return f"{x:.3g} {y:.3g} {z:.3g} N"
-
-
-def _not_held(rig: Rig, loads: Sequence[PlannedLoad], setup: Setup) -> str:
-    """Hold all loads, or none at all where there are none; say what was not held."""
-    held = [each.load for each in loads] or [rig.idle]
-    names = [each.name for each in loads] or ["no load"]
+    held = [load.load for load in loads] or [rig.idle]
+    names = [load.name for load in loads] or ["no load"]
     for name, trace in zip(names, rig.hold(held), strict=True):
-        found = judge(trace, rig.bench.scene.layout, setup.hold)
+        found = judge(trace, layout, setup.hold)
         if found.outcome is not Outcome.HELD:
-            return f"{name}: {found.outcome.value}: {found.reason}"
-    return ""
+            return OurVerdict(True, False, margin, f"{name}: {found.outcome.value}: {found.reason}")
+    return OurVerdict(True, True, margin, "")
 
 
-@dataclass(frozen=True, slots=True)
-class GraspCase:
-    """A grasp to judge by a test, as it is sent to a worker process."""
-
-    protocol: str
-    body: Polyhedron
-    grasp: Grasp
-    friction: float
-    setup: Setup
+Case: TypeAlias = Callable[[], Judgement]
+"""A call of `judge_by` or `judge_hand_by`, which can be sent to a worker process: a `partial`."""
 
 
-@dataclass(frozen=True, slots=True)
-class HandCase:
-    """A hand in a grasp to judge by a test, as it is sent to a worker process."""
-
-    protocol: str
-    hand: Hand
-    body: Polyhedron
-    reach: HandReach
-    friction: float
-
-
-def judged(cases: Sequence[GraspCase | HandCase], processes: int) -> Iterator[Judgement]:
+def judged(cases: Sequence[Case], processes: int) -> Iterator[Judgement]:
     """Yield one judgement per case, in order; the number of processes does not change them."""
     yield from each(_judged, cases, jobs=processes)
 
 
-def _judged(case: GraspCase | HandCase) -> Judgement:
-    if isinstance(case, HandCase):
-        return judge_hand_by(case.protocol, case.hand, case.body, case.reach, case.friction)
-    return judge_by(case.protocol, case.body, case.grasp, case.friction, setup=case.setup)
+def _judged(case: Case) -> Judgement:
+    return case()

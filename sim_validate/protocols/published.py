@@ -30,9 +30,7 @@ class Source:
     repository: str
     """Owner and name on GitHub."""
     commit: str
-    """Commit that was read, in full."""
     paths: tuple[str, ...]
-    """Files in it that state the numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +64,7 @@ class Passing:
     most_m: float = math.inf
     """Displacement below which a look passes [m]."""
     most_deg: float = math.inf
-    """Turn below which a look passes [deg]."""
     fingers: int = 0
-    """Least number of fingers that must touch the object at each look."""
     most_overlap_m: float | None = None
     """Overlap of hand and object before closing up to which a grasp is tested at all [m]; None
     where the test does not ask."""

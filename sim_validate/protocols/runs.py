@@ -21,8 +21,9 @@ import numpy as np
 from grasp_core.arrays import Array
 from scenes.silent_mujoco import unlogged
 from scenes.tested import TestedScene
-from sim_validate.protocols.published import Passing, PublishedProtocol, Run, Step
+from sim_validate.protocols.published import Passing, PublishedProtocol, Run
 from sim_validate.simulation.bench import batch, compiled, faults, mujoco, step
+from sim_validate.simulation.schedules import samples
 from sim_validate.simulation.traces import rotation_angles
 
 CHUNK = 10
@@ -42,7 +43,6 @@ class Timeline:
     wrenches: Array
     """Force and torque on the object, along the world's axes, (n, 6) [N, N m]."""
     looks: tuple[int, ...]
-    """Samples after which the object is looked at."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,9 +52,7 @@ class Motion:
     poses: Array
     """Position of the object's centre of mass and its orientation (w, x, y, z), (n, 7)."""
     touching: tuple[frozenset[int], ...]
-    """For each look, the fingers that touch the object."""
     fault: str
-    """What went wrong in the simulator; empty if nothing did."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +60,8 @@ class RunVerdict:
     """How one run of a published test ended."""
 
     number: int
-    """Number of the run in the test, from 0."""
     passed: bool
     reason: str
-    """Why it did not pass; empty if it did."""
     displacement_m: float
     """Largest displacement at a look, up to the first that did not pass [m]."""
     turn_deg: float
@@ -91,23 +87,18 @@ def timeline(protocol: PublishedProtocol, scene: TestedScene, run: Run) -> Timel
     """Lay out one run: closing, squeezing, then its steps."""
     sample_s = CHUNK * scene.physics.timestep
     closing = _closing(protocol, scene, sample_s)
-    counts = [_samples(step.seconds, sample_s) for step in run]
-    begins = np.cumsum([len(closing), *counts])[:-1].tolist()
-    looks = [
-        look
-        for first, count, step in zip(begins, counts, run, strict=True)
-        for look in _looks(first, count, step, sample_s)
-    ]
-    n = len(closing) + sum(counts)
+    counts = [samples(step.seconds, sample_s) for step in run]
+    begins = np.cumsum([len(closing), *counts]).tolist()
+    looks = list[int]()
+    for first, end, part in zip(begins, begins[1:], run, strict=False):
+        every = end - first if part.look_s is None else samples(part.look_s, sample_s)
+        looks += sorted({*range(first + every - 1, end, every), end - 1})
+    n = begins[-1]
     wrenches = np.zeros((n, 6))
     wrenches[len(closing) :] = _wrenches(run, counts, scene, sample_s)
     wrenches = (wrenches.reshape(n, 2, 3) @ scene.axes.T).reshape(n, 6)
     held = np.broadcast_to(scene.squeezing, (sum(counts), len(scene.squeezing)))
     return Timeline(np.vstack([closing, held]), wrenches, tuple(looks))
-
-
-def _samples(seconds: float, sample_s: float) -> int:
-    return max(1, round(seconds / sample_s))
 
 
 def _closing(protocol: PublishedProtocol, scene: TestedScene, sample_s: float) -> Array:
@@ -118,14 +109,8 @@ def _closing(protocol: PublishedProtocol, scene: TestedScene, sample_s: float) -
         (protocol.squeeze_s, scene.shut, scene.squeezing),
     ):
         if seconds:
-            parts.append(np.linspace(begin, end, _samples(seconds, sample_s) + 1)[1:])
+            parts.append(np.linspace(begin, end, samples(seconds, sample_s) + 1)[1:])
     return np.vstack(parts)
-
-
-def _looks(first: int, count: int, step: Step, sample_s: float) -> list[int]:
-    every = count if step.look_s is None else _samples(step.look_s, sample_s)
-    last = first + count - 1
-    return sorted({*range(first + every - 1, last + 1, every), last})
 
 
 def _wrenches(run: Run, counts: list[int], scene: TestedScene, sample_s: float) -> Array:
@@ -235,15 +220,11 @@ def judged_run(number: int, motion: Motion, run: Timeline, passing: Passing) -> 
         turn = float(np.degrees(rotation_angles(pose[None, 3:], AT_REST[None, 3:])[0]))
         moved, turned = max(moved, shift), max(turned, turn)
         seen.append(fingers)
-        reason = _why(shift, turn, fingers, passing)
+        if not shift < passing.most_m:
+            reason = f"the object moved by {1e3 * shift:.3g} mm, and {1e3 * passing.most_m:g}"
+            reason += " is enough"
+        elif not turn < passing.most_deg:
+            reason = f"the object turned by {turn:.3g} deg, and {passing.most_deg:g} is enough"
+        elif fingers < passing.fingers:
+            reason = f"{fingers} fingers touched the object, and {passing.fingers} must"
     return RunVerdict(number, not reason, reason, moved, turned, min(seen, default=0))
-
-
-def _why(shift_m: float, turn_deg: float, fingers: int, passing: Passing) -> str:
-    if not shift_m < passing.most_m:
-        return f"the object moved by {1e3 * shift_m:.3g} mm, and {1e3 * passing.most_m:g} is enough"
-    if not turn_deg < passing.most_deg:
-        return f"the object turned by {turn_deg:.3g} deg, and {passing.most_deg:g} is enough"
-    if fingers < passing.fingers:
-        return f"{fingers} fingers touched the object, and {passing.fingers} must"
-    return ""

@@ -8,12 +8,6 @@ number of threads.
 # pyright: basic, reportAttributeAccessIssue=false
 # MuJoCo ships no types for its core; plain arrays and numbers leave this module.
 
-
-# pyright: basic, reportAttributeAccessIssue=false
-# MuJoCo ships no types for its core.
-
-# pyright: basic, reportAttributeAccessIssue=false
-# MuJoCo ships no types for its core; plain arrays and numbers leave this module.
 import math
 import time
 from collections.abc import Sequence
@@ -27,7 +21,7 @@ from grasp_core.arrays import Array, Indices, cross, to_digits
 from grasp_core.errors import InputError
 from scenes.mjcf import Scene
 from scenes.silent_mujoco import batch, mujoco, unlogged
-from sim_validate.simulation.schedules import Clock, Schedule
+from sim_validate.simulation.schedules import Schedule
 
 STATE = ("time", "qpos", "qvel", "ctrl", "xfrc_applied")
 """Parts of a state, which lie in the order of their bits."""
@@ -47,16 +41,12 @@ def state_parts(model: mujoco.MjModel) -> dict[str, slice]:
 
     A batch finds them too, but needs a whole `MjData` for it, which takes longer than most trials.
     """
-    ends = {}
+    found, every = {}, int(mujoco.mjtState.mjSTATE_INTEGRATION)
     for name in STATE:
-        upto = 2 * int(getattr(mujoco.mjtState, f"mjSTATE_{name.upper()}")) - 1
-        upto &= int(mujoco.mjtState.mjSTATE_INTEGRATION)
-        ends[name] = mujoco.mj_stateSize(model, upto)
-    sizes = {
-        name: mujoco.mj_stateSize(model, int(getattr(mujoco.mjtState, f"mjSTATE_{name.upper()}")))
-        for name in STATE
-    }
-    return {name: slice(end - sizes[name], end) for name, end in ends.items()}
+        bit = int(getattr(mujoco.mjtState, f"mjSTATE_{name.upper()}"))
+        end = mujoco.mj_stateSize(model, (2 * bit - 1) & every)
+        found[name] = slice(end - mujoco.mj_stateSize(model, bit), end)
+    return found
 
 
 def step(
@@ -105,37 +95,41 @@ FEWEST = 2
 """Fewest trials that room is made for: one to close the fingers, and most controls have two."""
 CHUNK = 5
 """Simulation steps per sample; loads change, and motion is recorded, once per sample."""
+CLOCK_SLACK_S = 1e-9
+"""Largest clock error that counts as rounding [s]: simulated time is a sum of equal steps, and a
+reset would change it by milliseconds."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Motion:
-    """Where object and fingertips were in each of the n samples of a trial, in the world frame."""
+@dataclass(frozen=True, slots=True)
+class Health:
+    """Whether the simulator did what it was told in a trial."""
 
-    times_s: Array
-    """Times of the samples, (n,) [s]."""
-    joints: Array
-    """Joint positions, (n, 7 + 3k), or (n, 7) for rigid fingertips [m]: position (3) and quaternion
-    (4) of the object's frame, then the slides (3) of each fingertip along its contact's axes."""
-    state: Array
-    """Complete state of the simulator at the end, from which a further trial can start."""
-    finite: bool
-    """Whether every number of the simulator's state stayed finite."""
-    warnings: int
-    """How many warnings the simulator raised."""
-    clock_error_s: float
+    finite: bool = True
+    warnings: int = 0
+    clock_error_s: float = 0.0
     """Simulated time minus the time stepped [s]; it is not zero after a silent reset."""
-    error: str
-    """The simulator's own message if it gave up, otherwise empty."""
-    timed_out: bool
-    """Whether the trial was stopped before its end."""
-    skipped: int = 0
-    """How many samples of its schedule were left out before friction was lowered, because the
-    object had settled."""
+    error: str = ""
+    """The simulator's own message if it gave up."""
+    timed_out: bool = False
 
-    def after(self, earlier: "Motion") -> "Motion":
-        """Add the faults of the earlier motion whose end state this motion started from."""
-        return replace(
-            self,
+    @property
+    def fault(self) -> str:
+        """Why the trial proves nothing about the object, such as divergence; else empty."""
+        if self.error:
+            return self.error
+        if self.timed_out:
+            return "stopped before its end"
+        if not self.finite:
+            return "a number of the state is not finite"
+        if self.warnings:
+            return f"the simulator raised {self.warnings} warnings"
+        if abs(self.clock_error_s) > CLOCK_SLACK_S:
+            return f"the simulator's clock is off by {self.clock_error_s:.3g} s: it was reset"
+        return ""
+
+    def after(self, earlier: "Health") -> "Health":
+        """Add the faults of an earlier trial whose end state this one started from."""
+        return Health(
             finite=earlier.finite and self.finite,
             warnings=earlier.warnings + self.warnings,
             clock_error_s=earlier.clock_error_s + self.clock_error_s,
@@ -144,8 +138,28 @@ class Motion:
         )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Where object and fingertips were in each of the n samples of a trial, in the world frame."""
+
+    times_s: Array
+    joints: Array
+    """Joint positions, (n, 7 + 3k), or (n, 7) for rigid fingertips [m]: position (3) and quaternion
+    (4) of the object's frame, then the slides (3) of each fingertip along its contact's axes."""
+    state: Array
+    """Complete state of the simulator at the end, from which a further trial can start."""
+    health: Health
+    skipped: int = 0
+    """How many samples of its schedule were left out before friction was lowered, because the
+    object had settled."""
+
+    def after(self, earlier: "Motion") -> "Motion":
+        """Add the faults of the earlier motion whose end state this motion started from."""
+        return replace(self, health=self.health.after(earlier.health))
+
+
 class Ends(Protocol):
-    """What tells which trials may end before their schedules do."""
+    """What tells which trials may end before their schedules do: `EarlyEnds`."""
 
     earliest: int
     """The first sample after which it wants to look."""
@@ -165,7 +179,7 @@ class Bench:
         self.scene, self.threads = scene, threads
         self.deadline = time.monotonic() + timeout_s
         self.model = compiled(scene.xml)
-        self.clock = Clock(CHUNK * self.model.opt.timestep)
+        self.sample_s = CHUNK * float(self.model.opt.timestep)
         self.body = self.model.body("object").id
         self.parts = state_parts(self.model)
         touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
@@ -189,32 +203,29 @@ class Bench:
             trials.state[: len(schedules)] = start
         clock = trials.state[:, self.parts["time"]][:, 0]
         begun = float(clock[0])
-        ran = self._step_through(trials, schedules, ends)
+        every, counts, skipped, stopped, errors = self._step_through(trials, schedules, ends)
         warned = trials.warning[:, :, 1].sum(axis=1)
-        times = self.model.opt.timestep * (CHUNK * np.arange(1, ran.joints.shape[1] + 1))
+        times = self.model.opt.timestep * (CHUNK * np.arange(1, every.shape[1] + 1))
         found: list[Motion] = []
-        for trial, count in enumerate(ran.counts):
-            joints, state = ran.joints[trial, :count], trials.state[trial].copy()
+        for trial, count in enumerate(counts):
+            joints, state = every[trial, :count], trials.state[trial].copy()
             expected = begun + CHUNK * int(count) * self.model.opt.timestep
-            found.append(
-                Motion(
-                    times_s=times[:count],
-                    joints=joints,
-                    state=state,
-                    finite=bool(np.isfinite(state).all() and np.isfinite(joints).all()),
-                    warnings=int(warned[trial]),
-                    clock_error_s=float(clock[trial] - expected),
-                    error=ran.errors.get(trial, ""),
-                    timed_out=bool(ran.stopped[trial]),
-                    skipped=int(ran.skipped[trial]),
-                )
-            )
+            health = Health(
+                bool(np.isfinite(state).all() and np.isfinite(joints).all()), int(warned[trial]),
+                float(clock[trial] - expected), errors.get(trial, ""), bool(stopped[trial]),
+            )  # fmt: skip
+            found.append(Motion(times[:count], joints, state, health, int(skipped[trial])))
         return tuple(found)
 
     def _step_through(
         self, trials: batch.Batch, schedules: Sequence[Schedule], ends: Ends | None
-    ) -> "_Ran":
-        """Step m trials to their ends."""
+    ) -> tuple[Array, Indices, Indices, Mask, dict[int, str]]:
+        """Step m trials to their ends.
+
+        Gives joint positions, (m, n, q), of which each trial has filled in its own number of
+        samples; these numbers, those of samples left out, and whether time ran out, (m,) each; and
+        the simulator's own messages by trial.
+        """
         wrenches, controls, frictions = self._applied(schedules)
         count, length = frictions.shape
         watched = np.array([schedule.watched for schedule in schedules])
@@ -223,41 +234,39 @@ class Bench:
         )
         applied = applied.reshape(len(applied), -1, 6)[:, self.body]
         friction = trials.expand("geom_friction")[:, self.touching, 0]
-        ran = _Ran(
-            np.empty((count, length, joints.shape[1])), np.zeros(count, dtype=np.intp),
-            np.zeros(count, dtype=np.intp), np.zeros(count, dtype=bool), {},
-        )  # fmt: skip
-        going, sample = np.arange(count), np.zeros(count, dtype=np.intp)
+        every = np.empty((count, length, joints.shape[1]))
+        counts, skipped, sample = (np.zeros(count, dtype=np.intp) for _ in range(3))
+        going, stopped, errors = np.arange(count), np.zeros(count, dtype=bool), dict[int, str]()
         # before any may end, all trials are at the same sample: slices are quicker than indices
         alike = length if ends is None else ends.earliest
         with unlogged():
             while going.size:
                 if time.monotonic() > self.deadline:
-                    ran.stopped[going] = True
+                    stopped[going] = True
                     break
                 together = sample[0] < alike
                 rows = slice(count) if together else going
                 now = int(sample[0]) if together else sample[going]
-                done = now if together else ran.counts[going]
+                done = now if together else counts[going]
                 applied[rows] = wrenches[rows, now]
                 servos[rows] = controls[rows, now]
                 friction[rows] = frictions[rows, now, None]
-                step(trials, ran.errors, CHUNK, going)
-                ran.joints[rows, done] = joints[rows]
-                ran.counts[rows] += 1
+                step(trials, errors, CHUNK, going)
+                every[rows, done] = joints[rows]
+                counts[rows] += 1
                 if ends is not None and not together:
                     settled, answered = ends.look(
                         going, sample[going], joints[going], speeds[going]
                     )
                     early = going[settled]
                     if early.size:
-                        ran.skipped[early] += watched[early] - 1 - sample[early]
+                        skipped[early] += watched[early] - 1 - sample[early]
                         sample[early] = watched[early] - 1
                     going = going[~answered]
                 sample[rows] += 1
                 if not together or now == length - 1:
                     going = going[sample[going] < length]
-        return ran
+        return every, counts, skipped, stopped, errors
 
     def _applied(self, schedules: Sequence[Schedule]) -> tuple[Array, Array, Array]:
         """Return what is applied in each of n samples of m trials, as the simulator takes it.
@@ -276,28 +285,8 @@ class Bench:
         return wrenches, controls, frictions
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Ran:
-    """What m trials did."""
-
-    joints: Array
-    """Joint positions, (m, n, q), of which each trial has filled in its own number of samples."""
-    counts: Indices
-    """Number of samples of each trial, (m,)."""
-    skipped: Indices
-    """Number of samples that each trial left out, (m,)."""
-    stopped: Mask
-    """Whether time ran out, (m,)."""
-    errors: dict[int, str]
-    """The simulator's own messages, by trial."""
-
-
 def first_touch(scene: Scene) -> tuple[Array, Array]:
-    """Find what each fingertip touches before anything moves.
-
-    Gives normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a
-    fingertip that has not exactly one contact.
-    """
+    """Find what each fingertip touches before anything moves, as `touched` gives it."""
     model = compiled(scene.xml)
     tips = [model.geom(f"finger{finger}").id for finger in range(len(scene.layout.contacts))]
     return touched(model, mujoco.MjData(model), tips)

@@ -93,7 +93,6 @@ class EarlyEnds:
         self, layout: Layout, trials: Sequence[Schedule], sample_s: float, thresholds: Thresholds,
         start: Array | None = None,
     ) -> None:  # fmt: skip
-        """Begin to look at trials."""
         self.layout, self.thresholds, self.sample_s = layout, thresholds, sample_s
         self.resting = np.array([trial.resting for trial in trials])
         self.watched = np.array([trial.watched for trial in trials])
@@ -114,11 +113,9 @@ class EarlyEnds:
     def look(
         self, places: Indices, samples: Indices, joints: Array, speeds: Array
     ) -> tuple[Mask, Mask]:
-        """Look at trials after a sample: have they settled, and are they answered?
+        """Tell whether trials need not settle any longer, and whether they are answered, (n,) each.
 
-        Takes `samples` (n,); `joints` (n, 7 + 3k); `speeds` (n, 6 + 3k). Gives whether each trial
-        need not settle any longer before friction is lowered, and whether its answer is known, (n,)
-        each.
+        Takes `samples` (n,); `joints` (n, 7 + 3k); `speeds` (n, 6 + 3k).
         """
         settled = answered = np.zeros(len(places), dtype=np.bool_)
         with np.errstate(all="ignore"):  # what diverges is neither settled nor answered
@@ -126,15 +123,12 @@ class EarlyEnds:
             after = samples >= self.watched[places]
             if not after.all():
                 settled = ~after & self._settled(places, samples, joints, speeds, reach)
-                self._begin(places[~after], joints[~after])
+                # from where objects must not move, in case friction is lowered next
+                self.starts[places[~after]] = joints[~after, :7]
+                self.began_m[places[~after]] = np.nan
             if after.any():
                 answered = after & self._answered(places, samples, joints, speeds, reach)
         return settled, answered
-
-    def _begin(self, places: Indices, joints: Array) -> None:
-        """Keep the poses from which objects must not move, in case friction is lowered next."""
-        self.starts[places] = joints[:, :7]
-        self.began_m[places] = np.nan
 
     def _reach(self, places: Indices, speeds: Array) -> Array | None:
         """Bound the way of each tip to its equilibrium: B of (3), (n,) [m]; None if unknown."""
@@ -234,11 +228,7 @@ class _Springs:
         self, commands: Array, friction: Array, joints: Array, speeds: Array, reach: Array,
         left_s: Array | float,
     ) -> Mask:  # fmt: skip
-        """Tell whether all contacts stay inside the cones of a friction for a time, (n,).
-
-        Takes `commands` (n, 3k) [N]; `friction` (n,); `joints` (n, 7 + 3k); `speeds` (n, 6 + 3k);
-        `reach` (n,) [m]; `left_s` [s].
-        """
+        """Tell whether all contacts stay inside the cones of a friction for a time, (n,)."""
         pushes = commands - self.spring * joints[:, 7:] - self.damper * speeds[:, 6:]
         pushes = pushes.reshape(len(pushes), -1, 3)
         crept = left_s * (_lengths(speeds[:, 6:]) + self.fastest * reach)

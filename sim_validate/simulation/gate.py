@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from grasp_core.arrays import Array
 from grasp_core.errors import UnfaithfulError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
@@ -32,53 +33,43 @@ MANY_FACED, FINGERS = "random-100-1", 20
 """An example mesh with many faces, and how many fingertips touch it at a time."""
 
 
-@dataclass(frozen=True, slots=True)
-class Touch:
-    """The contact between fingertips and a mesh that differs most from the mesh's faces.
+def worst_touch(
+    body: Polyhedron, contacts: Sequence[Contact], setup: Setup
+) -> tuple[int, float, float]:
+    """Put fingertips a little into a mesh and find the contact that differs most from its face.
 
-    The errors are NaN where a fingertip has no contact, or several.
+    Gives the finger, the error of its normal [rad], and the relative one of its depth; NaN where a
+    fingertip has no contact, or several.
     """
-
-    finger: int
-    normal_error_rad: float
-    depth_error: float
-    """Error of the contact's depth, relative to the right depth."""
-
-    @property
-    def right(self) -> bool:
-        """Whether the errors of normal and depth are within their limits."""
-        return self.normal_error_rad <= NORMAL_ERROR and self.depth_error <= DEPTH_ERROR
-
-
-def worst_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> Touch:
-    """Put fingertips a little into a mesh and find the contact that differs most from its face."""
     rigid = replace(setup, fingers=replace(setup.fingers, drive="rigid", indentation=0.0))
     size = rigid.scene(body, contacts, 1.0).layout.grasp_size_m
     depth = DEPTH * body.radius
     fingers = replace(rigid.fingers, indentation=depth / size)
     normals, depths = first_touch(replace(rigid, fingers=fingers).scene(body, contacts, 1.0))
-    faces = np.array([contact.normal for contact in contacts])
-    turned = np.arctan2(
-        np.linalg.norm(np.cross(normals, faces), axis=1), np.einsum("ki,ki->k", normals, faces)
-    )
+    turned = angles(normals, np.array([contact.normal for contact in contacts]))
     off = np.abs(depths / depth - 1.0)
     errors = np.nan_to_num(np.maximum(turned / NORMAL_ERROR, off / DEPTH_ERROR), nan=np.inf)
     finger = int(np.argmax(errors))
-    return Touch(finger, float(turned[finger]), float(off[finger]))
+    return finger, float(turned[finger]), float(off[finger])
+
+
+def angles(normals: Array, faces: Array) -> Array:
+    """Return the angles between normals and those of their faces, (k,) [rad]."""
+    across = np.linalg.norm(np.cross(normals, faces), axis=1)
+    return np.arctan2(across, np.einsum("ki,ki->k", normals, faces))
 
 
 def require_touch(body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> None:
     """Check that fingertips touch a mesh as its faces lie, where no pads are put between."""
     if setup.surface != "mesh":
         return
-    worst = worst_touch(body, contacts, setup)
-    if not worst.right:
+    finger, turned, off = worst_touch(body, contacts, setup)
+    if not (turned <= NORMAL_ERROR and off <= DEPTH_ERROR):
         raise UnfaithfulError(
-            f"in simulation, fingertip {worst.finger} does not touch the mesh as planned: the "
-            f"contact normal is off by {worst.normal_error_rad:.3g} rad (at most "
-            f"{NORMAL_ERROR:g} is allowed), the depth by a share of {worst.depth_error:.3g} (at "
-            f"most {DEPTH_ERROR:g}; nan means no contact); use --surface pads, or raise "
-            "ccd_iterations in the settings of the physics"
+            f"in simulation, fingertip {finger} does not touch the mesh as planned: the contact "
+            f"normal is off by {turned:.3g} rad (at most {NORMAL_ERROR:g} is allowed), the depth "
+            f"by a share of {off:.3g} (at most {DEPTH_ERROR:g}; nan means no contact); use "
+            "--surface pads, or raise ccd_iterations in the settings of the physics"
         )
 
 
@@ -87,13 +78,17 @@ def mesh_touches(case: Case) -> tuple[Check, Check]:
     body = case.body(MANY_FACED)
     contacts = [Contact(face.centroid, face.normal) for face in body.faces]
     groups = [contacts[start : start + FINGERS] for start in range(0, len(contacts), FINGERS)]
-    touches = [worst_touch(body, group, case.setup) for group in groups]
-    # the maximum is NaN if one angle is
-    turned = np.max([touch.normal_error_rad for touch in touches])
-    deep = np.max([touch.depth_error for touch in touches])
+    _, turned, off = np.transpose([worst_touch(body, group, case.setup) for group in groups])
+    return touch_checks(turned, off)
+
+
+def touch_checks(turned: Array, off: Array, where: str = "") -> tuple[Check, Check]:
+    """Check the largest errors of contacts' normals [rad] and depths; NaN if one is."""
+    normal = f"angle between a contact's normal and its face's{where}"
+    depth = f"error of a contact's depth, relative to it{where}"
     return (
-        Check("angle between a contact's normal and its face's", float(turned), 0.0, NORMAL_ERROR),
-        Check("error of a contact's depth, relative to it", float(deep), 0.0, DEPTH_ERROR),
+        Check(normal, float(np.max(turned)), 0.0, NORMAL_ERROR),
+        Check(depth, float(np.max(off)), 0.0, DEPTH_ERROR),
     )
 
 
@@ -104,20 +99,27 @@ MOST_KNOWN = 256
 
 @dataclass(frozen=True, slots=True)
 class Gate:
-    """The results of checking the simulator on cases with known answers."""
+    """The results of checking a version of MuJoCo on cases with known answers."""
 
     checks: tuple[Check, ...]
     mujoco: str
-    """Version of MuJoCo that was checked."""
 
     @property
     def passed(self) -> bool:
         """Whether all checks passed."""
         return all(check.passed for check in self.checks)
 
+    def require(self, so: str) -> None:
+        """Refuse settings under which a check failed, and say what is `so` not done with them."""
+        if not self.passed:
+            failed = "; ".join(str(check) for check in self.checks if not check.passed)
+            raise UnfaithfulError(
+                f"the simulator is not faithful with these settings, so {so}; these checks failed: "
+                f"{failed}"
+            )
+
 
 _KNOWN: dict[Case, Gate] = {}
-"""Results of the settings that were measured last."""
 
 
 def require_faithful(
@@ -125,12 +127,7 @@ def require_faithful(
 ) -> Gate:
     """Check the simulator on known cases, and refuse settings under which a check fails."""
     gate = measured_gate(setup, friction, radius_m)
-    if not gate.passed:
-        failed = "; ".join(str(check) for check in gate.checks if not check.passed)
-        raise UnfaithfulError(
-            "the simulator is not faithful with these settings, so no grasp is certified; these "
-            f"checks failed: {failed}"
-        )
+    gate.require("no grasp is certified")
     return gate
 
 
@@ -139,7 +136,14 @@ def measured_gate(
 ) -> Gate:
     """Check the simulator on known cases, once per process for the same settings."""
     case = _case(setup, friction, radius_m)
-    return _KNOWN.get(case) or _kept(case, _measured(case))
+    if case in _KNOWN:
+        return _KNOWN[case]
+    pads = replace(case, setup=replace(case.setup, surface="pads"))  # controls are always on pads
+    checks = known_answers(pads)
+    if setup.surface == "mesh":
+        meshes = (*mesh_touches(case), *known_answers(case))
+        checks += tuple(replace(check, name=f"on a mesh: {check.name}") for check in meshes)
+    return _kept(case, Gate(checks, versions()["mujoco"]))
 
 
 def remember_gate(gate: Gate, setup: Setup, friction: float, radius_m: float) -> None:
@@ -159,12 +163,3 @@ def _kept(case: Case, gate: Gate) -> Gate:
     if len(_KNOWN) > MOST_KNOWN:
         del _KNOWN[next(iter(_KNOWN))]
     return gate
-
-
-def _measured(case: Case) -> Gate:
-    pads = replace(case, setup=replace(case.setup, surface="pads"))  # controls are always on pads
-    checks = known_answers(pads)
-    if case.setup.surface == "mesh":
-        meshes = (*mesh_touches(case), *known_answers(case))
-        checks += tuple(replace(check, name=f"on a mesh: {check.name}") for check in meshes)
-    return Gate(checks, versions()["mujoco"])

@@ -38,12 +38,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.contacts import contact_frictions
+from grasp_core.closure.contacts import contact_frictions, stacked
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
-from sim_validate.simulation.bench import Bench
+from sim_validate.simulation.bench import CLOCK_SLACK_S, Bench
 from sim_validate.simulation.limits import (
     SimulatedLimit,
     bisected,
@@ -54,9 +54,9 @@ from sim_validate.simulation.limits import (
     released_friction,
 )
 from sim_validate.simulation.rig import Rig, squeezed
-from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.schedules import Load, Schedule
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.traces import CLOCK_SLACK_S, Trace, holds
+from sim_validate.simulation.traces import holds
 
 LEAST_OFFSET, LARGEST_OFFSET = 0.01, 1.0
 """Least and largest critical friction that two offset fingers on the box can be made to need."""
@@ -86,6 +86,18 @@ class Check:
         )
 
 
+def near(name: str, ratio: float | None, tolerance: float) -> Check:
+    """Check that a measured figure, over the known one, is one; None if it was not measured."""
+    return Check(name, math.nan if ratio is None else ratio, 1.0 - tolerance, 1.0 + tolerance)
+
+
+def sized(name: str, radius_m: float) -> Polyhedron:
+    """Scale an example object to a size, with its centre of mass at the origin."""
+    example = example_object(name)
+    vertices = (example.vertices - example.center_of_mass) * radius_m / example.radius
+    return Polyhedron.from_mesh(vertices, example.triangles, name=name)
+
+
 @dataclass(frozen=True, slots=True)
 class Case:
     """The settings, friction and object size with which the simulator is checked on known cases."""
@@ -99,11 +111,14 @@ class Case:
         """The friction under test, or the nearest one that offset fingers on a box can need."""
         return min(max(self.friction, LEAST_OFFSET), LARGEST_OFFSET)
 
+    @property
+    def push(self) -> float:
+        """The normal force of each finger on the box [N]."""
+        return PUSH * self.setup.fingers.max_normal_force_n
+
     def body(self, name: str) -> Polyhedron:
-        """Scale an example object to the size under test, with its centre of mass at the origin."""
-        example = example_object(name)
-        vertices = (example.vertices - example.center_of_mass) * self.radius_m / example.radius
-        return Polyhedron.from_mesh(vertices, example.triangles, name=name)
+        """Scale an example object to the size under test."""
+        return sized(name, self.radius_m)
 
     def squeezed(
         self, body: Polyhedron, contacts: Sequence[Contact], forces: Array, friction: float
@@ -118,7 +133,7 @@ def tetrahedron(case: Case) -> tuple[Rig, list[Load]]:
     body, largest = case.body("tetrahedron"), case.setup.fingers.max_normal_force_n
     contacts = [Contact(face.centroid, face.normal) for face in body.faces]
     rig = case.squeezed(body, contacts, PUSH * largest * body.normals, case.friction)
-    arms = np.array([contact.position for contact in contacts]) - body.center_of_mass
+    arms = stacked(contacts)[0] - body.center_of_mass
     frictions = contact_frictions(case.friction, len(contacts))
     resisted = WrenchBody(arms, body.normals, frictions, largest)
     found = [limit_of(resisted, wrench) for wrench in axis_wrenches(body.radius)]
@@ -126,6 +141,8 @@ def tetrahedron(case: Case) -> tuple[Rig, list[Load]]:
 
 
 AZIMUTHS_DEG = (0.0, 22.5, 45.0, 67.5)
+SIDES = [(s, t) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
+"""Signs of the places of four contacts, two on each of two opposite faces."""
 SLIP_TOLERANCE = 0.005
 """Largest error of the load at which a box slips, relative to the load that statics predicts."""
 LEAST_LEVER = 0.05
@@ -158,8 +175,10 @@ def _incline(case: Case) -> list[Check]:
     """Let a box weigh on four rigid supports, pull it at their level, and check when it slides."""
     body = case.body("box")
     length, width, height = np.ptp(body.vertices, axis=0)
-    corners = [(s * length / 4, t * width / 4) for s in (-1, 1) for t in (-1, 1)]
-    contacts = [Contact(np.array([x, y, -height / 2]), np.array([0, 0, 1.0])) for x, y in corners]
+    contacts = [
+        Contact(np.array([s * length / 4, t * width / 4, -height / 2]), np.array([0, 0, 1.0]))
+        for s, t in SIDES
+    ]
     rigid = replace(case.setup, fingers=replace(case.setup.fingers, drive="rigid"))
     weight = case.setup.fingers.max_normal_force_n
     resting = Load(np.array([0, 0, -weight, 0, 0, 0.0]), np.zeros((4, 3)))
@@ -178,15 +197,8 @@ def _pulled_box(case: Case) -> list[Check]:
     """Pull a box that fingers hold on two opposite faces, and check when it slips."""
     body = case.body("box")
     length, width, _ = np.ptp(body.vertices, axis=0)
-    contacts = [
-        Contact(np.array([s * length / 2, t * width / 4, 0.0]), np.array([-s, 0.0, 0.0]))
-        for s in (-1.0, 1.0)
-        for t in (-1.0, 1.0)
-    ]
-    push = PUSH * case.setup.fingers.max_normal_force_n
-    forces = push * np.array([contact.normal for contact in contacts])
-    rig = case.squeezed(body, contacts, forces, case.friction)
-    largest = 4.0 * case.friction * push
+    rig = _held_across(case, body, length, width / 4)
+    forces, largest = rig.idle.forces, 4.0 * case.friction * case.push
     limits = [
         Load(np.array([0, *(largest * way), 0, 0, 0]), forces - np.array([0, *(largest * way / 4)]))
         for way in _ways()
@@ -198,6 +210,15 @@ def _pulled_box(case: Case) -> list[Check]:
     ]
 
 
+def _held_across(case: Case, body: Polyhedron, length: float, lever: float) -> Rig:
+    """Squeeze a box on the two faces across x, with fingers a lever from their middles."""
+    contacts = [
+        Contact(np.array([s * length / 2, t * lever, 0.0]), np.array([-s, 0.0, 0.0]))
+        for s, t in SIDES
+    ]
+    return case.squeezed(body, contacts, case.push * stacked(contacts)[1], case.friction)
+
+
 def _twisted_box(case: Case) -> list[Check]:
     """Twist a box that soft fingers hold on two opposite faces, and check when it turns."""
     friction, torsion_m = case.friction, case.setup.torsion_m
@@ -207,28 +228,19 @@ def _twisted_box(case: Case) -> list[Check]:
     length, width, _ = np.ptp(body.vertices, axis=0)
     # where both parts resist alike, if that is on the faces and apart enough
     lever = min(max(torsion_m / friction, LEAST_LEVER * width), width / 4.0)
-    sides = [(s, t) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
-    contacts = [
-        Contact(np.array([s * length / 2, t * lever, 0.0]), np.array([-s, 0.0, 0.0]))
-        for s, t in sides
-    ]
-    push = PUSH * case.setup.fingers.max_normal_force_n
-    forces = push * np.array([contact.normal for contact in contacts])
-    rig = case.squeezed(body, contacts, forces, friction)
+    rig = _held_across(case, body, length, lever)
     each = math.hypot(friction * lever, torsion_m)
     # a point of the limit surface: sliding and turning as fast as one rigid body does
-    slides = push * friction**2 * lever / each
+    slides = case.push * friction**2 * lever / each
     limit = Load(
-        np.array([0, 0, 0, 4.0 * push * each, 0, 0]),
-        forces - np.array([[0.0, 0.0, t * slides] for _, t in sides]),
+        np.array([0, 0, 0, 4.0 * case.push * each, 0, 0]),
+        rig.idle.forces - np.array([[0.0, 0.0, t * slides] for _, t in SIDES]),
     )
     name = "twist at which a held box turns, over 4 N sqrt((mu a)^2 + mu_t^2)"
-    tolerance = (1.0 - SLIP_TOLERANCE, 1.0 + SLIP_TOLERANCE)
-    ways = {"holds": bisected_limits, "ramps": ramped_limits}
-    found = {way: search(rig, [limit])[0] for way, search in ways.items()}
     return [
-        Check(f"{name}, by {way}", math.nan if at is None else at.share, *tolerance)
-        for way, at in found.items()
+        near(f"{name}, by {way}", found and found.share, SLIP_TOLERANCE)
+        for way, search in (("holds", bisected_limits), ("ramps", ramped_limits))
+        for found in search(rig, [limit])
     ]
 
 
@@ -239,9 +251,8 @@ def _ways() -> list[Array]:
 
 def _slips(name: str, found: Sequence[SimulatedLimit | None]) -> list[Check]:
     """Compare the loads at which a box slips with those of statics, one check per direction."""
-    tolerance = (1.0 - SLIP_TOLERANCE, 1.0 + SLIP_TOLERANCE)
     return [
-        Check(f"{name}, at {azimuth:g} deg", math.nan if at is None else at.share, *tolerance)
+        near(f"{name}, at {azimuth:g} deg", at and at.share, SLIP_TOLERANCE)
         for azimuth, at in zip(AZIMUTHS_DEG, found, strict=True)
     ]
 
@@ -255,19 +266,12 @@ def _offset_fingers(case: Case) -> list[Check]:
     shift = 0.5 * critical * distance + gap
     contacts = [
         Contact(np.array([s * shift + t * gap, 0.0, s * distance / 2]), np.array([0.0, 0.0, -s]))
-        for s in (-1.0, 1.0)
-        for t in (-1.0, 1.0)
+        for s, t in SIDES
     ]
-    positions = np.array([contact.position for contact in contacts])
-    normals = np.array([contact.normal for contact in contacts])
+    places = stacked(contacts)
     bench = Bench(case.setup.scene(body, contacts, critical))
-    released = released_friction(
-        bench, positions, normals, critical, case.setup, whole=True
-    ).simulated
-    largest = PUSH * case.setup.fingers.max_normal_force_n
-    rig = case.squeezed(
-        body, contacts, largest * forces_just_above(positions, normals, critical), critical
-    )
+    released = released_friction(bench, *places, critical, case.setup, whole=True).simulated
+    rig = case.squeezed(body, contacts, case.push * forces_just_above(*places, critical), critical)
 
     def stays(frictions: list[float]) -> list[bool | None]:
         traces = [replace(rig, friction=each).hold([rig.idle])[0] for each in frictions]
@@ -276,24 +280,25 @@ def _offset_fingers(case: Case) -> list[Check]:
     held = bisected(stays, critical, case.setup.friction)
     name = "friction at which offset fingers let go, over h / w"
     return [
-        Check(
-            f"{name}, by releases", math.nan if released is None else released / critical,
-            1.0 - SLIP_TOLERANCE, 1.0 + SLIP_TOLERANCE,
-        ),
-        Check(
-            f"{name}, by holds", math.nan if held is None else sum(held) / (2.0 * critical),
-            1.0 - NEAR, 1.0 + NEAR,
-        ),
-    ]  # fmt: skip
+        near(f"{name}, by releases", released and released / critical, SLIP_TOLERANCE),
+        near(f"{name}, by holds", held and sum(held) / (2.0 * critical), NEAR),
+    ]
 
 
 def _creep(case: Case) -> Check:
     """Check how fast a tetrahedron held at its face centres creeps under twelve loads."""
     rig, limits = tetrahedron(case)
     traces = rig.hold([part(rig.idle, limit, CREEP_LOAD) for limit in limits])
+    speeds = list[float]()
+    for trace in traces:  # the mean speed in the second half; NaN if the trial is not valid
+        half = len(trace.times_s) // 2
+        if trace.health.fault or not half:
+            speeds.append(math.nan)
+        else:
+            moved = trace.displacements_m[-1] - trace.displacements_m[half - 1]
+            speeds.append(float(moved / (trace.times_s[-1] - trace.times_s[half - 1])))
     # the maximum is NaN if one speed is
-    fastest = np.abs([_speed(trace) for trace in traces]).max()
-    speed = float(fastest) / rig.bench.scene.layout.grasp_size_m
+    speed = float(np.abs(speeds).max()) / rig.bench.scene.layout.grasp_size_m
     noticed = case.setup.hold.hold_threshold / case.setup.hold.hold_s
     limit = min(CREEP_LIMIT, CREEP_SHARE * noticed)
     return Check("creep under load, in grasp sizes per second", speed, 0.0, limit)
@@ -313,21 +318,12 @@ def _hidden(case: Case) -> Check:
     return Check(name, share, 0.0, HIDDEN_LIMIT)
 
 
-def _speed(trace: Trace) -> float:
-    """Return the mean speed in a trace's second half [m/s]; NaN if the trial is not valid."""
-    half = len(trace.times_s) // 2
-    if trace.fault or not half:
-        return math.nan
-    moved = trace.displacements_m[-1] - trace.displacements_m[half - 1]
-    return float(moved / (trace.times_s[-1] - trace.times_s[half - 1]))
-
-
 def _blow_up(case: Case) -> Check:
     """Check the simulator's clock after a load so large that numbers overflow."""
     rig, _ = tetrahedron(case)
     (trace,) = rig.hold([Load(np.full(6, BLOW_UP), rig.idle.forces)])
-    seen = not trace.finite or trace.warnings > 0
-    error = trace.clock_error_s if seen else math.nan
+    seen = not trace.health.finite or trace.health.warnings > 0
+    error = trace.health.clock_error_s if seen else math.nan
     name = "simulated less stepped time after a blow-up, in seconds"
     return Check(name, error, -CLOCK_SLACK_S, CLOCK_SLACK_S)
 
@@ -375,29 +371,24 @@ def _gap(motions: Sequence[Array], others: Sequence[Array]) -> float:
 def _held(case: Case) -> Array:
     """Simulate the held tetrahedron; return joint positions (trials, n, q) in grasp sizes."""
     rig, limits = tetrahedron(case)
-    held = rig.motions_of_holds([part(rig.idle, limit, SHARE) for limit in limits])
-    return _in_sizes(held, rig)
+    return _in_sizes(rig, rig.holds([part(rig.idle, limit, SHARE) for limit in limits]))
 
 
-def _released(case: Case, needed: float) -> Array:
-    """Release a box at frictions above the one it needs; return joint positions as `_held` does."""
-    box = _lightly_held_box(case, needed)
-    settling = case.setup.friction.settling_friction * needed
-    released = box.motions_of_releases(settling, [above * needed for above in ABOVE])
-    return _in_sizes(released, box)
-
-
-def _in_sizes(joints: Array, rig: Rig) -> Array:
+def _in_sizes(rig: Rig, trials: Sequence[Schedule]) -> Array:
+    joints = rig.joints(trials)
     scale = np.full(joints.shape[-1], rig.bench.scene.layout.grasp_size_m)
     scale[3:7] = 1.0  # a quaternion
     return joints / scale
 
 
-def _lightly_held_box(case: Case, friction: float) -> Rig:
-    """Squeeze a box along an oblique line from above and below; two side fingers hardly push."""
+def _released(case: Case, needed: float) -> Array:
+    """Release a box at frictions above the one it needs; return joint positions as `_held` does.
+
+    Fingers squeeze it along an oblique line from above and below; two side fingers hardly push.
+    """
     body = case.body("box")
     _, width, height = np.ptp(body.vertices, axis=0)
-    shift = 0.5 * friction * height
+    shift = 0.5 * needed * height
     # The side fingers stand off centre, because symmetry hides faults.
     contacts = [
         *(Contact(np.array([s * shift, 0.0, s * height / 2]), np.array([0.0, 0.0, -s]))
@@ -405,8 +396,8 @@ def _lightly_held_box(case: Case, friction: float) -> Rig:
         *(Contact(np.array([0.13 * height, s * width / 2, 0.07 * height]), np.array([0.0, -s, 0.0]))
           for s in (-1.0, 1.0)),
     ]  # fmt: skip
-    normals = np.array([contact.normal for contact in contacts])
-    pushes = np.array([1.0, 1.0, LIGHT, LIGHT])[:, None] * normals
-    pushes[:2, 0] = friction * np.array([1.0, -1.0])
-    largest = PUSH * case.setup.fingers.max_normal_force_n
-    return case.squeezed(body, contacts, largest * pushes, friction)
+    pushes = np.array([1.0, 1.0, LIGHT, LIGHT])[:, None] * stacked(contacts)[1]
+    pushes[:2, 0] = needed * np.array([1.0, -1.0])
+    box = case.squeezed(body, contacts, case.push * pushes, needed)
+    settling = case.setup.friction.settling_friction * needed
+    return _in_sizes(box, box.releases(settling, [above * needed for above in ABOVE]))

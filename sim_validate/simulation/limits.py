@@ -50,8 +50,7 @@ class SimulatedLimit:
     lower: float
     upper: float
     share: float
-    """Best estimate of the share of the predicted limit at which the object lets go: where a ramp
-    passed its threshold, or the middle of a bisection."""
+    """Best estimate of where the object lets go: a ramp's threshold, or a bisection's middle."""
 
 
 def ramped_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:
@@ -82,13 +81,10 @@ def _in_some_span(
 
 
 def _onset(trace: Trace, shares: Array, threshold: float) -> SimulatedLimit | None:
-    """Find where a ramp lets go; None if it does not let go, or does at its very start.
-
-    Within a sample the displacement grows with the third power of time.
-    """
+    """Find where a ramp lets go; None if it does not let go, or does at its very start."""
     moved = trace.displacements_m
     passed = np.flatnonzero(moved >= threshold)
-    if not passed.size or passed[0] == 0 or trace.fault:
+    if not passed.size or passed[0] == 0 or trace.health.fault:
         return None
     first = int(passed[0])
     before, after = shares[first - 1], shares[first]
@@ -161,17 +157,14 @@ class CriticalFriction:
     """The middle of the bracket. It is zero if the object stays even at `least_friction`, and None
     if nothing was measured or the object does not begin to slip near the prediction."""
     bracket: tuple[float, float] | None = None
-    """Two frictions close together: the object slipped at the first and stayed at the second."""
+    """The object slipped at the first friction and stayed at the second."""
 
 
 def released_friction(
     bench: Bench, positions: Array, normals: Array, predicted: float, setup: Setup, *,
     whole: bool = False,
 ) -> CriticalFriction:  # fmt: skip
-    """Measure the critical friction of a grasp whose scene is compiled, whatever friction it has.
-
-    Takes `positions` (k, 3) [m]; `normals` (k, 3).
-    """
+    """Measure the critical friction of a grasp whose scene is compiled with any friction."""
     protocol = setup.friction
     high = protocol.settling_friction * max(predicted, protocol.least_friction)
     # The excess is relative, so a prediction of zero needs a friction to be relative to.
@@ -198,10 +191,7 @@ def released_friction(
 def bisected(
     stays: Callable[[list[float]], list[bool | None]], predicted: float, protocol: FrictionProtocol
 ) -> tuple[float, float] | None:
-    """Bracket the friction at which the object begins to stay, near the predicted one.
-
-    The result is None if the object begins to stay elsewhere, or if a trial says nothing about it.
-    """
+    """Bracket the friction at which the object begins to stay; None if not near the prediction."""
     for span in protocol.spans:
         lower, upper = (1.0 - span) * predicted, (1.0 + span) * predicted
         if stays([lower, upper]) == [False, True]:
@@ -220,8 +210,7 @@ def forces_just_above(
 ) -> Array:
     """Find balanced forces that need almost the critical friction, (k, 3), largest push 1 N.
 
-    These are the forces nearest to the critical friction with which every finger pushes enough. If
-    there are none, they are the forces for the largest friction in `ABOVE` that has any.
+    Every finger pushes enough with them, or they are for the largest friction in `ABOVE`.
     """
     forces = None
     for above in ABOVE:

@@ -34,7 +34,6 @@ class PlannedLoad:
     load: Load
     """The wrench that is applied, and the finger forces planned for it."""
     predicted_limit: float
-    """Largest multiple of the wrench that the grasp resists, according to the analysis."""
     limit: Load
     """The wrench at its predicted limit, and the finger forces that balance it."""
     required_friction: float
@@ -53,9 +52,10 @@ def planned_loads(
 ) -> tuple[PlannedLoad, ...]:
     """Plan all wrenches to test, in order: along axes, weakest, random, the user's own."""
     resisted = resisted_by(body, contacts, friction, setup, motors)
-    need, share = _Need.of(body, contacts, setup), setup.hold.load_share
     relative = [
-        _load(name, found, share * found.limit, idle, need)
+        _load(
+            name, found, setup.hold.load_share * found.limit, idle, body, contacts, setup.torsion_m
+        )
         for name, found in _relative(resisted, body.radius, agenda)
     ]
     named = [(each.name, each.wrench) for each in agenda.wrenches]
@@ -73,14 +73,11 @@ def loads_as_they_are(
     *,
     motors: Motors | None = None,
 ) -> tuple[PlannedLoad, ...]:
-    """Plan finger forces for wrenches that are applied as given, not at a share of a limit.
-
-    Takes `wrenches` (6,) [N, N m].
-    """
+    """Plan finger forces for wrenches that are applied as given, not at a share of a limit."""
     resisted = resisted_by(body, contacts, friction, setup, motors)
-    need = _Need.of(body, contacts, setup)
     return tuple(
-        _load(name, limit_of(resisted, wrench), 1.0, idle, need) for name, wrench in wrenches
+        _load(name, limit_of(resisted, wrench), 1.0, idle, body, contacts, setup.torsion_m)
+        for name, wrench in wrenches
     )
 
 
@@ -90,14 +87,11 @@ def resisted_by(
 ) -> WrenchBody:  # fmt: skip
     """Return the body of wrenches that contacts resist, with torques about the centre of mass."""
     positions, normals = stacked(contacts)
+    frictions = contact_frictions(friction, len(contacts))
     return WrenchBody(
-        positions - body.center_of_mass,
-        normals,
-        contact_frictions(friction, len(contacts)),
-        setup.fingers.max_normal_force_n,
-        motors,
-        torsions=contact_torsions(setup.torsion_m, contact_frictions(friction, len(contacts))),
-    )
+        positions - body.center_of_mass, normals, frictions, setup.fingers.max_normal_force_n,
+        motors, torsions=contact_torsions(setup.torsion_m, frictions),
+    )  # fmt: skip
 
 
 def _relative(
@@ -114,51 +108,30 @@ def _relative(
     return [*zip(AXIS_NAMES, axes, strict=True), (WEAKEST, weakest), *others]
 
 
-def _load(name: str, found: WrenchLimit, multiple: float, idle: Load, need: "_Need") -> PlannedLoad:
-    """Plan a multiple of a wrench, with forces between those at rest and those at the limit."""
+def _load(
+    name: str, found: WrenchLimit, multiple: float, idle: Load, body: Polyhedron,
+    contacts: Sequence[Contact], torsion_m: float,
+) -> PlannedLoad:  # fmt: skip
+    """Plan a multiple of a wrench, with forces between those at rest and those at the limit.
+
+    The friction that they need is the largest ratio of a tangential to a normal force.
+    """
     wrench = to_digits(multiple * found.wrench)
     predicted = found.limit / multiple
     limit = Load(predicted * wrench, to_digits(found.forces))
     share = 1.0 / predicted if predicted > 0.0 else 0.0
-    planned = part(idle, limit, share) if share else Load(wrench, idle.forces)
-    load = Load(wrench, planned.forces)
-    return PlannedLoad(
-        name, load, predicted, limit, need.friction(load, found, idle, min(share, 1.0))
-    )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Need:
-    """What the contacts of a grasp need to apply forces."""
-
-    arms: Array
-    """Contact points from the centre of mass, (k, 3) [m]."""
-    normals: Array
-    """Inward unit normals, (k, 3)."""
-    torsion_m: float
-
-    @classmethod
-    def of(cls, body: Polyhedron, contacts: Sequence[Contact], setup: Setup) -> "_Need":
-        positions, normals = stacked(contacts)
-        return cls(positions - body.center_of_mass, normals, setup.torsion_m)
-
-    def friction(self, load: Load, found: WrenchLimit, idle: Load, share: float) -> float:
-        """Compute the friction that forces need: the largest ratio of tangential to normal.
-
-        With torsion, the normal force counts as far as the torque of the contact leaves it.
-        """
-        along, across = normal_and_tangential(load.forces, self.normals)
-        pushing = along > NO_PUSH * along.max()
-        along, across = along[pushing], across[pushing]
-        if found.torques is not None:
-            torques = (1.0 - share) * self._torques(idle) + share * found.torques
-            turning = np.abs(torques[pushing]) / self.torsion_m
-            along = np.sqrt(np.maximum(along**2 - turning**2, (NO_PUSH * along) ** 2))
-        return float(to_digits((across / along).max()))
-
-    def _torques(self, load: Load) -> Array:
-        """Compute the torques about the normals, of least norm, that balance a load, (k,) [N m]."""
-        missing = load.wrench[3:] + cross(self.arms, load.forces).sum(axis=0)
-        return np.asarray(
-            np.linalg.lstsq(self.normals.T, -missing, rcond=None)[0], dtype=np.float64
-        )
+    load = Load(wrench, part(idle, limit, share).forces if share else idle.forces)
+    positions, normals = stacked(contacts)
+    along, across = normal_and_tangential(load.forces, normals)
+    pushing = along > NO_PUSH * along.max()
+    along, across = along[pushing], across[pushing]
+    if found.torques is not None:  # the normal force counts as far as the contact's torque leaves
+        share = min(share, 1.0)
+        # the torques about the normals, of least norm, that balance the load at rest
+        missing = idle.wrench[3:] + cross(positions - body.center_of_mass, idle.forces).sum(axis=0)
+        resting = np.asarray(np.linalg.lstsq(normals.T, -missing, rcond=None)[0], dtype=np.float64)
+        torques = (1.0 - share) * resting + share * found.torques
+        turning = np.abs(torques[pushing]) / torsion_m
+        along = np.sqrt(np.maximum(along**2 - turning**2, (NO_PUSH * along) ** 2))
+    required = float(to_digits((across / along).max()))
+    return PlannedLoad(name, load, predicted, limit, required)

@@ -22,14 +22,11 @@ class Watched:
     joints: Array
     """Joint positions as in `Motion.joints`, (n, 7 + 3k)."""
     trace: Trace
-    """The trace from the moment friction was lowered."""
     times_s: Array
     """Times of the samples, zero at the moment friction was lowered, (n,) [s]."""
     pushes_n: Array
-    """Forces that the servos of each fingertip apply along the axes of its contact, (n, k, 3)
-    [N]."""
+    """Forces of the servos along the axes of the contacts, (n, k, 3) [N]."""
     friction: Array
-    """Friction coefficient in each sample, (n,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +36,7 @@ class Rig:
     bench: Bench
     setup: Setup
     friction: float
-    """The friction coefficient at which the object is to be held."""
+    """The friction at which the object is to be held."""
     idle: Load
     """The load without a wrench: only the forces that squeeze the object."""
     closed: Motion | None
@@ -56,12 +53,11 @@ class Rig:
         """Simulate a hold under each load, and trace it from the moment friction is lowered."""
         protocol, size = self.setup.hold, self.bench.scene.layout.grasp_size_m
         limits = Thresholds(protocol.hold_threshold * size, protocol.total_threshold * size)
-        return self._traces(self._holds(loads, settling_frictions), limits)
+        return self._traces(self.holds(loads, settling_frictions), limits)
 
-    def watch(self, load: Load, settling_friction: float | None = None) -> Watched:
+    def watch(self, load: Load, settling_frictions: Sequence[float] | None = None) -> Watched:
         """Simulate one whole hold, and keep all motion since the fingers closed."""
-        settling = None if settling_friction is None else [settling_friction]
-        (schedule,) = self._holds([load], settling)
+        (schedule,) = self.holds([load], settling_frictions)
         (motion,) = self.bench.run([schedule], self.closed and self.closed.state)
         (found,) = self._traced([schedule], [motion])
         before = [] if self.closed is None else [self.closed.joints[-1:]]
@@ -69,20 +65,21 @@ class Rig:
         return Watched(
             joints=np.concatenate([*before, motion.joints]),
             trace=found,
-            times_s=self.bench.clock.sample_s
+            times_s=self.bench.sample_s
             * np.arange(1.0 - schedule.watched, count + 1.0 - schedule.watched),
             pushes_n=pushes(schedule.forces[:count], motion.joints, self.bench.scene.layout),
             friction=schedule.friction[:count],
         )
 
-    def _holds(
-        self, loads: Sequence[Load], settling_frictions: Sequence[float] | None
+    def holds(
+        self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None
     ) -> list[Schedule]:
-        protocol, clock = self.setup.hold, self.bench.clock
+        """Schedule a hold under each load."""
+        protocol = self.setup.hold
         usual = protocol.settling_friction * self.friction
         settling = settling_frictions or [usual] * len(loads)
         return [
-            schedules.hold(self.idle, load, (high, self.friction), clock, protocol)
+            schedules.hold(self.idle, load, (high, self.friction), self.bench.sample_s, protocol)
             for load, high in zip(loads, settling, strict=True)
         ]
 
@@ -90,9 +87,9 @@ class Rig:
         self, limits: Sequence[Load], shares: tuple[float, float]
     ) -> tuple[tuple[Trace, ...], Array]:
         """Raise each load between two shares of itself; return the motions and the shares (n,)."""
-        clock, protocols = self.bench.clock, (self.setup.hold, self.setup.limit)
+        sample_s, protocols = self.bench.sample_s, (self.setup.hold, self.setup.limit)
         rises = [
-            schedules.ramp(self.idle, load, shares, self.friction, clock, protocols)
+            schedules.ramp(self.idle, load, shares, self.friction, sample_s, protocols)
             for load in limits
         ]
         return self._traces([schedule for schedule, _ in rises]), rises[0][1]
@@ -100,9 +97,8 @@ class Rig:
     def at_rest(self, settling_friction: float) -> "Rig":
         """Let the unloaded object settle, so that it need not before each release."""
         assert self.closed is not None  # noqa: S101 - rigid fingers have not closed
-        trial = schedules.settle(
-            self.idle.forces, settling_friction, self.bench.clock, self.setup.friction
-        )
+        protocol = self.setup.friction
+        trial = schedules.settle(self.idle, settling_friction, self.bench.sample_s, protocol)
         (motion,) = self.bench.run([trial], self.closed.state)
         return replace(self, closed=motion.after(self.closed), settled=True)
 
@@ -111,27 +107,19 @@ class Rig:
     ) -> tuple[Trace, ...]:
         """Lower the friction of the unloaded object to several values, and trace its motion."""
         limits = None if threshold_m is None else Thresholds(threshold_m)
-        return self._traces(self._releases(settling_friction, frictions), limits)
+        return self._traces(self.releases(settling_friction, frictions), limits)
 
-    def _releases(self, settling_friction: float, frictions: Sequence[float]) -> list[Schedule]:
-        clock, protocol = self.bench.clock, self.setup.friction
+    def releases(self, settling_friction: float, frictions: Sequence[float]) -> list[Schedule]:
+        """Schedule a release to each friction."""
+        sample_s, protocol = self.bench.sample_s, self.setup.friction
         return [
-            schedules.release(
-                self.idle.forces, settling_friction, friction, clock, protocol,
-                settled=self.settled,
-            )
+            schedules.release(self.idle, (settling_friction, friction), sample_s, protocol,
+                              settled=self.settled)
             for friction in frictions
         ]  # fmt: skip
 
-    def motions_of_holds(self, loads: Sequence[Load]) -> Array:
-        """Return joint positions under each load, from closed fingers on, (trials, n, 7 + 3k)."""
-        return self._joints(self._holds(loads, None))
-
-    def motions_of_releases(self, settling_friction: float, frictions: Sequence[float]) -> Array:
-        """Return joint positions after each release from closed fingers, (trials, n, 7 + 3k)."""
-        return self._joints(self._releases(settling_friction, frictions))
-
-    def _joints(self, trials: Sequence[Schedule]) -> Array:
+    def joints(self, trials: Sequence[Schedule]) -> Array:
+        """Return joint positions in trials, from closed fingers on, (trials, n, 7 + 3k)."""
         motions = self.bench.run(trials, self.closed and self.closed.state)
         return np.array([motion.joints for motion in motions])
 
@@ -141,16 +129,16 @@ class Rig:
         bench, ends, closed = self.bench, None, self.closed
         if limits is not None and not self.whole:
             at = None if closed is None or not len(closed.joints) else closed.joints[-1]
-            ends = EarlyEnds(bench.scene.layout, trials, bench.clock.sample_s, limits, at)
+            ends = EarlyEnds(bench.scene.layout, trials, bench.sample_s, limits, at)
         return self._traced(trials, bench.run(trials, closed and closed.state, ends))
 
     def _traced(self, trials: Sequence[Schedule], motions: Sequence[Motion]) -> tuple[Trace, ...]:
-        closed, layout = self.closed, self.bench.scene.layout
+        closed = self.closed
         whole = motions if closed is None else [motion.after(closed) for motion in motions]
         watched = [
             trial.watched - motion.skipped for trial, motion in zip(trials, motions, strict=True)
         ]
-        return traces(whole, layout, watched, closed if self.settled else None)
+        return traces(whole, self.bench.scene.layout, watched, closed if self.settled else None)
 
 
 def pushes(planned: Array, joints: Array, layout: Layout) -> Array:
@@ -169,10 +157,7 @@ def squeezed(
     bench: Bench, setup: Setup, forces: Array, friction: float,
     settling_friction: float | None = None,
 ) -> Rig:  # fmt: skip
-    """Close the fingers of a compiled scene on the unloaded object.
-
-    Takes `forces` (k, 3) [N].
-    """
+    """Close the fingers of a compiled scene on the unloaded object."""
     high = settling_friction or setup.hold.settling_friction * friction
-    (closed,) = bench.run([schedules.squeeze(forces, high, bench.clock, setup.hold)])
+    (closed,) = bench.run([schedules.squeeze(forces, high, bench.sample_s, setup.hold)])
     return Rig(bench, setup, friction, Load(np.zeros(6), forces), closed)

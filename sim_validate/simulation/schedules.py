@@ -17,11 +17,10 @@ critical friction, friction is lowered to a trial value, and the object must sta
 is bisected.
 """
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -30,7 +29,6 @@ from grasp_core.checked import LARGEST, SMALLEST, number, several, whole
 from grasp_core.errors import InputError
 
 MOST_ROUNDS = 40
-SECONDS, POSITIVE = (0.05, 60.0), (SMALLEST, LARGEST)
 RANGES = {
     "hold_s": (0.2, 60.0),  # a shorter hold does not see a small imbalance move anything
     "load_share": (0.1, 0.999),  # a smaller share would say next to nothing about a grasp
@@ -41,12 +39,36 @@ RANGES = {
     "least_excess": (1e-4, 0.01),
     "least_friction": (1e-6, 0.01),
     "settling_friction": (1.0, 100.0),
+    **dict.fromkeys(("squeeze_s", "load_s", "settle_s", "ramp_s"), (0.05, 60.0)),
 }
 """Least and largest value of each number that needs more than being positive."""
 
 
+class _Checked:
+    """Checks the numbers of a protocol."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(cast("Any", self)).items():
+            if name == "spans":
+                shares = several(
+                    value, partial(number, name=name, above=0.0, below=1.0), name, "shares"
+                )
+                if not shares or any(one >= two for one, two in pairwise(shares)):
+                    raise InputError(
+                        f"{name} must be one or more numbers from 0 to 1 in rising order, got "
+                        f"{value}"
+                    )
+            elif name == "rounds":
+                whole(value, name, least=1, most=MOST_ROUNDS)
+            else:
+                least, largest = RANGES.get(name, (SMALLEST, LARGEST))
+                number(value, name, least=least, most=largest)
+
+
 @dataclass(frozen=True, slots=True)
-class HoldProtocol:
+class HoldProtocol(_Checked):
     """Durations, loads and thresholds of a trial in which the object must hold a wrench.
 
     Thresholds are relative to the size of the grasp, which is the lever of its contacts about the
@@ -87,12 +109,9 @@ class HoldProtocol:
     gap_threshold: float = 2e-4
     """A fingertip farther than this from its face has lost contact, in grasp sizes."""
 
-    def __post_init__(self) -> None:
-        _check(asdict(self))
-
 
 @dataclass(frozen=True, slots=True)
-class LimitProtocol:
+class LimitProtocol(_Checked):
     """How the largest wrench that a grasp resists is found in simulation.
 
     Raises:
@@ -110,12 +129,9 @@ class LimitProtocol:
     rounds: int = 4
     """How often bisection halves an interval."""
 
-    def __post_init__(self) -> None:
-        _check(asdict(self))
-
 
 @dataclass(frozen=True, slots=True)
-class FrictionProtocol:
+class FrictionProtocol(_Checked):
     """How the critical friction of a grasp is found in simulation.
 
     Raises:
@@ -138,26 +154,6 @@ class FrictionProtocol:
     an imbalance of a ten-thousandth of the largest normal force. Fingers that hardly push let the
     object creep by up to 1e-5 above the critical friction."""
 
-    def __post_init__(self) -> None:
-        _check(asdict(self))
-
-
-def _check(numbers: Mapping[str, Any]) -> None:
-    for name, value in numbers.items():
-        if name == "spans":
-            shares = several(
-                value, partial(number, name=name, above=0.0, below=1.0), name, "shares"
-            )
-            if not shares or any(one >= two for one, two in pairwise(shares)):
-                raise InputError(
-                    f"{name} must be one or more numbers from 0 to 1 in rising order, got {value}"
-                )
-        elif name == "rounds":
-            whole(value, name, least=1, most=MOST_ROUNDS)
-        else:
-            least, largest = RANGES.get(name, SECONDS if name.endswith("_s") else POSITIVE)
-            number(value, name, least=least, most=largest)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Load:
@@ -178,43 +174,36 @@ class Schedule:
     forces: Array
     """Planned finger forces in each sample, (n, k, 3) [N]."""
     friction: Array
-    """Friction coefficient in each sample, (n,)."""
     watched: int
     """Index of the first sample from which the object must stay where it is."""
     resting: int
     """Index of the first sample from which load and finger forces no longer change."""
 
 
-@dataclass(frozen=True, slots=True)
-class Clock:
-    """The duration of a sample; it converts durations to numbers of samples."""
-
-    sample_s: float
-
-    def samples(self, duration_s: float) -> int:
-        """Return the whole number of samples nearest to a duration, at least one."""
-        return max(1, round(duration_s / self.sample_s))
+def samples(duration_s: float, sample_s: float) -> int:
+    """Return the whole number of samples nearest to a duration, at least one."""
+    return max(1, round(duration_s / sample_s))
 
 
-def squeeze(forces: Array, friction: float, clock: Clock, protocol: HoldProtocol) -> Schedule:
+def squeeze(forces: Array, friction: float, sample_s: float, protocol: HoldProtocol) -> Schedule:
     """Schedule the fingers to close on the unloaded object."""
-    shares = smooth(clock.samples(protocol.squeeze_s))
+    shares = smooth(samples(protocol.squeeze_s, sample_s))
     closing = shares[:, None, None] * forces
     count = len(shares)
     return Schedule(np.zeros((count, 6)), closing, np.full(count, friction), count, count)
 
 
 def hold(
-    idle: Load, load: Load, frictions: tuple[float, float], clock: Clock, protocol: HoldProtocol
+    idle: Load, load: Load, frictions: tuple[float, float], sample_s: float, protocol: HoldProtocol
 ) -> Schedule:
     """Schedule a hold: load the squeezed object at high friction, settle, lower friction, watch."""
-    rise, rest = clock.samples(protocol.load_s), clock.samples(protocol.settle_s)
-    shares = np.concatenate([smooth(rise), np.ones(rest + clock.samples(protocol.hold_s))])
+    rise, rest = samples(protocol.load_s, sample_s), samples(protocol.settle_s, sample_s)
+    shares = np.concatenate([smooth(rise), np.ones(rest + samples(protocol.hold_s, sample_s))])
     return _between(idle, load, shares, frictions, rise + rest, rise)
 
 
 def ramp(
-    idle: Load, limit: Load, shares: tuple[float, float], friction: float, clock: Clock,
+    idle: Load, limit: Load, shares: tuple[float, float], friction: float, sample_s: float,
     protocols: tuple[HoldProtocol, LimitProtocol],
 ) -> tuple[Schedule, Array]:  # fmt: skip
     """Schedule a load that rises slowly through the largest one that is resisted.
@@ -224,37 +213,30 @@ def ramp(
 
     Gives the schedule, and the share of the limit that is applied in each watched sample.
     """
-    hold_protocol, limit_protocol = protocols
-    rise, rest = clock.samples(hold_protocol.load_s), clock.samples(hold_protocol.settle_s)
+    holding, limiting = protocols
+    rise, rest = samples(holding.load_s, sample_s), samples(holding.settle_s, sample_s)
     lower, upper = shares
-    count = clock.samples(limit_protocol.ramp_s)
+    count = samples(limiting.ramp_s, sample_s)
     climb = lower + (upper - lower) * np.arange(1, count + 1) / count
     applied = np.concatenate([lower * smooth(rise), np.full(rest, lower), climb])
-    high = hold_protocol.settling_friction * friction
+    high = holding.settling_friction * friction
     return _between(idle, limit, applied, (high, friction), rise + rest, len(applied)), climb
 
 
 def release(
-    forces: Array, settling_friction: float, friction: float, clock: Clock,
-    protocol: FrictionProtocol, *, settled: bool = False,
+    still: Load, frictions: tuple[float, float], sample_s: float, protocol: FrictionProtocol, *,
+    settled: bool = False,
 ) -> Schedule:  # fmt: skip
-    """Schedule a release: lower the friction of a squeezed object without load, and watch.
-
-    Takes `forces` (k, 3) [N].
-    """
-    rest = 0 if settled else clock.samples(protocol.settle_s)
-    shares = np.ones(rest + clock.samples(protocol.hold_s))
-    still = Load(np.zeros(6), forces)
-    return _between(still, still, shares, (settling_friction, friction), rest, 0)
+    """Schedule a release: lower the friction of a squeezed object without load, and watch."""
+    rest = 0 if settled else samples(protocol.settle_s, sample_s)
+    shares = np.ones(rest + samples(protocol.hold_s, sample_s))
+    return _between(still, still, shares, frictions, rest, 0)
 
 
-def settle(
-    forces: Array, settling_friction: float, clock: Clock, protocol: FrictionProtocol
-) -> Schedule:
+def settle(still: Load, friction: float, sample_s: float, protocol: FrictionProtocol) -> Schedule:
     """Schedule what comes before a release: a squeezed object without load settles."""
-    still = Load(np.zeros(6), forces)
-    count = clock.samples(protocol.settle_s)
-    return _between(still, still, np.ones(count), (settling_friction, settling_friction), count, 0)
+    count = samples(protocol.settle_s, sample_s)
+    return _between(still, still, np.ones(count), (friction, friction), count, 0)
 
 
 def smooth(count: int) -> Array:
@@ -269,10 +251,6 @@ def _between(
 ) -> Schedule:  # fmt: skip
     friction = np.full(len(shares), frictions[0])
     friction[watched:] = frictions[1]
-    return Schedule(
-        wrenches=start.wrench + shares[:, None] * (end.wrench - start.wrench),
-        forces=start.forces + shares[:, None, None] * (end.forces - start.forces),
-        friction=friction,
-        watched=watched,
-        resting=resting,
-    )
+    wrenches = start.wrench + shares[:, None] * (end.wrench - start.wrench)
+    forces = start.forces + shares[:, None, None] * (end.forces - start.forces)
+    return Schedule(wrenches, forces, friction, watched, resting)

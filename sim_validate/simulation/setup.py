@@ -42,15 +42,6 @@ AXIS_NAMES = tuple(
 NAME = re.compile(r"[\w+\- ]{1,100}")
 WEAKEST = "weakest"
 RANDOM = "random_{}"
-
-
-PARTS = {
-    "fingers": FingerSettings,
-    "physics": PhysicsSettings,
-    "hold": HoldProtocol,
-    "limit": LimitProtocol,
-    "friction": FrictionProtocol,
-}
 MOST_THREADS = 1024
 HARD_FINGER = 3
 """MuJoCo's `condim` of a contact whose force has a normal and two tangential parts."""
@@ -84,9 +75,24 @@ class Setup:
         return changed(self)
 
     def __post_init__(self) -> None:
-        for name, kind in PARTS.items():
-            instance(getattr(self, name), kind, name)
-        _check_model(self.physics)
+        instance(self.fingers, FingerSettings, "fingers")
+        physics = instance(self.physics, PhysicsSettings, "physics")
+        instance(self.hold, HoldProtocol, "hold")
+        instance(self.limit, LimitProtocol, "limit")
+        instance(self.friction, FrictionProtocol, "friction")
+        # forces that the analysis does not model
+        if any(physics.gravity):
+            raise InputError(
+                f"physics.gravity must be zero, got {physics.gravity}: masses are scaled, so it "
+                "would not be the object's weight; give the weight as a wrench (--weight-n, or "
+                "Agenda.wrenches)"
+            )
+        if physics.condim != HARD_FINGER:
+            raise InputError(
+                f"physics.condim must be {HARD_FINGER}, got {physics.condim}: predictions are for "
+                "hard fingers, whose contacts have friction and no torsion; for soft ones give "
+                "physics.torsion_m"
+            )
         one_of(self.surface, get_args(Surface), "surface")
         whole(self.threads, "threads", least=1, most=MOST_THREADS)
         number(self.timeout_s, "timeout_s", above=0.0, most=math.inf)
@@ -100,22 +106,6 @@ class Setup:
         """Build the MuJoCo scene of a grasp with these settings."""
         return build_scene(
             body, grasp, friction, fingers=self.fingers, physics=self.physics, surface=self.surface
-        )
-
-
-def _check_model(physics: PhysicsSettings) -> None:
-    """Refuse physics settings with forces that the analysis does not model."""
-    if any(physics.gravity):
-        raise InputError(
-            f"physics.gravity must be zero, got {physics.gravity}: masses are scaled, so it would "
-            "not be the object's weight; give the weight as a wrench (--weight-n, or "
-            "Agenda.wrenches)"
-        )
-    if physics.condim != HARD_FINGER:
-        raise InputError(
-            f"physics.condim must be {HARD_FINGER}, got {physics.condim}: predictions are for hard "
-            "fingers, whose contacts have friction and no torsion; for soft ones give "
-            "physics.torsion_m"
         )
 
 
@@ -204,14 +194,18 @@ class Agenda:
         instance(self.noise, Noise, "noise")
         each = partial(instance, kind=NamedWrench, name="wrenches")
         several(self.wrenches, each, "wrenches", "NamedWrench values")
-        drawn = (RANDOM.format(place) for place in range(self.random_wrenches))
-        taken = {*AXIS_NAMES, WEAKEST, *drawn}
+        taken = drawn_names(self.random_wrenches)
         for each in self.wrenches:
             if each.name in taken:
                 raise InputError(
                     f"two wrenches are named {each.name!r}: give one of them another name"
                 )
             taken.add(each.name)
+
+
+def drawn_names(random_wrenches: int) -> set[str]:
+    """Return the names of the wrenches of a grasp that are not a user's."""
+    return {*AXIS_NAMES, WEAKEST, *(RANDOM.format(place) for place in range(random_wrenches))}
 
 
 def with_planned_radius(fingers: FingerSettings, planned: Finger | None) -> FingerSettings:

@@ -6,22 +6,18 @@ size away. The functions are pure, so that old traces can be judged again.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, cross
+from grasp_core.arrays import Array, cross
 from grasp_core.by_value import ByValue
 from grasp_core.closure.contacts import normal_and_tangential
 from grasp_core.objects.on_faces import within
 from scenes.layout import Layout
-from sim_validate.simulation.bench import Motion
+from sim_validate.simulation.bench import Health, Motion
 from sim_validate.simulation.schedules import HoldProtocol
-
-CLOCK_SLACK_S = 1e-9
-"""Largest clock error that counts as rounding [s]: simulated time is a sum of equal steps, and a
-reset would change it by milliseconds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,13 +25,11 @@ class Trace:
     """Motion of object and fingertips in the n samples from the moment the object must stay."""
 
     times_s: Array
-    """Times of the samples, (n,) [s]."""
     displacements_m: Array
     """Motion of the point between the contacts plus grasp size times rotation, (n,) [m]."""
     shifts_m: Array
     """Motion of the point between the contacts alone, (n,) [m]."""
     rotations_rad: Array
-    """Rotation of the object, (n,) [rad]."""
     slips_m: Array
     """Tangential motion of each fingertip over its face, (n, k) [m]."""
     gaps_m: Array
@@ -45,35 +39,11 @@ class Trace:
     [m]."""
     start_m: float
     """Displacement from the planned pose at the first sample of the trace [m]."""
-    finite: bool
-    """Whether every number of the simulator's state stayed finite."""
-    warnings: int
-    """How many warnings the simulator raised."""
-    clock_error_s: float
-    """Simulated time minus the time stepped [s]; it is not zero after a silent reset."""
-    error: str = ""
-    """The simulator's own message if it gave up, otherwise empty."""
-    timed_out: bool = False
-    """Whether the trial was stopped before its end."""
-
-    @property
-    def fault(self) -> str:
-        """Why the trial proves nothing about the object, such as divergence; else empty."""
-        if self.error:
-            return self.error
-        if self.timed_out:
-            return "stopped before its end"
-        if not self.finite:
-            return "a number of the state is not finite"
-        if self.warnings:
-            return f"the simulator raised {self.warnings} warnings"
-        if abs(self.clock_error_s) > CLOCK_SLACK_S:
-            return f"the simulator's clock is off by {self.clock_error_s:.3g} s: it was reset"
-        return ""
+    health: Health
 
     def stayed(self, threshold_m: float) -> bool | None:
         """Tell whether no displacement reached a threshold [m]; None if the trial is not valid."""
-        return None if self.fault else bool((self.displacements_m < threshold_m).all())
+        return None if self.health.fault else bool((self.displacements_m < threshold_m).all())
 
 
 def traces(
@@ -103,19 +73,11 @@ def traces(
         )
     ]  # fmt: skip
     return tuple(
-        Trace(
-            motion.times_s[: len(measured[0])], *measured,
-            start_m=start_m,
-            finite=motion.finite,
-            warnings=motion.warnings,
-            clock_error_s=motion.clock_error_s,
-            error=motion.error,
-            timed_out=motion.timed_out,
-        )
+        Trace(motion.times_s[: len(measured[0])], *measured, start_m=start_m, health=motion.health)
         for motion, start_m, *measured in zip(
             motions, strayed(starts[:, :7], layout).tolist(), *each, strict=True
         )
-    )  # fmt: skip
+    )
 
 
 def _start(motion: Motion, first: int, earlier: Motion | None) -> Array:
@@ -209,26 +171,35 @@ class HoldVerdict(ByValue):
 
     outcome: Outcome
     reason: str
-    """What happened, in words; empty if the object was held."""
     displacement_m: float
     """Largest displacement while the object had to be held [m]: motion of the point between the
     contacts plus grasp size times rotation."""
     start_displacement_m: float
-    """Displacement before friction was lowered, while the object was loaded at high friction
-    [m]."""
+    """Displacement before friction was lowered, while the object was loaded [m]."""
     rotation_rad: float
     slip_m: Array
-    """Largest tangential motion of each fingertip over its face, (k,) [m]."""
+    """Largest tangential motion of each fingertip over its face [m]."""
     failed_after_s: float | None
     """When a threshold was first crossed [s], from the moment friction was lowered; None if
     never."""
 
 
-def judge(trace: Trace, layout: Layout, protocol: HoldProtocol) -> HoldVerdict:
-    """Judge a trial: compare its motion with the thresholds of a protocol."""
-    failing = _failing(trace, layout.grasp_size_m, protocol)
+def judge(
+    trace: Trace, layout: Layout, protocol: HoldProtocol, overlap: Sequence[str] = ()
+) -> HoldVerdict:
+    """Judge a trial: compare its motion with the thresholds of a protocol.
+
+    Where fingertips cannot stand where they were put, `overlap` says why, and the start is invalid.
+    """
+    size = layout.grasp_size_m
+    moved = trace.displacements_m >= protocol.hold_threshold * size
+    strayed = trace.start_m + trace.displacements_m >= protocol.total_threshold * size
+    apart = (trace.gaps_m > protocol.gap_threshold * size).any(axis=1)
+    failing = np.flatnonzero(moved | strayed | apart)
     first = int(failing[0]) if failing.size else None
     outcome, reason = _outcome(trace, layout, protocol, first)
+    if overlap:
+        outcome, reason = Outcome.INVALID_START, "; ".join(overlap)
     return HoldVerdict(
         outcome=outcome,
         reason=reason,
@@ -246,44 +217,28 @@ def holds(trace: Trace, layout: Layout, protocol: HoldProtocol) -> bool | None:
     return outcome is Outcome.HELD if outcome in (Outcome.HELD, *LET_GO) else None
 
 
-def invalid_start(verdict: HoldVerdict, reasons: Sequence[str]) -> HoldVerdict:
-    """Replace the outcome of a verdict because fingertips cannot stand where they were put."""
-    return replace(verdict, outcome=Outcome.INVALID_START, reason="; ".join(reasons))
-
-
-def _failing(trace: Trace, size: float, protocol: HoldProtocol) -> Indices:
-    """Find the samples in which displacement or gap crosses a threshold; return their indices."""
-    moved = trace.displacements_m >= protocol.hold_threshold * size
-    strayed = trace.start_m + trace.displacements_m >= protocol.total_threshold * size
-    apart = (trace.gaps_m > protocol.gap_threshold * size).any(axis=1)
-    return np.flatnonzero(moved | strayed | apart)
-
-
 def _outcome(
     trace: Trace, layout: Layout, protocol: HoldProtocol, first: int | None
 ) -> tuple[Outcome, str]:
-    if trace.error:
-        return Outcome.ERROR, trace.error
-    if trace.timed_out:
-        return Outcome.TIMEOUT, trace.fault
-    if trace.fault:
-        return Outcome.DIVERGED, trace.fault
+    health = trace.health
+    if health.fault:
+        stopped = Outcome.TIMEOUT if health.timed_out else Outcome.DIVERGED
+        return Outcome.ERROR if health.error else stopped, health.fault
     if trace.start_m >= protocol.total_threshold * layout.grasp_size_m:
         moved = f"the object moved by {_um(trace.start_m)} while it was loaded at high friction"
         return Outcome.SLIPPED, moved
     if first is None:
         return Outcome.HELD, ""
-    return _how_it_let_go(trace, layout, protocol, first)
-
-
-def _how_it_let_go(
-    trace: Trace, layout: Layout, protocol: HoldProtocol, first: int
-) -> tuple[Outcome, str]:
-    """Name the finger that lost its face, or slid farthest, when a threshold was first crossed."""
+    # the finger that lost its face, or slid farthest, when a threshold was first crossed
     gaps, slips = trace.gaps_m[first], trace.slips_m[first]
-    rolled = np.flatnonzero([not on for on in _on_faces(trace.touched_m[first], layout)])
-    if rolled.size:
-        return Outcome.LOST_CONTACT, f"finger {rolled[0]} rolled off its face"
+    on_faces = [  # true where the face is not known
+        not border or any(within(point, piece, frame[:, 0], 0.0) for piece in border)
+        for point, border, frame in zip(
+            trace.touched_m[first], layout.borders, layout.frames, strict=True
+        )
+    ]
+    if not all(on_faces):
+        return Outcome.LOST_CONTACT, f"finger {on_faces.index(False)} rolled off its face"
     finger = int(np.argmax(gaps))
     if gaps[finger] > protocol.gap_threshold * layout.grasp_size_m:
         return Outcome.LOST_CONTACT, f"finger {finger} is {_um(gaps[finger])} off its face"
@@ -292,14 +247,6 @@ def _how_it_let_go(
     if trace.displacements_m[first] < protocol.hold_threshold * layout.grasp_size_m:
         turned += f" after {_um(trace.start_m)} of motion while it was loaded"
     return Outcome.SLIPPED, f"finger {finger} slid {_um(slips[finger])} over its face, {turned}"
-
-
-def _on_faces(touched: Array, layout: Layout) -> list[bool]:
-    """Tell for each point whether it lies on its contact's face; True if that face is not known."""
-    return [
-        not border or any(within(point, piece, frame[:, 0], 0.0) for piece in border)
-        for point, border, frame in zip(touched, layout.borders, layout.frames, strict=True)
-    ]
 
 
 def _um(length_m: float) -> str:

@@ -1,6 +1,1 @@
-"""Does a grasp hold in simulation what the analysis says it holds?
-
-This folder takes an object, a grasp, a setup (how trials are simulated) and an agenda (which trials
-to run). It returns a verdict: trials under wrenches, trials of negative controls (contact sets that
-must fail), and repeats with noise.
-"""
+"""Whether a grasp holds in simulation what the analysis says it holds: trials and verdicts."""

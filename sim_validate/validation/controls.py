@@ -10,6 +10,7 @@ balance.
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -65,20 +66,15 @@ def negative_controls(
     moved on their faces, out of the grasp's region. With torsion (`torsion_m` [m]) all of them are
     proved open as soft fingers.
     """
-    rng = np.random.default_rng(seed)
+    lower = FRICTION_SHARE * grasp.critical_friction
+    low_friction = _refuted("low_friction", grasp.contacts, lower, torsion_m)
     candidates = (
-        _low_friction(grasp, torsion_m),
+        low_friction if lower >= LEAST_FRICTION else iter(()),
         _fingers_removed(grasp, friction, torsion_m),
         _normal_flipped(grasp, friction, torsion_m),
-        _contacts_moved(body, grasp, friction, torsion_m, rng),
+        _contacts_moved(body, grasp, friction, torsion_m, np.random.default_rng(seed)),
     )
     return tuple(found for tries in candidates if (found := next(tries, None)) is not None)
-
-
-def _low_friction(grasp: Grasp, torsion_m: float) -> Iterator[Control]:
-    friction = FRICTION_SHARE * grasp.critical_friction
-    if friction >= LEAST_FRICTION:
-        yield from _refuted("low_friction", grasp.contacts, friction, torsion_m)
 
 
 def _fingers_removed(grasp: Grasp, friction: float, torsion_m: float) -> Iterator[Control]:
@@ -92,19 +88,13 @@ def _fingers_removed(grasp: Grasp, friction: float, torsion_m: float) -> Iterato
     for rest in threes:
         yield from _refuted("fingers_removed", rest, friction, torsion_m)
     for rest in threes:
-        lower = FRICTION_SHARE * _critical(rest, torsion_m)
+        lower = math.inf
+        with suppress(SolverError, UndecidedError):
+            lower = FRICTION_SHARE * critical_friction(*stacked(rest), torsion_m=torsion_m)
         if LEAST_FRICTION <= lower <= friction:
             yield from _refuted("fingers_removed", rest, lower, torsion_m)
     for rest in combinations(grasp.contacts, 2):
         yield from _refuted("fingers_removed", rest, friction, torsion_m)
-
-
-def _critical(contacts: Sequence[Contact], torsion_m: float) -> float:
-    """The lowest friction at which contacts are force-closed; infinity if it is not known."""
-    try:
-        return critical_friction(*stacked(contacts), torsion_m=torsion_m)
-    except (SolverError, UndecidedError):
-        return math.inf
 
 
 def _normal_flipped(grasp: Grasp, friction: float, torsion_m: float) -> Iterator[Control]:
@@ -120,18 +110,12 @@ def _contacts_moved(
 ) -> Iterator[Control]:
     pieces = [body.faces[face].pieces for face in grasp.faces]
     for _ in range(SEARCH):
-        moved = [
-            Contact(_near_corner(choice, rng), contact.normal)
-            for choice, contact in zip(pieces, grasp.contacts, strict=True)
-        ]
+        moved = list[Contact]()
+        for choice, contact in zip(pieces, grasp.contacts, strict=True):
+            piece = choice[int(rng.integers(len(choice)))]
+            corner, middle = piece[int(rng.integers(len(piece)))], piece.mean(axis=0)
+            moved.append(Contact(middle + TOWARD_CORNER * (corner - middle), contact.normal))
         yield from _refuted("contacts_moved", moved, friction, torsion_m)
-
-
-def _near_corner(pieces: Sequence[Array], rng: np.random.Generator) -> Array:
-    """A random point of a face next to one of its corners."""
-    piece = pieces[int(rng.integers(len(pieces)))]
-    corner, middle = piece[int(rng.integers(len(piece)))], piece.mean(axis=0)
-    return middle + TOWARD_CORNER * (corner - middle)
 
 
 def _refuted(
@@ -160,7 +144,6 @@ class ControlLoad:
     settling: float
     """Friction coefficient while the object settles, before the load is applied."""
     required_friction: float | None
-    """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -169,12 +152,10 @@ class ControlTrial(ByValue):
 
     name: str
     wrench: Array
-    """Applied external wrench, (6,) [N, N m], torque about the centre of mass."""
     required_friction: float | None
     """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
     hold: HoldVerdict
     trace: Trace | None
-    """Recorded motion in the trial; kept only if asked for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -183,7 +164,6 @@ class ControlVerdict(ByValue):
 
     control: Control
     tried: tuple[ControlTrial, ...]
-    """Trials of the loads that no contact forces can balance."""
 
     @property
     def held(self) -> bool:
@@ -238,11 +218,9 @@ def _planned(
     body: Polyhedron, control: Control, setup: Setup, name: str, wrench: Array
 ) -> ControlLoad:
     """Plan forces for a wrench: of least friction, or nearest to balance where none balance it."""
-    positions = np.array([contact.position for contact in control.contacts])
-    normals = np.array([contact.normal for contact in control.contacts])
     largest = setup.fingers.max_normal_force_n
     limits = (setup.hold.least_normal_share * largest, largest)
-    given, center = (positions, normals, control.friction, wrench), body.center_of_mass
+    given, center = (*stacked(control.contacts), control.friction, wrench), body.center_of_mass
     balanced = least_friction_forces(*given, normal_force=limits, center=center)
     if balanced is None:
         needed, forces = None, closest_forces(*given, normal_force=limits, center=center)

@@ -36,7 +36,7 @@ from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.loads import PlannedLoad, loads_as_they_are
 from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.setup import Agenda, Noise, Setup
-from sim_validate.simulation.traces import LET_GO, Outcome, invalid_start, judge, rotated
+from sim_validate.simulation.traces import LET_GO, Outcome, judge, rotated
 from sim_validate.validation.controls import Control, try_control
 from sim_validate.validation.verdict import AGREEMENT, NoisyTrial, Robustness, WrenchVerdict
 
@@ -55,17 +55,15 @@ class Disturbed:
     contacts: tuple[Contact, ...]
     """The contacts in `landed`, with surface normals tilted by the noise."""
     missed: tuple[int, ...]
-    """Indices of the fingers whose lines do not meet their faces."""
     friction: float
     mass: float
     """Mass of the trial, relative to the planned mass."""
 
 
 def disturbed(
-    body: Polyhedron, grasp: Grasp, friction: float, noise: Noise, draw: tuple[int, int]
+    body: Polyhedron, grasp: Grasp, friction: float, noise: Noise, seed: int, number: int
 ) -> Disturbed:
-    """Disturb a grasp by one draw of noise."""
-    seed, number = draw
+    """Disturb a grasp by the noise of one repeated trial."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(STREAM, number)))
     shift, turn = noise.shift * body.radius * rng.normal(size=3), rng.normal(size=3)
     slipperiness, heaviness = rng.normal(size=2)
@@ -146,24 +144,21 @@ def robustness(
     agenda: Agenda, setup: Setup,
 ) -> Robustness:  # fmt: skip
     """Repeat the holds of a grasp with noise."""
-    trials = tuple(
-        noisy_trial(body, disturbed_in(body, grasp, friction, agenda, number), loads, number, setup)
-        for number in range(agenda.trials)
+    numbers = range(agenda.trials)
+    cases = (
+        disturbed(body, grasp, friction, agenda.noise, agenda.seed, number) for number in numbers
     )
-    return Robustness(agenda.noise, trials)
+    trials = [
+        noisy_trial(body, case, loads, number, setup)
+        for number, case in zip(numbers, cases, strict=True)
+    ]
+    return Robustness(agenda.noise, tuple(trials))
 
 
 def for_repeats(setup: Setup, scene: Scene) -> Setup:
     """The setup for repeats: the undisturbed grasp's fingertips, on pads that may lean."""
     fingers = replace(setup.fingers, radius_m=scene.layout.drive.radius_m)
     return replace(setup, fingers=fingers, surface="pads")
-
-
-def disturbed_in(
-    body: Polyhedron, grasp: Grasp, friction: float, agenda: Agenda, number: int
-) -> Disturbed:
-    """Disturb a grasp by the noise of one repeated trial."""
-    return disturbed(body, grasp, friction, agenda.noise, (agenda.seed, number))
 
 
 def noisy_trial(
@@ -178,9 +173,14 @@ def noisy_trial(
         certificate = force_closure(positions, normals, case.friction, torsion_m=setup.torsion_m)
     except UndecidedError as error:
         return NoisyTrial(number, None, Outcome.ERROR, "", str(error), ())
-    if not certificate.closed:
+    if not certificate.closed:  # a negative control, which must let go
         control = Control(OPEN, case.contacts, case.friction, certificate)
-        return _opened(body, control, number, setup)
+        verdict = try_control(body, control, Agenda(), setup)
+        if verdict.held:
+            wrong = ("contacts that are proved not force-closed held the object",)
+            return NoisyTrial(number, False, Outcome.HELD, "", "", wrong)
+        name, hold = verdict.tried[0].name, verdict.tried[0].hold
+        return NoisyTrial(number, False, hold.outcome, name, hold.reason, _silent(hold.outcome))
     verdicts = tuple(_held_loads(body, case, loads, setup))
     first = next((each for each in verdicts if each.hold.outcome is not Outcome.HELD), None)
     silent = () if first is None else _silent(first.hold.outcome)
@@ -208,10 +208,9 @@ def _held_loads(
     layout = rig.bench.scene.layout
     overlap = clashes(body, *stacked(case.landed), layout.drive.radius_m)
     for each, trace in zip(planned, rig.hold([one.load for one in planned]), strict=True):
-        hold = judge(trace, layout, setup.hold)
         yield WrenchVerdict(
             each.name, each.load.wrench, each.predicted_limit, each.required_friction,
-            invalid_start(hold, overlap) if overlap else hold,
+            judge(trace, layout, setup.hold, overlap),
         )  # fmt: skip
 
 
@@ -219,29 +218,15 @@ def noisy_case(
     body: Polyhedron, case: Disturbed, loads: Sequence[NamedLoad], setup: Setup
 ) -> tuple[Rig, tuple[PlannedLoad, ...]]:
     """Close fingers on the contacts of a repeat, and plan forces for its loads."""
-    scene = heavier(setup.scene(body, case.contacts, case.friction), case.mass)
+    planned = setup.scene(body, case.contacts, case.friction)
+    layout = replace(
+        planned.layout,
+        mass_kg=case.mass * planned.layout.mass_kg,
+        inertia_kg_m2=case.mass * planned.layout.inertia_kg_m2,
+    )
+    text = to_text(layout, planned.physics, planned.surface)
+    scene = replace(planned, xml=text, layout=layout)
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     rig = squeezed(bench, setup, scene.layout.squeeze_forces, case.friction)
     heavy = [(name, case.mass * wrench) for name, wrench in loads]
     return rig, loads_as_they_are(body, case.contacts, case.friction, rig.idle, heavy, setup)
-
-
-def heavier(scene: Scene, factor: float) -> Scene:
-    """Scale the mass and inertia of the object in a scene."""
-    layout = replace(
-        scene.layout,
-        mass_kg=factor * scene.layout.mass_kg,
-        inertia_kg_m2=factor * scene.layout.inertia_kg_m2,
-    )
-    return replace(scene, xml=to_text(layout, scene.physics, scene.surface), layout=layout)
-
-
-def _opened(body: Polyhedron, control: Control, number: int, setup: Setup) -> NoisyTrial:
-    """Simulate contacts that are not force-closed as a negative control, which must let go."""
-    verdict = try_control(body, control, Agenda(), setup)
-    if verdict.held:
-        wrong = ("contacts that are proved not force-closed held the object",)
-        return NoisyTrial(number, False, Outcome.HELD, "", "", wrong)
-    first = verdict.tried[0]
-    ended = first.hold.outcome
-    return NoisyTrial(number, False, ended, first.name, first.hold.reason, _silent(ended))

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -41,12 +41,10 @@ from sim_validate.simulation.limits import (
 from sim_validate.simulation.loads import PlannedLoad, planned_loads
 from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.simulation.traces import invalid_start, judge
+from sim_validate.simulation.traces import judge
 from sim_validate.validation.controls import ControlVerdict, negative_controls, try_control
 from sim_validate.validation.noise import for_repeats, robustness
 from sim_validate.validation.verdict import Verdict, WrenchVerdict
-
-Chosen = TypeVar("Chosen")
 
 
 def validate(
@@ -133,19 +131,14 @@ def _held_wrenches(
     if agenda.limits != "none":
         search = ramped_limits if agenda.limits == "ramp" else bisected_limits
         found = search(rig, limits)
-    verdicts = [judge(trace, layout, rig.setup.hold) for trace in traces]
     return tuple(
         WrenchVerdict(
-            name=planned.name,
-            wrench=planned.load.wrench,
-            predicted_limit=planned.predicted_limit,
-            required_friction=planned.required_friction,
-            hold=invalid_start(verdict, overlap) if overlap else verdict,
-            simulated_limit=limit,
-            trace=trace if agenda.keep_traces else None,
+            each.name, each.load.wrench, each.predicted_limit, each.required_friction,
+            judge(trace, layout, rig.setup.hold, overlap),
+            limit, trace if agenda.keep_traces else None,
         )
-        for planned, trace, verdict, limit in zip(loads, traces, verdicts, found, strict=True)
-    )
+        for each, trace, limit in zip(loads, traces, found, strict=True)
+    )  # fmt: skip
 
 
 def simulated_critical_friction(
@@ -167,7 +160,7 @@ def simulated_critical_friction(
         UnfaithfulError: The simulator fails its checks with these settings.
     """
     check_on_faces(body, grasp)
-    setup = _given(setup, Setup(), "setup")
+    _, setup = asked_for(None, setup)
     predicted = critical_friction(grasp, torsion_m=setup.torsion_m)
     if not np.isfinite(predicted):
         raise InputError(f"grasp {grasp.id}: no friction gives force closure; choose another grasp")
@@ -182,15 +175,10 @@ def simulated_critical_friction(
 
 def asked_for(agenda: Agenda | None, setup: Setup | None) -> tuple[Agenda, Setup]:
     """Check which trials are asked for and how they are simulated; None stands for the defaults."""
-    return _given(agenda, Agenda(), "agenda"), _given(setup, Setup(), "setup")
-
-
-def _given(value: Chosen | None, default: Chosen, name: str) -> Chosen:
-    """The value, checked to be of the default's class, or the default if it is None."""
-    if value is None:
-        return default
-    instance(value, type(default), name)
-    return value
+    return (
+        Agenda() if agenda is None else instance(agenda, Agenda, "agenda"),
+        Setup() if setup is None else instance(setup, Setup, "setup"),
+    )
 
 
 Progress: TypeAlias = Callable[[int, int, Verdict], object]

@@ -30,11 +30,9 @@ class WrenchVerdict(ByValue):
 
     name: str
     wrench: Array
-    """Applied external wrench, (6,) [N, N m], torque about the centre of mass."""
     predicted_limit: float
     """Largest multiple of the applied wrench that the analysis says is resisted."""
     required_friction: float
-    """Friction that the planned forces need."""
     hold: HoldVerdict
     simulated_limit: SimulatedLimit | None = None
     """Where the object lets go, relative to the predicted limit; None if not measured, or not
@@ -104,18 +102,11 @@ class Robustness:
         )
 
 
-CONFIDENCE = 0.95
-
-
 def interval(count: int, of: int) -> tuple[float, float]:
     """The 95 % confidence interval of a share, by Clopper and Pearson's exact method."""
-    found = _stats().binomtest(count, of).proportion_ci(CONFIDENCE, method="exact")
+    stats: Any = importlib.import_module("scipy.stats")  # has no types, takes half a second
+    found = stats.binomtest(count, of).proportion_ci(0.95, method="exact")
     return float(found.low), float(found.high)
-
-
-def _stats() -> Any:
-    """SciPy's statistics, imported on use: it has no types and takes half a second to import."""
-    return importlib.import_module("scipy.stats")
 
 
 ROWS = 8
@@ -196,7 +187,6 @@ class Verdict(ByValue, InNotebooks):
 
 
 def _disagreement(friction: CriticalFriction) -> str:
-    """Describe how simulated and predicted critical friction differ; empty if they agree."""
     simulated, predicted = friction.simulated, friction.predicted
     if simulated is None:
         return "not found near the predicted one"
@@ -206,7 +196,6 @@ def _disagreement(friction: CriticalFriction) -> str:
 
 
 def _rows(verdict: Verdict) -> list[tuple[str, ...]]:
-    """Return the cells of the table by which notebooks show a verdict."""
     rows: list[tuple[str, ...]] = [("trial", "outcome", "limit predicted", "simulated")]
     trials = sorted(verdict.wrenches, key=lambda trial: trial.hold.outcome is Outcome.HELD)
     for trial in trials[:ROWS]:

@@ -126,12 +126,6 @@ def test_fingertips_of_a_record_meet_the_object_at_one_moment(hand, gap):
     assert whole.pregrasp[FREE:] == pytest.approx(reach.pregrasp)
 
 
-@pytest.mark.parametrize(("hand", "servo"), [("allegro", 5.0), ("leap", 3.0)])
-def test_the_squeeze_is_for_the_servos_of_the_hands_file(hand, servo):
-    model, reach = gc.load_hand(hand), reached(hand)[0]
-    assert dex_record(model, reach, "o") == dex_record(model, reach, "o", servo_n_m_per_rad=servo)
-
-
 @pytest.mark.parametrize("hand", HANDS)
 def test_the_file_of_a_hand_has_an_inertial_for_palm_and_links(hand):
     model = gc.load_hand(hand)

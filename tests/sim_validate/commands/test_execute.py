@@ -107,15 +107,6 @@ def test_a_grasp_that_does_not_survive_is_a_result(capsys):
 
 
 @pytest.mark.usefixtures("here")
-def test_where_knocks_fail_the_speed_that_they_give_is_told(capsys):
-    words = ["execute", "grasps.json", "--mass-kg", "0.01", "--limit", "1", *QUICK]
-    assert main([*words, "--knock-n-s", "0.4"]) == Exit.NEGATIVE
-    said = capsys.readouterr().err
-    assert "a knock of 0.4 N s would give a free object of 0.01 kg 40 m/s; choose" in said
-    assert re.search("knock [+-][xyz]: (.* too far after a slip|dropped), moved", said)
-
-
-@pytest.mark.usefixtures("here")
 def test_a_grasp_without_a_squeeze_is_a_result_with_its_reason(capsys):
     words = ["execute", "grasps.json", "--friction", "0.03", "--mass-kg", "0.3", *QUICK]
     assert main([*words, "--out", "."]) == Exit.NEGATIVE
@@ -137,18 +128,6 @@ def test_where_no_trial_is_possible_nothing_was_survived(capsys):
     assert main(words) == Exit.NEGATIVE
     assert "no trial is possible, so nothing was survived" in capsys.readouterr().err
     assert not sv.load_executions("executions.json").grasps[0].survived
-
-
-@pytest.mark.usefixtures("here")
-def test_trials_of_no_size_are_told_and_written_as_left_out(capsys):
-    words = ["execute", "grasps.json", "--mass-kg", "0.3", "--trials", "weight,shake,knock"]
-    assert main([*words, "--shake-g", "0", "--knock-n-s", "0", "--out", "."]) == Exit.GOOD
-    said = capsys.readouterr().out
-    for kind, flag in (("shake", "shake_g, --shake-g"), ("knock", "knock_n_s, --knock-n-s")):
-        assert f"no {kind} for 2 of 2 grasps: its size is 0 ({flag})\n" in said
-    for grasp in sv.load_executions("executions.json").grasps:
-        assert [each.kind for each in grasp.execution.skipped] == ["shake", "knock"]
-        assert [each.kind for each in grasp.execution.trials] == ["weight"]
 
 
 @pytest.mark.usefixtures("here")
@@ -249,14 +228,9 @@ def test_a_file_of_flags_and_a_file_of_physics(here):
 REFUSED = {
     "--mass-kg 1 --density-kg-m3 1000": (Exit.USAGE, "exclude each other"),
     "--mass-kg 0": (Exit.USAGE, "--mass-kg must be at least 1e-09"),
-    "--density-kg-m3 nan": (Exit.USAGE, "--density-kg-m3 must be at least"),
     "--trials weight,throw": (Exit.USAGE, "--trials must be names among weight, lift, shake"),
     "--down 0 0 0": (Exit.USAGE, "--down must not be zero"),
-    "--off-deg 181": (Exit.USAGE, "--off-deg must be at least 0, at most 180"),
-    "--misplacements 0": (Exit.USAGE, "--misplacements must be at least 1"),
-    "--lift-s 0": (Exit.USAGE, "--lift-s must be at least 0.05"),
     "--shake-hz 1e6": (Exit.USAGE, "--shake-hz must be at least 0.1, at most 25"),
-    "--damping-ratio 0": (Exit.USAGE, "--damping-ratio must be at least 0.01"),
     "--grasp nobody": (Exit.INPUT, "no grasp is named nobody"),
     "--setup none.toml": (Exit.INPUT, "none.toml"),
     "--setup fingers.toml": (Exit.INPUT, "fingers.toml: expected the table physics"),
@@ -276,13 +250,6 @@ def test_flags_that_make_no_sense_are_refused_before_anything_runs(here, capsys,
     assert not (here / "e" / "executions.json").exists()
 
 
-def test_a_file_without_grasps_has_nothing_to_execute(here, capsys):
-    document = json.loads((here / "grasps.json").read_text())
-    (here / "none.json").write_text(json.dumps(document | {"grasps": []}))
-    assert main(["execute", "none.json", "--json"]) == Exit.NONE
-    assert json.loads(capsys.readouterr().out) == {"absence": "none.json holds no grasp"}
-
-
 RUN = ["run", "tetrahedron", "--limit", "1", "--no-report", "--out", "r"]
 
 
@@ -300,16 +267,6 @@ def test_run_executes_grasps_too_and_a_run_without_removes_the_file(here, capsys
     ]
     assert main([*RUN, "-q"]) == Exit.GOOD
     assert not (here / "r" / "executions.json").exists()
-
-
-def test_the_report_of_a_run_shows_its_executions(here):
-    words = [word for word in RUN if word != "--no-report"]
-    flags = ["--execute", "--mass-kg", "0.1", "--execute-trials", "knock"]
-    assert main([*words, *flags, "-q"]) == Exit.GOOD
-    page = (here / "r" / "report" / "index.html").read_text()
-    assert "1 of 1 grasps survived every trial" in page
-    assert page.count('<figure class="panels"><svg') >= 1
-    assert "Filled marks are what survived in simulation" in page
 
 
 def test_a_run_has_a_report_where_executions_are_refused(here, capsys, monkeypatch):

@@ -50,15 +50,6 @@ def test_a_hand_without_torque_limits_says_that_none_are_stated(capsys):
     assert "Links that may overlap, besides neighbours: palm and thumb_proximal." in said
 
 
-def test_fingers_that_meet_in_the_middle_of_their_ranges_are_not_listed(tmp_path, capsys):
-    """With the ends bent by 45 degrees more, they meet in the middle of the ranges."""
-    path = tmp_path / "closed.xml"
-    path.write_text(three_fingers_mjcf().replace('range="-90 10"', 'range="-170 0"'))
-    assert main(["hand", str(path), "--fingertips", ",".join(THREE_TIPS), "--json"]) == Exit.GOOD
-    pairs = json.loads(capsys.readouterr().out)["may_overlap"]
-    assert pairs == []
-
-
 def test_ranges_that_were_meant_in_radians_are_pointed_out(words, capsys):
     path = Path(words[1])
     path.write_text(re.sub(r'range="-?[0-9.]+ -?[0-9.]+"', 'range="-1.5 1.5"', path.read_text()))
@@ -79,11 +70,6 @@ def test_the_weight_of_links_is_said_with_its_source(words, capsys):
     assert "block of 52 corners" in said
     assert main(["hand", "allegro"]) == Exit.GOOD
     assert "Masses of links: unknown" in capsys.readouterr().out
-
-
-def test_a_file_without_named_fingertips_is_refused(words, capsys):
-    assert main(words[:2]) == Exit.INPUT
-    assert "name 3 to 5 fingertips" in capsys.readouterr().err
 
 
 def test_joints_that_follow_others_and_notes_are_said(tmp_path, capsys):

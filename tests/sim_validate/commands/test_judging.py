@@ -68,13 +68,6 @@ def test_fingers_that_hardly_push_fail_and_the_command_says_why(grasps, capsys):
     assert "ours:" in found.err
 
 
-def test_old_judgements_go_when_new_ones_come(tmp_path):
-    old = tmp_path / "judgements.json"
-    old.write_text("old")
-    main(["plan", "wedge", "--limit", "1", "--out", str(tmp_path), "-q"])
-    assert not old.exists()
-
-
 def test_a_report_shows_what_each_test_says_and_new_judgements_remove_it(grasps, tmp_path):
     run = tmp_path / "run"
     run.mkdir()
@@ -144,8 +137,3 @@ def test_a_hand_is_judged_and_its_records_are_written(graspable, tmp_path, capsy
 def test_a_hand_is_judged_in_simulation_only(graspable, capsys):
     assert main(["reach", str(graspable), "--protocol", "dexgraspbench"]) == Exit.USAGE
     assert "--simulate" in capsys.readouterr().err
-
-
-def test_an_unknown_test_is_refused_before_anything_is_read(capsys):
-    assert main(["validate", "nowhere.json", "--protocol", "best"]) == Exit.USAGE
-    assert "dexgraspbench" in capsys.readouterr().err

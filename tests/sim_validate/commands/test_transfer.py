@@ -151,12 +151,6 @@ def test_the_old_grasps_are_not_overwritten(folder, capsys):
     assert (folder / "plan" / "grasps.json").read_text() == before
 
 
-def test_a_forgotten_unit_is_mentioned(folder, capsys):
-    line = ["transfer", str(folder / "plan" / "grasps.json"), str(folder / "moved.obj")]
-    assert main([*line, "--unit", "cm"]) == Exit.NONE
-    assert "is 10.03 times as large as the old one" in capsys.readouterr().err
-
-
 def test_a_given_centre_of_mass_stays(folder, tmp_path):
     line = ["plan", str(folder / "part.obj"), "--unit", "mm", "--limit", "2", "-q"]
     plan = tmp_path / "plan"

@@ -53,14 +53,6 @@ def test_a_task_too_heavy_for_the_grasp_makes_it_fail(verdict):
     assert found["mismatches"] == []
 
 
-@pytest.mark.parametrize("way", ["ramp", "bisection"])
-def test_limits_are_found_beside_the_predicted_ones(verdict, way):
-    for trial in verdict("--limits", way, "--random-wrenches", "2")["wrenches"]:
-        low, high = trial["simulated_limit_bracket"]
-        assert low <= trial["simulated_limit"] <= high
-        assert trial["simulated_limit"] == pytest.approx(trial["predicted_limit"], rel=0.02)
-
-
 def test_traces_tell_how_contacts_moved(planned):
     command = ["validate", "grasps.json", "--traces", "--out", "v", "-q"]
     assert main(command) == Exit.GOOD
@@ -73,17 +65,6 @@ def test_traces_tell_how_contacts_moved(planned):
             assert moved.max() == pytest.approx(trial["displacement_m"])
             assert traces[f"{name}.slips_m"].shape == (len(moved), 4)
         assert any("separating" in name for name in traces.files)
-
-
-def test_a_convex_object_is_also_touched_on_its_own_mesh(verdict):
-    assert verdict("--surface", "mesh")["settings"]["surface"] == "mesh"
-
-
-def test_a_trial_out_of_time_says_so(verdict):
-    found = verdict("--timeout-s", "1e-9", code=Exit.NEGATIVE)
-    assert found["held"] is False
-    assert {trial["outcome"] for trial in found["wrenches"]} == {"timeout"}
-    assert found["mismatches"] == ["critical friction: not found near the predicted one"]
 
 
 def test_a_simulator_that_is_unfaithful_is_refused_with_its_figures(planned, capsys):

@@ -70,16 +70,6 @@ def test_the_weight_sinks_by_load_over_stiffness(stiffness):
     assert in_world(motion)[-1, :, 2] == pytest.approx(MASS * G / 4, rel=1e-3)
 
 
-@pytest.mark.parametrize("push", [1.2, 1.7])
-def test_the_weight_is_held_where_friction_times_push_carries_it(push):
-    """The least push is m g / (4 mu), 1.47 N."""
-    (motion,) = ran(paths.held_weight(DOWN, 0.5), push=push)
-    found = outcome(
-        motion, box_scene(push=push).layout, paths.held_weight(DOWN, 0.5), np.full(4, 0.5)
-    )
-    assert found.slipped == (push < MASS * G / 2.0)
-
-
 def test_an_object_that_is_let_go_falls():
     """Fingers open in an instant and swing outwards; it is free from then on."""
     count = 80
@@ -93,17 +83,6 @@ def test_an_object_that_is_let_go_falls():
     speeds = np.diff(fallen) / SAMPLE_S
     assert np.diff(speeds) / SAMPLE_S == pytest.approx(-G, rel=1e-6)
     assert outcome(motion, box_scene().layout, falling, np.full(4, 0.5)).dropped
-
-
-def test_an_impulse_gives_a_free_object_its_speed():
-    """Nothing holds the object: the fingers stay at their places and do not push."""
-    bench, count = box_bench(), 40
-    wrenches = np.zeros((count, 6))
-    wrenches[0] = [0, 0, 0.03 / SAMPLE_S, 0, 0, 0]
-    drive = replace(idle(count), wrenches=wrenches, grasping=np.full(count, -1.0))
-    (motion,) = bench.run([drive])
-    speed = np.diff(motion.moved[:, 2])[-1] / SAMPLE_S
-    assert speed == pytest.approx(0.03 / MASS, rel=1e-3)
 
 
 def test_a_held_object_swings_at_its_natural_frequency():

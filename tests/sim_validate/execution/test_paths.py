@@ -5,7 +5,6 @@ import pytest
 
 from scenes.execution.held_mjcf import SAMPLE_S
 from sim_validate.execution import paths
-from sim_validate.execution.paths import idle, joined
 from tests.sim_validate.execution.held_rigs import G, icosphere
 
 DOWN = np.array([0.0, 0.0, -G])
@@ -84,12 +83,6 @@ def test_a_stop_ends_all_motion_at_no_more_than_its_deceleration(deceleration, s
     assert (drive.shares[np.flatnonzero(sizes)] == 1.0).all()
 
 
-def test_a_long_stop_decelerates_as_stated():
-    """From 0.5 m/s at 10 m/s^2 in 50 ms; the smooth ends leave the middle as it is."""
-    drive = paths.stop(DOWN, UP, 10.0, 0.5)
-    assert np.linalg.norm(drive.accelerations, axis=1).max() == pytest.approx(10.0, rel=0.05)
-
-
 @pytest.mark.parametrize("hertz", [0.5, 5.0, 20.0])
 def test_a_shake_reaches_its_size_and_brings_the_palm_to_rest(hertz):
     """Means over samples are below the peak of a sinusoid by 1 - sinc(f dt) at most, and by as
@@ -145,29 +138,3 @@ def test_gravity_turns_evenly_and_slowly(turned):
     speeds = np.arccos(np.einsum("ni,ni->n", ways[1:], ways[:-1]).clip(max=1.0))[1:] / SAMPLE_S
     assert np.median(speeds) == pytest.approx(np.clip(0.15 * frequency, 1.0, 20.0), rel=0.02)
     assert speeds.max() < 1.1 * np.median(speeds)
-
-
-def test_weight_that_stays_grows_smoothly():
-    drive = paths.held_weight(DOWN)
-    assert (np.diff(drive.shares) >= 0.0).all()
-    assert np.abs(np.diff(drive.shares)).max() < 2.0 * SAMPLE_S / paths.RISE_S
-    np.testing.assert_array_equal(drive.gravity, drive.shares[:, None] * DOWN)
-    assert drive.shares[0] < 0.01
-    assert drive.shares[-1] == 1.0
-
-
-def test_closing_builds_up_the_squeeze_without_weight():
-    drive = paths.closing()
-    assert (np.diff(drive.grasping) >= 0.0).all()
-    assert drive.grasping[-1] == 1.0
-    for nothing in (drive.gravity, drive.accelerations, drive.wrenches, drive.shares):
-        assert not nothing.any()
-
-
-def test_drives_follow_each_other():
-    first, second = paths.closing(), paths.held_weight(DOWN)
-    both = joined(first, second)
-    assert len(both) == len(first) + len(second)
-    np.testing.assert_array_equal(both.grasping[: len(first)], first.grasping)
-    np.testing.assert_array_equal(both.gravity[len(first) :], second.gravity)
-    assert len(idle(7)) == 7

@@ -137,15 +137,6 @@ def test_slow_loads_slip_where_the_static_analysis_says(name):
         assert multiple == pytest.approx(expected, rel=2e-3)
 
 
-def test_a_box_carries_friction_times_push():
-    """Four fingers of 5 N at friction 0.5 carry 10 N, and the box weighs 2.94 N."""
-    drive = paths.held_weight(DOWN, 2.0)
-    (found,) = predicted_slips(box_dynamics(), [drive])
-    static = 4 * 0.5 * 5.0 / (MASS * G)
-    assert found <= static
-    assert found == pytest.approx(static, rel=0.05)
-
-
 @pytest.mark.parametrize("hertz", [2.0, 8.0, 14.0, 20.0])
 def test_shakes_are_amplified_like_a_mass_on_springs(hertz):
     """Across the pushes all fingers share alike; the object's acceleration a |T| follows from the
@@ -190,13 +181,6 @@ def test_predictions_do_not_depend_on_their_company():
     alone = [predicted_slips(dynamics, [drive])[0] for drive in several]
     assert together == pytest.approx(alone, rel=1e-12)
     assert predicted_slips(dynamics, several[::-1])[::-1] == pytest.approx(together, rel=1e-12)
-
-
-def test_larger_loads_slip_at_smaller_multiples():
-    drive = drives()["knock"]
-    twice = replace(drive, wrenches=2 * drive.wrenches, gravity=2 * drive.gravity)
-    one, other = predicted_slips(box_dynamics(), [drive, twice])
-    assert one == pytest.approx(2.0 * other, rel=1e-9)
 
 
 def test_nothing_slips_where_nothing_acts():
@@ -245,9 +229,3 @@ def test_narrow_limits_lose_the_object_before_it_slips():
     assert (losses < slips).all()
     (_, twice) = losses_of(dynamics, several, most_m=2e-6)
     assert twice == pytest.approx(2.0 * losses, rel=1e-9)
-
-
-def test_a_load_that_never_comes_loses_nothing():
-    slips, losses = losses_of(box_dynamics(), [idle(20)])
-    assert (slips.tolist(), losses.tolist()) == ([np.inf], [np.inf])
-    assert [part.tolist() for part in losses_of(box_dynamics(), [])] == [[], []]

@@ -1,5 +1,7 @@
 """What is read off motions that are made by hand: rolled, slid, carried, dropped."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -52,9 +54,7 @@ def motion_of(moved=None, turned=None, palm=None, centers=None, forces=None):
 
 
 def loaded():
-    drive = idle(COUNT)
-    object.__setattr__(drive, "shares", np.linspace(0.0, 1.0, COUNT))
-    return drive
+    return replace(idle(COUNT), shares=np.linspace(0.0, 1.0, COUNT))
 
 
 def judged(motion, drive=None):
@@ -196,18 +196,11 @@ def test_what_is_seen_does_not_depend_on_where_the_palm_is():
     place = rng.normal(size=3)
     axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     angle = np.arctan2(np.linalg.norm(axis), np.trace(R) - 1.0)
-    there = HeldMotion(
+    there = replace(
+        here,
         moved=here.moved + place,
         turned=quaternions(axis, np.full(COUNT, angle)),
         palm=np.tile(np.append(place, [a, b, c]), (COUNT, 1)),
-        fingers=here.fingers,
-        tips=here.tips,
-        tip_turns=None,
-        forces=here.forces,
-        pressed=here.pressed,
-        table=here.table,
-        states=np.zeros((COUNT, 0)),
-        faults=(),
     )
     one, other = judged(here), judged(there)
     assert (other.slip_m, other.first_slip) == pytest.approx((one.slip_m, one.first_slip), rel=1e-6)
@@ -224,9 +217,9 @@ def taken_off(samples, by):
     world[samples, 0, 2] = 0.5 * 5.0
     centers = np.tile(layout.tip_centers, (COUNT, 1, 1))
     centers[samples[0] :, 0, 1] += by * layout.radius_m
-    drive = loaded()
-    object.__setattr__(drive, "shares", np.minimum(np.linspace(0.0, 4.0, COUNT), 1.0))
-    object.__setattr__(drive, "table", Table(np.array([0, 0, -0.03]), np.array([0, 0, 1.0])))
+    table = Table(np.array([0, 0, -0.03]), np.array([0, 0, 1.0]))
+    shares = np.minimum(np.linspace(0.0, 4.0, COUNT), 1.0)
+    drive = replace(idle(COUNT), shares=shares, table=table)
     return motion_of(centers=centers, forces=np.einsum("kij,nki->nkj", layout.axes, world)), drive
 
 
@@ -254,5 +247,4 @@ def test_a_contact_that_is_on_its_cone_when_the_full_load_has_come_has_slipped()
 
 def test_only_a_take_off_may_touch_a_cone():
     motion, drive = taken_off([40], 0.5 * TOUCHED)
-    object.__setattr__(drive, "table", None)
-    assert judged(motion, drive).slipped
+    assert judged(motion, replace(drive, table=None)).slipped

@@ -28,12 +28,6 @@ def test_every_kind_has_its_trials():
     assert all(trial.name.startswith(trial.kind) for trial in trials)
 
 
-def test_only_the_trials_asked_for_are_there():
-    for kind in SETTINGS.trials:
-        trials, _ = listed(trials=(kind,))
-        assert {trial.kind for trial in trials} == {kind}
-
-
 @pytest.mark.parametrize(("kind", "setting"), [("shake", "shake_g"), ("knock", "knock_n_s")])
 def test_trials_of_no_size_are_left_out_with_a_reason(kind, setting):
     trials, skipped = listed(trials=("weight", kind), **{setting: 0.0})

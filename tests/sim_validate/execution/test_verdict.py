@@ -46,30 +46,10 @@ def test_survival_is_counted_by_kind():
     assert [one.kind for one in found.of_kind("knock")] == ["knock"] * 3
 
 
-def test_controls_let_go_only_if_all_do():
-    held, lost = ExecutionControl("a", False, 1.2), ExecutionControl("b", True, 0.9)
-    assert execution(controls=(lost, lost)).controls_let_go
-    assert not execution(controls=(lost, held)).controls_let_go
-
-
-def test_only_a_dropped_object_is_dropped():
-    fates = {fate: trial("knock", False, fate).dropped for fate in ("stuck", "slipped", "dropped")}
-    assert fates == {"stuck": False, "slipped": False, "dropped": True}
-
-
 def test_losses_are_told_in_millimetres_and_degrees_as_limits_are_given():
+    turn = math.radians(107.5)
     lost = ExecutionTrial(
-        "knock",
-        "knock -y",
-        False,
-        "slipped",
-        2e-3,
-        0.123,
-        math.radians(107.5),
-        0.8,
-        0.9,
-        0.75,
-        1e-3,
+        "knock", "knock -y", False, "slipped", 2e-3, 0.123, turn, 0.8, 0.9, 0.75, 1e-3
     )
     assert losses_in_words(execution(trial("weight", True), lost)) == [trial_in_words(lost)]
     assert trial_in_words(lost) == (
@@ -114,7 +94,3 @@ def test_the_best_grasp_survived_and_has_the_largest_of_the_least_losses():
     assert best_executed(grasps[3:]) is None
     endless = executed("h", [math.inf])
     assert best_executed([*grasps, endless]) == endless
-
-
-def test_the_payload_is_the_mass_that_the_squeeze_is_certified_for():
-    assert execution().payload_kg == pytest.approx(0.6, rel=1e-15)

@@ -8,10 +8,9 @@ import pytest
 
 import grasp_core as gc
 import scenes
-import sim_validate as sv
 from grasp_core.errors import InputError
 from grasp_core.values import Contact
-from sim_validate.protocols.judging import GraspCase, judge_by, judge_hand_by, judged
+from sim_validate.protocols.judging import judge_by, judge_hand_by
 from sim_validate.protocols.published import protocol, protocol_names
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
@@ -64,19 +63,6 @@ def test_more_load_than_the_fingers_can_push_fails_theirs_ours_and_the_predictio
 def test_a_test_without_loads_has_no_margin():
     found = judge_by("molmospaces", BODY, GRASP, FRICTION)
     assert math.isinf(found.ours.margin)
-
-
-@pytest.mark.slow
-def test_judgements_do_not_depend_on_processes_or_threads():
-    setup = sv.Setup()
-    cases = [
-        GraspCase(name, BODY, GRASP, FRICTION, used)
-        for name in ("mj-grasp-sim", "dexgraspbench")
-        for used in (setup, replace(setup, threads=2))
-    ] * 4
-    one, many = list(judged(cases, 1)), list(judged(cases, 2))
-    assert one == many
-    assert one[0].runs == one[1].runs
 
 
 @pytest.mark.parametrize("name", ["dexgraspbench", "dexonomy", "mj-grasp-sim"])

@@ -1,13 +1,11 @@
 """Published tests are what their own files say: loads, durations, thresholds, physics."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import sim_validate as sv
-from grasp_core.errors import InputError
 from sim_validate.cli.flag_groups import ProtocolName
 from sim_validate.protocols.published import PROTOCOLS, protocol, protocol_names
 
@@ -83,13 +81,3 @@ def test_flags_python_and_values_have_the_same_names():
     assert protocol_names() == ProtocolName.__args__ == tuple(PROTOCOLS)
     assert all(name == test.name for name, test in PROTOCOLS.items())
     assert sv.protocol_names() == protocol_names()
-
-
-def test_an_unknown_name_is_refused_with_the_names_there_are():
-    with pytest.raises(InputError, match=r"name must be .*dexgraspbench.*molmospaces.*nothing"):
-        protocol("nothing")
-
-
-def test_a_test_with_another_friction_is_another_value():
-    test = protocol("dexonomy")
-    assert replace(test, friction=0.5) != test

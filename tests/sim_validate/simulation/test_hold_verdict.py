@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import scenes
+from sim_validate.simulation.bench import Health
 from sim_validate.simulation.schedules import HoldProtocol
-from sim_validate.simulation.traces import Outcome, Trace, invalid_start, judge
+from sim_validate.simulation.traces import Outcome, Trace, judge
 from tests.sim_validate.rigs import grasps
 
 
@@ -30,9 +31,7 @@ def trace(layout, **changes):
         "times_s": np.arange(1, 6) * 0.01,
         "rotations_rad": np.full(5, 1e-7),
         "touched_m": np.tile(layout.contacts, (5, 1, 1)),
-        "finite": True,
-        "warnings": 0,
-        "clock_error_s": 0.0,
+        "health": Health(),
     }
     return Trace(**lengths, **rest | changes)
 
@@ -51,11 +50,11 @@ APART = np.where(np.arange(20).reshape(5, 4) == 9, 3e-4, -1e-6)
         ({"start_m": 1.9e-4, "displacements_m": 0.5 * MOVING}, Outcome.SLIPPED, 0.03, "slid"),
         ({"gaps_m": APART}, Outcome.LOST_CONTACT, 0.03, "finger 1 is .* um off its face"),
         ({"gaps_m": APART, "displacements_m": np.roll(MOVING, -2)}, Outcome.SLIPPED, 0.01, "slid"),
-        ({"finite": False}, Outcome.DIVERGED, None, "not finite"),
-        ({"warnings": 1}, Outcome.DIVERGED, None, "1 warnings"),
-        ({"clock_error_s": -0.2}, Outcome.DIVERGED, None, "it was reset"),
-        ({"error": "stack overflow"}, Outcome.ERROR, None, "stack overflow"),
-        ({"timed_out": True}, Outcome.TIMEOUT, None, "stopped before its end"),
+        ({"health": Health(finite=False)}, Outcome.DIVERGED, None, "not finite"),
+        ({"health": Health(warnings=1)}, Outcome.DIVERGED, None, "1 warnings"),
+        ({"health": Health(clock_error_s=-0.2)}, Outcome.DIVERGED, None, "it was reset"),
+        ({"health": Health(error="stack overflow")}, Outcome.ERROR, None, "stack overflow"),
+        ({"health": Health(timed_out=True)}, Outcome.TIMEOUT, None, "stopped before its end"),
     ],
 )
 def test_each_way_to_fail_has_its_name_its_reason_and_its_time(
@@ -81,7 +80,7 @@ def test_a_fingertip_beyond_the_border_has_rolled_off(layout):
 
 def test_a_number_that_is_not_finite_never_holds(layout):
     """Comparisons with NaN are false, so a threshold alone would let it pass."""
-    broken = trace(layout, displacements_m=np.full(5, np.nan), finite=False)
+    broken = trace(layout, displacements_m=np.full(5, np.nan), health=Health(finite=False))
     assert judge(broken, layout, HoldProtocol()).outcome is Outcome.DIVERGED
 
 
@@ -89,7 +88,7 @@ def test_a_trace_that_was_never_watched_is_no_hold(layout):
     none = {
         "times_s": np.empty(0), "displacements_m": np.empty(0), "shifts_m": np.empty(0),
         "rotations_rad": np.empty(0), "slips_m": np.empty((0, 4)), "gaps_m": np.empty((0, 4)),
-        "touched_m": np.empty((0, 4, 3)), "timed_out": True,
+        "touched_m": np.empty((0, 4, 3)), "health": Health(timed_out=True),
     }  # fmt: skip
     verdict = judge(trace(layout, **none), layout, HoldProtocol())
     assert verdict.outcome is Outcome.TIMEOUT
@@ -97,8 +96,8 @@ def test_a_trace_that_was_never_watched_is_no_hold(layout):
 
 
 def test_overlapping_fingertips_make_the_start_invalid(layout):
-    held = judge(trace(layout), layout, HoldProtocol())
-    verdict = invalid_start(held, ["fingertips 0 and 1 overlap", "fingertip 2 meets the object"])
+    overlap = ["fingertips 0 and 1 overlap", "fingertip 2 meets the object"]
+    verdict = judge(trace(layout), layout, HoldProtocol(), overlap)
     assert verdict.outcome is Outcome.INVALID_START
     assert verdict.reason == "fingertips 0 and 1 overlap; fingertip 2 meets the object"
 

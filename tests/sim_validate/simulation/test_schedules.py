@@ -4,7 +4,6 @@ import pytest
 from sim_validate.simulation import schedules
 from sim_validate.simulation.limits import OVERLOAD, part
 from sim_validate.simulation.schedules import (
-    Clock,
     FrictionProtocol,
     HoldProtocol,
     LimitProtocol,
@@ -12,7 +11,7 @@ from sim_validate.simulation.schedules import (
 )
 from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
 
-CLOCK = Clock(0.01)
+SAMPLE_S, STILL = 0.01, Load(np.zeros(6), np.full((4, 3), 5.0))
 IDLE = Load(np.zeros(6), np.full((4, 3), 2.0))
 LOAD = Load(np.arange(1.0, 7.0), np.full((4, 3), 5.0))
 
@@ -26,7 +25,7 @@ def test_smooth_shares_rise_from_almost_nothing_to_one():
 
 
 def test_a_hold_loads_at_high_friction_and_watches_at_the_one_under_test():
-    schedule = schedules.hold(IDLE, LOAD, (1.5, 0.5), CLOCK, HoldProtocol())
+    schedule = schedules.hold(IDLE, LOAD, (1.5, 0.5), SAMPLE_S, HoldProtocol())
     watched = schedule.watched
     assert watched == 16 + 10
     assert len(schedule.friction) == watched + 40
@@ -38,9 +37,9 @@ def test_a_hold_loads_at_high_friction_and_watches_at_the_one_under_test():
 
 def test_schedules_say_from_where_their_loads_are_constant():
     made = (
-        schedules.hold(IDLE, LOAD, (1.5, 0.5), CLOCK, HoldProtocol()),
-        schedules.release(LOAD.forces, 2.0, 0.3, CLOCK, FrictionProtocol()),
-        schedules.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, CLOCK, (HoldProtocol(), LimitProtocol()))[0],
+        schedules.hold(IDLE, LOAD, (1.5, 0.5), SAMPLE_S, HoldProtocol()),
+        schedules.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol()),
+        schedules.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, SAMPLE_S, (HoldProtocol(), LimitProtocol()))[0],
     )
     assert [each.resting for each in made] == [16, 0, len(made[2].friction)]
     for each in made:
@@ -49,9 +48,9 @@ def test_schedules_say_from_where_their_loads_are_constant():
 
 
 def test_settling_and_a_settled_release_are_a_release():
-    whole = schedules.release(LOAD.forces, 2.0, 0.3, CLOCK, FrictionProtocol())
-    rest = schedules.settle(LOAD.forces, 2.0, CLOCK, FrictionProtocol())
-    left = schedules.release(LOAD.forces, 2.0, 0.3, CLOCK, FrictionProtocol(), settled=True)
+    whole = schedules.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol())
+    rest = schedules.settle(STILL, 2.0, SAMPLE_S, FrictionProtocol())
+    left = schedules.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol(), settled=True)
     assert (rest.watched, left.watched) == (10, 0)
     for name in ("forces", "wrenches", "friction"):
         parts = [getattr(each, name) for each in (rest, left)]
@@ -59,23 +58,23 @@ def test_settling_and_a_settled_release_are_a_release():
 
 
 def test_a_squeeze_applies_no_wrench_and_ends_with_the_planned_forces():
-    schedule = schedules.squeeze(LOAD.forces, 1.5, CLOCK, HoldProtocol())
+    schedule = schedules.squeeze(LOAD.forces, 1.5, SAMPLE_S, HoldProtocol())
     assert not schedule.wrenches.any()
     np.testing.assert_array_equal(schedule.forces[-1], LOAD.forces)
     assert schedule.watched == len(schedule.friction) == 16
 
 
 def test_a_release_changes_nothing_but_the_friction():
-    schedule = schedules.release(LOAD.forces, 2.0, 0.3, CLOCK, FrictionProtocol())
+    schedule = schedules.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol())
     assert not schedule.wrenches.any()
-    assert (schedule.forces == LOAD.forces).all()
+    assert (schedule.forces == STILL.forces).all()
     assert schedule.friction[schedule.watched - 1] == 2.0
     assert schedule.friction[schedule.watched] == 0.3
 
 
 def test_a_ramp_watches_while_the_load_rises_between_the_shares():
     protocols = HoldProtocol(), LimitProtocol()
-    schedule, shares = schedules.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, CLOCK, protocols)
+    schedule, shares = schedules.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, SAMPLE_S, protocols)
     assert len(shares) == len(schedule.friction) - schedule.watched == 50
     assert shares[-1] == pytest.approx(1.1)
     applied = schedule.wrenches[schedule.watched :] / LOAD.wrench

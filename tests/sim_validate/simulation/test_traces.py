@@ -6,7 +6,7 @@ import pytest
 import scenes
 from scenes.layout import TOUCH
 from scenes.mjcf_text import quaternion
-from sim_validate.simulation.bench import Motion
+from sim_validate.simulation.bench import Health, Motion
 from sim_validate.simulation.traces import (
     displaced,
     rotated,
@@ -27,8 +27,7 @@ def layout():
 def motion(rows, **changes):
     still = {
         "times_s": 0.01 * np.arange(1, len(rows) + 1), "joints": np.array(rows),
-        "state": np.zeros(1), "finite": True, "warnings": 0, "clock_error_s": 0.0, "error": "",
-        "timed_out": False,
+        "state": np.zeros(1), "health": Health(),
     }  # fmt: skip
     return Motion(**still | changes)
 
@@ -95,9 +94,9 @@ def test_fingers_that_move_with_the_object_do_not_slip(layout):
 
 
 def test_a_motion_stopped_before_watching_began_has_an_empty_trace(layout):
-    (found,) = traces([motion([pose(), pose()], timed_out=True)], layout, [5])
+    (found,) = traces([motion([pose(), pose()], health=Health(timed_out=True))], layout, [5])
     assert len(found.times_s) == len(found.displacements_m) == 0
-    assert found.timed_out
+    assert found.health.timed_out
 
 
 def test_rigid_fingers_have_no_slides(layout):

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sim_validate.simulation.bench import Health
 from sim_validate.simulation.limits import _onset, bisected_limits, ramped_limits
 from sim_validate.simulation.schedules import LimitProtocol, Load
 from sim_validate.simulation.setup import Setup
@@ -19,7 +20,7 @@ def rising(displacements):
     return Trace(
         times_s=np.arange(n), displacements_m=np.array(displacements), shifts_m=np.zeros(n),
         rotations_rad=np.zeros(n), slips_m=nothing, gaps_m=nothing, touched_m=np.zeros((n, 4, 3)),
-        start_m=0.0, finite=True, warnings=0, clock_error_s=0.0,
+        start_m=0.0, health=Health(),
     )  # fmt: skip
 
 
@@ -77,7 +78,7 @@ def test_a_ramp_without_an_onset_finds_nothing(moved):
 
 def test_a_ramp_that_diverged_finds_nothing():
     moved = np.concatenate([np.zeros(20), [1.0], np.full(29, np.nan)])
-    broken = replace(rising(moved), finite=False)
+    broken = replace(rising(moved), health=Health(finite=False))
     assert _onset(broken, np.linspace(0.98, 1.02, 50), 1e-6) is None
 
 

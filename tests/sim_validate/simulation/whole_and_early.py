@@ -56,7 +56,9 @@ def of_controls(body, grasp, friction):
 
 def judged(rig, loads, settling=None):
     layout, protocol = rig.bench.scene.layout, rig.setup.hold
-    pairs = zip(rig.hold(loads, settling, whole=True), rig.hold(loads, settling), strict=True)
+    pairs = zip(
+        replace(rig, whole=True).hold(loads, settling), rig.hold(loads, settling), strict=True
+    )
     for traces in pairs:
         whole, early = (judge(trace, layout, protocol) for trace in traces)
         yield Pair(whole.outcome.value, early.outcome.value, lengths(traces))

@@ -5,12 +5,11 @@ import math
 
 import pytest
 
-import grasp_core as gc
 import sim_validate as sv
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.setup import Agenda, NamedWrench, Noise, Setup
 from sim_validate.simulation.traces import Outcome
-from sim_validate.validation.noise import disturbed_in, heavier, noisy_trial
+from sim_validate.validation.noise import disturbed, noisy_case, noisy_trial
 from sim_validate.validation.verdict import interval
 from tests.marks import more
 from tests.sim_validate.rigs import grasps
@@ -56,8 +55,7 @@ def test_a_load_beyond_the_limit_is_not_held_however_it_came_about():
     """Loads are 80 % of what is resisted: a mass a third larger is too much, one a tenth is not."""
     body, (grasp,) = grasps("wedge", 0.5, 1)
     noise = dataclasses.replace(STILL, mass=0.3)
-    agenda = dataclasses.replace(ONLY_NOISE, noise=noise)
-    cases = [disturbed_in(body, grasp, 0.5, agenda, number) for number in range(24)]
+    cases = [disturbed(body, grasp, 0.5, noise, 0, number) for number in range(24)]
     found = repeated(body, grasp, 0.5, noise=noise, trials=24).robustness
     assert {case.mass > 1.25 for case in cases} == {True, False}
     for case, trial in zip(cases, found.trials, strict=True):
@@ -79,10 +77,8 @@ def test_contacts_that_noise_opens_must_let_go():
 def test_a_simulator_that_holds_what_it_must_not_is_contradicted(monkeypatch):
     body, (grasp,) = grasps("wedge", 0.5, 1)
     noise = dataclasses.replace(STILL, friction=1.0)
-    numbers = range(30)
-    agenda = dataclasses.replace(ONLY_NOISE, noise=noise)
     friction = 1.02 * grasp.critical_friction
-    cases = [disturbed_in(body, grasp, friction, agenda, number) for number in numbers]
+    cases = [disturbed(body, grasp, friction, noise, 0, number) for number in range(30)]
     slippery = next(case for case in cases if case.friction < 0.8 * grasp.critical_friction)
     sticky = max(case.friction for case in cases)
     loads = [NamedWrench("lift", [0.0, 0.0, 1e-3, 0.0, 0.0, 0.0])]
@@ -120,8 +116,11 @@ def test_the_same_seed_gives_the_same_repeats():
 
 def test_a_heavier_object_is_the_same_scene_with_more_mass():
     body, (grasp,) = grasps("wedge", 0.5, 1)
-    scene = Setup().scene(body, grasp, 0.5)
-    heavy = heavier(scene, 1.5)
+    case = disturbed(body, grasp, 0.5, STILL, 0, 0)
+    scene, heavy = (
+        noisy_case(body, dataclasses.replace(case, mass=mass), [], Setup())[0].bench.scene
+        for mass in (1.0, 1.5)
+    )
     assert heavy.layout.mass_kg == 1.5 * scene.layout.mass_kg
     changed = [
         pair
@@ -147,8 +146,3 @@ def test_intervals_cover_the_share_as_often_as_they_say():
             chance = math.comb(30, count) * share**count * (1.0 - share) ** (30 - count)
             inside += chance * (low <= share <= high)
         assert 0.95 <= inside <= 0.999
-
-
-def test_repeats_are_counted():
-    with pytest.raises(gc.InputError, match="trials"):
-        Agenda(trials=-1)
