@@ -21,7 +21,6 @@ from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
 from sim_validate.datasets.units import units_of
 from sim_validate.datasets.verify import Sample, verify
-from sim_validate.datasets.workers import Limits
 from sim_validate.main import main
 from sim_validate.parallel.processes import local_processes
 from tests.marks import more
@@ -160,7 +159,7 @@ def test_a_unit_that_ends_its_worker_is_tried_again_alone_then_quarantined(tmp_p
 def test_a_unit_that_never_ends_is_given_up(tmp_path):
     config = dataclasses.replace(CONFIG, objects=("tetrahedron",), frictions=(0.5,))
     with local_processes(1) as engine:
-        built = build(config, tmp_path / "ds", engine, silent, Limits(1e-3))
+        built = build(config, tmp_path / "ds", engine, silent, 1e-3)
     assert built.quarantined == 1
     assert "took too long, twice" in (tmp_path / "ds" / "quarantine.jsonl").read_text()
 
