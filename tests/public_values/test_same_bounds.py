@@ -25,7 +25,7 @@ from sim_validate.cli import (
     transfer_flags,
 )
 from sim_validate.cli.flag_bounds import Bound
-from sim_validate.datasets.config import Learning
+from sim_validate.datasets.config import asked_learning
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.simulation.setup import Noise
 from tests.sim_validate.rigs import grasps
@@ -125,7 +125,7 @@ Settings = {
     "random wrenches": (
         flag_groups.Testing, "random_wrenches", lambda value: sv.Agenda(random_wrenches=value),
     ),
-    "synthetic": (dataset_flags.Learned, "synthetic", lambda value: Learning(synthetic=value)),
+    "synthetic": (dataset_flags.Learned, "synthetic", lambda v: asked_learning({"synthetic": v})),
     **{
         f"execute {name}": (execution_flags.Executing, name, executing(name)) for name in EXECUTION
     },
