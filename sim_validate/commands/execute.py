@@ -8,7 +8,7 @@ from pathlib import Path
 
 from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
-from sim_validate.cli import execution_flags
+from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.executions import check_mass, execution_settings
@@ -50,7 +50,7 @@ SLIPS_MEAN = (
 )
 
 
-def execute_file(command: execution_flags.Execute, reporter: Reporter) -> int:
+def execute_file(command: command_flags.Execute, reporter: Reporter) -> int:
     """Execute the grasps of a file in simulation and report which of them survive."""
     check_mass(command.executing.mass)
     saved = saved_grasps(command.grasps, reporter)

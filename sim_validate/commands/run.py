@@ -10,9 +10,9 @@ from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.records.grasps_json import SavedGrasps, plan_to_json
 from sim_validate.cli import command_flags
+from sim_validate.cli.command_flags import Report
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit, reason_of
-from sim_validate.cli.showing_flags import Report
 from sim_validate.commands.asked.executions import check_executing, execution_of_run
 from sim_validate.commands.asked.objects import asked_finger, object_to_plan
 from sim_validate.commands.asked.trials import prepared

@@ -13,7 +13,7 @@ from grasp_core.transferring.changed_part import SURE_GROWTH, given_center, grow
 from grasp_core.transferring.judging import CHANGES, Change, GraspFigures
 from grasp_core.transferring.like_faces import check_planar
 from grasp_core.transferring.transfer import CarriedGrasp, Transfer, transfer
-from sim_validate.cli import flag_groups, transfer_flags
+from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.grasps import saved_grasps
@@ -30,7 +30,7 @@ BAD: tuple[Change, ...] = ("worse", "gone")
 """What becomes of a grasp if its part should not have changed like that."""
 
 
-def transfer_file(command: transfer_flags.Transfer, reporter: Reporter) -> int:
+def transfer_file(command: command_flags.Transfer, reporter: Reporter) -> int:
     """Carry the grasps of a file over to a changed part, write them, and say what has changed."""
     saved = saved_grasps(command.grasps, reporter)
     if saved is None:
@@ -73,7 +73,7 @@ def _check_elsewhere(grasps: Path, out: Path | None) -> None:
         )
 
 
-def _changed_part(command: transfer_flags.Transfer, old: Polyhedron) -> Polyhedron:
+def _changed_part(command: command_flags.Transfer, old: Polyhedron) -> Polyhedron:
     center = command.center_of_mass_m
     if center is None and (kept := given_center(old)) is not None:
         x, y, z = kept.tolist()

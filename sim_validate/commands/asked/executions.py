@@ -7,7 +7,8 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.records.grasps_json import SavedGrasps
 from scenes.execution.held import HeldSettings
 from sim_validate.cli.command_flags import Run
-from sim_validate.cli.execution_flags import (
+from sim_validate.cli.flag_bounds import FlagsError
+from sim_validate.cli.flag_groups import (
     DENSITY_KG_M3,
     TRIALS,
     UPRIGHT,
@@ -16,7 +17,6 @@ from sim_validate.cli.execution_flags import (
     Tips,
     trials_in,
 )
-from sim_validate.cli.flag_bounds import FlagsError
 from sim_validate.commands.asked.objects import asked_finger
 from sim_validate.execution.settings import ExecutionSettings, TrialKind
 

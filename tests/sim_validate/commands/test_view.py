@@ -11,8 +11,8 @@ from PIL import Image
 
 import scenes
 from scenes.drawing import clips, sheets
+from sim_validate.cli.command_flags import CLIPS, PICTURES
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.cli.showing_flags import CLIPS, PICTURES
 from sim_validate.commands import view as view_command
 from sim_validate.commands.view import COMING, closing
 from sim_validate.main import main
