@@ -11,8 +11,8 @@ from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked.executions import check_mass, execution_settings
-from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
+from sim_validate.commands.asked.objects import chosen_grasps, saved_grasps
+from sim_validate.commands.asked.trials import check_mass, execution_settings
 from sim_validate.execution.jobs import ExecutionJob, executed
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (

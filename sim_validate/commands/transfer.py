@@ -16,8 +16,7 @@ from grasp_core.transferring.transfer import CarriedGrasp, Transfer, transfer
 from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked.grasps import saved_grasps
-from sim_validate.commands.asked.objects import load_object
+from sim_validate.commands.asked.objects import load_object, saved_grasps
 from sim_validate.files.result_folders import alone_in, remove_results
 from sim_validate.records.transfers import TRANSFER, carried_to_json, transfer_to_json
 
