@@ -116,7 +116,7 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
             path = write_text(command.out / "grasps.json", text)
             reporter.say(f"wrote {path}")
         if best is not None:
-            from sim_validate.commands.best.search import rated, write_best
+            from sim_validate.commands.best import rated, write_best
 
             compared = rated(body, best, planned)
             write_best(body, best, compared, command.out, reporter)
@@ -133,7 +133,7 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
         show_gains(found.moves, reporter)
     if best is None:
         return Exit.GOOD
-    from sim_validate.commands.best.search import show_best
+    from sim_validate.commands.best import show_best
 
     return show_best(best, compared, reporter)
 
@@ -159,7 +159,7 @@ def _searched(
     """Return the best grasp if it is asked for."""
     if not command.best:
         return None
-    from sim_validate.commands.best.search import search_best
+    from sim_validate.commands.best import search_best
 
     return search_best(body, command, wrenches, reporter)
 
@@ -168,7 +168,7 @@ def _with_best(found: Plan, best: "BestGrasp | None") -> Plan:
     """Put the best grasp before the planned ones if there is one."""
     if best is None:
         return found
-    from sim_validate.commands.best.search import with_best
+    from sim_validate.commands.best import with_best
 
     return with_best(found, best)
 
