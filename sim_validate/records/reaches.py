@@ -30,7 +30,7 @@ from sim_validate.hands.execute_hand import ExecutedHand
 from sim_validate.hands.validate_hand import HandVerdict
 from sim_validate.records.executions import EnoughRecord, enough_record, tip_radii
 from sim_validate.records.fields import Count, Finite, ObjectRecord, Positive, object_record
-from sim_validate.records.hand_model import ModelRecord, hand_of_model, model_record
+from sim_validate.records.hand_model import hand_of_model, model_record
 
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Index = Annotated[int, Field(ge=0, lt=FINGERS)]
@@ -49,7 +49,7 @@ class HandRecord(TypedDict):
     fingers: list[str]
     sources: list[str]
     torque_source: str
-    model: ModelRecord
+    model: dict[str, Any]
 
 
 class ReachedContactRecord(TypedDict):
