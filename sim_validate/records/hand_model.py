@@ -84,8 +84,8 @@ def _tip_record(tip: Fingertip) -> dict[str, Any]:
     return {key: written[key] for key in (BALL if tip.corners is None else BLOCK)}
 
 
-def _finger(record: Any, where: str) -> HandFinger:
-    block = isinstance(record, dict) and "tip_corners_m" in record
+def _finger(record: object, where: str) -> HandFinger:
+    block = "tip_corners_m" in _object(record, where)
     given = _keyed(record, ["name", "links", *(BLOCK if block else BALL)], where)
     with about(where):
         tip = Fingertip(**{name: _value(given[key]) for name, key in TIP.items() if key in given})
@@ -120,11 +120,15 @@ def _listed(record: object, where: str) -> list[Any]:
     return cast("list[Any]", record)
 
 
-def _keyed(record: object, keys: Collection[str], where: str) -> dict[str, Any]:
-    """Return a record that has certain keys and no others."""
+def _object(record: object, where: str) -> dict[str, Any]:
     if not isinstance(record, dict):
         raise InputError(f"{where}: expected an object, got {shown(record)}")
-    given = cast("dict[str, Any]", record)
+    return cast("dict[str, Any]", record)
+
+
+def _keyed(record: object, keys: Collection[str], where: str) -> dict[str, Any]:
+    """Return a record that has certain keys and no others."""
+    given = _object(record, where)
     if odd := sorted(given.keys() ^ set(keys)):
         fault = "unknown" if odd[0] in given else "missing"
         raise InputError(f"{where}: {place(odd[:1])}: {fault} key; keys are {', '.join(keys)}")
