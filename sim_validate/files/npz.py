@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import shown
 from grasp_core.files.text_files import read_bytes
 
@@ -34,10 +34,8 @@ LARGEST_LETTER, FIRST_HALF, LAST_HALF = 0x10FFFF, 0xD800, 0xDFFF
 def read_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:
     """Read the named arrays of an npz file that exist; nothing in the file is executed."""
     data = read_bytes(path, MOST_BYTES)
-    try:
+    with about(path):
         return arrays_of(data, names)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def arrays_of(data: bytes, names: Collection[str]) -> dict[str, NDArray[Any]]:

@@ -18,7 +18,7 @@ from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import MOST_RANDOM_WRENCHES, path_of
 from grasp_core.closure.contacts import contacts_sha256
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import record_of, text_of
 from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById, frame_of
@@ -453,10 +453,8 @@ def load_verdicts(path: str | Path) -> SavedVerdicts:
     """
     path = path_of(path, "path")
     text = read_text(path)
-    try:
+    with about(path):
         record = verdicts_of(text)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
     return SavedVerdicts(
         object_sha256=record["object"]["content_sha256"],
         friction=record["friction"],
