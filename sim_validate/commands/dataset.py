@@ -61,7 +61,6 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
 
 
 def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
-    """Start the processes or the cluster that compute the dataset."""
     if work.engine != "local":
         start = ray_workers if work.engine == "ray" else dask_workers
         return start(work.jobs, work.address)
@@ -137,7 +136,6 @@ def _asked(command: dataset_flags.Build) -> DatasetConfig:
 
 
 def _settings(settings: dataset_flags.Settings) -> dict[str, Any]:
-    """Rename the flags' settings to the names that a dataset configuration has for them."""
     given = {each.name: getattr(settings, each.name) for each in fields(settings)}
     lengths = asdict(given.pop("lengths"))
     return {"frictions": given.pop("friction") or (FRICTION,), **lengths, **given}

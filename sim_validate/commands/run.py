@@ -76,7 +76,9 @@ def _run_in(
     if found.moves:
         show_gains(found.moves, reporter)
     saved = SavedGrasps(body, found.friction, found.seed, found.grasps, found.finger)
-    _write_scenes(folder, saved, setup)
+    for grasp in saved.grasps:
+        scene = setup.scene(body, grasp, saved.friction)
+        write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
     code, text = simulate_grasps(saved, setup, agenda, jobs=jobs, folder=folder, reporter=reporter)
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
     try:
@@ -86,25 +88,13 @@ def _run_in(
             survival, more = execute_grasps(
                 saved, execution, jobs=jobs, folder=folder, reporter=reporter
             )
-            reporter.text(_together(text, more))
+            reporter.text(text_of(json.loads(text) | {"executions": json.loads(more)}))
             code = max(code, survival)
     except GraspError:  # the other results are complete, so that pages can show them
         _report(command, folder, reporter)
         raise
     _report(command, folder, reporter)
     return code
-
-
-def _write_scenes(folder: Path, saved: SavedGrasps, setup: Setup) -> None:
-    for grasp in saved.grasps:
-        scene = setup.scene(saved.body, grasp, saved.friction)
-        write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
-
-
-def _together(verdicts: str, executions: str) -> str:
-    """Put executions into the document of verdicts, under the key `executions`."""
-    document = json.loads(verdicts) | {"executions": json.loads(executions)}
-    return text_of(document)
 
 
 def _report(command: command_flags.Run, folder: Path, reporter: Reporter) -> None:

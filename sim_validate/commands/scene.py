@@ -43,7 +43,7 @@ def write_scenes(command: command_flags.Scene, reporter: Reporter) -> int:
             "--grasp ID"
         )
     friction = saved.friction if command.friction is None else command.friction
-    if _heavy(command):
+    if command.mass != Mass():
         text_of = _held(command, saved, friction, reporter)
     else:
         text_of = _scaled(command, saved, friction)
@@ -73,15 +73,10 @@ def _written(grasp: Grasp, text_of: TextOf, folder: Path | None, reporter: Repor
     return path
 
 
-def _heavy(command: command_flags.Scene) -> bool:
-    """Return whether the flags ask for an object of true mass."""
-    return command.mass != Mass()
-
-
 def _check(command: command_flags.Scene) -> None:
     """Refuse flags that the scene asked for does not use, before any file is read."""
     check_mass(command.mass)
-    if _heavy(command):
+    if command.mass != Mass():
         if (command.fingers, command.surface) != (flag_groups.Fingers(), "pads"):
             raise FlagsError(
                 "the flags from --max-normal-force to --surface are for scenes with scaled "

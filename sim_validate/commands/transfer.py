@@ -100,7 +100,6 @@ def _write(
 
 
 def _show(found: Transfer, reporter: Reporter) -> None:
-    """Show a table of the grasps, which faces moved, and why grasps are worse or gone."""
     order = sorted(found.grasps, key=lambda each: -CHANGES.index(each.status))
     shown = order[:TABLE_ROWS]
     title = f"{counted(len(order), 'grasp')} of {found.old.name} on {found.new.name}"
@@ -121,7 +120,6 @@ def _show(found: Transfer, reporter: Reporter) -> None:
 
 
 def _row(each: CarriedGrasp, changed: set[int]) -> tuple[str, ...]:
-    """Write how far contacts moved and turned, figures before and after, and changed faces."""
     moved = turned = ABSENT
     if all(contact.contact is not None for contact in each.contacts):
         moved = f"{MM * max(contact.distance for contact in each.contacts):.2f}"
@@ -132,7 +130,6 @@ def _row(each: CarriedGrasp, changed: set[int]) -> tuple[str, ...]:
 
 
 def _figures(figures: GraspFigures | None) -> tuple[str, str]:
-    """Write critical friction and quality."""
     if figures is None:
         return ABSENT, ABSENT
     return f"{figures.critical_friction:.4f}", f"{figures.ferrari_canny[0]:.4f}"

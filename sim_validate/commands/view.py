@@ -77,7 +77,6 @@ def _scene(saved: SavedGrasps, grasp: Grasp, friction: float) -> Scene:
 
 
 def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
-    """Open MuJoCo's own viewer, and wait until it is closed."""
     if not has_display():
         raise InputError(
             "there is no display for MuJoCo's viewer (neither DISPLAY nor WAYLAND_DISPLAY is set): "

@@ -96,7 +96,6 @@ def build(
 
 
 def _refuse_sources_inside(units: Sequence[WorkUnit], config: DatasetConfig, folder: Path) -> None:
-    """Refuse an output folder that holds the meshes or contacts that the dataset is made of."""
     sources = [unit.path for unit in units if unit.path is not None]
     sources += [Path(config.contacts).resolve()] if config.contacts else []
     for path in sources:

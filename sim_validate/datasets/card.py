@@ -84,7 +84,6 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
 
 
 def _tables(config: DatasetConfig, manifest: Manifest) -> Iterator[Mapping[str, Any]]:
-    """Yield what the page says of each table, with its numbers of rows by split."""
     for name, columns in config.tables.items():
         splits = {
             split: sum(each.rows or 0 for each in manifest.of_table(name) if each.split == split)
@@ -109,7 +108,6 @@ def _reference(table: Name, column: str) -> str:
 
 
 def _known_license(name: str) -> str | None:
-    """Look up the SPDX name of a licence, given in any letters; None if it is unusual."""
     wanted = name.lower()
     return next((spdx for spdx, hub in LICENSES.items() if wanted in (spdx.lower(), hub)), None)
 

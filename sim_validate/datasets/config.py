@@ -94,12 +94,17 @@ class Learning:
         return next((name for name, value in used.items() if value), "")
 
 
+def names_of(kind: type[Any]) -> list[str]:
+    """List the names of a class's settings."""
+    return [each.name for each in fields(kind)]
+
+
 def asked_learning(table: object) -> Learning:
     """Read the table `[learning]` of a settings file."""
     if not isinstance(table, Mapping):
         raise InputError(f"{LEARNING}: expected a table of settings, got {shown(table)}")
     given = cast("Mapping[str, Any]", table)
-    check_names(given, Learning, LEARNING)
+    check_names(given, names_of(Learning), LEARNING)
     return settings_of(Learning, given, [LEARNING])
 
 
@@ -206,7 +211,7 @@ def config_from_toml(path: Path) -> DatasetConfig:
 
 def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
     """Build a configuration from named settings with the types that TOML has."""
-    check_names(given, DatasetConfig, "the settings")
+    check_names(given, names_of(DatasetConfig), "the settings")
     tables = {TABLE: asked_execution, LEARNING: asked_learning}
     own = {name: value for name, value in given.items() if name not in tables}
     try:
@@ -263,7 +268,6 @@ def quoted(text: str) -> str:
 
 
 def _escaped(letter: str) -> str:
-    """Write a character inside a quoted string, escaped if necessary."""
     if letter in '"\\':
         return "\\" + letter
     return letter if letter.isprintable() else f"\\U{ord(letter):08x}"

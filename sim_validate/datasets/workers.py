@@ -162,7 +162,6 @@ def _try_alone(task: Task, engine: Engine) -> None:
 
 
 def _succeeded(future: "Future[None]", task: Task, engine: Engine) -> bool:
-    """Tell whether a unit was computed; False if its worker process died or was stopped."""
     error = future.exception()
     if error is None:
         if task.staging.finished(task.unit):

@@ -2,8 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Iterable
-from dataclasses import fields
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -49,9 +48,8 @@ def tables_of_toml(text: str) -> dict[str, Any]:
     return found
 
 
-def check_names(given: Iterable[str], kind: Any, where: str) -> None:
-    """Refuse a setting that a class of settings does not have."""
-    known = [each.name for each in fields(kind)]
+def check_names(given: Iterable[str], known: Collection[str], where: str) -> None:
+    """Refuse a setting that does not exist."""
     for name in given:
         if name not in known:
             raise InputError(

@@ -344,7 +344,6 @@ def enough_of(record: EnoughRecord | None, where: Where) -> Enough | None:
 
 
 def _require_nothing(record: ExecutionRecord, where: Where) -> None:
-    """Refuse results of a grasp that was not executed."""
     for name, result in record.items():
         if name in RESULTS and result not in (None, []):
             raise InputError(

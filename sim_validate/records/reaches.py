@@ -419,7 +419,6 @@ def _saved(record: ReachesFile) -> SavedReaches:
 
 
 def _reach(hand: HandRecord, record: ReachRecord, clearance_m: float) -> HandReach:
-    """Make the value of what was found for one grasp."""
     pose, name = record["pose"], record["id"]
     if not record["reached"] == (pose is not None) == (record["reason"] == ""):
         raise InputError(
@@ -472,7 +471,6 @@ def _hand(record: HandRecord, reached: Sequence[HandReach]) -> tuple[Hand | None
 
 
 def _touches(hand: Hand, reached: Sequence[HandReach]) -> bool:
-    """Tell whether the fingertips of a hand touch at the contacts in every pose."""
     for each in reached:
         if each.fingers is None or each.contacts is None or each.joints is None:
             continue

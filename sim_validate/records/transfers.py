@@ -42,7 +42,6 @@ def transfer_to_json(found: Transfer) -> str:
 
 
 def _summary(found: Transfer) -> dict[str, int]:
-    """Count grasps by what became of them, and contacts that moved or have no place."""
     contacts = [each for grasp in found.grasps for each in grasp.contacts]
     rounding = found.old.radius * 1e-9  # a contact on a face that stayed is put on its plane again
     placed = [each for each in contacts if each.contact is not None]

@@ -425,21 +425,21 @@ class SavedVerdicts(ByValue, ById[SavedVerdict]):
         Raises:
             InputError: The library pandas is not installed.
         """
-        return frame_of(list(map(_row, self.verdicts)), [each.id for each in self.verdicts])
-
-
-def _row(verdict: SavedVerdict) -> Mapping[str, object]:
-    simulated = verdict.simulated_critical_friction
-    return {
-        "good": verdict.good,
-        "held": verdict.held,
-        "outcome": verdict.outcome.value,
-        "controls_let_go": verdict.controls_let_go,
-        "mismatches": len(verdict.mismatches),
-        "predicted_critical_friction": verdict.predicted_critical_friction,
-        "simulated_critical_friction": math.nan if simulated is None else simulated,
-        "displacement_m": verdict.displacement_m,
-    }
+        rows = [
+            {
+                "good": each.good,
+                "held": each.held,
+                "outcome": each.outcome.value,
+                "controls_let_go": each.controls_let_go,
+                "mismatches": len(each.mismatches),
+                "predicted_critical_friction": each.predicted_critical_friction,
+                "simulated_critical_friction": math.nan if found is None else found,
+                "displacement_m": each.displacement_m,
+            }
+            for each in self.verdicts
+            for found in [each.simulated_critical_friction]
+        ]
+        return frame_of(rows, [each.id for each in self.verdicts])
 
 
 def load_verdicts(path: str | Path) -> SavedVerdicts:
