@@ -229,9 +229,3 @@ def test_fingers_on_one_face_and_certified_regions_do_not_go_together(capsys):
     asked = ["plan", "wedge", "--regions", "--share-faces-m", "0.01"]
     assert main(asked) == Exit.INPUT
     assert "leave one of the two flags out" in capsys.readouterr().err
-
-
-def test_other_centres_are_said_in_the_file(folder, capsys):
-    asked = ["regions", str(folder / "grasps.json"), "--limit", "1", "--max-cones", "500", "--json"]
-    assert main([*asked, "--recenter"]) == Exit.GOOD
-    assert json.loads(capsys.readouterr().out)["recenter"] is True

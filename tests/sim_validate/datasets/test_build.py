@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 import mujoco
-import numpy as np
 import pytest
 import trimesh
 
@@ -247,12 +246,6 @@ def test_a_finished_dataset_that_is_damaged_is_not_taken_for_one(copy):
         build(CONFIG, copy, Here(), silent)
 
 
-def test_a_folder_that_cannot_be_made_is_said(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(gc.InputError, match=r"file: exists and is not a folder"):
-        build(CONFIG, tmp_path / "file", Here(), silent)
-
-
 def test_a_dataset_without_any_grasp_is_one(tmp_path):
     config = DatasetConfig(objects=("wedge",), frictions=(0.1,), families=("regulus",),
                            cones="normal")  # fmt: skip
@@ -355,19 +348,8 @@ def test_many_rows_take_several_files(dataset, tmp_path, monkeypatch):
         assert all_rows(tmp_path / "ds", name) == all_rows(dataset, name)
 
 
-def test_a_dataset_is_loaded_as_arrays(dataset):
+def test_splits_are_parts_of_a_dataset(dataset):
     tables = sim_validate.load_dataset(dataset)
-    grasps = tables["grasps"]
-    rows = all_rows(dataset, "grasps")
-    count = len(rows)
-    assert {len(column) for column in grasps.values()} == {count}
-    assert grasps["contact_points_m"].shape == (count, 4, 3)
-    assert grasps["contact_points_m"].dtype == np.float64
-    for row, points, family in zip(rows, grasps["contact_points_m"], grasps["family"], strict=True):
-        there = row["contacts"]
-        np.testing.assert_array_equal(points[:there], row["contact_points_m"][:there])
-        assert np.isnan(points[row["contacts"] :]).all()
-        assert family == row["family"]
     names = ("train", "validation", "test")
     with pytest.warns(UserWarning, match="the split .* has no objects"):
         parts = [sim_validate.load_dataset(dataset, part) for part in names]
