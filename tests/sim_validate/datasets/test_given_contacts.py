@@ -138,32 +138,6 @@ def test_the_command_judges_a_file(planned, tmp_path):
     assert main(["dataset", "verify", str(tmp_path / "ds"), "--share", "1"]) == Exit.GOOD
 
 
-POINTS, NORMALS = np.zeros((2, 4, 3)), np.tile([1.0, 0.0, 0.0], (2, 4, 1))
-GOOD = {"contact_points_m": np.eye(4, 3)[None] * 0.01, "contact_normals": NORMALS[:1]}
-
-
-@pytest.mark.parametrize(
-    ("arrays", "message"),
-    [
-        ({"contact_points_m": POINTS}, "the array contact_normals is missing"),
-        ({"contact_points_m": POINTS[:, :3], "contact_normals": NORMALS}, "array of num"),
-        ({"contact_points_m": POINTS.astype(str), "contact_normals": NORMALS}, "array of num"),
-        ({"contact_points_m": POINTS[:1], "contact_normals": NORMALS}, "of equal length"),
-        (GOOD | {"grasp_id": np.array(["a", "b"])}, "of equal length"),
-        (GOOD | {"contact_points_m": np.full((1, 4, 3), np.nan)}, "finite"),
-        (GOOD | {"contact_normals": 2.0 * NORMALS[:1]}, "normal"),
-        (GOOD | {"grasp_id": np.array([{}], dtype=object)}, "grasp_id: expected an array of"),
-        ({"contact_points_m": POINTS[:0], "contact_normals": NORMALS[:0]}, "grasps"),
-    ],
-)
-def test_bad_arrays_are_refused_with_the_reason(arrays, message, tmp_path):
-    path = tmp_path / "g.npz"
-    np.savez(path, **arrays)
-    with pytest.raises(gc.InputError, match=message) as raised:
-        read_given(path)
-    assert str(path) in str(raised.value)
-
-
 def test_three_contacts_and_files_of_something_else_are_refused(tmp_path):
     path = tmp_path / "g.npz"
     path.write_bytes(b"PK\x03\x04 no archive")
