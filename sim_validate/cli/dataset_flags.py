@@ -118,7 +118,7 @@ class Import:
     """Judge grasps made by another tool, simulate them, and write them as a dataset."""
 
     contacts: Positional[Path]
-    """A contacts file (JSON) or npz file of four contacts for each grasp (see docs/datasets.md)."""
+    """A contacts file of four contacts for each grasp (see docs/datasets.md)."""
     object: Positional[str]
     """The mesh file that the contacts are on, or the name of a built-in object."""
     out: Path

@@ -142,13 +142,15 @@ GOOD = _npy(_header(), b"\0" * 8)
 ARCHIVES = {
     "encrypted": (_archive(("a.npy", GOOD), flag=1), "cannot be read as npz"),
     "twice": ("twice", "the same name"),
+    "object": (_archive(("a.npy", _npy(_header("'|O'"), b"\0" * 8))), "an array of numbers"),
+    "overflow": (_archive(("a.npy", _npy(_header(shape="(4294967296, 4294967296)")))), "s shape"),
+    "no archive": (b"PK nothing", "expected an npz file"),
     "structured": (_archive(("a.npy", _npy(_header("[('x', '<f8')]"), b"\0" * 8))), "expected an"),
     "negative": (_archive(("a.npy", _npy(_header(shape="(-1,)"), b"\0" * 8))), "s shape"),
     "short": (_archive(("a.npy", _npy(_header(shape="(2,)"), b"\0" * 8))), "as many numbers"),
     "long": (_archive(("a.npy", GOOD + b"\0")), "as many numbers"),
     "deep": (_archive(("a.npy", _npy("(" * 100))), "cannot be read as npz"),
     "version": (_archive(("a.npy", _npy(_header(), b"\0" * 8, b"\x03\x00"))), "format"),
-    "letters": (_archive(("a.npy", _npy(_header("'<U1'"), b"\xff" * 4))), "invalid Unicode"),
     "many": (_archive(*((f"{i}.npy", GOOD) for i in range(300))), "300 members"),
 }  # fmt: skip
 
@@ -180,7 +182,7 @@ def test_a_bomb_is_refused_by_what_it_claims_before_it_is_inflated(monkeypatch):
 def test_plain_arrays_come_back_as_numpy_writes_them(order):
     held = io.BytesIO()
     arrays = {
-        "a": np.arange(6.0).reshape(2, 3, order=order), "b": np.array(["x", "\u00e9"]),
+        "a": np.arange(6.0).reshape(2, 3, order=order),
         "c": np.array(3, dtype=">i2"), "d": np.zeros((0, 3)), "e": np.array([True]),
     }  # fmt: skip
     arrays["a"] = np.asarray(arrays["a"], order=order)
