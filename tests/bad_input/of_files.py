@@ -76,11 +76,11 @@ def zipped(name: str, data: bytes) -> bytes:
 
 OTHERS = {
     "a bomb called 3mf": ("part.3mf", zipped("3dmodel.model", bytes(50_000_000)), "ending"),
-    "a zip bomb called obj": ("part.obj", zipped("part.obj", bytes(50_000_000)), "zip|unpack"),
-    "a name that climbs": ("part.obj", zipped("../../part.obj", b"v"), "zip|unpack"),
-    "entities called off": ("part.off", ENTITIES, "XML|convert"),
+    "a zip bomb called obj": ("part.obj", zipped("part.obj", bytes(50_000_000)), "export"),
+    "a name that climbs": ("part.obj", zipped("../../part.obj", b"v"), "export"),
+    "entities called off": ("part.off", ENTITIES, "export"),
     "an entity outside": ("part.x3d", OUTSIDE, "ending"),
-    "an entity outside called ply": ("part.ply", OUTSIDE, "XML|convert"),
+    "an entity outside called ply": ("part.ply", OUTSIDE, "export"),
     "a compressed OFF": ("part.off.gz", b"\x1f\x8b\x08", "ending"),
     "an archive called stl": ("part.stl", gzip.compress(stl(), mtime=0), "export"),
     "a zip called obj": ("part.obj", b"PK\x03\x04" + bytes(200), "export"),
