@@ -137,7 +137,7 @@ def _same_executions(data: bytes, found: Any) -> None:
 
 POLYGON = [[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]]
 REGIONS = {
-    "schema": 3, "object": {"name": "box", "content_sha256": HASH}, "friction": 0.5,
+    "schema": 1, "object": {"name": "box", "content_sha256": HASH}, "friction": 0.5,
     "edge_clearance_m": 0.0,
     "grasps": [{"id": "c-0-1-2-3", "contacts_sha256": HASH, "disc_radius_m": 0.1,
                 "regions": [{"polygon_m": POLYGON, "inscribed_radius_m": 0.01}] * 4,
