@@ -23,9 +23,6 @@ from sim_validate.protocols.published import protocol_names as protocol_names
 from sim_validate.records.executions import Executions as Executions
 from sim_validate.records.executions import load_executions as load_executions
 from sim_validate.records.regions import load_regions as load_regions
-from sim_validate.records.transfers import SavedCarriedGrasp as SavedCarriedGrasp
-from sim_validate.records.transfers import SavedTransfer as SavedTransfer
-from sim_validate.records.transfers import load_transfer as load_transfer
 from sim_validate.records.verdicts import SavedVerdict as SavedVerdict
 from sim_validate.records.verdicts import SavedVerdicts as SavedVerdicts
 from sim_validate.records.verdicts import load_verdicts as load_verdicts

@@ -16,8 +16,8 @@ import grasp_core as gc
 from grasp_core import errors
 from sim_validate import main as commands
 from sim_validate.cli import command_flags
-from sim_validate.cli.execution_flags import TRIALS, Executing
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.cli.flag_groups import TRIALS, Executing
 from sim_validate.datasets.config import DatasetConfig, Learning, config_from_toml
 from sim_validate.datasets.given_contacts import read_given
 from sim_validate.execution.verdict import Fate

@@ -8,8 +8,16 @@ from tyro.conf import OmitArgPrefixes, Positional, arg, subcommand
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from sim_validate.cli.flag_bounds import at_least
-from sim_validate.cli.flag_groups import Count, Repeats, Seed, Speech, UnitName, Usual
-from sim_validate.cli.transfer_flags import Carrying
+from sim_validate.cli.flag_groups import (
+    Carrying,
+    Count,
+    Jobs,
+    Repeats,
+    Seed,
+    Speech,
+    UnitName,
+    Usual,
+)
 from sim_validate.parallel.processes import available_cores
 
 
@@ -53,8 +61,7 @@ class Record:
     seed: Seed | None = None
     """Seed of all random choices; if not given, the seed that the grasps were planned with."""
     changed: OmitArgPrefixes[ChangedPart] = field(default_factory=ChangedPart)
-    jobs: Count = field(default_factory=available_cores)
-    """Largest number of processes; results do not depend on it."""
+    jobs: Jobs = field(default_factory=available_cores)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
@@ -73,8 +80,7 @@ class Check:
     bless: bool = False
     """Write the new results over the baseline, even if grasps have become worse."""
     changed: OmitArgPrefixes[ChangedPart] = field(default_factory=ChangedPart)
-    jobs: Count = field(default_factory=available_cores)
-    """Largest number of processes; results do not depend on it."""
+    jobs: Jobs = field(default_factory=available_cores)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 

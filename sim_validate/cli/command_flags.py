@@ -10,30 +10,39 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 from grasp_core.checked import MOST_COUNT
 from sim_validate.cli.baseline_flags import Baseline
 from sim_validate.cli.dataset_flags import Dataset
-from sim_validate.cli.execution_flags import UPRIGHT, Execute, Executing, Mass, Tips, Trials
 from sim_validate.cli.flag_bounds import at_least, ends_in, within
 from sim_validate.cli.flag_groups import (
+    UPRIGHT,
+    Carrying,
     Count,
     Direction,
     Edges,
+    Executing,
     Fingers,
     Friction,
     Gap,
+    Jobs,
+    Lengths,
+    Mass,
     Mesh,
+    MeshLimits,
     NotNegative,
+    ObjectName,
     Planning,
+    Point,
     ProtocolName,
     Seed,
     Speech,
     Testing,
+    Tips,
+    Trials,
     Usual,
     Wrench,
 )
 from sim_validate.cli.hand_flags import Hand, Reach
-from sim_validate.cli.showing_flags import PICTURES, Report, View
-from sim_validate.cli.transfer_flags import Transfer
 from sim_validate.parallel.processes import available_cores
 
+PICTURES, CLIPS, PAGES = (".svg", ".png"), (".gif", ".webp"), (".html", ".htm")
 RUN_LIMIT = 100
 """Number of grasps that `run` simulates by default, which takes some ten seconds."""
 
@@ -42,8 +51,7 @@ RUN_LIMIT = 100
 class Run:
     """Plan grasps, simulate them and negative controls (contacts that must fail); write all."""
 
-    object: Positional[str]
-    """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
+    object: Positional[ObjectName]
     planning: OmitArgPrefixes[Planning] = field(default_factory=partial(Planning, limit=RUN_LIMIT))
     testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
@@ -67,8 +75,7 @@ class Run:
 class Plan:
     """Find force-closure grasps of an object, each with a checked certificate of force closure."""
 
-    object: Positional[str]
-    """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
+    object: Positional[ObjectName]
     planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
     best: bool = False
     """Also search for the grasp of the largest --measure on any faces, and prove how much better
@@ -84,8 +91,7 @@ class Plan:
     orientation; or the multiple of a task's --wrenches that is resisted."""
     wrenches: Path | None = None
     """With --measure task: JSON file of the task's wrenches (see docs/files.md)."""
-    jobs: Count = field(default_factory=available_cores)
-    """Largest number of processes; results do not depend on it."""
+    jobs: Jobs = field(default_factory=available_cores)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for grasps.json; if not given, no file is written."""
@@ -111,6 +117,34 @@ class Validate:
     out: Path | None = None
     """Folder for verdicts.json, or for judgements.json with --protocol; if not given, no file is
     written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Execute:
+    """Simulate grasps as a robot executes them: true mass, springy fingers, one fixed squeeze."""
+
+    grasps: Positional[Path]
+    """The grasps.json with the grasps to execute."""
+    grasp: str | None = None
+    """Id of the grasp to execute; if not given, all grasps are executed."""
+    friction: Friction | None = None
+    """Coulomb coefficient to simulate with; if not given, the one planned for."""
+    limit: Count | None = None
+    """Execute only this many grasps, from the first."""
+    trials: Annotated[Trials, arg(metavar="NAME,NAME,...")] = ()
+    """Names of the trials: weight, lift, shake, stop, knock, misplaced, separated by commas; all if
+    not given."""
+    down: Annotated[Direction, arg(metavar="X Y Z")] = UPRIGHT
+    """Direction of gravity in the object's frame, in the trials that do not choose their own."""
+    seed: Seed | None = None
+    """Seed of the directions of misplaced objects; if not given, the seed of the plan."""
+    executing: OmitArgPrefixes[Executing] = field(default_factory=Executing)
+    setup: Path | None = None
+    """A TOML file whose table `physics` has settings of the simulator (see docs/files.md)."""
+    jobs: Jobs = field(default_factory=available_cores)
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+    out: Path | None = None
+    """Folder for executions.json; if not given, no file is written."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +197,50 @@ class Export:
 
 
 @dataclass(frozen=True, slots=True)
+class View:
+    """Look at a grasp: in MuJoCo's viewer if there is a display, or in a file."""
+
+    grasps: Positional[Path]
+    """The grasps.json with the grasp to show, or the folder of a run."""
+    grasp: str | None = None
+    """Id of the grasp to show; if not given, the first one."""
+    friction: Friction | None = None
+    """Coulomb coefficient; if not given, the one planned for."""
+    picture: Annotated[Path, ends_in(*PICTURES)] | None = None
+    """Write the grasp as a picture like the paper's (svg, png)."""
+    page: Annotated[Path, ends_in(*PAGES)] | None = None
+    """Write a page (html) on which the grasp can be turned."""
+    clip: Annotated[Path, ends_in(*CLIPS)] | None = None
+    """Write a clip (webp, gif) of the fingers closing, which MuJoCo renders where there are
+    graphics."""
+    hand: bool = True
+    """Show the hand of the reaches.json beside the grasps, where it reaches the grasp, in the
+    picture and on the page."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Write the results of a run as pages that open in a browser, without any network."""
+
+    folder: Positional[Path]
+    """Folder of a run, with its grasps.json; or a folder of such folders."""
+    limit: Count | None = None
+    """Draw only this many grasps per run, those with problems before others; if not given, all."""
+    every_copy: bool = False
+    """Draw every grasp. If not given, grasps that a symmetry of the object makes from one another
+    share a card and one set of pictures."""
+    clips: Annotated[int, at_least(0, up_to=MOST_COUNT)] = 0
+    """Number of grasps per run of which clips of trials are made, those with problems first, if
+    graphics are available."""
+    jobs: Count = field(default_factory=available_cores)
+    """Largest number of processes."""
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+    out: Path | None = None
+    """Folder for the pages; if not given, `report` in the run's folder."""
+
+
+@dataclass(frozen=True, slots=True)
 class Regions:
     """Prove regions in which each finger may stand anywhere, whatever the others do."""
 
@@ -184,8 +262,7 @@ class Regions:
     max_cones: Annotated[int, within("max_cones")] = 10_000
     """Number of cones that one attempt at a proof may use. More cones take longer and enlarge radii
     by some hundredths, or not at all where they are as large as possible."""
-    jobs: Count = field(default_factory=available_cores)
-    """Largest number of processes; results do not depend on it."""
+    jobs: Jobs = field(default_factory=available_cores)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for regions.json and the proofs; if not given, no file is written."""
@@ -236,17 +313,38 @@ class Analyze:
     edges: Edges = 8
     """Number of edges of the pyramids that replace friction cones in two quality measures,
     min-weight and hull volume."""
-    jobs: Count = field(default_factory=available_cores)
-    """Largest number of processes; results do not depend on it."""
+    jobs: Jobs = field(default_factory=available_cores)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """Carry grasps over to a part that has changed since they were planned, and judge them anew."""
+
+    grasps: Positional[Path]
+    """The grasps.json that was planned on the old part."""
+    part: Positional[str]
+    """The changed part, in the same frame: a mesh file (obj, stl, ply, off, glb) or the name of a
+    built-in object."""
+    carrying: OmitArgPrefixes[Carrying] = field(default_factory=Carrying)
+    friction: Friction | None = None
+    """Coulomb coefficient to judge with, before and after; if not given, the one planned for."""
+    lengths: OmitArgPrefixes[Lengths] = field(default_factory=Lengths)
+    center_of_mass_m: Annotated[Point | None, arg(metavar="X Y Z")] = None
+    """Centre of mass of the changed part in the file's frame, in metres; if not given, that of
+    uniform density, or the old part's if that was given."""
+    limits: OmitArgPrefixes[MeshLimits] = field(default_factory=MeshLimits)
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+    out: Path | None = None
+    """Folder for transfer.json and the grasps.json of the changed part; if not given, no file is
+    written."""
 
 
 @dataclass(frozen=True, slots=True)
 class Inspect:
     """Show a mesh as a polyhedron: faces, mass properties, face quadruples to grasp by."""
 
-    object: Positional[str]
-    """A mesh file (obj, stl, ply, off, glb) or the name of a built-in object."""
+    object: Positional[ObjectName]
     picture: Annotated[Path, ends_in(*PICTURES)] | None = None
     """Write the object as a picture (svg, png)."""
     mesh: OmitArgPrefixes[Mesh] = field(default_factory=Mesh)
@@ -270,26 +368,9 @@ class Doctor:
 
 
 Command = (
-    Run
-    | Plan
-    | Validate
-    | Execute
-    | Scene
-    | Export
-    | View
-    | Report
-    | Regions
-    | Replay
-    | Analyze
-    | Transfer
-    | Reach
-    | Hand
-    | Dataset
-    | Baseline
-    | Inspect
-    | Objects
-    | Doctor
-)
+    Run | Plan | Validate | Execute | Scene | Export | View | Report | Regions | Replay | Analyze
+    | Transfer | Reach | Hand | Dataset | Baseline | Inspect | Objects | Doctor
+)  # fmt: skip
 
 
 COMMANDS = {kind.__name__.lower(): kind for kind in get_args(Command)}

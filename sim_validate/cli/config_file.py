@@ -15,7 +15,11 @@ COMMAND_WORDS = {"dataset": 2, "baseline": 2}
 
 def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]:
     """Put the settings of `--config FILE.toml` before the flags, which then override them."""
-    words = [part for word in arguments for part in _split_config(word)]
+    words = [
+        part
+        for word in arguments
+        for part in (word.split("=", 1) if word.startswith("--config=") else [word])
+    ]
     if "--config" not in words:
         return arguments
     at = words.index("--config")
@@ -60,11 +64,6 @@ def _read(path: Path, known: set[str]) -> list[str]:
         return flags_from(settings)
     except InputError as error:
         raise InputError(f"--config {path}: {error}") from error
-
-
-def _split_config(word: str) -> list[str]:
-    """Split `--config=FILE` into two words."""
-    return word.split("=", 1) if word.startswith("--config=") else [word]
 
 
 def _as_flags(name: str, value: Any) -> list[str]:

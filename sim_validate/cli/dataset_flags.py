@@ -54,7 +54,7 @@ class Planning:
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """Where a dataset is computed, and how much time and memory; no row depends on these."""
+    """Where a dataset is computed, and how much time; no row depends on these."""
 
     engine: Literal["local", "ray", "dask"] = "local"
     """Where to compute: in processes of this machine, or on a Ray or Dask cluster."""
@@ -63,8 +63,6 @@ class Work:
     timeout_s: Positive = 3600.0
     """Time after which an attempt at one object and friction is stopped; each gets two attempts
     [s]."""
-    memory_mb: Count | None = None
-    """Memory that a process may use beyond that of a process that has just started [MiB]."""
     jobs: Count = field(default_factory=available_cores)
     """Number of processes; results do not depend on it."""
 
@@ -120,7 +118,7 @@ class Import:
     """Judge grasps made by another tool, simulate them, and write them as a dataset."""
 
     contacts: Positional[Path]
-    """A contacts file (JSON) or npz file of four contacts for each grasp (see docs/datasets.md)."""
+    """A contacts file of four contacts for each grasp (see docs/datasets.md)."""
     object: Positional[str]
     """The mesh file that the contacts are on, or the name of a built-in object."""
     out: Path

@@ -74,7 +74,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "dataset build meshes/ wedge --friction 0.3 --friction 0.5 --limit 20 --out ds",
         "dataset build ds/config.toml --out again",
     ),
-    "dataset import": ("dataset import contacts.npz mug.obj --out judged",),
+    "dataset import": ("dataset import contacts.json mug.obj --out judged",),
     "dataset verify": ("dataset verify ds",),
     "dataset export": ("dataset export ds --to isaac --out isaac",),
     "baseline record": ("baseline record grasps.json -o wedge.baseline.json",),

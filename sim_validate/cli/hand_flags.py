@@ -14,6 +14,7 @@ from sim_validate.cli.flag_groups import (
     Count,
     Direction,
     Friction,
+    Jobs,
     ProtocolName,
     Seed,
     Speech,
@@ -21,20 +22,22 @@ from sim_validate.cli.flag_groups import (
 )
 from sim_validate.parallel.processes import available_cores
 
-Fingertips = Annotated[str, arg(metavar="NAME,NAME,...")]
-"""Names of a hand's fingertips in its file."""
+HandName = Annotated[str, arg(help=(
+    "The hand: allegro, allegro-urdf, leap, an MJCF or URDF file, or menagerie:NAME of the package "
+    "mujoco-menagerie."
+))]  # fmt: skip
+Fingertips = Annotated[str, arg(metavar="NAME,NAME,...", help=(
+    "For a hand from a file: names of sites, geoms or bodies that are fingertips, separated by "
+    "commas."
+))]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class Hand:
     """Show what a hand was read as: fingers, joints with ranges and torque limits, fingertips."""
 
-    hand: Positional[str]
-    """The hand: allegro, allegro-urdf, leap, an MJCF or URDF file, or menagerie:NAME of the package
-    mujoco-menagerie."""
+    hand: Positional[HandName]
     fingertips: Fingertips = ""
-    """For a hand from a file: names of sites, geoms or bodies that are fingertips, separated by
-    commas."""
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
@@ -44,12 +47,8 @@ class Reach:
 
     grasps: Positional[Path]
     """A grasps.json."""
-    hand: str = "allegro"
-    """The hand: allegro, allegro-urdf, leap, an MJCF or URDF file, or menagerie:NAME of the package
-    mujoco-menagerie."""
+    hand: HandName = "allegro"
     fingertips: Fingertips = ""
-    """For a hand from a file: names of sites, geoms or bodies that are fingertips, separated by
-    commas."""
     grasp: str | None = None
     """Id of the only grasp to look at."""
     table: Annotated[Direction | None, arg(metavar="X Y Z")] = None
@@ -81,8 +80,7 @@ class Reach:
     """Seed of the postures from which the search starts."""
     limit: Count | None = None
     """Look at the first so many grasps only."""
-    jobs: Count = field(default_factory=available_cores)
-    """Largest number of processes; results do not depend on it."""
+    jobs: Jobs = field(default_factory=available_cores)
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for reaches.json; if not given, no file is written."""

@@ -11,36 +11,25 @@ from contextlib import suppress
 from typing import TextIO
 
 
-class _Read(io.FileIO):
-    """A wrapper for standard output that drops text after its reader closed the pipe."""
-
-    def write(self, data: object, /) -> int:
-        try:
-            return super().write(data)  # type: ignore[arg-type]
-        except BrokenPipeError:
-            return len(memoryview(data))  # type: ignore[arg-type]
-
-
-class _Told(io.FileIO):
-    """A wrapper for standard error that ignores messages it cannot write."""
-
-    def write(self, data: object, /) -> int:
-        try:
-            return super().write(data)  # type: ignore[arg-type]
-        except OSError:
-            return len(memoryview(data))  # type: ignore[arg-type]
-
-
 def steady() -> None:
     """Replace standard output and error by streams that survive a closed reader."""
-    sys.stdout = _over(sys.stdout, _Read)
-    sys.stderr = _over(sys.stderr, _Told)
+    sys.stdout = _over(sys.stdout, BrokenPipeError)
+    sys.stderr = _over(sys.stderr, OSError)
 
 
-def _over(stream: TextIO, kind: type[io.FileIO]) -> TextIO:
+def _over(stream: TextIO, ignored: type[OSError]) -> TextIO:
+    """Return a stream that drops what it cannot write where that fails with a certain error."""
     if not isinstance(stream, io.TextIOWrapper):  # closed, or another program's own stream
         return stream
-    buffered = io.BufferedWriter(kind(stream.fileno(), "w", closefd=False))
+
+    class Raw(io.FileIO):
+        def write(self, data: object, /) -> int:
+            try:
+                return super().write(data)  # type: ignore[arg-type]
+            except ignored:
+                return len(memoryview(data))  # type: ignore[arg-type]
+
+    buffered = io.BufferedWriter(Raw(stream.fileno(), "w", closefd=False))
     return io.TextIOWrapper(
         buffered,
         encoding=stream.encoding,

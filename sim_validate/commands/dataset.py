@@ -19,12 +19,11 @@ from sim_validate.datasets.isaac import export
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.open_dataset import splits_in_words
 from sim_validate.datasets.verify import Sample, verify
-from sim_validate.datasets.workers import Engine, Limits
+from sim_validate.datasets.workers import Engine
 from sim_validate.parallel.clusters import dask_workers, ray_workers
 
 FRICTION = 0.5
 """Friction coefficient for planning and simulation if no flag gives one."""
-MEGABYTE = 2**20
 
 
 def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
@@ -45,9 +44,8 @@ def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
 
 def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter: Reporter) -> int:
     _warn_of_missing(config, reporter)
-    memory = None if work.memory_mb is None else work.memory_mb * MEGABYTE
     with reporter.progress("building") as steps, _engine(work) as engine:
-        built = build(config, out, engine, steps.update, Limits(work.timeout_s, memory))
+        built = build(config, out, engine, steps.update, work.timeout_s)
     rows = built.rows
     reporter.say(
         f"{out}: {built.units} units, {built.made} made now, {built.quarantined} quarantined; "
@@ -63,7 +61,6 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
 
 
 def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
-    """Start the processes or the cluster that compute the dataset."""
     if work.engine != "local":
         start = ray_workers if work.engine == "ray" else dask_workers
         return start(work.jobs, work.address)
@@ -139,7 +136,6 @@ def _asked(command: dataset_flags.Build) -> DatasetConfig:
 
 
 def _settings(settings: dataset_flags.Settings) -> dict[str, Any]:
-    """Rename the flags' settings to the names that a dataset configuration has for them."""
     given = {each.name: getattr(settings, each.name) for each in fields(settings)}
     lengths = asdict(given.pop("lengths"))
     return {"frictions": given.pop("friction") or (FRICTION,), **lengths, **given}

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
-from sim_validate.cli import execution_flags
+from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked.executions import check_mass, execution_settings
-from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
+from sim_validate.commands.asked.objects import chosen_grasps, saved_grasps
+from sim_validate.commands.asked.trials import check_mass, execution_settings
 from sim_validate.execution.jobs import ExecutionJob, executed
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (
@@ -49,7 +49,7 @@ SLIPS_MEAN = (
 )
 
 
-def execute_file(command: execution_flags.Execute, reporter: Reporter) -> int:
+def execute_file(command: command_flags.Execute, reporter: Reporter) -> int:
     """Execute the grasps of a file in simulation and report which of them survive."""
     check_mass(command.executing.mass)
     saved = saved_grasps(command.grasps, reporter)

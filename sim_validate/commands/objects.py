@@ -68,7 +68,7 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
         facts["picture"] = str(write_object_picture(body, command.picture))
     reporter.document(facts)
     reporter.say(body.name)
-    for sentence in _sentences(body, spanning):
+    for sentence in _sentences(body, facts):
         reporter.say(f"  {sentence}")
     if body.patches is None and len(body.faces) <= MOST_NUMBERED:
         rows = [
@@ -83,17 +83,16 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
     return Exit.GOOD
 
 
-def _sentences(body: Polyhedron, spanning: int | None) -> Iterator[str]:
-    """Yield the facts about a mesh in sentences."""
+def _sentences(body: Polyhedron, facts: dict[str, Any]) -> Iterator[str]:
     yield f"The mesh has {len(body.vertices)} vertices and {len(body.triangles)} triangles."
-    yield _on_faces(body)
+    yield _on_faces(body, facts)
     yield (
         f"{'It' if body.surface.closed else 'Its convex hull'} encloses a volume of "
         f"{CM3 * body.volume:.4g} cm^3, and it reaches "
         f"{MM * body.radius:.4g} mm from its centre of mass, which is at "
         f"{vector(np.round(MM * body.center_of_mass, 3))} mm."
     )
-    if spanning is not None:
+    if (spanning := facts["spanning_quadruples"]) is not None:
         yield (
             f"The normals of {spanning} sets of four faces positively span all directions, so the "
             "constructions of the paper have faces to start from." if spanning else
@@ -105,22 +104,18 @@ def _sentences(body: Polyhedron, spanning: int | None) -> Iterator[str]:
     yield f"The sha256 of its content is {body.content_sha256}."
 
 
-def _on_faces(body: Polyhedron) -> str:
-    """Say in a sentence what the faces of a mesh are."""
+def _on_faces(body: Polyhedron, facts: dict[str, Any]) -> str:
     if body.patches is None:
-        holed = sum(bool(face.holes) for face in body.faces)
-        dented = sum(len(face.pieces) > 1 for face in body.faces)
         return (
-            f"Its {len(body.faces)} faces are planar; {dented} of them are not convex, and {holed} "
-            "have holes."
+            f"Its {len(body.faces)} faces are planar; {facts['non_convex_faces']} of them "
+            f"are not convex, and {facts['faces_with_holes']} have holes."
         )
-    spread = math.degrees(max((face.spread for face in body.faces), default=0.0))
-    depth = max((face.depth for face in body.faces), default=0.0)
     asked = body.patches
     return (
         f"Its surface is curved: fingers may stand on {len(body.faces)} nearly flat patches, which "
-        f"turn by {spread:.2g} deg at most ({asked.spread_deg:.4g} deg allowed) and are "
-        f"{MM * depth:.2g} mm deep at most ({asked.depth:.4g} of its extent allowed)."
+        f"turn by {facts['largest_spread_deg']:.2g} deg at most ({asked.spread_deg:.4g} deg "
+        f"allowed) and are {MM * facts['largest_depth_m']:.2g} mm deep at most ({asked.depth:.4g} "
+        "of its extent allowed)."
     )
 
 

@@ -109,20 +109,25 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
     body = object_to_plan(command.object, command.planning, reporter)
     with alone_in(command.out):
         found = plan_object(body, command.planning, command.jobs, reporter)
-        best = _searched(body, command, wrenches, reporter)
+        best: BestGrasp | None = None
+        if command.best:
+            from sim_validate.commands.best import search_best
+
+            best = search_best(body, command, wrenches, reporter)
         if command.out:
             remove_results(command.out)
         found = with_regions(body, found, command.planning, command.out, command.jobs, reporter)
-        planned, compared, found = found.grasps, list["Rated"](), _with_best(found, best)
+        planned, compared = found.grasps, list["Rated"]()
+        if best is not None:
+            found = replace(found, grasps=(best.grasp, *planned), absence=None)
         text = plan_to_json(body, found)
         if command.out:
             path = write_text(command.out / "grasps.json", text)
             reporter.say(f"wrote {path}")
         if best is not None:
-            from sim_validate.commands.best.search import rated, write_best
+            from sim_validate.commands.best import write_best
 
-            compared = rated(body, best, planned)
-            write_best(body, best, compared, command.out, reporter)
+            compared = write_best(body, best, planned, command.out, reporter)
         elif reporter.json_only:
             print(text, end="")  # noqa: T201 - the document itself
     say_counts(body, found, reporter)
@@ -136,7 +141,7 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
         show_gains(found.moves, reporter)
     if best is None:
         return Exit.GOOD
-    from sim_validate.commands.best.search import show_best
+    from sim_validate.commands.best import show_best
 
     return show_best(best, compared, reporter)
 
@@ -154,26 +159,6 @@ def _task(command: command_flags.Plan) -> Array | None:
     from sim_validate.records.wrenches import wrenches_from_file
 
     return np.array([each.wrench for each in wrenches_from_file(command.wrenches)])
-
-
-def _searched(
-    body: Polyhedron, command: command_flags.Plan, wrenches: Array | None, reporter: Reporter
-) -> "BestGrasp | None":
-    """Return the best grasp if it is asked for."""
-    if not command.best:
-        return None
-    from sim_validate.commands.best.search import search_best
-
-    return search_best(body, command, wrenches, reporter)
-
-
-def _with_best(found: Plan, best: "BestGrasp | None") -> Plan:
-    """Put the best grasp before the planned ones if there is one."""
-    if best is None:
-        return found
-    from sim_validate.commands.best.search import with_best
-
-    return with_best(found, best)
 
 
 def _table(

@@ -23,7 +23,7 @@ from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.flag_bounds import FlagsError
-from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
+from sim_validate.commands.asked.objects import chosen_grasps, saved_grasps
 from sim_validate.commands.hand import asked_hand
 from sim_validate.commands.judging import judge_hands
 from sim_validate.dexgraspbench import dex_record, write_dex_object, write_dex_record

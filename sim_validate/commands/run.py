@@ -10,12 +10,11 @@ from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.records.grasps_json import SavedGrasps, plan_to_json
 from sim_validate.cli import command_flags
+from sim_validate.cli.command_flags import Report
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit, reason_of
-from sim_validate.cli.showing_flags import Report
-from sim_validate.commands.asked.executions import check_executing, execution_of_run
 from sim_validate.commands.asked.objects import asked_finger, object_to_plan
-from sim_validate.commands.asked.trials import prepared
+from sim_validate.commands.asked.trials import check_executing, execution_of_run, prepared
 from sim_validate.commands.execute import execute_grasps
 from sim_validate.commands.plan import plan_object, say_counts, show_gains, with_regions
 from sim_validate.commands.validate import simulate_grasps
@@ -77,7 +76,9 @@ def _run_in(
     if found.moves:
         show_gains(found.moves, reporter)
     saved = SavedGrasps(body, found.friction, found.seed, found.grasps, found.finger)
-    _write_scenes(folder, saved, setup)
+    for grasp in saved.grasps:
+        scene = setup.scene(body, grasp, saved.friction)
+        write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
     code, text = simulate_grasps(saved, setup, agenda, jobs=jobs, folder=folder, reporter=reporter)
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
     try:
@@ -87,25 +88,13 @@ def _run_in(
             survival, more = execute_grasps(
                 saved, execution, jobs=jobs, folder=folder, reporter=reporter
             )
-            reporter.text(_together(text, more))
+            reporter.text(text_of(json.loads(text) | {"executions": json.loads(more)}))
             code = max(code, survival)
     except GraspError:  # the other results are complete, so that pages can show them
         _report(command, folder, reporter)
         raise
     _report(command, folder, reporter)
     return code
-
-
-def _write_scenes(folder: Path, saved: SavedGrasps, setup: Setup) -> None:
-    for grasp in saved.grasps:
-        scene = setup.scene(saved.body, grasp, saved.friction)
-        write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
-
-
-def _together(verdicts: str, executions: str) -> str:
-    """Put executions into the document of verdicts, under the key `executions`."""
-    document = json.loads(verdicts) | {"executions": json.loads(executions)}
-    return text_of(document)
 
 
 def _report(command: command_flags.Run, folder: Path, reporter: Reporter) -> None:

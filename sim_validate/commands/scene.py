@@ -18,11 +18,10 @@ from scenes.mjcf import build_scene
 from scenes.physics import PhysicsSettings
 from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import Reporter
-from sim_validate.cli.execution_flags import UPRIGHT, Mass, Tips
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.flag_bounds import FlagsError
-from sim_validate.commands.asked.executions import check_mass, holding
-from sim_validate.commands.asked.trials import finger_settings
+from sim_validate.cli.flag_groups import UPRIGHT, Mass, Tips
+from sim_validate.commands.asked.trials import check_mass, finger_settings, holding
 from sim_validate.execution.execute import chosen_squeeze, held_scene
 from sim_validate.files.result_folders import alone_in
 from sim_validate.records.grasps import grasp_with_id, read_grasps
@@ -44,7 +43,7 @@ def write_scenes(command: command_flags.Scene, reporter: Reporter) -> int:
             "--grasp ID"
         )
     friction = saved.friction if command.friction is None else command.friction
-    if _heavy(command):
+    if command.mass != Mass():
         text_of = _held(command, saved, friction, reporter)
     else:
         text_of = _scaled(command, saved, friction)
@@ -74,15 +73,10 @@ def _written(grasp: Grasp, text_of: TextOf, folder: Path | None, reporter: Repor
     return path
 
 
-def _heavy(command: command_flags.Scene) -> bool:
-    """Return whether the flags ask for an object of true mass."""
-    return command.mass != Mass()
-
-
 def _check(command: command_flags.Scene) -> None:
     """Refuse flags that the scene asked for does not use, before any file is read."""
     check_mass(command.mass)
-    if _heavy(command):
+    if command.mass != Mass():
         if (command.fingers, command.surface) != (flag_groups.Fingers(), "pads"):
             raise FlagsError(
                 "the flags from --max-normal-force to --surface are for scenes with scaled "

@@ -8,20 +8,16 @@ from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.shells import SMALL
 from grasp_core.transferring.changed_part import SURE_GROWTH, given_center, growth
-from grasp_core.transferring.face_changes import check_planar
-from grasp_core.transferring.transfer import (
-    CHANGES,
-    CarriedGrasp,
-    Change,
-    GraspFigures,
-    Transfer,
-    transfer,
-)
-from sim_validate.cli import flag_groups, transfer_flags
+from grasp_core.transferring.face_changes import (check_planar)
+from grasp_core.transferring.transfer import (CHANGES, CarriedGrasp, Change, GraspFigures, Transfer, transfer)
+from sim_validate.cli import (flag_groups)
+from grasp_core.transferring.judging import (CHANGES, Change, GraspFigures)
+from grasp_core.transferring.like_faces import (check_planar)
+from grasp_core.transferring.transfer import (CarriedGrasp, Transfer, transfer)
+from sim_validate.cli import (command_flags, flag_groups)
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked.grasps import saved_grasps
-from sim_validate.commands.asked.objects import load_object
+from sim_validate.commands.asked.objects import load_object, saved_grasps
 from sim_validate.files.result_folders import alone_in, remove_results
 from sim_validate.records.transfers import TRANSFER, carried_to_json, transfer_to_json
 
@@ -34,7 +30,7 @@ BAD: tuple[Change, ...] = ("worse", "gone")
 """What becomes of a grasp if its part should not have changed like that."""
 
 
-def transfer_file(command: transfer_flags.Transfer, reporter: Reporter) -> int:
+def transfer_file(command: command_flags.Transfer, reporter: Reporter) -> int:
     """Carry the grasps of a file over to a changed part, write them, and say what has changed."""
     saved = saved_grasps(command.grasps, reporter)
     if saved is None:
@@ -72,7 +68,7 @@ def transfer_file(command: transfer_flags.Transfer, reporter: Reporter) -> int:
     return Exit.NEGATIVE if any(map(found.count, BAD)) else Exit.GOOD
 
 
-def _changed_part(command: transfer_flags.Transfer, old: Polyhedron) -> Polyhedron:
+def _changed_part(command: command_flags.Transfer, old: Polyhedron) -> Polyhedron:
     center = command.center_of_mass_m
     if center is None and (kept := given_center(old)) is not None:
         x, y, z = kept.tolist()
@@ -85,7 +81,6 @@ def _changed_part(command: transfer_flags.Transfer, old: Polyhedron) -> Polyhedr
 
 
 def _show(found: Transfer, reporter: Reporter) -> None:
-    """Show a table of the grasps, which faces moved, and why grasps are worse or gone."""
     order = sorted(found.grasps, key=lambda each: -CHANGES.index(each.status))
     shown = order[:TABLE_ROWS]
     title = f"{counted(len(order), 'grasp')} of {found.old.name} on {found.new.name}"
@@ -106,7 +101,6 @@ def _show(found: Transfer, reporter: Reporter) -> None:
 
 
 def _row(each: CarriedGrasp, changed: set[int]) -> tuple[str, ...]:
-    """Write how far contacts moved and turned, figures before and after, and changed faces."""
     moved = turned = ABSENT
     if all(contact.contact is not None for contact in each.contacts):
         moved = f"{MM * max(contact.distance for contact in each.contacts):.2f}"
@@ -117,7 +111,6 @@ def _row(each: CarriedGrasp, changed: set[int]) -> tuple[str, ...]:
 
 
 def _figures(figures: GraspFigures | None) -> tuple[str, str]:
-    """Write critical friction and quality."""
     if figures is None:
         return ABSENT, ABSENT
     return f"{figures.critical_friction:.4f}", f"{figures.ferrari_canny[0]:.4f}"

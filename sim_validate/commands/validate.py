@@ -11,7 +11,7 @@ from grasp_core.values import Grasp
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked.grasps import chosen_grasps, saved_grasps
+from sim_validate.commands.asked.objects import chosen_grasps, saved_grasps
 from sim_validate.commands.asked.trials import prepared
 from sim_validate.commands.judging import judge_grasps
 from sim_validate.files.result_folders import alone_in, remove_verdicts

@@ -17,7 +17,7 @@ from scenes.drawing.pictures import grasp_sheet
 from scenes.drawing.turntable import turntable_page
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, build_scene
-from sim_validate.cli import showing_flags
+from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.files.result_folders import alone_in
@@ -33,7 +33,7 @@ SWING_DEG, ELEVATION_DEG = 120.0, 25.0
 """Angle by which the camera moves around during a clip, and its elevation [deg]."""
 
 
-def view_grasp(command: showing_flags.View, reporter: Reporter) -> int:
+def view_grasp(command: command_flags.View, reporter: Reporter) -> int:
     """Show a grasp in MuJoCo's viewer, or write it to the files that are asked for."""
     path = command.grasps / GRASPS if command.grasps.is_dir() else command.grasps
     saved = read_grasps(path)
@@ -77,7 +77,6 @@ def _scene(saved: SavedGrasps, grasp: Grasp, friction: float) -> Scene:
 
 
 def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
-    """Open MuJoCo's own viewer, and wait until it is closed."""
     if not has_display():
         raise InputError(
             "there is no display for MuJoCo's viewer (neither DISPLAY nor WAYLAND_DISPLAY is set): "
@@ -115,7 +114,7 @@ def closing(scene: Scene) -> Array:
     return np.column_stack([np.tile(home, (len(slides), 1)), slides])
 
 
-def report_folder(command: showing_flags.Report, reporter: Reporter) -> int:
+def report_folder(command: command_flags.Report, reporter: Reporter) -> int:
     """Write the results of a run as pages, and print where they are."""
     at = command.out or folder_of(command.folder)
     with alone_in(at if command.out or at.is_dir() else None):
@@ -124,7 +123,7 @@ def report_folder(command: showing_flags.Report, reporter: Reporter) -> int:
     return Exit.GOOD
 
 
-def shown_report(asked: showing_flags.Report, reporter: Reporter) -> Report:
+def shown_report(asked: command_flags.Report, reporter: Reporter) -> Report:
     """Write the pages of a run, and say where they are."""
 
     def say_ready(index: Path, drawn: int, total: int) -> None:

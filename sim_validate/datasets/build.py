@@ -33,7 +33,7 @@ from sim_validate.datasets.parquet import TableFiles, pyarrow
 from sim_validate.datasets.staging import Finished, Staging
 from sim_validate.datasets.tables import Name
 from sim_validate.datasets.units import WorkUnit, provenance, units_of, units_sha256
-from sim_validate.datasets.workers import Engine, Limits, drive
+from sim_validate.datasets.workers import Engine, drive
 from sim_validate.files.paths import path_inside
 from sim_validate.files.result_folders import alone_in
 from sim_validate.simulation.gate import require_faithful
@@ -67,7 +67,7 @@ def build(
     folder: Path,
     engine: Engine,
     report: Callable[[int, int], None],
-    limits: Limits | None = None,
+    timeout_s: float | None = None,
 ) -> Built:
     """Build a dataset, or resume an interrupted build.
 
@@ -90,13 +90,12 @@ def build(
         for friction in config.frictions if left else ():
             # a gate that fails at one object's size only leaves that object out
             require_faithful(Setup(), friction)
-        drive(left, staging, engine, report, limits)
+        drive(left, staging, engine, report, timeout_s)
         _finish(config, units, staging, folder)
         return _as_built(folder, units, len(left))
 
 
 def _refuse_sources_inside(units: Sequence[WorkUnit], config: DatasetConfig, folder: Path) -> None:
-    """Refuse an output folder that holds the meshes or contacts that the dataset is made of."""
     sources = [unit.path for unit in units if unit.path is not None]
     sources += [Path(config.contacts).resolve()] if config.contacts else []
     for path in sources:

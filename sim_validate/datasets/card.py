@@ -31,20 +31,9 @@ SIZES = (
 LARGEST = "10B<n<100B"
 MARKS = frozenset("\\`*_[]<>|~&#!$@")
 """Characters that can begin Markdown or HTML within a line."""
-NAMED_ALIKE = (
-    "CC0-1.0", "CC-BY-3.0", "CC-BY-4.0", "CC-BY-SA-3.0", "CC-BY-SA-4.0", "CC-BY-NC-3.0",
-    "CC-BY-NC-4.0", "CC-BY-ND-4.0", "CC-BY-NC-ND-3.0", "CC-BY-NC-ND-4.0", "CC-BY-NC-SA-3.0",
-    "CC-BY-NC-SA-4.0", "CDLA-Permissive-1.0", "CDLA-Permissive-2.0", "CDLA-Sharing-1.0",
-    "Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "MIT", "Unlicense",
-)  # fmt: skip
-"""SPDX names of licences whose names on the Hugging Face Hub are the same in small letters."""
-LICENSES = {
-    **{name: name.lower() for name in NAMED_ALIKE},
-    "ODbL-1.0": "odbl",
-    "ODC-By-1.0": "odc-by",
-    "PDDL-1.0": "pddl",
-}
-"""Usual licences of data: their names on the Hugging Face Hub, by their names in SPDX."""
+SPDX = re.compile(r"[A-Za-z0-9.+-]+")
+"""Pattern of a licence's name in SPDX; in small letters it is that of the Hugging Face Hub, but for
+a few such as ODbL-1.0, there `odbl`."""
 ADDRESS = re.compile(r"https?://[^\s<>\"'`\\|{}^]+")
 """Pattern of a web address that can stand in Markdown as a link unchanged."""
 
@@ -53,7 +42,6 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
     """Write the README.md of a dataset."""
     rows, tables = manifest.rows(), list(_tables(config, manifest))
     (of_grasps,) = (table["splits"] for table in tables if table["name"] == "grasps")
-    license_name = _known_license(config.license)
     chances = [
         f"{name} {upto - before:.0%}"
         for (name, upto), before in zip(SPLITS, (0.0, *(upto for _, upto in SPLITS)), strict=False)
@@ -67,12 +55,12 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
         rows=rows,
         tables=tables,
         executed=config.execution,
-        hub_license=LICENSES.get(license_name or "", ""),
+        hub_license=config.license.lower() if SPDX.fullmatch(config.license) else "",
         credits={
             "Creator": _as_markdown(config.creator),
             "Address": _as_address(config.url),
             "Published": _as_markdown(config.published),
-            "Licence": _as_address(license_name or config.license),
+            "Licence": _as_address(config.license),
         },
         size=next((size for upto, size in SIZES if sum(rows.values()) < upto), LARGEST),
         chances=", ".join(reversed(chances)),
@@ -84,7 +72,6 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
 
 
 def _tables(config: DatasetConfig, manifest: Manifest) -> Iterator[Mapping[str, Any]]:
-    """Yield what the page says of each table, with its numbers of rows by split."""
     for name, columns in config.tables.items():
         splits = {
             split: sum(each.rows or 0 for each in manifest.of_table(name) if each.split == split)
@@ -106,12 +93,6 @@ def _reference(table: Name, column: str) -> str:
     if (target := REFERENCES.get((table, column))) is None:
         return ""
     return f"; names a row of `{target[0]}` by its `{target[1]}`"
-
-
-def _known_license(name: str) -> str | None:
-    """Look up the SPDX name of a licence, given in any letters; None if it is unusual."""
-    wanted = name.lower()
-    return next((spdx for spdx, hub in LICENSES.items() if wanted in (spdx.lower(), hub)), None)
 
 
 def _as_address(text: str) -> str:

@@ -1,25 +1,18 @@
-"""Reads contacts made by other tools, from JSON or npz; each set of four is one grasp to judge."""
+"""Reads contacts made by other tools; each set of four is one grasp to judge."""
 
 import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from grasp_core.errors import InputError
+from grasp_core.arrays import Array
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import value_of
-from grasp_core.files.text_files import read_bytes, text_of
+from grasp_core.files.text_files import read_text
 from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
 from grasp_core.values import FINGERS
-from sim_validate.files.npz import arrays_of
 
-POINTS, NORMALS, NAMES = "contact_points_m", "contact_normals", "grasp_id"
-"""Names of the arrays of an npz file: points (n, 4, 3) [m], normals (n, 4, 3), optionally names
-(n,)."""
 NO_FRICTION = 1.0
 """Friction put in for files that state none; it is never used, because a dataset's configuration
 has its own."""
@@ -43,12 +36,9 @@ class GivenGrasp:
 
 def read_given(path: Path, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
     """Read contacts made by other tools."""
-    try:
-        data = read_bytes(path)
-        text = contacts_text(data) if path.suffix == ".npz" else text_of(data)
+    text = read_text(path)
+    with about(path):
         return given_from_json(text, outward=outward)
-    except InputError as error:
-        raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
 
 
 def given_text(given: Sequence[GivenGrasp]) -> str:
@@ -92,40 +82,5 @@ def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ..
     )
 
 
-def contacts_text(data: bytes) -> str:
-    """Turn the bytes of an npz file into the text of a contacts file."""
-    arrays = arrays_of(data, (POINTS, NORMALS, NAMES))
-    for name in (POINTS, NORMALS):
-        if name not in arrays:
-            raise InputError(
-                f"the array {name} is missing; expected {POINTS} and {NORMALS}, of shape (n, 4, "
-                "3) each"
-            )
-        array = arrays[name]
-        if array.dtype.kind not in "fiu" or not (array.ndim and array.shape[1:] == (FINGERS, 3)):
-            raise InputError(
-                f"{name}: expected an array of numbers, of shape (n, 4, 3), got {array.dtype} "
-                f"{array.shape}"
-            )
-    points, normals = arrays[POINTS], arrays[NORMALS]
-    names = arrays.get(NAMES, np.arange(len(points)))
-    if names.ndim != 1 or not len(points) == len(normals) == len(names):
-        raise InputError(
-            f"{POINTS}, {NORMALS} and {NAMES}: expected arrays of equal length, got shapes "
-            f"{points.shape}, {normals.shape} and {names.shape}"
-        )
-    for name, array in ((POINTS, points), (NORMALS, normals)):
-        if not (good := np.isfinite(array).all(axis=(1, 2))).all():
-            row = int(good.argmin())
-            raise InputError(
-                f"{name}[{row}]: expected finite numbers, got NaN or infinity; leave out the "
-                f"{np.sum(~good)} rows that have some"
-            )
-    return given_text(
-        [GivenGrasp("", str(name), _rows(p), _rows(n))
-         for name, p, n in zip(names, points, normals, strict=True)]
-    )  # fmt: skip
-
-
-def _rows(array: NDArray[np.floating[Any]]) -> tuple[Triple, ...]:
+def _rows(array: Array) -> tuple[Triple, ...]:
     return tuple((float(x), float(y), float(z)) for x, y, z in array)

@@ -80,7 +80,6 @@ def export(
 
 
 def _write(chosen: Selection, folder: Path, report: Callable[[int, int], None]) -> dict[Name, int]:
-    """Write one file for the grasps of each object at each friction."""
     facts, total = chosen.facts(), chosen.counts()["objects"]
     objects = grasps = 0
     for object_id, body, rows in _grasped_objects(chosen):
@@ -111,7 +110,6 @@ def _grasped_objects(chosen: Selection) -> Iterator[tuple[str, Polyhedron, list[
 
 
 def _new_path(folder: Path, name: str) -> Path:
-    """Make a path for a file with a given name, whatever characters the name has."""
     path = folder / f"{UNSAFE.sub('_', name).lstrip('.')[:LONGEST]}.yaml"
     if path.exists():
         raise InputError(
@@ -123,7 +121,6 @@ def _new_path(folder: Path, name: str) -> Path:
 def _lines(
     object_id: str, body: Polyhedron, rows: Sequence[Row], facts: Mapping[str, str]
 ) -> Iterator[str]:
-    """Yield the lines of a file about some grasps of an object, all at one friction."""
     radius = min(fitting_radius(body, *_places(row)) for row in rows)
     source, mesh = quoted(body.name), mesh_path(Path(), object_id).as_posix()
     friction = rows[0]["friction"]

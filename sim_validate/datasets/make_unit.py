@@ -114,7 +114,6 @@ class _Making:
         return verdict
 
     def _vary(self, grasp: Grasp, body: Polyhedron, verdict: Verdict, executed: Executed) -> None:
-        """Add the grasps that are made from a grasp, if any are asked for."""
         config = self.unit.config
         if config.learning is None:
             return
@@ -123,7 +122,6 @@ class _Making:
             self.found.add_varied(grasp.id, each)
 
     def _executed(self, grasp: Grasp, body: Polyhedron) -> Executed:
-        """Execute a grasp if that is asked for, or say why its execution is refused."""
         asked = self.unit.config.execution
         if asked is None:
             return None

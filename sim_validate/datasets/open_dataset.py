@@ -5,7 +5,7 @@ object's hash, so that rows can be read grouped by object, with only one object 
 """
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -16,19 +16,12 @@ from grasp_core.errors import InputError
 from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
 from sim_validate.datasets.manifest import Listed, Manifest, listed, read_manifest
 from sim_validate.datasets.parquet import Columns, each_batch, read_columns
-from sim_validate.datasets.tables import SHORT, SPLITS, Name, Tables
+from sim_validate.datasets.tables import KEYS, SHORT, SPLITS, Name, Tables
 from sim_validate.files.paths import path_inside
 
 Row: TypeAlias = Mapping[str, Any]
 ObjectRows: TypeAlias = Mapping[Name, Sequence[Row]]
 Group: TypeAlias = tuple[str, list[Row]]
-BEGINNINGS: Mapping[Name, Callable[[Row], str]] = {
-    "objects": lambda row: str(row["object_id"])[:SHORT],
-    "grasps": lambda row: str(row["object_id"])[:SHORT],
-    "trials": lambda row: str(row["grasp_id"])[:SHORT],
-    "executions": lambda row: str(row["grasp_id"])[:SHORT],
-}
-"""Functions that return the part of a row's name that all rows of its object share."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,5 +160,7 @@ def by_object(chosen: Selection) -> Iterator[ObjectRows]:
 
 
 def _groups(chosen: Selection, name: Name) -> Iterator[Group]:
-    for beginning, rows in groupby(chosen.rows(name), key=BEGINNINGS[name]):
+    """Yield rows grouped by the part of their first key that all rows of an object share."""
+    key = KEYS[name][0]
+    for beginning, rows in groupby(chosen.rows(name), key=lambda row: str(row[key])[:SHORT]):
         yield beginning, list(rows)

@@ -212,7 +212,6 @@ class GraspRows:
         self._add_trials(name, verdict.tried, lambda _: {})
 
     def _add_executions(self, name: str, executed: Executed) -> None:
-        """Add the trials of an execution, each misplaced one with its seed."""
         asked = self.unit.config.execution
         if asked is not None:
             more = () if self._figures is None else self._figures.asked.seeds
@@ -222,7 +221,6 @@ class GraspRows:
     def _of_executed(
         self, body: Polyhedron, contacts: Sequence[Contact], friction: float, executed: Executed
     ) -> Mapping[str, Any]:
-        """Return all cells that are about an execution."""
         cells = execution_cells(executed)
         if self._figures is None or cells.get("mass_kg") is None:
             return cells

@@ -298,7 +298,6 @@ class Varying:
         return try_control(seated.body, control, self.agenda, Setup())
 
     def _executed(self, variant: Variant) -> Executed:
-        """Execute the contacts if that is asked for, in force closure or not."""
         if self.execution is None:
             return None
         try:

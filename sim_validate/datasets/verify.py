@@ -83,7 +83,6 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
 
 
 def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
-    """Yield sentences on what is wrong with rows and meshes, one object at a time."""
     config = config_from_toml(folder / CONFIG)
     for each in manifest.files:
         if each.table and not Path(each.path).name.startswith(f"{each.split}-"):
@@ -127,7 +126,6 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
 
 
 def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
-    """Check that the manifest agrees with the files that it lists."""
     config = config_from_toml(folder / CONFIG)
     if config.sha256 != manifest.config_sha256:
         yield f"{CONFIG}: the file is not the configuration that the manifest names"
@@ -144,7 +142,6 @@ def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
 
 
 def _sample_faults(folder: Path, manifest: Manifest, sample: Sample) -> Iterator[str]:
-    """Compute a sample of a dataset again, and yield a sentence about each difference."""
     redoing = _Redoing(folder, manifest)
     everything = Selection(folder, manifest, None)
     units = [
@@ -247,7 +244,6 @@ def _of_unit(rows: ObjectRows, object_id: str, friction: float) -> ObjectRows:
 def _differences(
     name: Name, tables: Tables, stored: Sequence[Row], made: Sequence[Row]
 ) -> Iterator[str]:
-    """Yield sentences on cells that differ, and on rows that only one side has."""
     before = {tuple(row[key] for key in KEYS[name]): row for row in stored}
     after = {tuple(row[key] for key in KEYS[name]): row for row in made}
     yield from (

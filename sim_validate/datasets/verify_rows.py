@@ -83,7 +83,6 @@ def object_faults(
 
 
 def _table_faults(split: str, rows: ObjectRows) -> Iterator[str]:
-    """Check that rows are in the files of their split, and have keys of their own."""
     for name in ("objects", "grasps"):
         if any(row["split"] != split for row in rows[name]):
             yield f"{name}: files of the split {split} have rows of another split"
@@ -131,7 +130,6 @@ def _outcome_faults(row: Mapping[str, Any], trials: Sequence[str]) -> Iterator[s
 
 
 def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
-    """Check that meshes belong to their objects, and that contacts lie on the meshes."""
     claimed: dict[str, list[tuple[Array, Array | None, float]]] = {
         row["object_id"]: [] for row in rows["objects"]
     }
@@ -166,7 +164,6 @@ def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
 def _reference_faults(
     row: Mapping[str, Any], splits: Mapping[str, str], names: Set[str]
 ) -> Iterator[str]:
-    """Yield sentences on references of a row to rows that are missing."""
     if splits.get(row["object_id"]) != row["split"]:
         yield "the row's object is missing, or in another split"
     if row["control_of"] is not None and row["control_of"] not in names:
@@ -209,7 +206,6 @@ def _contact_faults(row: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _requested_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> Iterator[str]:
-    """Check the cells that tables have on request, and the trials of executions."""
     trials: dict[str, list[Row]] = {}
     for trial in rows.get("executions", ()):
         trials.setdefault(trial["grasp_id"], []).append(trial)
@@ -238,7 +234,6 @@ def _requested_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> 
 
 
 def _kind_faults(row: Row, by_name: Mapping[str, Row], *, is_curved: bool) -> Iterator[str]:
-    """Check the kind of a row, and a varied grasp against the one that it was made from."""
     if row["label"] == VARIED:
         yield from _varied_faults(row, by_name, is_curved=is_curved)
     elif row["kind"] != (wanted := LABELS.get(row["label"], row["label"])):
@@ -266,7 +261,6 @@ def _varied_faults(row: Row, by_name: Mapping[str, Row], *, is_curved: bool) -> 
 
 
 def _ratio_faults(row: Row) -> Iterator[str]:
-    """Check the ratio of the friction to the critical one, and that ratios fit the kind."""
     try:
         critical = critical_friction(row["contact_points_m"], row["contact_normals"])
     except GraspError as error:
@@ -289,7 +283,6 @@ def _ratio_faults(row: Row) -> Iterator[str]:
 def _execution_faults(
     row: Row, trials: Sequence[Row], body: Polyhedron, asked: AskedExecution
 ) -> Iterator[str]:
-    """Check a row against its trials and, if it agrees with them, what its squeeze carries."""
     found = list(_trial_faults(row, trials))
     yield from found
     if row["executed"] and not found:
@@ -382,7 +375,6 @@ def _closure_faults(row: Row, body: Polyhedron, figures: Figures) -> Iterator[st
 
 
 def _witness_faults(row: Row, body: Polyhedron) -> Iterator[str]:
-    """Check that forces balance, are in their cones, and have normal parts whose sum is one."""
     forces, normals = np.array(row["witness_forces_n"]), np.array(row["contact_normals"])
     arms = (np.array(row["contact_points_m"]) - body.center_of_mass) / body.radius
     pushes = np.einsum("ki,ki->k", forces, normals)
@@ -405,7 +397,6 @@ def _margin_faults(row: Row, trials: Sequence[Row]) -> Iterator[str]:
 
 
 def _hand_faults(row: Row, hand: Hand, body: Polyhedron) -> Iterator[str]:
-    """Yield sentences on what is wrong with the pose of a hand in a row of grasps."""
     reached = row["hand_reached"]
     if bool(row["force_closed"]) != (reached is not None):
         yield f"hand_reached is {reached}, but force_closed is {row['force_closed']}"
@@ -421,7 +412,6 @@ def _hand_faults(row: Row, hand: Hand, body: Polyhedron) -> Iterator[str]:
 
 
 def _motion_faults(row: Row, hand: Hand) -> Iterator[str]:
-    """Check joint angles, the palm's pose, and the way in, each by itself."""
     low, high = hand.ranges.T
     for name in ("hand_joints_rad", "hand_open_joints_rad"):
         if row[name] is not None:
@@ -439,7 +429,6 @@ def _motion_faults(row: Row, hand: Hand) -> Iterator[str]:
 
 
 def _place_faults(row: Row, hand: Hand, body: Polyhedron) -> Iterator[str]:
-    """Check where the hand is that has the stated joint angles and pose of the palm."""
     joints, pose = np.array(row["hand_joints_rad"]), np.array(row["T_object_palm_m"])
     fingers: list[int] = row["hand_fingers"]
     points, normals = np.array(row["hand_points_m"]), np.array(row["hand_normals"])

@@ -7,46 +7,29 @@ because it would fail again. A failure that would befall every unit - a full dis
 other packages - ends the build.
 
 A worker process must run the same code and packages as the process that started it, or its rows
-could differ. The system enforces the limits, whatever a unit does: a timer ends a process in which
-a unit takes too long, also inside a call that never comes back, and memory beyond the limit is
-refused.
+could differ. A timer of the system ends a process in which a unit takes too long, also inside a
+call that never comes back.
 """
 
 import errno
-import importlib
-import os
 import signal
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
 from grasp_core.errors import GraspError
-from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.make_unit import made_of
 from sim_validate.datasets.staging import Staging
-from sim_validate.datasets.units import WorkerError, WorkUnit, body_of, provenance, units_of
+from sim_validate.datasets.units import WorkerError, WorkUnit, body_of, provenance
 from sim_validate.parallel import interrupts
 
 AHEAD = 3
 """Number of units submitted per worker process, so that no worker waits for the next unit."""
 LOOK_S = 1.0
 """Time between two checks for an interrupt [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """Time and memory that one unit of work may use."""
-
-    timeout_s: float
-    memory_bytes: int | None = None
-    """Address space that a unit may use beyond that of a process that has just started; None for no
-    limit."""
 
 
 Work: TypeAlias = Callable[[WorkUnit, Staging], None]
@@ -78,19 +61,22 @@ class Task:
     staging: Staging
     provenance: Mapping[str, str]
     """Versions of packages, and the hash of the code, that the worker process must have, too."""
-    limits: Limits | None = None
-    """Limits of the unit; None if the unit is computed in the process that runs the build."""
+    timeout_s: float | None = None
+    """Time that the unit may take [s]; None where the process that runs the build computes it."""
     work: Work = do_unit
 
 
 def do_task(task: Task) -> None:
     """Compute a unit in a worker process, and keep its rows."""
     _check_worker(task)
-    if task.limits is None:
+    if task.timeout_s is None:
         task.work(task.unit, task.staging)
         return
-    with _kept(task.limits):
+    signal.setitimer(signal.ITIMER_REAL, task.timeout_s)
+    try:
         task.work(task.unit, task.staging)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 def _check_worker(task: Task) -> None:
@@ -106,49 +92,6 @@ def _check_worker(task: Task) -> None:
             f"{task.staging.folder}: a worker process cannot see this folder; --out must be on a "
             "file system that all processes share"
         )
-
-
-@contextmanager
-def _kept(limits: Limits) -> Generator[None]:
-    signal.setitimer(signal.ITIMER_REAL, limits.timeout_s)
-    try:
-        with _memory_kept(limits.memory_bytes):
-            yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-
-
-@contextmanager
-def _memory_kept(more: int | None) -> Generator[None]:
-    if more is None:
-        yield
-        return
-    _load()  # a library that runs out of memory while it starts can hang
-    resource: Any = importlib.import_module("resource")
-    before, most = resource.getrlimit(resource.RLIMIT_AS)
-    set_before = [limit for limit in (before, most) if limit != resource.RLIM_INFINITY]
-    wanted = min([_address_space() + more, *set_before])
-    resource.setrlimit(resource.RLIMIT_AS, (wanted, most))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, (before, most))
-
-
-@cache
-def _load() -> None:
-    """Compute a small unit, so that all code is loaded before limits are set."""
-    config = DatasetConfig(objects=("tetrahedron",), families=("concurrent",), limit=1)
-    (unit,) = units_of(config)
-    made_of(unit, body_of(unit))
-
-
-def _address_space() -> int:
-    """Return the size of this process's address space in bytes; 0 if it is not known."""
-    sizes = Path("/proc/self/statm")
-    if not sizes.is_file():
-        return 0
-    return int(sizes.read_text(encoding="ascii").split()[0]) * int(os.sysconf("SC_PAGE_SIZE"))
 
 
 class Engine(Protocol):
@@ -171,7 +114,7 @@ def drive(
     staging: Staging,
     engine: Engine,
     report: Callable[[int, int], None],
-    limits: Limits | None = None,
+    timeout_s: float | None = None,
     work: Work = do_unit,
 ) -> None:
     """Have all units computed; each one is kept or quarantined in the end.
@@ -180,7 +123,7 @@ def drive(
     """
     own = dict(provenance())
     told = -1
-    waiting = deque(Task(unit, staging, own, limits, work) for unit in units)
+    waiting = deque(Task(unit, staging, own, timeout_s, work) for unit in units)
     again, finished = list[Task](), 0
     under_way: dict[Future[None], Task] = {}
     while waiting or under_way:
@@ -213,13 +156,12 @@ def _try_alone(task: Task, engine: Engine) -> None:
     if _succeeded(future, task, engine):
         return
     took_s = time.monotonic() - began
-    late = task.limits is not None and took_s >= task.limits.timeout_s
+    late = task.timeout_s is not None and took_s >= task.timeout_s
     reason = "took too long, twice" if late else "its worker ended, twice"
     task.staging.quarantine(task.unit, reason)
 
 
 def _succeeded(future: "Future[None]", task: Task, engine: Engine) -> bool:
-    """Tell whether a unit was computed; False if its worker process died or was stopped."""
     error = future.exception()
     if error is None:
         if task.staging.finished(task.unit):

@@ -1,7 +1,7 @@
 """Reads arrays from npz files, each checked before much memory is used.
 
 An archive may claim any size, hold a name twice, or have members with wrong headers. Only arrays of
-numbers, truth values and text are read, with exactly as many bytes as their shapes need.
+numbers and truth values are read, with exactly as many bytes as their shapes need.
 """
 
 import io
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import shown
 from grasp_core.files.text_files import read_bytes
 
@@ -23,21 +23,17 @@ MOST_BYTES = 256 * 2**20
 MOST_MEMBERS = 256
 MOST_HEADER = 10_000
 """Largest number of characters in an array's header, a limit of numpy's."""
-KINDS = "biufU"
-"""Kinds of arrays that are read: truth values, numbers, text."""
+KINDS = "biuf"
+"""Kinds of arrays that are read: truth values and numbers."""
 BEGINNING, ENDING = b"PK\x03\x04", ".npy"
 """First bytes of a zip archive, and ending of the array names inside it."""
-LARGEST_LETTER, FIRST_HALF, LAST_HALF = 0x10FFFF, 0xD800, 0xDFFF
-"""Largest Unicode code point, and the range of surrogates, which are halves of characters."""
 
 
 def read_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:
     """Read the named arrays of an npz file that exist; nothing in the file is executed."""
     data = read_bytes(path, MOST_BYTES)
-    try:
+    with about(path):
         return arrays_of(data, names)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def arrays_of(data: bytes, names: Collection[str]) -> dict[str, NDArray[Any]]:
@@ -91,9 +87,7 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> NDAr
             )
         shape, by_columns, dtype = readers[version](stream, max_header_size=MOST_HEADER)
         if dtype.kind not in KINDS or dtype.subdtype is not None:
-            raise InputError(
-                f"{name}: expected an array of numbers or text, got {shown(str(dtype))}"
-            )
+            raise InputError(f"{name}: expected an array of numbers, got {shown(str(dtype))}")
         size = math.prod(shape) * dtype.itemsize
         if min(shape, default=0) < 0 or size > member.file_size:
             raise InputError(
@@ -105,18 +99,4 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> NDAr
             raise InputError(
                 f"{name}: the array does not hold as many numbers as its shape {shape} needs"
             )
-    array = np.ndarray(shape, dtype, held, order="F" if by_columns else "C")
-    _check_letters(array, name)
-    return array
-
-
-def _check_letters(array: NDArray[Any], name: str) -> None:
-    """Refuse text that holds invalid Unicode code points, which numpy would accept."""
-    if array.dtype.kind != "U" or not array.size or not array.dtype.itemsize:
-        return
-    codes = np.frombuffer(array.tobytes(), array.dtype.str[0].replace("|", "=") + "u4")
-    halves = (codes >= FIRST_HALF) & (codes <= LAST_HALF)
-    if codes.max() > LARGEST_LETTER or halves.any():
-        raise InputError(
-            f"{name}: the text in this array has invalid Unicode characters; write it again"
-        )
+    return np.ndarray(shape, dtype, held, order="F" if by_columns else "C")

@@ -82,7 +82,6 @@ def remove_judgements(folder: Path) -> None:
 
 
 def _of_grasps(folder: Path, suffix: str, mark: bytes) -> list[Path]:
-    """List the files in a folder that are about grasps."""
     return [
         path for path in folder.glob(f"*{suffix}")
         if ID.fullmatch(path.stem) or (path.is_file() and mark in path.read_bytes())
@@ -170,7 +169,8 @@ def alone_in(folder: Path | None) -> Generator[None]:
     if folder is None:
         yield
         return
-    with _locked(folder) as made:
+    handle, made = _taken(folder)
+    try:
         for part in PARTS:
             remove_unfinished(folder / part)
         try:
@@ -179,6 +179,8 @@ def alone_in(folder: Path | None) -> Generator[None]:
             with suppress(OSError):  # a folder that holds something stays
                 for path in made:
                     path.rmdir()
+    finally:
+        os.close(handle)
 
 
 def _make(folder: Path) -> list[Path]:
@@ -197,16 +199,6 @@ def _make(folder: Path) -> list[Path]:
             f"{folder}: no file can be written there ({error.strerror}); give another --out"
         ) from error
     return missing
-
-
-@contextmanager
-def _locked(folder: Path) -> Generator[list[Path]]:
-    """Make the folder and lock it; yield the folders that are new."""
-    handle, made = _taken(folder)
-    try:
-        yield made
-    finally:
-        os.close(handle)
 
 
 def _taken(folder: Path) -> tuple[int, list[Path]]:

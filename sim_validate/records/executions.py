@@ -5,10 +5,10 @@ never comes is infinite.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, NotRequired, TypeVar, cast
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 from pydantic import ConfigDict, Field, with_config
 from typing_extensions import TypedDict
@@ -16,7 +16,7 @@ from typing_extensions import TypedDict
 from grasp_core.arrays import frozen
 from grasp_core.by_value import ByValue
 from grasp_core.checked import path_of
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import place, record_of, settings_of, text_of
 from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById, frame_of
@@ -40,9 +40,14 @@ FEWEST_CONTACTS = 2
 Force = tuple[Finite, Finite, Finite]
 EXECUTIONS = "executions.json"
 """Name of the file in a folder of results."""
+RESULTS = {
+    "load_multiple", "squeeze_n", "tip_radius_m", "physics", "trials", "controls", "skipped",
+}  # fmt: skip
+"""Fields that say nothing about a grasp that was not executed."""
 Where = tuple[str | int, ...]
 """Keys that lead to a record in its file."""
 Settings = TypeVar("Settings", ExecutionSettings, PhysicsSettings)
+Value = TypeVar("Value", ExecutionTrial, ExecutionControl, Skipped)
 
 
 class ExecutionTrialRecord(TypedDict):
@@ -128,7 +133,7 @@ class ExecutionsFile(TypedDict):
     friction: Positive
     complete: bool
     settings: dict[str, Any]
-    summary: NotRequired[ExecutionsSummary]
+    summary: ExecutionsSummary
     executions: list[ExecutionRecord]
     versions: dict[str, str | None]
 
@@ -223,16 +228,11 @@ def _record(grasp: ExecutedGrasp) -> ExecutionRecord:
         "squeeze_n": None if found is None else found.squeeze.tolist(),
         "tip_radius_m": tip_radii(found),
         "enough": enough_record(grasp.enough),
-        "trials": [] if found is None else [_trial_record(trial) for trial in found.trials],
-        "controls": [] if found is None else [
-            {"name": each.name, "let_go": each.let_go, "first_slip": each.first_slip}
-            for each in found.controls
-        ],
-        "skipped": [] if found is None else [
-            {"kind": each.kind, "reason": each.reason} for each in found.skipped
-        ],
+        "trials": _records(grasp.trials),
+        "controls": _records(() if found is None else found.controls),
+        "skipped": _records(() if found is None else found.skipped),
         "physics": None if found is None or found.physics is None else found.physics.record(),
-    }  # fmt: skip
+    }
 
 
 def tip_radii(found: Execution | None) -> list[float] | None:
@@ -248,20 +248,9 @@ def enough_record(found: Enough | None) -> EnoughRecord | None:
     return cast("EnoughRecord", finite(asdict(found)))
 
 
-def _trial_record(trial: ExecutionTrial) -> ExecutionTrialRecord:
-    return {
-        "kind": trial.kind,
-        "name": trial.name,
-        "survived": trial.survived,
-        "fate": trial.fate,
-        "slip_m": trial.slip_m,
-        "displacement_m": trial.displacement_m,
-        "turn_rad": trial.turn_rad,
-        "predicted_first_slip": trial.predicted_first_slip,
-        "predicted_loss": trial.predicted_loss,
-        "simulated_first_slip": trial.simulated_first_slip,
-        "step_s": trial.step_s,
-    }
+def _records(values: Sequence[Any]) -> list[Any]:
+    """Write trials, controls or what was skipped: every field, by its name."""
+    return [asdict(value) for value in values]
 
 
 def load_executions(path: str | Path) -> Executions:
@@ -275,10 +264,8 @@ def load_executions(path: str | Path) -> Executions:
     """
     path = path_of(path, "path")
     text = read_text(path)
-    try:
+    with about(path):
         return executions_from_json(text)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def executions_from_json(text: str) -> Executions:
@@ -288,12 +275,11 @@ def executions_from_json(text: str) -> Executions:
     grasps = tuple(
         _grasp(each, settings, ("executions", row)) for row, each in enumerate(record["executions"])
     )
-    summary: Mapping[str, object] = record.get("summary") or {}
     for name, count in executions_summary(grasps).items():
-        if summary.get(name, count) != count:
+        if record["summary"][name] != count:
             raise InputError(
-                f"summary.{name}: expected {count}, as the executions say, got {summary[name]}; "
-                "write the file again, or remove it"
+                f"summary.{name}: expected {count}, as the executions say, got "
+                f"{record['summary'][name]}; write the file again, or remove it"
             )
     return Executions(
         object_sha256=record["object"]["content_sha256"],
@@ -311,17 +297,27 @@ def _filled(kind: type[Settings], given: dict[str, Any], where: Where) -> Settin
         if name not in known:
             said = f"unknown key; known keys are {', '.join(known)}"
             raise InputError(f"{place([*where, name])}: {said}")
-    return settings_of(kind, given, where)
+    found = settings_of(kind, given, where)
+    written = found.record() if isinstance(found, PhysicsSettings) else asdict(found)
+    _require_all(written, given, where)
+    return found
+
+
+def _require_all(written: Mapping[str, Any], given: Mapping[str, Any], where: Where) -> None:
+    """Refuse a record that lacks a setting, whose usual value may not be the one that was used."""
+    for name, value in written.items():
+        if name not in given:
+            raise InputError(f"{place([*where, name])}: missing; add it")
+        if isinstance(value, dict):
+            _require_all(cast("dict[str, Any]", value), given[name], (*where, name))
 
 
 def _grasp(record: ExecutionRecord, settings: ExecutionSettings, where: Where) -> ExecutedGrasp:
+    enough, found = enough_of(record["enough"], (*where, "enough")), None
     if record["reason"] is None:
-        found = _execution(record, settings, where)
+        found = replace(_execution(record, settings, where), enough=enough)
     else:
-        found = None
         _require_nothing(record, where)
-    enough = enough_of(record["enough"], (*where, "enough"))
-    found = None if found is None else replace(found, enough=enough)
     grasp = ExecutedGrasp(
         record["id"], record["family"], record["contacts_sha256"], found, record["reason"], enough
     )
@@ -340,22 +336,16 @@ def enough_of(record: EnoughRecord | None, where: Where) -> Enough | None:
     if record is None:
         return None
     push, loss = record["push_n"], record["predicted_loss"]
-    try:
+    with about(place(where)):
         return Enough(
             record["load_multiple"], push, record["stiffness_n_per_m"],
-            loss if push is None else _or_infinite(loss), record["reason"],
+            loss if push is None or loss is not None else math.inf, record["reason"],
         )  # fmt: skip
-    except InputError as error:
-        raise InputError(f"{place(where)}: {error}") from error
 
 
 def _require_nothing(record: ExecutionRecord, where: Where) -> None:
-    """Refuse results of a grasp that was not executed."""
-    results = {name: record[name] for name in (
-        "load_multiple", "squeeze_n", "tip_radius_m", "physics", "trials", "controls", "skipped",
-    )}  # fmt: skip
-    for name, result in results.items():
-        if result not in (None, []):
+    for name, result in record.items():
+        if name in RESULTS and result not in (None, []):
             raise InputError(
                 f"{place([*where, name])}: expected nothing (null or an empty list) beside a reason"
             )
@@ -373,31 +363,18 @@ def _execution(record: ExecutionRecord, settings: ExecutionSettings, where: Wher
         mass_kg=settings.mass_kg,
         squeeze=frozen(squeeze, (None, 3), place([*where, "squeeze_n"])),
         load_multiple=multiple,
-        trials=tuple(
-            ExecutionTrial(
-                kind=each["kind"],
-                name=each["name"],
-                survived=each["survived"],
-                fate=each["fate"],
-                slip_m=_or_infinite(each["slip_m"]),
-                displacement_m=_or_infinite(each["displacement_m"]),
-                turn_rad=_or_infinite(each["turn_rad"]),
-                predicted_first_slip=_or_infinite(each["predicted_first_slip"]),
-                predicted_loss=_or_infinite(each["predicted_loss"]),
-                simulated_first_slip=_or_infinite(each["simulated_first_slip"]),
-                step_s=each["step_s"],
-            )
-            for each in record["trials"]
-        ),
-        controls=tuple(
-            ExecutionControl(each["name"], each["let_go"], _or_infinite(each["first_slip"]))
-            for each in record["controls"]
-        ),
-        skipped=tuple(Skipped(each["kind"], each["reason"]) for each in record["skipped"]),
+        trials=tuple(_value(ExecutionTrial, each) for each in record["trials"]),
+        controls=tuple(_value(ExecutionControl, each) for each in record["controls"]),
+        skipped=tuple(_value(Skipped, each) for each in record["skipped"]),
         physics=None if physics is None else _filled(PhysicsSettings, physics, (*where, "physics")),
         tip_radius_m=radii,
     )
 
 
-def _or_infinite(value: float | None) -> float:
-    return math.inf if value is None else value
+def _value(kind: type[Value], record: Mapping[str, Any]) -> Value:
+    """Make a value from its record, in which a number that is null is infinite."""
+    given: dict[str, Any] = {
+        each.name: math.inf if record[each.name] is None else record[each.name]
+        for each in fields(kind)
+    }
+    return kind(**given)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.text_files import read_text
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import SavedGrasps, grasps_from_json
@@ -16,10 +16,8 @@ NAMED = 5
 def read_grasps(path: Path) -> SavedGrasps:
     """Read the grasps of a `grasps.json`."""
     text = read_text(path)
-    try:
+    with about(path):
         return grasps_from_json(text)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def grasp_with_id(path: Path, saved: SavedGrasps | Plan, wanted: str | None) -> Grasp:

@@ -1,212 +1,135 @@
-"""The fields of a hand's links, joints and shapes in a file, and the hand that they describe.
+"""The parts of a hand in a file, and the hand that they describe.
 
-A file that holds them can be drawn without the file or the table that the hand was made from.
+A file that holds them can be drawn without the file or the table that the hand was made from. Keys
+are the names of the parts' fields, with their units; the parts themselves check their values.
 """
 
-from typing import Annotated, NotRequired
+from collections.abc import Collection, Mapping
+from typing import Any, cast
 
 import numpy as np
-from pydantic import Field
-from typing_extensions import TypedDict
 
-from grasp_core.arrays import Array
+from grasp_core.errors import InputError, about
+from grasp_core.files.json_text import place, shown
 from grasp_core.hands.couplings import Coupling
-from grasp_core.hands.hand import (
-    MOST_CORNERS,
-    MOST_FINGERS,
-    MOST_LINKS,
-    MOST_SHAPES,
-    Fingertip,
-    Hand,
-    HandFinger,
-    Joint,
-    Link,
-    LinkShape,
-)
-from sim_validate.records.fields import Finite
+from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link, LinkShape
 
-Triple = tuple[Finite, Finite, Finite]
-Rotation = tuple[Triple, Triple, Triple]
-
-
-class ShapeRecord(TypedDict):
-    """Fields about a rounded box, in the frame of its link."""
-
-    position_m: Triple
-    rotation: Rotation
-    half_sizes_m: Triple
-    radius_m: Finite
-
-
-class JointRecord(TypedDict):
-    """Fields about a joint, in the frame of the link before it."""
-
-    name: str
-    position_m: Triple
-    rotation: Rotation
-    axis: Triple
-    lowest_rad: Finite
-    highest_rad: Finite
-    torque_limit_n_m: Finite | None
+KEYS: Mapping[type, Mapping[str, str]] = {
+    LinkShape: {
+        "position": "position_m", "rotation": "rotation", "half_sizes": "half_sizes_m",
+        "radius": "radius_m",
+    },
+    Joint: {
+        "name": "name", "position": "position_m", "rotation": "rotation", "axis": "axis",
+        "lowest": "lowest_rad", "highest": "highest_rad", "torque_limit_n_m": "torque_limit_n_m",
+    },
+    Link: {
+        "name": "name", "joint": "joint", "shapes": "shapes", "mass_kg": "mass_kg",
+        "center_of_mass": "center_of_mass_m",
+    },
+    Coupling: {"joint": "joint", "driver": "driver", "ratio": "ratio", "offset": "offset_rad"},
+}  # fmt: skip
+"""Key of each field of a part."""
+TIP = {
+    "center": "tip_center_m", "radius": "tip_radius_m", "corners": "tip_corners_m",
+    "rounding": "tip_rounding_m",
+}  # fmt: skip
+"""Keys of a fingertip, which stand beside those of its finger; a ball has only the first two."""
+BALL, BLOCK = [*TIP.values()][:2], [*TIP.values()]
+MODEL = ("palm", "fingers", "ignored_pairs", "couplings", "notes")
 
 
-class LinkRecord(TypedDict):
-    """Fields about a link of a finger and the joint that moves it."""
-
-    name: str
-    joint: JointRecord
-    shapes: Annotated[list[ShapeRecord], Field(max_length=MOST_SHAPES)]
-    mass_kg: Finite | None
-    center_of_mass_m: Triple | None
-
-
-class FingerRecord(TypedDict):
-    """Fields about a finger, from the palm outwards."""
-
-    name: str
-    links: Annotated[list[LinkRecord], Field(max_length=MOST_LINKS)]
-    tip_center_m: Triple
-    tip_radius_m: Finite
-    tip_corners_m: NotRequired[Annotated[list[Triple], Field(max_length=MOST_CORNERS)]]
-    tip_rounding_m: NotRequired[Finite]
-
-
-class CouplingRecord(TypedDict):
-    """Fields about a joint that follows another."""
-
-    joint: str
-    driver: str
-    ratio: Finite
-    offset_rad: Finite
-
-
-class ModelRecord(TypedDict):
-    """Fields about all parts of a hand."""
-
-    palm: Annotated[list[ShapeRecord], Field(max_length=MOST_SHAPES)]
-    fingers: Annotated[list[FingerRecord], Field(max_length=MOST_FINGERS)]
-    ignored_pairs: list[tuple[str, str]]
-    couplings: list[CouplingRecord]
-    notes: list[str]
-
-
-def model_record(hand: Hand) -> ModelRecord:
+def model_record(hand: Hand) -> dict[str, Any]:
     """Write the parts of a hand."""
-    return {
-        "palm": [_shape(each) for each in hand.palm],
-        "fingers": [_finger(finger) for finger in hand.fingers],
-        "ignored_pairs": list(hand.ignored_pairs),
-        "couplings": couplings_record(hand),
-        "notes": list(hand.notes),
-    }
-
-
-def couplings_record(hand: Hand) -> list[CouplingRecord]:
-    """Write which joints follow others."""
-    return [
-        {
-            "joint": each.joint,
-            "driver": each.driver,
-            "ratio": each.ratio,
-            "offset_rad": each.offset,
-        }
-        for each in hand.couplings
+    fingers = [
+        {"name": each.name, "links": _plain(each.links), **_tip_record(each.tip)}
+        for each in hand.fingers
     ]
+    return {name: _plain(getattr(hand, name)) for name in MODEL} | {"fingers": fingers}
 
 
-def hand_of_model(
-    name: str, record: ModelRecord, sources: list[str], torque_source: str
-) -> Hand:  # fmt: skip
+def couplings_record(hand: Hand) -> list[dict[str, Any]]:
+    """Write which joints follow others."""
+    return _plain(hand.couplings)
+
+
+def hand_of_model(name: str, record: object, sources: list[str], torque_source: str) -> Hand:
     """Make the hand that a record describes."""
+    model = _keyed(record, MODEL, "model")
     fingers = tuple(
-        HandFinger(
-            each["name"],
-            tuple(map(_link_of, each["links"])),
-            _tip_of(each),
-        )
-        for each in record["fingers"]
-    )  # fmt: skip
-    palm = tuple(map(_shape_of, record["palm"]))
-    pairs = tuple(record["ignored_pairs"])
-    couplings = tuple(
-        Coupling(each["joint"], each["driver"], each["ratio"], each["offset_rad"])
-        for each in record["couplings"]
+        _finger(each, f"fingers[{number}]")
+        for number, each in enumerate(_listed(model["fingers"], "fingers"))
     )
-    notes = tuple(record["notes"])
-    return Hand(name, palm, fingers, tuple(sources), torque_source, pairs, couplings, notes)
-
-
-def _finger(finger: HandFinger) -> FingerRecord:
-    tip = finger.tip
-    record: FingerRecord = {
-        "name": finger.name,
-        "links": [_link(link) for link in finger.links],
-        "tip_center_m": _triple(tip.center),
-        "tip_radius_m": tip.radius,
-    }
-    if tip.corners is not None:
-        record["tip_corners_m"] = list(map(_triple, tip.corners))
-        record["tip_rounding_m"] = tip.rounding
-    return record
-
-
-def _tip_of(record: FingerRecord) -> Fingertip:
-    center, radius = np.array(record["tip_center_m"]), record["tip_radius_m"]
-    if "tip_corners_m" not in record:
-        return Fingertip(center, radius)
-    corners = np.array(record["tip_corners_m"])
-    return Fingertip(center, radius, corners, record.get("tip_rounding_m", 0.0))
-
-
-def _shape(shape: LinkShape) -> ShapeRecord:
-    return {
-        "position_m": _triple(shape.position),
-        "rotation": _rotation(shape.rotation),
-        "half_sizes_m": _triple(shape.half_sizes),
-        "radius_m": shape.radius,
-    }
-
-
-def _shape_of(record: ShapeRecord) -> LinkShape:
-    place, turned, half = record["position_m"], record["rotation"], record["half_sizes_m"]
-    return LinkShape(np.array(place), np.array(turned), np.array(half), record["radius_m"])
-
-
-def _link(link: Link) -> LinkRecord:
-    joint, center = link.joint, link.center_of_mass
-    return {
-        "name": link.name,
-        "joint": {
-            "name": joint.name,
-            "position_m": _triple(joint.position),
-            "rotation": _rotation(joint.rotation),
-            "axis": _triple(joint.axis),
-            "lowest_rad": joint.lowest,
-            "highest_rad": joint.highest,
-            "torque_limit_n_m": joint.torque_limit_n_m,
-        },
-        "shapes": [_shape(each) for each in link.shapes],
-        "mass_kg": link.mass_kg,
-        "center_of_mass_m": None if center is None else _triple(center),
-    }
-
-
-def _link_of(record: LinkRecord) -> Link:
-    own, center = record["joint"], record["center_of_mass_m"]
-    joint = Joint(
-        own["name"], np.array(own["position_m"]), np.array(own["rotation"]), np.array(own["axis"]),
-        own["lowest_rad"], own["highest_rad"], own["torque_limit_n_m"],
+    pairs = [_listed(each, "ignored_pairs") for each in _listed(model["ignored_pairs"], "pairs")]
+    return Hand(
+        name, _parts(LinkShape, model["palm"], "palm"), fingers, tuple(sources), torque_source,
+        tuple(map(tuple, pairs)), _parts(Coupling, model["couplings"], "couplings"),
+        tuple(_listed(model["notes"], "notes")),
     )  # fmt: skip
-    shapes = tuple(map(_shape_of, record["shapes"]))
-    middle = None if center is None else np.array(center)
-    return Link(record["name"], joint, shapes, record["mass_kg"], middle)
 
 
-def _triple(vector: Array) -> Triple:
-    x, y, z = vector.tolist()
-    return x, y, z
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, tuple):
+        return [_plain(part) for part in cast("tuple[Any, ...]", value)]
+    keys = KEYS.get(value.__class__)
+    if keys is None:
+        return value
+    return {key: _plain(getattr(value, name)) for name, key in keys.items()}
 
 
-def _rotation(rows: Array) -> Rotation:
-    first, second, third = map(_triple, rows)
-    return first, second, third
+def _tip_record(tip: Fingertip) -> dict[str, Any]:
+    written = {key: _plain(getattr(tip, name)) for name, key in TIP.items()}
+    return {key: written[key] for key in (BALL if tip.corners is None else BLOCK)}
+
+
+def _finger(record: object, where: str) -> HandFinger:
+    block = "tip_corners_m" in _object(record, where)
+    given = _keyed(record, ["name", "links", *(BLOCK if block else BALL)], where)
+    with about(where):
+        tip = Fingertip(**{name: _value(given[key]) for name, key in TIP.items() if key in given})
+        return HandFinger(given["name"], _parts(Link, given["links"], "links"), tip)
+
+
+def _parts(kind: type[Any], record: object, where: str) -> tuple[Any, ...]:
+    return tuple(
+        _part(kind, each, f"{where}[{number}]")
+        for number, each in enumerate(_listed(record, where))
+    )
+
+
+def _part(kind: type[Any], record: object, where: str) -> Any:
+    given = _keyed(record, KEYS[kind].values(), where)
+    values = {name: _value(given[key]) for name, key in KEYS[kind].items()}
+    with about(where):
+        if kind is Link:
+            values["joint"] = _part(Joint, given["joint"], "joint")
+            values["shapes"] = _parts(LinkShape, given["shapes"], "shapes")
+        return kind(**values)
+
+
+def _value(value: object) -> Any:
+    """Return a value with whole numbers as floats, which a file may hold for them."""
+    return float(value) if type(value) is int else value
+
+
+def _listed(record: object, where: str) -> list[Any]:
+    if not isinstance(record, list):
+        raise InputError(f"{where}: expected a list, got {shown(record)}")
+    return cast("list[Any]", record)
+
+
+def _object(record: object, where: str) -> dict[str, Any]:
+    if not isinstance(record, dict):
+        raise InputError(f"{where}: expected an object, got {shown(record)}")
+    return cast("dict[str, Any]", record)
+
+
+def _keyed(record: object, keys: Collection[str], where: str) -> dict[str, Any]:
+    """Return a record that has certain keys and no others."""
+    given = _object(record, where)
+    if odd := sorted(given.keys() ^ set(keys)):
+        fault = "unknown" if odd[0] in given else "missing"
+        raise InputError(f"{where}: {place(odd[:1])}: {fault} key; keys are {', '.join(keys)}")
+    return given

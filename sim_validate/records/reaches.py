@@ -13,9 +13,8 @@ import numpy as np
 from pydantic import ConfigDict, Field, with_config
 from typing_extensions import TypedDict
 
-from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contacts_sha256
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.files.json_text import record_of, text_of
 from grasp_core.files.text_files import read_text
@@ -29,12 +28,11 @@ from grasp_core.values import FINGERS, Contact, Grasp
 from sim_validate.hands.execute_hand import ExecutedHand
 from sim_validate.hands.validate_hand import HandVerdict
 from sim_validate.records.executions import EnoughRecord, enough_record, tip_radii
-from sim_validate.records.fields import Count, Finite, ObjectRecord, Positive, object_record
-from sim_validate.records.hand_model import ModelRecord, hand_of_model, model_record
+from sim_validate.records.fields import Count, Finite, ObjectRecord, Positive, Triple, object_record
+from sim_validate.records.hand_model import hand_of_model, model_record
 
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Index = Annotated[int, Field(ge=0, lt=FINGERS)]
-Triple = tuple[Finite, Finite, Finite]
 Row = tuple[Finite, Finite, Finite, Finite]
 SCHEMA = 1
 TOUCHING_M = 1e-4
@@ -49,7 +47,7 @@ class HandRecord(TypedDict):
     fingers: list[str]
     sources: list[str]
     torque_source: str
-    model: ModelRecord
+    model: dict[str, Any]
 
 
 class ReachedContactRecord(TypedDict):
@@ -269,7 +267,7 @@ def _record(hand: Hand, found: HandReach, planned: str, tried: HandTrials) -> Re
         record["payload"] = {
             "lower_kg": carried.lower,
             "upper_kg": carried.upper,
-            "weakest_gravity": _triple(carried.weakest),
+            "weakest_gravity": carried.weakest.tolist(),
         }
     if found.grasp in tried.verdicts:
         record["simulated"] = _simulated(tried.verdicts[found.grasp])
@@ -280,15 +278,11 @@ def _record(hand: Hand, found: HandReach, planned: str, tried: HandTrials) -> Re
 
 def _executed(found: ExecutedHand) -> ExecutedHandRecord:
     execution = found.execution
-    if execution is None:
-        return {
-            "refused": found.refused, "enough": enough_record(found.enough), "execution": None,
-        }  # fmt: skip
-    losses = [trial.predicted_loss for trial in execution.trials]
+    losses = [] if execution is None else [trial.predicted_loss for trial in execution.trials]
     return {
-        "refused": "",
+        "refused": "" if execution is not None else found.refused,
         "enough": enough_record(found.enough),
-        "execution": {
+        "execution": None if execution is None else {
             "mass_kg": execution.mass_kg,
             "survived": execution.survived,
             "trials": len(execution.trials),
@@ -296,11 +290,11 @@ def _executed(found: ExecutedHand) -> ExecutedHandRecord:
             "skipped": [f"{each.kind}: {each.reason}" for each in execution.skipped],
             "least_predicted_loss": min(losses) if losses else None,
             "payload_kg": execution.payload_kg,
-            "squeeze_n": [_triple(force) for force in execution.squeeze],
+            "squeeze_n": [force.tolist() for force in execution.squeeze],
             "tip_radius_m": tip_radii(execution),
             "controls_held": [each.name for each in execution.controls if not each.let_go],
         },
-    }
+    }  # fmt: skip
 
 
 def _simulated(verdict: HandVerdict) -> SimulatedHandRecord:
@@ -330,32 +324,21 @@ def _pose(hand: Hand, found: HandReach) -> PoseRecord | None:
     listed: list[ReachedContactRecord] = [
         {
             "finger": hand.fingers[fingers[k]].name,
-            "position_m": _triple(contact.position),
-            "normal": _triple(contact.normal),
+            "position_m": contact.position.tolist(),
+            "normal": contact.normal.tolist(),
             "within_region": bool((found.within_regions or ())[k]),
         }
         for k, contact in enumerate(contacts)
     ]
-    first, second, third, last = (_row(row) for row in found.palm_pose)
     return {
-        "palm_pose": (first, second, third, last),
+        "palm_pose": found.palm_pose.tolist(),
         "joints_rad": found.joints.tolist(),
         "used": used,
         "contacts": listed,
         "closure_margin": certificate.margin,
         "pregrasp_joints_rad": None if found.pregrasp is None else found.pregrasp.tolist(),
-        "approach": None if found.approach is None else _triple(found.approach),
+        "approach": None if found.approach is None else found.approach.tolist(),
     }
-
-
-def _triple(vector: Array) -> Triple:
-    x, y, z = vector.tolist()
-    return x, y, z
-
-
-def _row(row: Array) -> Row:
-    x, y, z, w = row.tolist()
-    return x, y, z, w
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -397,10 +380,9 @@ class SavedReaches:
 
 def read_reaches(path: Path) -> tuple[SavedReaches, ReachesFile]:
     """Read the poses of a hand, and the record that holds them."""
-    try:
-        return reaches_from_json(read_text(path))
-    except InputError as error:
-        raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
+    text = read_text(path)
+    with about(path):
+        return reaches_from_json(text)
 
 
 def reaches_from_json(text: str) -> tuple[SavedReaches, ReachesFile]:
@@ -413,6 +395,10 @@ def _saved(record: ReachesFile) -> SavedReaches:
     own, asked = record["hand"], record["asked"]
     found = {each["id"]: _reach(own, each, asked["clearance_m"]) for each in record["reaches"]}
     hand, missing = _hand(own, [each for each in found.values() if each.reached])
+
+    def told(name: Literal["payload", "simulated", "executed"]) -> dict[str, Any]:
+        return {each["id"]: each.get(name) for each in record["reaches"] if name in each}
+
     return SavedReaches(
         hand=hand,
         hand_name=own["name"],
@@ -426,18 +412,13 @@ def _saved(record: ReachesFile) -> SavedReaches:
             for each in record["reaches"] if each["pose"] is not None
         },
         fingers=tuple(own["fingers"]),
-        payloads={each["id"]: each["payload"] for each in record["reaches"] if "payload" in each},
-        simulated={
-            each["id"]: each["simulated"] for each in record["reaches"] if "simulated" in each
-        },
-        executed={
-            each["id"]: each["executed"] for each in record["reaches"] if "executed" in each
-        },
+        payloads=told("payload"),
+        simulated=told("simulated"),
+        executed=told("executed"),
     )  # fmt: skip
 
 
 def _reach(hand: HandRecord, record: ReachRecord, clearance_m: float) -> HandReach:
-    """Make the value of what was found for one grasp."""
     pose, name = record["pose"], record["id"]
     if not record["reached"] == (pose is not None) == (record["reason"] == ""):
         raise InputError(
@@ -449,7 +430,7 @@ def _reach(hand: HandRecord, record: ReachRecord, clearance_m: float) -> HandRea
             hand["name"], name, record["reason"], record["explanation"], record["starts"],
             clearance_m,
         )  # fmt: skip
-    contacts = pose["contacts"]
+    contacts, way_in, approach = pose["contacts"], pose["pregrasp_joints_rad"], pose["approach"]
     unknown = {each["finger"] for each in contacts} - set(hand["fingers"])
     if unknown or len(pose["joints_rad"]) != len(hand["joints"]):
         raise InputError(
@@ -462,32 +443,21 @@ def _reach(hand: HandRecord, record: ReachRecord, clearance_m: float) -> HandRea
         fingers=np.array([hand["fingers"].index(each["finger"]) for each in contacts]),
         joints=np.array(pose["joints_rad"]),
         palm_pose=np.array(pose["palm_pose"]),
-        contacts=_contacts(pose),
+        contacts=tuple(
+            Contact(np.array(each["position_m"]), np.array(each["normal"])) for each in contacts
+        ),
         within_regions=tuple(each["within_region"] for each in contacts),
-        pregrasp=_array(pose["pregrasp_joints_rad"]),
-        approach=_array(pose["approach"]),
+        pregrasp=None if way_in is None else np.array(way_in),
+        approach=None if approach is None else np.array(approach),
         used=np.array(pose["used"]),
     )  # fmt: skip
-
-
-def _contacts(pose: PoseRecord) -> tuple[Contact, ...]:
-    return tuple(
-        Contact(np.array(each["position_m"]), np.array(each["normal"]))
-        for each in pose["contacts"]
-    )  # fmt: skip
-
-
-def _array(values: Sequence[float] | None) -> Array | None:
-    return None if values is None else np.array(values)
 
 
 def _hand(record: HandRecord, reached: Sequence[HandReach]) -> tuple[Hand | None, str]:
     """Return the hand of a file, or None and the reason why it cannot be drawn."""
     name = record["name"]
-    try:
+    with about(f"hand.model of {name} is none that a hand can have"):
         hand = hand_of_model(name, record["model"], record["sources"], record["torque_source"])
-    except InputError as error:
-        raise InputError(f"hand.model of {name} is none that a hand can have: {error}") from error
     same = [joint.name for joint in hand.joints] == record["joints"] and (
         [finger.name for finger in hand.fingers] == record["fingers"]
     )
@@ -501,7 +471,6 @@ def _hand(record: HandRecord, reached: Sequence[HandReach]) -> tuple[Hand | None
 
 
 def _touches(hand: Hand, reached: Sequence[HandReach]) -> bool:
-    """Tell whether the fingertips of a hand touch at the contacts in every pose."""
     for each in reached:
         if each.fingers is None or each.contacts is None or each.joints is None:
             continue

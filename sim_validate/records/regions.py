@@ -16,7 +16,7 @@ from typing_extensions import TypedDict
 from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
 from grasp_core.checked import path_of
 from grasp_core.closure.contacts import contacts_sha256
-from grasp_core.errors import InputError, SolverError
+from grasp_core.errors import InputError, SolverError, about
 from grasp_core.files.json_text import record_of, text_of
 from grasp_core.files.text_files import write_text
 from grasp_core.geometry.polygons import FEWEST_CORNERS
@@ -214,12 +214,8 @@ def load_regions(path: str | Path) -> CertifiedRegions:
         InputError: The file does not hold the proof of a grasp's regions.
     """
     path = path_of(path, "path")
-    try:
+    with about(f"{path}: expected a proof file as `graspproof regions` writes it"):
         return regions_of(read_arrays(path, SHAPES))
-    except InputError as error:
-        raise InputError(
-            f"{path}: expected a proof file as `graspproof regions` writes it: {error}"
-        ) from error
 
 
 def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
@@ -229,12 +225,8 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
             f"the array {missing[0]} is missing; certify again with `graspproof regions`"
         )
     limit = np.asarray(kept["open_radius_m"])  # infinite where no open choice was found
-    finite = {
-        **kept,
-        "open_radius_m": np.where(np.isposinf(limit), 0.0, limit)
-        if limit.dtype.kind == "f"
-        else limit,
-    }
+    known = np.where(np.isposinf(limit), 0.0, limit) if limit.dtype.kind == "f" else limit
+    finite = {**kept, "open_radius_m": known}
     numbers = {name: frozen(finite[name], shape, name) for name, shape in SHAPES.items()}
     scale = numbers["scale_m"].item()
     if not SMALLEST_SCALE <= scale <= LARGEST:

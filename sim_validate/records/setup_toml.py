@@ -3,19 +3,16 @@
 The tables are `physics`, `fingers`, `hold`, `limit` and `friction`; all are optional.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, cast
 
-from pydantic import TypeAdapter, ValidationError
-
-from grasp_core.errors import InputError
-from grasp_core.files.json_text import complaint, shown
+from grasp_core.errors import InputError, about
+from grasp_core.files.json_text import settings_of, shown
 from scenes.fingertips import FingerSettings
 from scenes.physics import PhysicsSettings
-from sim_validate.files.toml_tables import read_tables
+from sim_validate.files.toml_tables import check_names, read_tables
 from sim_validate.simulation.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.simulation.setup import Setup
 
@@ -46,10 +43,8 @@ def setup_from_tables(tables: Mapping[str, Any], setup: Setup, path: str) -> Set
             raise InputError(f"{path}: expected tables {', '.join(OF_USERS)}, got {shown(name)}")
         table = cast("dict[str, Any]", given)
         filled = _filled(path, name, getattr(setup, name), table)
-        try:
+        with about(f"{path}: {name}"):  # a part may be valid, but not fit the predictions
             setup = replace(setup, **{name: filled})
-        except InputError as error:  # a part may be valid, but not fit the predictions
-            raise InputError(f"{path}: [{name}] {error}") from error
     return setup
 
 
@@ -62,7 +57,7 @@ def physics_from_file(path: Path) -> dict[str, Any]:
         given = cast("dict[str, Any]", table)
     if "gravity" in given:
         raise InputError(
-            f"{path}: [physics] gravity is that of the earth; leave it out, and give its "
+            f"{path}: physics.gravity is that of the earth; leave it out, and give its "
             "direction with --down"
         )
     checked = _filled(str(path), "physics", PhysicsSettings(), given)
@@ -80,19 +75,8 @@ def tables_of(setup: Setup) -> dict[str, dict[str, Any]]:
 
 def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:
     """Replace some fields of a group of settings, each checked against its type."""
-    for name in given:
-        if name not in OF_USERS[table]:
-            raise InputError(
-                f"{path}: [{table}]: no setting is named {shown(name)}; choose from "
-                f"{', '.join(OF_USERS[table])}"
-            )
-    kind = cast("type[Any]", type(values))
-    try:
-        known = {field.name: getattr(values, field.name) for field in fields(values)}
-        text = json.dumps({**known, **given})
-        checked: Any = TypeAdapter(kind).validate_json(text, strict=True)
-    except ValidationError as error:
-        raise InputError(f"{path}: [{table}] {complaint(error, kind)}") from error
-    except InputError as error:  # raised by the value's own checks
-        raise InputError(f"{path}: [{table}] {error}") from error
-    return checked
+    with about(path):
+        check_names(given, OF_USERS[table], table)
+        known = {each.name: getattr(values, each.name) for each in fields(values)}
+        kind = cast("type[Any]", type(values))
+        return settings_of(kind, {**known, **given}, [table])

@@ -18,7 +18,7 @@ from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from grasp_core.checked import MOST_RANDOM_WRENCHES, path_of
 from grasp_core.closure.contacts import contacts_sha256
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import record_of, text_of
 from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById, frame_of
@@ -425,21 +425,21 @@ class SavedVerdicts(ByValue, ById[SavedVerdict]):
         Raises:
             InputError: The library pandas is not installed.
         """
-        return frame_of(list(map(_row, self.verdicts)), [each.id for each in self.verdicts])
-
-
-def _row(verdict: SavedVerdict) -> Mapping[str, object]:
-    simulated = verdict.simulated_critical_friction
-    return {
-        "good": verdict.good,
-        "held": verdict.held,
-        "outcome": verdict.outcome.value,
-        "controls_let_go": verdict.controls_let_go,
-        "mismatches": len(verdict.mismatches),
-        "predicted_critical_friction": verdict.predicted_critical_friction,
-        "simulated_critical_friction": math.nan if simulated is None else simulated,
-        "displacement_m": verdict.displacement_m,
-    }
+        rows = [
+            {
+                "good": each.good,
+                "held": each.held,
+                "outcome": each.outcome.value,
+                "controls_let_go": each.controls_let_go,
+                "mismatches": len(each.mismatches),
+                "predicted_critical_friction": each.predicted_critical_friction,
+                "simulated_critical_friction": math.nan if found is None else found,
+                "displacement_m": each.displacement_m,
+            }
+            for each in self.verdicts
+            for found in [each.simulated_critical_friction]
+        ]
+        return frame_of(rows, [each.id for each in self.verdicts])
 
 
 def load_verdicts(path: str | Path) -> SavedVerdicts:
@@ -453,10 +453,8 @@ def load_verdicts(path: str | Path) -> SavedVerdicts:
     """
     path = path_of(path, "path")
     text = read_text(path)
-    try:
+    with about(path):
         record = verdicts_of(text)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
     return SavedVerdicts(
         object_sha256=record["object"]["content_sha256"],
         friction=record["friction"],

@@ -12,22 +12,21 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import place, record_of, shown
 from grasp_core.files.text_files import read_text
+from sim_validate.records.fields import Triple
 from sim_validate.simulation.setup import NamedWrench
 
 MOST_WRENCHES = 10_000
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Vector = tuple[Number, Number, Number]
 
 
 class _Given(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     name: str
-    force_n: Vector
-    torque_n_m: Vector = (0.0, 0.0, 0.0)
+    force_n: Triple
+    torque_n_m: Triple = (0.0, 0.0, 0.0)
 
 
 class _WrenchFile(BaseModel):
@@ -39,40 +38,30 @@ class _WrenchFile(BaseModel):
 def wrenches_from_file(path: Path) -> tuple[NamedWrench, ...]:
     """Read the wrenches of a file."""
     text = read_text(path)
-    try:
+    with about(path):
         return wrenches_from_json(text)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def wrenches_from_json(text: str) -> tuple[NamedWrench, ...]:
     """Parse the wrenches in the text of a file."""
     given = record_of(_WrenchFile, text, "wrench file", nulls=False).wrenches
-    names = set[str]()
+    found: dict[str, NamedWrench] = {}
     for number, each in enumerate(given):
-        if each.name in names:
+        if each.name in found:
             where = place(["wrenches", number, "name"])
             raise InputError(
                 f"{where}: expected wrenches with different names, got two named {shown(each.name)}"
             )
-        names.add(each.name)
-    return tuple(_named(each, i) for i, each in enumerate(given))
-
-
-def _named(given: _Given, number: int) -> NamedWrench:
-    try:
-        return NamedWrench(given.name, np.array([*given.force_n, *given.torque_n_m]))
-    except InputError as error:
-        raise InputError(f"{place(['wrenches', number])}: {error}") from error
+        with about(place(["wrenches", number])):
+            wrench = np.array([*each.force_n, *each.torque_n_m])
+            found[each.name] = NamedWrench(each.name, wrench)
+    return tuple(found.values())
 
 
 def weights(
     weight_n: float, downs: tuple[tuple[float, float, float], ...]
 ) -> tuple[NamedWrench, ...]:
-    """Turn the object's weight into wrenches, one for each direction of gravity.
-
-    Takes `weight_n` [N].
-    """
+    """Turn the object's weight into wrenches, one for each direction of gravity."""
     ways = [np.array(down) for down in downs] or [*np.eye(3), *-np.eye(3)]
     return tuple(
         NamedWrench(

@@ -1,7 +1,9 @@
 """Group 1: what a name of a file may lead to, whatever is in the file."""
 
 import gzip
+import io
 import os
+import zipfile
 from functools import partial
 from pathlib import Path
 
@@ -23,7 +25,7 @@ READERS = {
     "replay": ("grasps.json", "replay FILE --out made"),
     "baseline": ("baseline.json", "baseline check FILE"),
     "dataset": ("dataset.toml", "dataset build FILE --out made"),
-    "import": ("contacts.npz", "dataset import FILE tetrahedron --friction 0.5 --out made"),
+    "import": ("contacts.json", "dataset import FILE tetrahedron --friction 0.5 --out made"),
 }
 """Commands by what they read, each with a file of the right ending."""
 
@@ -60,7 +62,26 @@ NAMES = {
     "that is a flag": "-v.obj",
     "with a bell": "a\x07.obj",
 }
+ENTITIES = '<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "ha"><!ENTITY b "&a;&a;">]><l>&b;</l>'
+OUTSIDE = '<?xml version="1.0"?><!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><r>&x;</r>'
+
+
+def zipped(name: str, data: bytes) -> bytes:
+    """An archive with one file."""
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)
+    return held.getvalue()
+
+
 OTHERS = {
+    "a bomb called 3mf": ("part.3mf", zipped("3dmodel.model", bytes(50_000_000)), "ending"),
+    "a zip bomb called obj": ("part.obj", zipped("part.obj", bytes(50_000_000)), "export"),
+    "a name that climbs": ("part.obj", zipped("../../part.obj", b"v"), "export"),
+    "entities called off": ("part.off", ENTITIES, "export"),
+    "an entity outside": ("part.x3d", OUTSIDE, "ending"),
+    "an entity outside called ply": ("part.ply", OUTSIDE, "export"),
+    "a compressed OFF": ("part.off.gz", b"\x1f\x8b\x08", "ending"),
     "an archive called stl": ("part.stl", gzip.compress(stl(), mtime=0), "export"),
     "a zip called obj": ("part.obj", b"PK\x03\x04" + bytes(200), "export"),
     "a zip called glb": ("part.glb", b"PK\x03\x04" + bytes(200), "export"),
@@ -86,6 +107,11 @@ OTHERS = {
 ALL_LEFT_OUT = {(file, "without a byte") for file in ("config", "setup")}
 
 
+def _yaml(folder: Path) -> list[str]:
+    (folder / "grasps.yaml").write_text("a: !!python/object/apply:os.system ['touch owned']\n")
+    return ["dataset", "import", "grasps.yaml", "tetrahedron", "--friction", "0.5", "--out", "made"]
+
+
 def cases() -> list[Case]:
     """All of the group."""
     found = [
@@ -101,4 +127,4 @@ def cases() -> list[Case]:
     for name, (file, data, says) in OTHERS.items():
         command = "inspect --max-mesh-bytes 1024" if "kilobyte" in name else "inspect"
         found.append(file_case(GROUP, name, file, data, says, command=command))
-    return found
+    return [*found, Case(GROUP, "YAML that runs", _yaml, 4, ("grasps.yaml",))]

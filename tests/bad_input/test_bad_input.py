@@ -9,7 +9,6 @@ from tests.bad_input.trying import complaints, tried
 
 APART = {
     "of_files": ("inspect: a file that is an endless device", "a name with an escape"),
-    "of_archives": ("npz: an array of 800 MB in 800 kB",),
     "of_binary_meshes": ("glb: 10^5 deep nodes",),
     "of_obj": ("a line of fifty megabytes",),
 }

@@ -23,7 +23,6 @@ from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.parquet import parquet_bytes
 from sim_validate.datasets.units import body_of, units_of
 from sim_validate.datasets.verify import Sample, verify
-from sim_validate.datasets.workers import Limits
 
 FRICTIONS = (0.3, 0.5)
 PROFILED = 3
@@ -57,7 +56,7 @@ def main():
 def report_build(config, out, jobs):
     began = time.perf_counter()
     with local_processes(jobs) as engine:
-        built = build(config, out, engine, lambda *_: None, Limits(3600.0))
+        built = build(config, out, engine, lambda *_: None, 3600.0)
     took = time.perf_counter() - began
     assert built.made == built.units, f"{out}: was begun before; give a new --out"
     grasps = sim_validate.load_dataset(out)["grasps"]

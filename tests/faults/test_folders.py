@@ -24,11 +24,6 @@ def test_a_file_in_place_of_a_folder_is_refused(command, below, tmp_path, capsys
     assert contents(tmp_path) == {"file": b"mine"}
 
 
-def test_a_name_that_is_too_long_is_refused(tmp_path, capsys):
-    assert main([*PLAN, "--out", str(tmp_path / ("a" * 256))]) == 4
-    assert "File name too long" in capsys.readouterr().err
-
-
 NAMES = ["a" * 255, "a\nb", os.fsdecode(b"\xff\xfe")]
 
 
@@ -86,15 +81,6 @@ def test_results_about_ids_of_peoples_own_are_removed_as_well(tmp_path):
     assert own | results < set(contents(tmp_path))
     assert main([*PLAN, "--out", out]) == 0
     assert set(contents(tmp_path)) == own | {"grasps.json"}
-
-
-@pytest.mark.slow
-def test_new_verdicts_remove_old_traces_and_pages(tmp_path):
-    out = str(tmp_path)
-    assert main(["run", "tetrahedron", "--limit", "1", "--traces", "-q", "--out", out]) == 0
-    assert main(["validate", str(tmp_path / "grasps.json"), "-q", "--out", out]) == 0
-    left = {"grasps.json", "verdicts.json", "scenes/c-0-1-2-3.xml"}
-    assert set(contents(tmp_path)) == left
 
 
 @pytest.mark.slow

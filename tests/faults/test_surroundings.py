@@ -72,13 +72,6 @@ def test_where_no_folder_keeps_an_inner_loop_it_is_compiled_again():
     assert (there.stdout.splitlines(), kept) == ([*own, "not kept"], "kept")
 
 
-@pytest.mark.slow
-def test_an_empty_environment_will_do(tmp_path):
-    command = [*CLI, *RUN, "--no-report", "--out", str(tmp_path / "a")]
-    done = subprocess.run(command, cwd=ROOT, env={}, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
 def test_letters_that_a_terminal_does_not_have_are_spelled_out(graspproof, tmp_path):
     name = tmp_path / "Schlüssel.off"
     name.write_text(
@@ -132,20 +125,6 @@ def test_cores_are_those_that_the_process_may_use(tmp_path, monkeypatch):
         if text:
             (tmp_path / "cpu.max").write_text(text)
         assert engines.available_cores() == cores
-
-
-@pytest.mark.slow
-def test_results_depend_on_neither_processes_nor_cores(tmp_path):
-    words = ["run", "box", "--limit", "16", "--no-report", "-q", "--out"]
-    assert main([*words, str(tmp_path / "one"), "--jobs", "1"]) == 0
-    assert main([*words, str(tmp_path / "many"), "--jobs", "64"]) == 0
-    own = os.sched_getaffinity(0)
-    try:
-        os.sched_setaffinity(0, {min(own)})
-        assert main([*words, str(tmp_path / "core")]) == 0
-    finally:
-        os.sched_setaffinity(0, own)
-    assert contents(tmp_path / "one") == contents(tmp_path / "many") == contents(tmp_path / "core")
 
 
 @pytest.mark.slow

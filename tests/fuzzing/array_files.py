@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from pyarrow import parquet
 
-from sim_validate.datasets.given_contacts import contacts_text, given_from_json
 from sim_validate.datasets.parquet import parquet_bytes, read_columns
 from sim_validate.datasets.tables import TABLES
 from sim_validate.files.npz import arrays_of
@@ -53,19 +52,6 @@ def _same_proof(data: bytes, found: Any) -> None:
     np.testing.assert_array_equal(kept["forces"], found.cover.forces)
 
 
-POINTS = np.array([[[0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01], [-0.01, 0, 0]]])
-NORMALS = np.array([[[-1.0, 0, 0], [0, -1, 0], [0, 0, -1], [1, 0, 0]]])
-
-
-def _same_points(data: bytes, found: Any) -> None:
-    kept = _plain(data, ("contact_points_m", "grasp_id"))
-    assert kept["contact_points_m"].astype(float).tolist() == [
-        [list(point) for point in each.points] for each in found
-    ]
-    if "grasp_id" in kept:
-        assert [str(name) for name in kept["grasp_id"]] == [each.name for each in found]
-
-
 def _rows() -> list[dict[str, Any]]:
     values = {"text": "a", "bool": True, "int": 1, "float": 0.5}
     return [
@@ -93,8 +79,5 @@ def _same_table(data: bytes, found: Any) -> None:
 TARGETS = (
     Target("proof", lambda data: regions_of(arrays_of(data, SHAPES)), lambda: [npz(**_proof())],
            _same_proof, "npz"),
-    Target("given-npz", lambda data: given_from_json(contacts_text(data)),
-           lambda: [npz(contact_points_m=POINTS, contact_normals=NORMALS,
-                        grasp_id=np.array(["a"]))], _same_points, "npz"),
     Target("table", _table, lambda: [parquet_bytes("objects", _rows(), {})], _same_table),
 )  # fmt: skip

@@ -33,7 +33,6 @@ from sim_validate.records.executions import executions_from_json, executions_to_
 from sim_validate.records.reaches import reaches_from_json
 from sim_validate.records.regions import RegionsFile
 from sim_validate.records.setup_toml import setup_from_tables, tables_of
-from sim_validate.records.transfers import transfer_from_json, transfer_to_json
 from sim_validate.records.verdicts import verdicts_of
 from sim_validate.records.wrenches import wrenches_from_json
 from sim_validate.simulation.setup import Setup
@@ -136,23 +135,9 @@ def _same_executions(data: bytes, found: Any) -> None:
         _compare(stated[name], json.loads(text)[name])
 
 
-def _transfer_seed() -> bytes:
-    body = example_object("tetrahedron")
-    return transfer_to_json(gc.transfer(body, body, gc.plan(body, 0.5, limit=1))).encode()
-
-
-def _same_transfer(data: bytes, found: Any) -> None:
-    stated = json.loads(data)
-    assert [each.id for each in found] == [each["id"] for each in stated["grasps"]]
-    for each, told in zip(found, stated["grasps"], strict=True):
-        places = [None if c.contact is None else c.contact.position.tolist() for c in each.contacts]
-        _compare([c["position_m"] for c in told["contacts"]], places)
-        assert (each.status, each.new_id) == (told["status"], told["new_id"])
-
-
 POLYGON = [[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]]
 REGIONS = {
-    "schema": 3, "object": {"name": "box", "content_sha256": HASH}, "friction": 0.5,
+    "schema": 1, "object": {"name": "box", "content_sha256": HASH}, "friction": 0.5,
     "edge_clearance_m": 0.0,
     "grasps": [{"id": "c-0-1-2-3", "contacts_sha256": HASH, "disc_radius_m": 0.1,
                 "regions": [{"polygon_m": POLYGON, "inscribed_radius_m": 0.01}] * 4,
@@ -344,8 +329,6 @@ TARGETS = (
            lambda: [_json(VERDICTS)], _same_record, "json"),
     Target("executions", lambda data: executions_from_json(text_of(data)),
            lambda: [executions_text().encode()], _same_executions, "json"),
-    Target("transfer", lambda data: transfer_from_json(text_of(data)), lambda: [_transfer_seed()],
-           _same_transfer, "json"),
     Target("regions", lambda data: record_of(RegionsFile, text_of(data), "regions.json", schema=1),
            lambda: [_json(REGIONS)], _same_record, "json"),
     Target("reaches", lambda data: reaches_from_json(text_of(data)),

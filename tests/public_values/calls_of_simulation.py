@@ -97,9 +97,6 @@ CALLS = [
     Call("sv.load_executions", lambda: {"path": "no/such/executions.json"}, {
         "path": PATH | {"nowhere": "no/such/executions.json"},
     }, succeeds_in="tests/sim_validate/records/test_executions.py"),
-    Call("sv.load_transfer", lambda: {"path": "no/such/transfer.json"}, {
-        "path": PATH | {"nowhere": "no/such/transfer.json"},
-    }, succeeds_in="tests/sim_validate/records/test_transfers.py"),
     Call("sv.load_verdicts", lambda: {"path": "no/such/verdicts.json"}, {
         "path": PATH | {"nowhere": "no/such/verdicts.json"},
     }, succeeds_in="tests/sim_validate/records/test_verdicts.py"),

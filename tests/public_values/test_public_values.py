@@ -33,7 +33,7 @@ MADE_BY_FUNCTIONS = {
     "HandPayload HandReach Improvement Payload Plan QualityCeiling Transfer WrenchLimit",
     "scenes": "HandScene HeldScene Layout Scene Sheet Turntable",
     "sv": "ExecutedGrasp Execution ExecutionTrial Executions HandVerdict Judgement "
-    "PublishedProtocol SavedCarriedGrasp SavedTransfer SavedVerdict SavedVerdicts Verdict",
+    "PublishedProtocol SavedVerdict SavedVerdicts Verdict",
 }
 """Results, by package: users read them and do not make them."""
 NAMED_OTHERWISE = {
@@ -44,7 +44,6 @@ NAMED_OTHERWISE = {
     ("sv.load_regions", "path"): "path|no/such",
     ("sv.load_executions", "path"): "path|no/such",
     ("sv.load_verdicts", "path"): "path|no/such",
-    ("sv.load_transfer", "path"): "path|no/such",
     ("gc.load_grasps", "path"): "path|no/such",
     ("sv.load_dataset", "folder"): "folder|no/such",
     ("sv.load_dex_record", "path"): "path|no/such",

@@ -19,13 +19,11 @@ from sim_validate.baselines.part import IfChanged
 from sim_validate.cli import (
     command_flags,
     dataset_flags,
-    execution_flags,
     flag_groups,
     hand_flags,
-    transfer_flags,
 )
 from sim_validate.cli.flag_bounds import Bound
-from sim_validate.datasets.config import Learning
+from sim_validate.datasets.config import asked_learning
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.simulation.setup import Noise
 from tests.sim_validate.rigs import grasps
@@ -106,9 +104,9 @@ Settings = {
     ),
     "plan --jobs": (command_flags.Plan, "jobs", stops_at("jobs", lambda v: best(jobs=v))),
     "plan --ceiling": (flag_groups.Planning, "ceiling", stops_at("parts", ceiling)),
-    "execute --mass-kg": (execution_flags.Mass, "mass_kg", executing("mass_kg")),
+    "execute --mass-kg": (flag_groups.Mass, "mass_kg", executing("mass_kg")),
     "execute --damping-ratio": (
-        execution_flags.Tips, "damping_ratio", lambda value: HeldSettings(damping_ratio=value),
+        flag_groups.Tips, "damping_ratio", lambda value: HeldSettings(damping_ratio=value),
     ),
     "patches": (flag_groups.Mesh, "patches", lambda value: PatchLimits(most=value)),
     "patch spread": (
@@ -120,14 +118,14 @@ Settings = {
         lambda value: FingerSettings(max_normal_force_n=value),
     ),
     "transfer --angle-deg": (
-        transfer_flags.Carrying, "angle_deg", lambda value: IfChanged(angle_deg=value),
+        flag_groups.Carrying, "angle_deg", lambda value: IfChanged(angle_deg=value),
     ),
     "random wrenches": (
         flag_groups.Testing, "random_wrenches", lambda value: sv.Agenda(random_wrenches=value),
     ),
-    "synthetic": (dataset_flags.Learned, "synthetic", lambda value: Learning(synthetic=value)),
+    "synthetic": (dataset_flags.Learned, "synthetic", lambda v: asked_learning({"synthetic": v})),
     **{
-        f"execute {name}": (execution_flags.Executing, name, executing(name)) for name in EXECUTION
+        f"execute {name}": (flag_groups.Executing, name, executing(name)) for name in EXECUTION
     },
     **{
         f"noise of {name}": (

@@ -1,4 +1,4 @@
-"""Loads the object that a command's flags name, and builds the fingers to plan for."""
+"""Loads the object or the grasps that a command's flags name, and the fingers to plan for."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,9 +9,11 @@ from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.objects.surface import PatchLimits
 from grasp_core.planning.reach import Finger
+from grasp_core.records.grasps_json import SavedGrasps
 from scenes.example_objects import example_object
 from sim_validate.cli import flag_groups
 from sim_validate.cli.console import Reporter
+from sim_validate.records.grasps import read_grasps
 
 
 def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
@@ -62,7 +64,12 @@ def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter
             "--ceiling needs --optimize, because it bounds the quality that moved contacts can "
             "reach"
         )
-    _check_optimize(planning)
+    kept = (planning.edge_clearance_m, planning.share_faces_m, planning.approach_m)
+    if planning.optimize and any(kept):
+        raise InputError(
+            "--optimize moves contacts and would ignore --edge-clearance-m, --share-faces-m and "
+            "--approach-m; leave out --optimize or these three flags"
+        )
     if planning.regions and planning.share_faces_m is not None:
         raise InputError(
             "--regions and --share-faces-m exclude each other, because regions on one face could "
@@ -80,15 +87,6 @@ def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter
     return body
 
 
-def _check_optimize(planning: flag_groups.Planning) -> None:
-    kept = (planning.edge_clearance_m, planning.share_faces_m, planning.approach_m)
-    if planning.optimize and any(kept):
-        raise InputError(
-            "--optimize moves contacts and would ignore --edge-clearance-m, --share-faces-m and "
-            "--approach-m; leave out --optimize or these three flags"
-        )
-
-
 def asked_finger(planning: flag_groups.Planning) -> Finger | None:
     """Build the finger whose straight free path is planned, or None if no flag asks for it."""
     if planning.approach_m is None:
@@ -103,3 +101,31 @@ def asked_finger(planning: flag_groups.Planning) -> Finger | None:
     if planning.finger_radius_m is None:
         raise InputError("--approach-m also needs --finger-radius-m, the radius of the fingertips")
     return Finger(planning.finger_radius_m, planning.approach_m)
+
+
+def saved_grasps(path: Path, reporter: Reporter) -> SavedGrasps | None:
+    """Read a `grasps.json`, and warn of what was changed in its mesh.
+
+    None, with a word about it, if the file holds no grasp.
+    """
+    saved = read_grasps(path)
+    for note in saved.body.surface.notes():
+        reporter.warn(f"{saved.body.name}: {note}")
+    if saved.grasps:
+        return saved
+    absence = f"{path} holds no grasp"
+    reporter.say(absence)
+    reporter.document({"absence": absence})
+    return None
+
+
+def chosen_grasps(
+    saved: SavedGrasps, *, friction: float | None, seed: int | None, limit: int | None
+) -> SavedGrasps:
+    """Keep the first grasps, up to a limit, with another friction or seed where one is given."""
+    return replace(
+        saved,
+        friction=saved.friction if friction is None else friction,
+        seed=saved.seed if seed is None else seed,
+        grasps=saved.grasps[:limit],
+    )

@@ -147,14 +147,3 @@ def test_a_worker_that_is_killed_costs_nothing_but_time(large_dataset, tmp_path)
     assert killed
     assert process.wait(timeout=HANGING_S) == Exit.GOOD
     assert files(folder) == files(large_dataset)
-
-
-@pytest.mark.slow
-def test_a_worker_without_enough_memory_leaves_its_object_out(tmp_path):
-    flags = ["--family", "concurrent", "--limit", "1", "--jobs", "1", "--memory-mb", "16"]
-    folder = tmp_path / "ds"
-    names = ["wedge", *flags, "--timeout-s", "60", "--out", str(folder)]
-    assert main(["dataset", "build", *names]) == Exit.PARTIAL
-    (line,) = (folder / "quarantine.jsonl").read_text().splitlines()
-    assert json.loads(line)["object"] == "wedge"
-    assert verify(folder) == []

@@ -14,9 +14,9 @@ import sim_validate as sv
 from grasp_core.errors import UnfaithfulError
 from scenes.execution.held import HeldSettings
 from scenes.fingertips import fitting_radius
-from sim_validate.cli import execution_flags
-from sim_validate.cli.execution_flags import DENSITY_KG_M3, TRIALS, UPRIGHT, Executing, Tips
+from sim_validate.cli import command_flags
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.cli.flag_groups import DENSITY_KG_M3, TRIALS, UPRIGHT, Executing, Tips
 from sim_validate.commands import run
 from sim_validate.execution import jobs
 from sim_validate.execution.execute import execute
@@ -209,7 +209,7 @@ def test_the_defaults_of_flags_are_those_of_the_settings():
     assert hand.down == UPRIGHT
     assert get_args(TrialKind) == TRIALS
     assert DENSITY_KG_M3 == 1000.0
-    shared = {each.name: each.default for each in fields(execution_flags.Execute)}
+    shared = {each.name: each.default for each in fields(command_flags.Execute)}
     assert shared["trials"] == ()
     assert shared["grasps"] is MISSING
 

@@ -22,15 +22,8 @@ NAMES = ("axes", "codes", "forces")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("regions")
     assert main(["plan", "wedge", "--limit", "3", "--out", str(folder), "-q"]) == Exit.GOOD
-    asked = [
-        "regions",
-        str(folder / "grasps.json"),
-        "--max-cones",
-        "1000",
-        "--out",
-        str(folder),
-        "-q",
-    ]
+    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "1000"]
+    asked += ["--out", str(folder), "-q"]
     assert main(asked) == Exit.GOOD
     return folder
 
@@ -75,15 +68,8 @@ def test_processes_and_runs_agree(folder, tmp_path):
 
 def test_one_grasp_with_a_reserve(folder, capsys):
     name = json.loads((folder / "grasps.json").read_text())["grasps"][0]["id"]
-    asked = [
-        "regions",
-        str(folder / "grasps.json"),
-        "--grasp",
-        name,
-        "--max-cones",
-        "1000",
-        "--json",
-    ]
+    asked = ["regions", str(folder / "grasps.json"), "--grasp", name, "--json"]
+    asked += ["--max-cones", "1000"]
     assert main([*asked, "--reserve", ".4"]) == Exit.GOOD
     found = json.loads(capsys.readouterr().out)
     (grasp,) = found["grasps"]
@@ -229,9 +215,3 @@ def test_fingers_on_one_face_and_certified_regions_do_not_go_together(capsys):
     asked = ["plan", "wedge", "--regions", "--share-faces-m", "0.01"]
     assert main(asked) == Exit.INPUT
     assert "leave one of the two flags out" in capsys.readouterr().err
-
-
-def test_other_centres_are_said_in_the_file(folder, capsys):
-    asked = ["regions", str(folder / "grasps.json"), "--limit", "1", "--max-cones", "500", "--json"]
-    assert main([*asked, "--recenter"]) == Exit.GOOD
-    assert json.loads(capsys.readouterr().out)["recenter"] is True

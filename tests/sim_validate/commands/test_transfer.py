@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import write_text
 from scenes.example_objects import example_object
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.records.grasps import read_grasps
-from sim_validate.records.transfers import TransferFile
 from tests.bad_input.mesh_texts import obj
 from tests.changed_parts import with_face_moved, with_hole
 
@@ -55,8 +53,7 @@ def test_it_writes_grasps_and_what_became_of_them(folder, tmp_path, capsys):
     said = capsys.readouterr().out
     assert "moved: face 3 moved 1.00 mm outward; 4 faces of another area" in said
     assert "6 of 6 grasps were carried over" in said
-    text = (tmp_path / "new" / "transfer.json").read_text()
-    record = record_of(TransferFile, text, "transfer.json", schema=1)
+    record = json.loads((tmp_path / "new" / "transfer.json").read_text())
     saved = read_grasps(tmp_path / "new" / "grasps.json")
     assert saved.body.name == "moved"
     assert record["new"]["content_sha256"] == saved.body.content_sha256

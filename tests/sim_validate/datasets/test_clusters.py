@@ -13,7 +13,7 @@ from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.units import WorkerError, units_of
-from sim_validate.datasets.workers import Limits, do_unit, drive
+from sim_validate.datasets.workers import do_unit, drive
 from sim_validate.parallel.clusters import dask_workers, ray_workers
 from tests.sim_validate.datasets.engines import Here, contents, silent
 
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 CONFIG = DatasetConfig(
     objects=("tetrahedron", "wedge"), frictions=(0.4, 0.5), families=("concurrent",), limit=2
 )
-LIMITS = Limits(timeout_s=100.0)
+TIMEOUT_S = 100.0
 PACKAGES = {"ray": "ray", "dask": "distributed"}
 
 
@@ -56,7 +56,7 @@ def faulty(unit, staging):
 
 def test_every_engine_makes_the_same_bytes(engine, alone, tmp_path):
     assert engine.workers == 2
-    built = build(CONFIG, tmp_path / "ds", engine, silent, LIMITS)
+    built = build(CONFIG, tmp_path / "ds", engine, silent, TIMEOUT_S)
     assert built.made == 4
     assert contents(tmp_path / "ds") == alone
 
@@ -70,7 +70,7 @@ def test_what_ends_or_hangs_is_given_up_and_the_others_are_done(engine, tmp_path
     staging = Staging(tmp_path / "staging")
     staging.clear_unfinished()
     units = units_of(config)
-    drive(units, staging, engine, silent, Limits(timeout_s=12.0), faulty)
+    drive(units, staging, engine, silent, 12.0, faulty)
     came = {unit.object: staging.result(unit) for unit in units}
     assert came["wedge"] == "its worker ended, twice"
     assert came["prism"] == "took too long, twice"
@@ -81,7 +81,7 @@ def test_a_worker_with_other_packages_ends_the_run(engine, tmp_path, monkeypatch
     other = dict(workers.provenance()) | {"mujoco": "3.0.0"}
     monkeypatch.setattr(workers, "provenance", lambda: other)
     with pytest.raises(WorkerError, match=r"another version of mujoco.* instead of 3\.0\.0"):
-        build(CONFIG, tmp_path / "ds", engine, silent, LIMITS)
+        build(CONFIG, tmp_path / "ds", engine, silent, TIMEOUT_S)
 
 
 def test_a_running_dask_cluster_is_used_and_several_threads_are_refused(alone, tmp_path):
@@ -90,7 +90,7 @@ def test_a_running_dask_cluster_is_used_and_several_threads_are_refused(alone, t
     with distributed.LocalCluster(threads_per_worker=1, **settings) as cluster:
         with dask_workers(9, cluster.scheduler_address) as started:
             assert started.workers == 1
-            build(CONFIG, tmp_path / "ds", started, silent, LIMITS)
+            build(CONFIG, tmp_path / "ds", started, silent, TIMEOUT_S)
         assert contents(tmp_path / "ds") == alone
     with (
         distributed.LocalCluster(threads_per_worker=2, **settings) as cluster,

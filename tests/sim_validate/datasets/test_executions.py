@@ -95,16 +95,6 @@ def test_tables_have_the_columns(executed):
     assert list(loaded["executions"]) == [column.name for column in EXECUTIONS]
 
 
-def test_the_readme_explains_executions(executed):
-    text = (executed / CARD).read_text(encoding="utf-8")
-    assert "which has its mass of 1.2 kg" in text
-    assert "natural negative" in text
-    assert 'config_name: "executions"' in text
-    for column in (*EXECUTED, *EXECUTIONS):
-        assert f"| `{column.name}` |" in text
-    assert "those in `executions` are in `mass_kg`" in text
-
-
 def test_a_dataset_without_executions_does_not_mention_them(small_dataset):
     assert "executed" not in (small_dataset / MANIFEST).read_text(encoding="utf-8")
     assert "execut" not in (small_dataset / CARD).read_text(encoding="utf-8")

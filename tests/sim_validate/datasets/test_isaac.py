@@ -153,15 +153,7 @@ def test_the_same_bytes_come_again_and_with_the_splits_together_all_grasps(datas
     assert (labels != "grasp").sum() > whole.rows["grasps"]  # of which none is exported
 
 
-NAMES = (
-    "../../etc/passwd",
-    ".hidden",
-    "a/b\\c",
-    "..",
-    "x" * 400,
-    'a: [b]\n"c": !!python/object',
-    "",
-)
+NAMES = ("../../etc/passwd", "..", "x" * 400, 'a: [b]\n"c": !!python/object', "")
 
 
 @pytest.mark.parametrize("text", [*NAMES, "\x7f\u2028\U0001f600"])
@@ -220,15 +212,6 @@ def test_a_damaged_dataset_is_refused_and_leaves_nothing(copy, tmp_path):
     (copy / "manifest.json").write_text(wrong)
     with pytest.raises(gc.InputError, match="rows, but the manifest lists"):
         export(copy, tmp_path / "out", None, silent)
-    for path in copy.glob("data/grasps/*.parquet"):
-        data = bytearray(path.read_bytes())
-        data[len(data) // 3] ^= 1
-        path.write_bytes(bytes(data))
-    with pytest.raises(gc.InputError):
-        export(copy, tmp_path / "out", None, silent)
-    (copy / "manifest.json").unlink()
-    with pytest.raises(gc.InputError, match="expected a finished dataset"):
-        export(copy, tmp_path / "out", None, silent)
     assert [path.name for path in tmp_path.iterdir()] == ["copy"]
 
 
@@ -265,13 +248,6 @@ def test_what_a_killed_writer_of_a_folder_left_goes_when_it_is_written_again(tmp
         with whole_folder(tmp_path / "out"):  # another command; the first one is still at work
             assert other.is_dir()
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
-
-
-def test_what_is_not_installed_is_named_with_its_extra(dataset, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(gc.InputError, match=r"graspproof\[dataset\]"):
-        export(dataset, tmp_path / "out", None, silent)
-    assert not list(tmp_path.iterdir())
 
 
 def test_the_command_says_what_it_wrote(dataset, tmp_path, capsys):

@@ -161,31 +161,11 @@ def test_hugging_face_datasets_loads_it_as_the_card_says(beside, offline, tmp_pa
     assert compared == sum(cells(table) for table in whole.values())
 
 
-@pytest.mark.slow
-def test_hugging_face_datasets_takes_grasps_unless_told_otherwise(beside, offline):
-    found = offline.load_dataset("ds")
-    assert {name: len(rows) for name, rows in found.items()} == {
-        split: len(sim_validate.load_dataset(beside, split)["grasps"]["held"]) for split in SPLITS
-    }
-
-
 def test_graspproof_loads_it_as_the_card_says(beside):
     found = run(snippet(beside, "sim_validate"))["grasps"]
     expected = sim_validate.load_dataset(beside, "train")["grasps"]
     assert len(found["held"]) == len(expected["held"]) >= 3
     np.testing.assert_array_equal(found["contact_points_m"], expected["contact_points_m"])
-
-
-def test_the_page_says_the_same_lines(folder):
-    said = PAGE.read_text()
-    lines = [
-        line.partition("= ")[2] if line.startswith("grasps =") else line
-        for package in ("polars", "pandas", "datasets", "sim_validate")
-        for line in snippet(folder, package).splitlines()
-        if not line.startswith(("import ", "points ="))
-    ]
-    assert len(lines) == 6
-    assert all(line.removesuffix('["grasps"]') in said for line in lines)
 
 
 @pytest.mark.parametrize("split", SPLITS)

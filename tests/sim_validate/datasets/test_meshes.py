@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -8,7 +6,6 @@ from scenes.example_objects import example_names, example_object
 from sim_validate.datasets.meshes import mesh_path, mesh_text, stored_body, stored_surface
 from tests.grasp_core.records import test_recorded_surfaces as recorded
 
-SCANS = Path(__file__).parents[4] / "shared" / "objects" / "ycb"
 NAMES = [*(name for name in example_names() if "FACES" not in name), "random-30-1"]
 
 
@@ -65,16 +62,6 @@ def test_a_stored_surface_whose_first_line_is_no_record_is_refused_by_field(tmp_
     path.write_text(text.replace('"holes": 2', '"holes": "two"'))
     with pytest.raises(gc.InputError, match=r"obj, first line: holes: expected a whole"):
         stored_body(tmp_path, body.content_sha256, "capped", "auto")
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not SCANS.is_dir(), reason="no scanned objects here")
-def test_stored_scans_come_back_to_the_last_bit(tmp_path):
-    paths = sorted(path for path in SCANS.rglob("*") if path.suffix in {".ply", ".obj", ".stl"})
-    assert len(paths) >= 6
-    for path in paths:
-        body = gc.load_polyhedron(path)
-        assert same(body, stored(body, tmp_path))
 
 
 def test_the_mesh_of_another_object_is_refused(tmp_path):

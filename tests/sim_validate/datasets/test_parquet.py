@@ -127,14 +127,6 @@ def test_no_flipped_bit_in_a_page_changes_rows_in_silence(written):
     assert noticed >= 1
 
 
-def test_a_cut_file_is_noticed(written):
-    path = written["trials"]
-    whole = path.read_bytes()
-    path.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(gc.InputError, match="damaged"):
-        read_rows(path, "trials")
-
-
 def test_two_rows_with_one_name_are_refused(rows):
     with pytest.raises(gc.InputError, match="two rows"):
         parquet_bytes("grasps", [*rows["grasps"], rows["grasps"][0]], {})

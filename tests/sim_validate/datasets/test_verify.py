@@ -74,7 +74,6 @@ def leaning(rows):
         ("grasps", lambda rows: rows[0].update(trials=0), "table of trials"),
         ("grasps", lambda rows: rows[0].update(friction=-1.0), "not among those of config"),
         ("grasps", lambda rows: rows[0].update(label="given", friction=-1.0), "cannot be computed"),
-        ("grasps", lambda rows: rows[0].update(contacts=0), "lacks its contacts"),
         ("grasps", lambda rows: rows[0].update(closure_margin=None), "lacks its contacts"),
         ("grasps", lambda rows: rows[0].update(outcome="slipped"), "is 'slipped'"),
         ("grasps", leaning, "not with its normals"),
@@ -219,13 +218,10 @@ def rewritten(folder, change):
     ("change", "words"),
     [
         (lambda r: r["files"][0].update(path="../x"), r"files\[0\].path: expected a relative path"),
-        (lambda r: r["files"][0].update(path="/etc/passwd"), r"files\[0\].path: expected a rel"),
         (lambda r: r["files"][0].update(rows=-1), r"files\[0\].rows: expected at least 0, got -1"),
         (lambda r: r.update(schema=3), "schema: expected 2, got 3: a newer graspproof wrote"),
         (lambda r: r["files"].append(r["files"][0]), "expected every path only once"),
-        (lambda r: r.update(units="4"), 'units: expected a whole number, got "4"'),
         (lambda r: r.update(taste=1), "taste: unknown key; known keys are config_sha256"),
-        (lambda r: r.pop("files"), "files: missing"),
     ],
 )
 def test_a_manifest_that_is_none_is_refused_by_field(copy, change, words):

@@ -15,13 +15,13 @@ from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.units import WorkerError, provenance, units_of
-from sim_validate.datasets.workers import Limits, Task, do_task, drive
+from sim_validate.datasets.workers import (Task, do_task, drive)
+from sim_validate.datasets.workers import (Task, do_task, do_unit, drive)
 from tests.patience import HANGING_S
 from tests.sim_validate.datasets.engines import Here, silent
 
 pytest.importorskip("pyarrow")
 CONFIG = DatasetConfig(objects=("tetrahedron",), families=("concurrent",), limit=1)
-LIMITS = Limits(timeout_s=HANGING_S)
 
 
 @pytest.fixture
@@ -31,24 +31,8 @@ def staging(tmp_path):
     return made
 
 
-def task(staging, work, limits=LIMITS):
-    return Task(units_of(CONFIG)[0], staging, dict(provenance()), limits, work)
-
-
-def note_memory(unit, staging):
-    import resource
-
-    most = resource.getrlimit(resource.RLIMIT_AS)[0]
-    staging.quarantine(unit, "limited" if 0 < most < 2**40 else "unlimited")
-
-
-def limit_twice(limits):
-    """The limits of memory that are in force in this process, where a unit may take a lot more."""
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_AS, limits)
-    with workers._memory_kept(2**40):
-        return resource.getrlimit(resource.RLIMIT_AS)
+def task(staging, work, timeout_s=HANGING_S):
+    return Task(units_of(CONFIG)[0], staging, dict(provenance()), timeout_s, work)
 
 
 def sleep(*_):
@@ -150,27 +134,14 @@ def test_a_fault_of_ours_with_one_object_does_not_stop_the_others(tmp_path, monk
     assert "internal error: ZeroDivisionError: a bug" in left_out
 
 
-def test_memory_is_limited_while_a_unit_is_done_and_a_process_that_never_ends_is_ended(staging):
-    """One process, which is limited for one unit and not for the next, and those after it."""
-    import resource
-
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    given = task(staging, note_memory, Limits(600.0, 2**30))
+def test_a_process_that_never_ends_is_ended(staging):
     with local_processes(1) as engine:
-        engine.submit(do_task, given).result()
-        assert staging.result(given.unit) == "limited"
-        staging.forget(given.unit)
-        engine.submit(do_task, task(staging, note_memory)).result()
-        assert staging.result(given.unit) == "unlimited"
         for never in (sleep, burn):
-            failed = engine.submit(do_task, task(staging, never, Limits(0.5))).exception(HANGING_S)
+            failed = engine.submit(do_task, task(staging, never, 0.5)).exception(HANGING_S)
             assert failed is not None
-        staging.forget(given.unit)
-        engine.submit(do_task, task(staging, note_memory)).result()
-        lower = (3 * 2**30, 4 * 2**30)
-        assert engine.submit(limit_twice, lower).result() == lower
-    assert staging.result(given.unit) == "unlimited"
-    assert resource.getrlimit(resource.RLIMIT_AS) == before
+        given = task(staging, do_unit)
+        engine.submit(do_task, given).result()
+    assert staging.finished(given.unit)
 
 
 @pytest.mark.slow

@@ -121,6 +121,15 @@ BAD = {
     "no load": (of_first(load_multiple=None), r"\.load_multiple: null is not allowed where"),
     "mass": (lambda d: d["settings"].update(mass_kg=-1), "settings: mass_kg must be a number"),
     "lost": (lambda d: d["settings"].pop("mass_kg"), r"settings\.mass_kg: missing"),
+    "default": (lambda d: d["settings"].pop("shake_g"), r"settings\.shake_g: missing; add it"),
+    "nested": (
+        lambda d: d["settings"]["hand"].pop("down"),
+        r"settings\.hand\.down: missing; add it",
+    ),
+    "tolerance": (
+        lambda d: d["executions"][0]["physics"].pop("tolerance"),
+        r"executions\[0\]\.physics\.tolerance: missing; add it",
+    ),
     "extra": (lambda d: d["settings"].update(speed=1), r"settings\.speed: unknown key"),
     "hand": (
         lambda d: d["settings"]["hand"].update(down=[0, 0, 0]),

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.files.json_text import BESIDE, DEEPEST, object_of, value_of
+from grasp_core.files.json_text import BESIDE, DEEPEST, object_of
 from grasp_core.files.text_files import read_bytes, read_text
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.datasets.given_contacts import read_given
 from sim_validate.files import npz
 from sim_validate.files.npz import arrays_of
 from sim_validate.files.paths import path_inside, require_inside
@@ -71,8 +70,6 @@ def test_a_configuration_of_flags_is_a_file_of_values(tmp_path, capsys):
         ("a = 1\na = 2", "not TOML: "),
         ("[friction]\nlimit = 1", "--config {}: friction: expected a value or a list, got a table"),
         ("limit = [{a = 1}]", "limit: expected a value or a list"),
-        ("friction = 07:32:00", "friction: expected a number or text, got 07:32:00"),
-        ("friction = nan", "friction: expected a finite number"),
         ("limit = " + "9" * 5000, "not TOML: "),
         ("friction = " + "[" * 5000, "too deep"),
     ):
@@ -120,12 +117,6 @@ def test_what_json_leaves_open_is_refused(text):
     assert len(str(raised.value)) < 300
 
 
-def test_nesting_up_to_the_limit_is_read():
-    assert value_of("[" * DEEPEST + "]" * DEEPEST)
-    found = object_of('{"a": "\\ud83d\\ude00", "b": null}', "thing")
-    assert found == {"a": "\U0001f600", "b": None}
-
-
 def _archive(*members, flag=0):
     held = io.BytesIO()
     with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -152,18 +143,15 @@ ARCHIVES = {
     "encrypted": (_archive(("a.npy", GOOD), flag=1), "cannot be read as npz"),
     "twice": ("twice", "the same name"),
     "object": (_archive(("a.npy", _npy(_header("'|O'"), b"\0" * 8))), "an array of numbers"),
-    "structured": (_archive(("a.npy", _npy(_header("[('x', '<f8')]"), b"\0" * 8))), "expected an"),
     "overflow": (_archive(("a.npy", _npy(_header(shape="(4294967296, 4294967296)")))), "s shape"),
+    "no archive": (b"PK nothing", "expected an npz file"),
+    "structured": (_archive(("a.npy", _npy(_header("[('x', '<f8')]"), b"\0" * 8))), "expected an"),
     "negative": (_archive(("a.npy", _npy(_header(shape="(-1,)"), b"\0" * 8))), "s shape"),
     "short": (_archive(("a.npy", _npy(_header(shape="(2,)"), b"\0" * 8))), "as many numbers"),
     "long": (_archive(("a.npy", GOOD + b"\0")), "as many numbers"),
-    "code": (_archive(("a.npy", _npy("__import__('os').abort()"))), "cannot be read as npz"),
     "deep": (_archive(("a.npy", _npy("(" * 100))), "cannot be read as npz"),
     "version": (_archive(("a.npy", _npy(_header(), b"\0" * 8, b"\x03\x00"))), "format"),
-    "letters": (_archive(("a.npy", _npy(_header("'<U1'"), b"\xff" * 4))), "invalid Unicode"),
-    "nested": (_archive(("a.npy", _archive(("a.npy", GOOD)))), "cannot be read as npz"),
     "many": (_archive(*((f"{i}.npy", GOOD) for i in range(300))), "300 members"),
-    "empty": (b"", "expected an npz file"),
 }  # fmt: skip
 
 
@@ -194,7 +182,7 @@ def test_a_bomb_is_refused_by_what_it_claims_before_it_is_inflated(monkeypatch):
 def test_plain_arrays_come_back_as_numpy_writes_them(order):
     held = io.BytesIO()
     arrays = {
-        "a": np.arange(6.0).reshape(2, 3, order=order), "b": np.array(["x", "\u00e9"]),
+        "a": np.arange(6.0).reshape(2, 3, order=order),
         "c": np.array(3, dtype=">i2"), "d": np.zeros((0, 3)), "e": np.array([True]),
     }  # fmt: skip
     arrays["a"] = np.asarray(arrays["a"], order=order)
@@ -203,13 +191,6 @@ def test_plain_arrays_come_back_as_numpy_writes_them(order):
     assert found.keys() == arrays.keys()
     for name, array in arrays.items():
         np.testing.assert_array_equal(found[name], array)
-
-
-def test_given_contacts_in_an_archive_that_lies_are_refused_with_the_file(tmp_path):
-    path = tmp_path / "g.npz"
-    path.write_bytes(ARCHIVES["overflow"][0])
-    with pytest.raises(gc.InputError, match=r"g\.npz: the array contact_points_m is"):
-        read_given(path)
 
 
 ELSEWHERE = [

@@ -29,16 +29,16 @@ def test_a_file_changes_what_it_names_and_nothing_else(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[physics]\ntimestp = 0.001\n", r"\[physics\]: no setting is named .timestp.*timestep"),
+        ("[physics]\ntimestp = 0.001\n", r"physics: no setting is named .timestp.*timestep"),
         ("[physic]\ntimestep = 0.001\n", "expected tables physics.* got .physic."),
         ("timestep = 0.001\n", "expected tables physics.* got .timestep."),
-        ('[physics]\ntimestep = "slow"\n', r"\[physics\] timestep: .*number"),
+        ('[physics]\ntimestep = "slow"\n', r"physics.timestep: .*number"),
         ("[physics]\ntimestep = -0.001\n", "timestep must be a number from 1e-05"),
         ("[physics]\ntolerance = nan\n", "physics.tolerance: expected a finite"),
         ("[hold]\nload_share = 2.0\n", "load_share must be a number from 0.1 up to 0.999"),
         ("[hold]\ncontrol_load = 1e-6\n", "control_load must be a number from 0.05 up to 2"),
         ("[physics]\ngravity = [0.0, 0.0, -9.81]\n", r"gravity must be zero.*--weight-n"),
-        ("[physics]\ncondim = 4\n", r"setup.toml: \[physics\] physics.condim must be 3"),
+        ("[physics]\ncondim = 4\n", r"setup.toml: physics: physics.condim must be 3"),
         ("[physics\n", "not TOML"),
     ],
 )

@@ -15,7 +15,7 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from scenes.execution.held import HeldSettings
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked.executions import execution_settings
+from sim_validate.commands.asked.trials import execution_settings
 from sim_validate.execution.enough import accelerations_g
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import Skipped

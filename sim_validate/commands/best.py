@@ -1,7 +1,6 @@
 """Searches for the best grasp of an object, shows it beside the planned ones, and writes both."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from grasp_core.arrays import Array
@@ -11,7 +10,6 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.best_grasp import best_grasp
 from grasp_core.optimizing.best.proof_file import write_proof
 from grasp_core.optimizing.best.result import BestGrasp, GapAt, measured
-from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter
@@ -58,33 +56,27 @@ def search_best(
         )  # fmt: skip
 
 
-def rated(body: Polyhedron, best: BestGrasp, planned: Sequence[Grasp]) -> list[Rated]:
-    """Return planned grasps with bounds of the measure of the best one."""
-    measure, friction = best.proof.measure, best.proof.friction
-    if measure.is_usual:
-        return [Rated(grasp, grasp.ferrari_canny) for grasp in planned]
-    found = [measured(body, grasp, friction, measure, ROUGH) for grasp in planned]
-    return [
-        Rated(grasp, (each.lower, each.upper)) for grasp, each in zip(planned, found, strict=True)
-    ]
-
-
-def with_best(found: Plan, best: BestGrasp) -> Plan:
-    """Put the best grasp before the planned ones."""
-    return replace(found, grasps=(best.grasp, *found.grasps), absence=None)
-
-
 def write_best(
-    body: Polyhedron, best: BestGrasp, planned: Sequence[Rated], folder: Path | None,
+    body: Polyhedron, best: BestGrasp, planned: Sequence[Grasp], folder: Path | None,
     reporter: Reporter,
-) -> None:  # fmt: skip
-    """Write the search's result and its proof to a folder, and to standard output with --json."""
-    document = best_to_document(body, best, planned, PROOF if folder else None)
+) -> list[Rated]:  # fmt: skip
+    """Write the search's result and its proof to a folder, and to standard output with --json.
+
+    Gives the planned grasps with bounds of the measure of the best one.
+    """
+    measure, friction = best.proof.measure, best.proof.friction
+    bounds = [grasp.ferrari_canny for grasp in planned]
+    if not measure.is_usual:
+        found = [measured(body, grasp, friction, measure, ROUGH) for grasp in planned]
+        bounds = [(each.lower, each.upper) for each in found]
+    compared = list(map(Rated, planned, bounds))
+    document = best_to_document(body, best, compared, PROOF if folder else None)
     if folder:
         write_proof(folder / PROOF, best.proof)
         write_text(folder / FILE, text_of(document))
         reporter.say(f"wrote {folder / FILE} and {folder / PROOF}")
     reporter.document(document)
+    return compared
 
 
 def show_best(best: BestGrasp, planned: Sequence[Rated], reporter: Reporter) -> int:
