@@ -74,7 +74,6 @@ def _signs() -> Array:
 
 
 def _box(x: float, y: float, z: float) -> Solid:
-    """Make an axis-aligned box with these half-widths about the origin."""
     return hull(_signs() * (x, y, z))
 
 

@@ -57,9 +57,7 @@ HEAD = """\
 # fingertips: what such messages have no fields for.
 """
 WIDTH = 120
-"""Number of columns after which lists are broken."""
 SECTIONS = 24
-"""Number of corners of the circles that replace round tips and rods."""
 ROUGHNESS = 0.6
 GraspFormat: TypeAlias = Literal["moveit", "gltf"]
 ENDINGS: Mapping[GraspFormat, tuple[str, ...]] = {"moveit": (".yaml", ".yml"), "gltf": (".glb",)}
@@ -76,21 +74,16 @@ class PlacedGrasp:
     contacts: Array
     """Pose at each contact, (4, 4, 4) [m]: the origin is the contact, z the inward normal."""
     tip_radius: float
-    """Radius of the fingertips, and of the rods behind them [m]."""
     rods: Array
     """Pose of each finger's rod, (4, 4, 4) [m]: the origin is the centre of the tip, and z is the
     direction in which the finger comes in; the rod lies behind the origin."""
     rod_length: float
-    """Length of the rods, which is how far fingers draw back before a grasp [m]."""
     figures: Mapping[str, str | float]
     """What is known of the grasp, by the names that tables have: see `Plan.to_dataframe`."""
 
 
 def placed_grasps(plan: Plan, fingertip_radius_m: float | None) -> tuple[PlacedGrasp, ...]:
-    """Place every grasp of a plan, in order.
-
-    Takes `fingertip_radius_m` [m].
-    """
+    """Place every grasp of a plan, in order."""
     radius, length = fingertip_radius_m, ROD_LENGTH * plan.body.radius
     if plan.finger is not None:
         radius, length = radius or plan.finger.radius_m, plan.finger.approach_m

@@ -77,10 +77,7 @@ class FingerSettings:
 
 
 def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:
-    """Choose a fingertip radius [m] at which nothing overlaps, if a large enough one exists.
-
-    Takes `positions` (k, 3) [m]; `normals` (k, 3).
-    """
+    """Choose a fingertip radius [m] at which nothing overlaps, if a large enough one exists."""
     usual = TIP_RADIUS * body.radius
     clear = float(_largest_clear(body, positions, normals, usual).min())
     largest = min(_largest_apart(positions, normals), clear)
@@ -90,11 +87,7 @@ def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:
 
 
 def clashes(body: Polyhedron, positions: Array, normals: Array, radius: float) -> tuple[str, ...]:
-    """List what fingertips of a radius overlap: each other, or the object beside their contacts.
-
-    Takes `positions` (k, 3) [m]; `normals` (k, 3); `radius` [m]. Gives one sentence for each
-    overlap.
-    """
+    """List what fingertips of a radius overlap: each other, or the object beside their contacts."""
     least = radius * (1.0 - TOUCHING)
     found = [
         f"fingertips {i} and {j} of radius {radius:.3g} m overlap"
@@ -143,7 +136,6 @@ def _largest_clear(body: Polyhedron, positions: Array, normals: Array, start: fl
 
 
 def _meeting(body: Polyhedron, centers: Array, radius: float, near: Array) -> Indices:
-    """Find the spheres that meet a triangle near them; all are looked at together."""
     triangles = body.triangles[near.any(axis=0)]
     if not len(triangles):
         return np.zeros(0, dtype=np.intp)
@@ -174,10 +166,7 @@ def _clear_radius(
 
 
 def _triangles_near(body: Polyhedron, positions: Array, normals: Array, radius: float) -> Array:
-    """Tell which triangles each fingertip of at most a given radius may meet, (k, t).
-
-    Spheres of smaller radius at the same contact lie inside the largest one.
-    """
+    """Tell which triangles each fingertip of at most a given radius may meet, (k, t)."""
     corners = body.vertices[body.triangles]
     middles = corners.mean(axis=1)
     extents = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)

@@ -67,9 +67,7 @@ class FingerDrive(ByValue):
     damping_n_s_per_m: float
     max_normal_force_n: float
     rigid: bool
-    """Whether fingertips are rigidly fixed in place; the numbers of the servos are then unused."""
     indentation_m: float
-    """Depth of a fingertip in its face at the start [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -233,10 +231,7 @@ def _drive(
 
 
 def _ways_in(grasp: Grasp | Sequence[Contact], normals: Array, fingers: FingerSettings) -> Array:
-    """Choose the unit direction in which each finger arrives, (k, 3).
-
-    It is the direction asked for, else the planned one, else the contact normal.
-    """
+    """Choose the unit direction in which each finger arrives, (k, 3)."""
     if fingers.approach is None:
         planned = grasp.approach_directions if isinstance(grasp, Grasp) else None
         return normals if planned is None else planned
@@ -245,10 +240,7 @@ def _ways_in(grasp: Grasp | Sequence[Contact], normals: Array, fingers: FingerSe
 
 
 def grasp_size(positions: Array) -> float:
-    """Compute the root mean square distance [m] of contacts from the axis they are closest to.
-
-    Takes `positions` (k, 3) [m].
-    """
+    """Compute the root mean square distance [m] of contacts from the axis they are closest to."""
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     lever = np.linalg.norm(spread[1:]) / math.sqrt(len(positions))
     return _to_digits(float(lever))
@@ -275,9 +267,9 @@ def _inertia(mass: float, positions: Array, size: float) -> Array:
 
 
 def _pushes(positions: Array, normals: Array, friction: float, torsion_m: float) -> Array:
-    """Compute forces in the contact frames, (k, 3), that balance under force closure.
+    """Compute balanced forces in the contact frames, (k, 3), or normal ones without closure.
 
-    The largest normal part is one. Contacts that are not in force closure push along their normals.
+    The largest normal part is one.
     """
     arms, _, _ = unit_size(positions)
     _, _, margins = deepest_forces(arms[None], normals[None], np.array([friction]))

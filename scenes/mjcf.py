@@ -30,13 +30,7 @@ from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
-from scenes.mjcf_text import (
-    Element,
-    add_element,
-    as_texts,
-    document,
-    quaternion,
-)
+from scenes.mjcf_text import Element, add_element, as_texts, document, quaternion
 from scenes.physics import PhysicsSettings, add_free_body, add_light, begin_scene
 
 Surface = Literal["pads", "mesh"]
@@ -46,7 +40,6 @@ SCALED = (
     "Masses and servos are scaled to suit the grasp: this scene is for tests of force closure. "
     "The command `graspproof scene` with a mass writes the true one, under gravity."
 )
-"""Comment at the top of every scene."""
 AXES = ("normal", "tangent1", "tangent2")
 
 

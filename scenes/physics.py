@@ -8,7 +8,7 @@ solver of MuJoCo 4.0.0 has a bug).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from grasp_core.arrays import Array, Indices, frozen
@@ -104,10 +104,6 @@ class PhysicsSettings:
                 f"torsion_m makes contacts of dimension {WITH_TORSION} by itself: leave condim at "
                 f"{WITHOUT_TORSION}, got {self.condim}"
             )
-
-    def with_gravity(self, gravity: tuple[float, float, float]) -> "PhysicsSettings":
-        """Return the settings with another acceleration of gravity [m/s^2]."""
-        return replace(self, gravity=gravity)
 
     def record(self) -> dict[str, Any]:
         """Return the settings by name; two of them only where unusual, as older files have it."""

@@ -56,9 +56,7 @@ COMMENT = (
     "The test of another tool: the object has the mass that the test states, and no gravity. "
     "Servos stand open at the start, and are told to close and to squeeze."
 )
-"""Comment at the top of every scene."""
 FINGERS = (1 << 20) - 1
-"""Bits of what fingertips touch: each may have one of its own."""
 ORIGIN = np.zeros((1, 3))
 TIP_MASS_KG = 0.05
 """Mass of a fingertip with the part of its finger that moves with it."""
@@ -67,7 +65,6 @@ OPEN_M, OPEN_SIZES = 0.01, 0.25
 ARMATURE_KG_M2 = 1e-4
 """Least inertia of each joint's motor where links have no masses of their own."""
 RING_RAD = 0.5
-"""Largest angle by which a joint on its servo rings in a step; stiffer servos get more inertia."""
 ROOT, TOLD = "root", "told"
 """Names of the body that a weld holds, and of the one that moves as told."""
 COVERED_M = 1e-6
@@ -85,7 +82,6 @@ class TestedScene(ByValue):
     friction: float
     mass_kg: float
     inertia_kg_m2: Array
-    """Inertia of the object about its centre of mass, along the world axes, (3, 3) [kg m^2]."""
     pushes_n: Array
     """Normal forces with which the fingers are told to squeeze, (k,) [N]."""
     opened: Array
@@ -94,9 +90,7 @@ class TestedScene(ByValue):
     shut: Array
     """Commands with which they just touch, (u,) [m or rad]."""
     squeezing: Array
-    """Commands with which they squeeze, (u,) [m or rad]."""
     fingers: tuple[tuple[str, ...], ...]
-    """Names of the bodies of each finger."""
     axes: Array = field(default_factory=lambda: np.eye(3))
     """Columns are the axes of the test's world, along which it pulls, in the scene's, (3, 3)."""
 
@@ -137,10 +131,7 @@ def _object(
 
 
 def ended(root: Element, opened: Array, told: int = 0) -> str:
-    """Add the keyframe `open` and write the scene.
-
-    Takes `opened` (u,).
-    """
+    """Add the keyframe `open` and write the scene."""
     place = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], opened])
     key = {"name": "open", "qpos": place, "ctrl": opened[told:]}
     moved = {"mpos": opened[:3], "mquat": opened[3:told]} if told else {}
@@ -243,9 +234,7 @@ class Postures:
     palms: Array
     """Poses of the palm in the object's frame, (3, 4, 4)."""
     joints: Array
-    """Joint angles, (3, j) [rad]."""
     pushes_n: Array
-    """Normal forces of the squeeze, (k,) [N]."""
     limits_n_m: Array | None = None
     """Largest torques of the joints' motors, (j,) [N m]; None for none."""
     axes: Array = field(default_factory=lambda: np.eye(3))
@@ -255,11 +244,7 @@ class Postures:
 def planned_postures(
     hand: Hand, body: Polyhedron, reach: HandReach, friction: float, stiffness_n_m_per_rad: float
 ) -> Postures:
-    """Return the postures of a hand that stands in a grasp.
-
-    The hand is open in its pregrasp, if it has one, and squeezes with the balanced forces of the
-    pose, as hard as closure tests do: 0.6 of what the motors can.
-    """
+    """Return the postures of a hand that stands in a grasp."""
     layout = hand_layout(hand, body, reach, friction)
     told = replace(layout, servo_n_m_per_rad=stiffness_n_m_per_rad)
     squeeze = layout.joints + told.commands(layout.squeeze_forces[None])[0]

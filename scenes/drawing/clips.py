@@ -43,7 +43,6 @@ of the object."""
 VISIBLE = 0.1
 """Size, in grasp sizes, to which small motions are magnified so that they are easily seen."""
 MOST = 1000.0
-"""Largest factor by which motions are magnified."""
 PATIENCE_S = 300.0
 
 
@@ -97,7 +96,6 @@ def _turned(turn: Any, quaternions: Array) -> Array:
 
 
 def _written(path: Path, **job_parts: Any) -> Path:
-    """Draw a clip in another process, with the first graphics library that works."""
     require_clip(path)
     with tempfile.TemporaryDirectory() as folder:
         job, out = Path(folder) / "job.npz", Path(folder) / f"clip{path.suffix.lower()}"
@@ -155,7 +153,6 @@ def has_display() -> bool:
 
 
 def _graphics() -> Iterator[str]:
-    """Yield the graphics libraries that MuJoCo may draw with, in the order to try them."""
     chosen = os.environ.get("MUJOCO_GL")
     if chosen is not None:
         yield chosen
@@ -166,10 +163,7 @@ def _graphics() -> Iterator[str]:
 
 
 def _run_frames(graphics: str, arguments: list[str]) -> str:
-    """Run the drawing program; return what went wrong, or an empty text.
-
-    Without arguments the program only tries whether it can draw.
-    """
+    """Run the drawing program; return what went wrong, or an empty text."""
     program = str(Path(__file__).with_name("frames.py"))
     command = [sys.executable, "-P", program, *arguments]
     settings = {**os.environ, "MUJOCO_GL": graphics}
@@ -207,7 +201,6 @@ def magnified(joints: Array, scene: Scene) -> tuple[Array, float]:
 
 
 def _rounded_down(factor: float) -> float:
-    """Round a factor down to one significant digit, but not below 1."""
     if factor < 1.0:
         return 1.0
     power = 10.0 ** math.floor(math.log10(factor))

@@ -22,7 +22,6 @@ DISTANCE = 3.2
 SKY, AMBIENT, DIFFUSE = (0.93, 0.95, 0.97), 0.45, 0.45
 """Colour of the background, and strengths of the ambient light and of the light from the camera."""
 INK, LETTERS = (30, 30, 40), 18
-"""Colour and height of the caption's letters [pixels]."""
 
 
 def draw_clip(given: Mapping[str, np.ndarray], out: str) -> None:
@@ -71,7 +70,6 @@ def try_out() -> None:
 
 
 def _lit(xml: str) -> mujoco.MjModel:
-    """Compile a scene with a bright background and light."""
     spec = mujoco.MjSpec.from_string(xml)
     spec.add_texture(
         name="sky",

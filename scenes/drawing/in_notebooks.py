@@ -22,13 +22,10 @@ from scenes.layout import Layout
 from scenes.mjcf import Scene
 
 SIDE = 260
-"""Width and height of a picture [pixels]."""
 MOST_CORNERS = 20_000
 """Largest number of points that are drawn: they take a third of a second, and a megabyte."""
 ROWS = 5
-"""Largest number of grasps in the table of a plan."""
 COLUMNS = 4
-"""Largest number of cells in a row."""
 MM, CM3 = 1e3, 1e6
 Row = Sequence[str]
 
@@ -63,10 +60,7 @@ def _cells(row: Row) -> str:
 def picture(
     shapes: Sequence[Shape], extent: Extent, view: View, numbers: Array | None = None
 ) -> str:
-    """Draw shapes as a small SVG element; nothing where there are too many of them.
-
-    Takes `numbers` (k, 3) [m].
-    """
+    """Draw shapes as a small SVG element; nothing where there are too many of them."""
     if sum(len(shape.vertices()) for shape in shapes) > MOST_CORNERS:
         return ""
     return svg_of(sheet_of(shapes, extent, view, "picture", numbers=numbers, side=SIDE), paper=True)

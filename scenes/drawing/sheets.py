@@ -35,7 +35,6 @@ ASSETS = Path(__file__).parent / "assets"
 FONT_FAMILY, FONT_FILES = "DejaVu Sans", ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf")
 """The letters of PNG files: Latin and Greek ones and signs of DejaVu Sans 2.37."""
 LETTER = 12.0
-"""Size of letters [pixels]."""
 ROUND = 48
 """Number of corners of a polygon that replaces a circle."""
 Anchor: TypeAlias = Literal["start", "middle", "end"]
@@ -60,7 +59,6 @@ class Area(ByValue):
     """A filled area, bounded by loops that run around it in one direction."""
 
     loops: tuple[Array, ...]
-    """Corners of each loop, (k, 2)."""
     fill: str
     opacity: float = 1.0
 
@@ -70,7 +68,6 @@ class Line(ByValue):
     """Lines of one colour and width."""
 
     lines: tuple[Array, ...]
-    """Points of each line, (k, 2)."""
     colour: str
     width: float = 1.4
     opacity: float = 1.0
@@ -82,7 +79,6 @@ class Dots(ByValue):
     """Round dots of one colour and size."""
 
     points: Array
-    """Their middles, (k, 2)."""
     colour: str
     radius: float = 2.5
     opacity: float = 1.0
@@ -99,7 +95,6 @@ class Words:
     size: float = LETTER
     bold: bool = False
     upwards: bool = False
-    """Whether the text runs upwards, as the name of an upright axis does."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -277,7 +272,6 @@ def night_style() -> str:
 
 
 def _style(names: Mapping[Look, str]) -> str:
-    """Write the rules of a file: its looks that have names, and what is other on dark screens."""
     rules = "".join(
         f".{name}{{{';'.join(f'{key}:{value}' for key, value in look if key != 'class')}}}"
         for look, name in names.items()
@@ -286,7 +280,6 @@ def _style(names: Mapping[Look, str]) -> str:
 
 
 def _names(runs: Iterable[tuple[bool, list[Mark]]]) -> dict[Look, str]:
-    """Name the looks that come again."""
     counts = Counter(
         look for plain, marks in runs if not plain for look, _ in groupby(marks, key=_look)
     )
@@ -361,7 +354,6 @@ def _steps(points: Array) -> str:
 
 
 def _plain(mark: Mark) -> str:
-    """Write words or an image."""
     if isinstance(mark, Image):
         data = b64encode(_image_png(mark.levels)).decode()
         return (

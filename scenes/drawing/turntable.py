@@ -35,7 +35,6 @@ UNITS = 1000.0
 """Number of units of length in one object radius."""
 MILLI = 1e3
 WIDTH, HEIGHT = 900, 640
-"""Size of the page in a notebook [pixels]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -144,13 +143,11 @@ def turntable_page(
 
 
 def _in_hand(held: PosedHand) -> tuple[str, str, str]:
-    """Say which fingers of a hand are at the contacts."""
     names = ", ".join(held.finger_names)
     return (f"fingers of {held.hand.name}", names, "that touch, by finger of the grasp")
 
 
 def _facts(body: Polyhedron, grasp: Grasp) -> list[tuple[str, str, str]]:
-    """List the figures of a grasp, each with its meaning."""
     kind = "faces" if body.patches is None else "patches"
     disc = f"{number(MILLI * grasp.radius)} mm" if grasp.radius else "none"
     return [

@@ -62,9 +62,7 @@ class View:
     axes: Array
     """Unit vectors to the right, up and towards the viewer, (3, 3), rows."""
     center: Array
-    """The point that the camera looks at, (3,) [m]."""
     distance: float
-    """Distance of the camera from `center` [m]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axes", frozen(self.axes, (3, 3), "axes"))
@@ -106,10 +104,7 @@ def best_view(body: Polyhedron, grasp: Grasp) -> View:
 
 
 def edge_on(body: Polyhedron, axes: Array) -> Array:
-    """Return the share of an object's surface that is seen nearly as lines in each view, (n,).
-
-    Takes `axes` (n, 3, 3).
-    """
+    """Return the share of an object's surface that is seen nearly as lines in each view, (n,)."""
     areas = np.array([face.area for face in body.faces])
     return (np.abs(axes[:, 2] @ body.normals.T) < EDGE_ON) @ areas / areas.sum()
 

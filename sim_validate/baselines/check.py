@@ -22,7 +22,6 @@ from sim_validate.validation.validation import Job, prepared, verdict_of
 from sim_validate.validation.verdict import Verdict
 
 Report = Callable[[int, int], None]
-"""Function that is called with (done, total) after each grasp."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,22 +29,15 @@ class Measured:
     """Verdicts on the grasps of a file, and the baseline made of them."""
 
     baseline: Baseline
-    """Baseline without the grasps that could not be simulated."""
     verdicts: Mapping[str, Verdict]
-    """Verdicts by the ids of their grasps."""
     refused: Mapping[str, str]
-    """Reasons why grasps could not be simulated, by id."""
     executions: Mapping[str, ExecutedGrasp] = field(default_factory=dict[str, ExecutedGrasp])
-    """Executions by the ids of their grasps; empty if none are asked for."""
 
 
 def measured(
     saved: SavedGrasps, about: tuple[str, int | None], how: How, processors: int, report: Report
 ) -> Measured:  # fmt: skip
-    """Simulate grasps and make a baseline of their verdicts.
-
-    Takes `report` (done, total).
-    """
+    """Simulate grasps and make a baseline of their verdicts."""
     chosen = saved.grasps[: about[1]]
     if not chosen:
         raise InputError(f"{about[0]}: expected at least one grasp to simulate, found none")
@@ -111,7 +103,6 @@ def _try(job: Job) -> Verdict | str:
 
 
 def _executed(job: ExecutionJob) -> ExecutedGrasp | str:
-    """Execute one grasp, or say why it is refused."""
     try:
         return executed_grasp(job)
     except InputError as error:
@@ -127,10 +118,7 @@ def complete(found: Measured, now: Present) -> Baseline:
 
 
 def with_planned_fingers(how: How, before: Baseline, saved: SavedGrasps) -> How:
-    """Replace the fingertips of the setup by those that the grasps are planned for now.
-
-    A radius that was not the planned one when the baseline was recorded stays.
-    """
+    """Replace the fingertips of the setup by those that the grasps are planned for now."""
     fingers = how.setup.fingers
     if fingers.radius_m != before.planned_radius_m:
         return how
@@ -165,10 +153,7 @@ class Checked:
 def check(
     before: Baseline, now: Present, where: str, how: How, processors: int, report: Report
 ) -> Checked:
-    """Simulate grasps again and compare them with a baseline.
-
-    Takes `report` (done, total).
-    """
+    """Simulate grasps again and compare them with a baseline."""
     now = now.first(before.limit)
     how = with_planned_fingers(how, before, now.saved)
     if now.gone and not now.saved.grasps:

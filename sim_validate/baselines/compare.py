@@ -21,13 +21,9 @@ from sim_validate.execution.verdict import may_slip
 from sim_validate.simulation.traces import LET_GO, Outcome
 
 DIGITS_OF_CHANGE = 2
-"""Number of digits of a difference that the numbers before and after show."""
 LEAST_DIGITS = 4
-"""Least number of digits of a number that changed."""
 DECISIVE = ("graspproof", "mujoco", "machine")
-"""Packages and other components whose version may change any result."""
 ASIDE = "python"
-"""Component whose version changes no result."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +48,6 @@ class Bands:
     """Whether exactly the same repeats with noise must hold; otherwise repeats with a load close to
     the limit may change."""
     friction: float = 0.0
-    """Differences of critical frictions that never count, beside `least`."""
     same_part: bool = True
     """Whether the part is the same; on another one, other negative controls may exist."""
 
@@ -223,17 +218,13 @@ class Status(StrEnum):
 
     SAME = "same"
     WITHIN = "within bands"
-    """Numbers differ only as much as other versions or processors make them differ."""
     GREY = "grey zone"
     """The verdict differs, on a grasp too close to its critical friction for a sure result."""
     IMPROVED = "improved"
     REGRESSED = "regressed"
     NOT_COMPARABLE = "not comparable"
-    """The object, the contacts or the settings differ, so the results cannot be compared."""
     MISSING = "missing"
-    """The grasp is in the baseline, but not among the present grasps."""
     NEW = "new"
-    """The grasp is among the present grasps, but not in the baseline."""
     GONE = "gone"
     """The part has changed, and the grasp does not exist on it: a contact has no place, or the
     contacts are no longer in force closure."""
@@ -251,7 +242,6 @@ WORDS = {
     Status.SAME: "same", Status.WITHIN: "same", Status.GREY: "same", Status.IMPROVED: "better",
     Status.REGRESSED: "worse",
 }  # fmt: skip
-"""What a grasp that was carried over to a changed part is called, by its status."""
 EXACT = Bands(
     predicted=1e-9, simulated=1e-9, least=0.0, displacement_m=1e-7, rotation_rad=1e-6,
     grey=0.0, exact=True,
@@ -280,9 +270,7 @@ class Carried:
     """What a comparison must know of a part that has changed since its grasps were planned."""
 
     change: str
-    """Which faces moved and by how much, in words."""
     gone: Mapping[str, str]
-    """Why grasps do not exist on the changed part, by id."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,9 +280,7 @@ class Finding:
     id: str
     status: Status
     reasons: tuple[str, ...] = ()
-    """Reasons for the status, one sentence each."""
     differences: tuple[str, ...] = ()
-    """Every difference from the baseline, one sentence each."""
     beyond: tuple[str, ...] = ()
     """Those of the differences that are beyond their bands."""
     before: Entry | None = None
@@ -360,11 +346,8 @@ def compare(
 
 @dataclass(frozen=True, slots=True)
 class _Known:
-    """What is the same in the comparison of every grasp."""
-
     before: Baseline
     changed: tuple[str, ...]
-    """Reasons why no grasp can be compared."""
     bands: Bands
     carried: Carried | None
     """How the part has changed since the baseline was recorded; None if it has not."""
@@ -387,7 +370,6 @@ def _is_other_part(before: Baseline, after: Baseline) -> bool:
 
 
 def _changed(before: Baseline, after: Baseline, carried: Carried | None) -> Iterator[str]:
-    """Yield the reasons why two baselines cannot be compared."""
     if carried is None and _is_other_part(before, after):
         same = before.object == after.object
         named = f"{before.object} -> {after.object}"
@@ -446,7 +428,6 @@ def _status(counting: list[Difference], *, grey: bool, same: bool) -> Status:
 
 
 def _is_grey(one: Entry, other: Entry, friction: float, bands: Bands) -> bool:
-    """Tell whether a verdict changed on a grasp that is close to its critical friction."""
     brink = abs(friction - one.critical_friction) <= bands.grey * friction
     decided = all(entry.outcome in (Outcome.HELD, *LET_GO) for entry in (one, other))
     return brink and decided and one.held != other.held

@@ -56,7 +56,6 @@ def written(path: Path, baseline: Baseline, now: Present) -> str:
 
 
 def _next_steps(name: str, at: str | None, files: tuple[Path, Path], now: Present) -> Iterator[str]:
-    """Yield the commands that show a grasp, and that check all of them."""
     baseline, grasps = (shlex.quote(str(path)) for path in files)
     chosen = f" --wrench={shlex.quote(at)}" if at else ""
     check = f"  all of them: graspproof baseline check {baseline} --grasps {grasps}"
@@ -74,7 +73,6 @@ def _next_steps(name: str, at: str | None, files: tuple[Path, Path], now: Presen
 
 
 def _to_see(name: str, chosen: str, grasps: str) -> str:
-    """Return the commands that simulate a grasp, and then one of its trials with a clip."""
     which = f"--grasp {shlex.quote(name)}{chosen} --grasps {grasps}"
     return (
         f"  to see it: graspproof validate {grasps} --out seen; "
@@ -122,16 +120,12 @@ def _numbers(title: str, entry: Entry) -> Iterator[str]:
 
 
 def _both(predicted: float, simulated: float | None, unit: str) -> str:
-    """Write a number as predicted and as simulated."""
     said = "not measured in simulation" if simulated is None else f"{simulated:.4g}{unit} simulated"
     return f"{predicted:.4g}{unit} predicted, {said}"
 
 
 def not_survived(grasp: ExecutedGrasp) -> str:
-    """Say why a grasp does not survive its execution: trials, numbers, predictions.
-
-    Gives lines about the grasp; empty if it survived every trial and every control slipped.
-    """
+    """Say why a grasp does not survive its execution: trials, numbers, predictions."""
     found = grasp.execution
     if found is None:
         return f"{grasp.id} was not executed: {grasp.reason}"

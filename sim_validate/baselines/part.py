@@ -23,11 +23,7 @@ from grasp_core.files.text_files import read_bytes
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.records.grasps_json import RECORDED, SavedGrasps
-from grasp_core.transferring.changed_part import (
-    fitting_lengths,
-    fitting_unit,
-    load_changed_part,
-)
+from grasp_core.transferring.changed_part import fitting_lengths, fitting_unit, load_changed_part
 from grasp_core.transferring.face_changes import (
     FaceChange,
     added_faces,
@@ -40,7 +36,6 @@ from sim_validate.baselines.baseline import Baseline, RecordedPart, recorded_par
 
 NOTE, FAIL = "note", "fail"
 TABLE = "changed_part"
-"""Name of the table of `IfChanged` in a `*.grasps.toml` file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +148,6 @@ class Source:
     file: Path | None = None
     """Path of the mesh file; None if it was not found, or the grasps come from no file."""
     note: str = ""
-    """A sentence that says the mesh file was not found; empty otherwise."""
     changed: bool = False
     """Whether the file holds another solid than the one that was planned on."""
     unit: str = ""
@@ -234,7 +228,6 @@ class Present:
     unit: str = ""
     """Unit of length of the changed part's file; empty where the part is as it was."""
     asked: IfChanged = CARRY
-    """What to do if the part has changed."""
     recorded_unit: str | None = None
     """Unit of the mesh file when the baseline was written; None if that is not known."""
     since: Moves | None = None
@@ -404,7 +397,6 @@ def _carried(saved: SavedGrasps, path: Path, file: Path, asked: IfChanged) -> tu
 
 
 def _tested(saved: SavedGrasps, carried: Transfer) -> SavedGrasps:
-    """Return the carried grasps with their old ids."""
     grasps = tuple(
         replace(each.grasp, id=each.old.id) for each in carried.grasps if each.grasp is not None
     )

@@ -14,12 +14,7 @@ from grasp_core.files.json_text import complaint, shown
 from grasp_core.records.grasps_json import SavedGrasps
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface
-from sim_validate.execution.settings import (
-    TABLE,
-    AskedExecution,
-    asked_execution,
-    execution_table,
-)
+from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution, execution_table
 from sim_validate.records.setup_toml import setup_from_file, setup_from_tables, tables_of
 from sim_validate.simulation.setup import (
     Agenda,
@@ -34,8 +29,6 @@ Count = Annotated[int, Field(ge=0)]
 
 
 class _Settings(BaseModel):
-    """The simulation settings in a baseline's file."""
-
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     setup: dict[str, Any]
@@ -56,7 +49,6 @@ class How:
     setup: Setup
     agenda: Agenda
     execution: AskedExecution | None = None
-    """How the grasps are executed besides; None to leave it out."""
 
 
 def settings_of(how: How) -> dict[str, Any]:

@@ -47,7 +47,6 @@ KINDS: Mapping[str, type] = {
     "limits": str, "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
     "survives": bool, "execution": dict, "changed_part": dict,
 }  # fmt: skip
-"""Types of the file's settings, by name."""
 WORDS = {str: "text", bool: "true or false", int: "a whole number", dict: "a table"}
 PATHS = ("grasps", "object", "baseline", "setup", "wrenches")
 DIRECT = ("limits", "random_wrenches", "trials", "seed")
@@ -59,19 +58,14 @@ class Suite:
     """Grasps that must stay as stable as they were; a setting of None is the baseline's."""
 
     path: Path
-    """Path of the `*.grasps.toml` file itself."""
     grasps: Path
-    """Path of the grasps.json."""
     baseline: Path
     object: Path | None = None
     """The mesh file that the grasps were planned from; None to search beside them for the object's
     name."""
     strict: bool = False
-    """Whether improved grasps fail, too."""
     setup: Path | None = None
-    """TOML file of simulation settings."""
     wrenches: Path | None = None
-    """JSON file of wrenches that each grasp must hold in full."""
     limits: str | None = None
     """How the largest multiple of each wrench is found in simulation."""
     random_wrenches: int | None = None
@@ -80,11 +74,8 @@ class Suite:
     noise: Noise | None = None
     seed: int | None = None
     survives: bool = False
-    """Whether each grasp must survive its execution, whatever the baseline says."""
     execution: AskedExecution | None = None
-    """How grasps are executed besides."""
     changed_part: IfChanged = CARRY
-    """What to do if the part has changed since the grasps were planned."""
 
     @cached_property
     def saved(self) -> SavedGrasps:
@@ -162,7 +153,6 @@ class Suite:
         return found
 
     def _kept_if_any(self) -> Baseline | None:
-        """Read the baseline that will be overwritten, if it exists."""
         try:
             return self.kept if self.baseline.is_file() else None
         except InputError as error:

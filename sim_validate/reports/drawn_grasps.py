@@ -39,23 +39,17 @@ class Task:
     """A grasp to draw, in a form that can be sent to another process."""
 
     saved: SavedGrasps
-    """The grasp and its object."""
     friction: float
     verdict: Record | None
     regions: Record | None
-    """Record of the grasp's certified regions, if it has any."""
     executions: Executions | None
-    """The execution of this grasp alone, if it was executed."""
     held: PosedHand | None
     """The hand in the grasp; None if there is none, or it does not reach the grasp."""
     source: Path
     """Path of the file with the verdict, which error messages name."""
     folder: Path
-    """Folder of the report."""
     name: str
-    """Beginning of the names of the grasp's files."""
     clip: bool
-    """Whether to draw clips of trials, too."""
 
     @property
     def grasp(self) -> Grasp:
@@ -69,7 +63,6 @@ class FilmedTrial:
 
     path: str
     trial: str
-    """Name of the trial."""
     fate: str
 
 
@@ -88,10 +81,8 @@ class Drawn:
     """Panels of the chart of motion; none if no trial was simulated."""
     clip: str | None = None
     trial: str = ""
-    """Name of the wrench in the trial that is shown."""
     outcome: str = ""
     executed: tuple[FilmedTrial, ...] = ()
-    """Clips of the execution's trials."""
     no_clip: str = ""
     """Reason why no clip could be drawn; empty if there is a clip or none was asked for."""
 
@@ -181,7 +172,6 @@ def _with_clip(task: Task, found: Replayed, drawn: Drawn) -> Drawn:
 
 
 def _with_executed(task: Task, executions: Executions, drawn: Drawn) -> Drawn:
-    """Film the trials of an execution in which something can be seen."""
     (found,) = executions.grasps
     if found.execution is None:
         return drawn

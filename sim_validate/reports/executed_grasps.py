@@ -151,10 +151,7 @@ def execution_section(executions: Executions | None, found: ExecutedGrasp | None
 
 
 def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
-    """Write the shell command that executes a grasp again, with the same settings.
-
-    The simulator's own settings are no flags, so the command takes the usual ones.
-    """
+    """Write the shell command that executes a grasp again, with the same settings."""
     words = ["graspproof", "execute", path, "--grasp", grasp_id]
     words += ["--friction", repr(executions.friction)]
     usual = ExecutionSettings(executions.settings.mass_kg).used
@@ -176,7 +173,6 @@ def _words(value: object) -> list[str]:
 
 
 def _facts(executions: Executions, found: Execution | None) -> Iterable[tuple[str, str]]:
-    """Yield names and values of what the fingers and the object were, and of the squeeze."""
     settings = executions.settings
     yield "Mass", f"{settings.mass_kg:.4g} kg, at friction {executions.friction:g}"
     yield "Push of a finger", f"at most {settings.push_n:.4g} N"
@@ -220,12 +216,10 @@ def _trial(trial: ExecutionTrial, settings: ExecutionSettings) -> Record:
 
 
 def _in_scripts(multiple: float) -> str:
-    """Write a multiple of a load as scripts of the page read it."""
     return "Infinity" if math.isinf(multiple) else f"{multiple:.6g}"
 
 
 def _slip(multiple: float | None) -> str:
-    """Write the multiple of a load at which a contact slips."""
     if multiple is None:
         return NOTHING
     return NEVER if math.isinf(multiple) else f"{multiple:.2f}"

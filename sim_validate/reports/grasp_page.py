@@ -25,9 +25,7 @@ MILLI, MICRO, PERCENT = 1e3, 1e6, 100.0
 ROTATED, MIRRORED = "rotated", "mirrored"
 """Kinds of copies of a grasp, as the pages call them."""
 DRAW_ALL = "graspproof report . --every-copy"
-"""Command that draws copies, too."""
 Fact: TypeAlias = tuple[str, str, str]
-"""Name, value and meaning of a measured number."""
 FAMILIES = {
     "concurrent": "the lines of force meet in one point",
     "pencil": "two pairs of lines, which meet in points of a common line",
@@ -55,7 +53,6 @@ MOTIONS = (
         "before that, at high friction: the fingers give way a little",
     ),
 )  # fmt: skip
-"""Names, fields and meanings of the two motions that a page tells."""
 MEASURES = {
     "ferrari-canny": ("Ferrari-Canny quality", " N"),
     "weight": ("weight held in every orientation, for normal forces of sum 1 N", " N"),
@@ -93,7 +90,6 @@ class Kin:
 
     copies: tuple[Copy, ...] = ()
     first: Copy | None = None
-    """The grasp that stands for its copies and has pictures; its `kind` is that of this copy."""
 
 
 def grasp_page(
@@ -136,7 +132,6 @@ def grasp_page(
 
 
 def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[Fact]:
-    """Yield the measured numbers of the page's list."""
     planned = run.saved.friction
     at_plan = "" if planned == run.friction else f", at friction {planned:g} as planned"
     yield "Family", grasp.family, FAMILIES[grasp.family]
@@ -177,7 +172,6 @@ def possible_facts(best: BestFile | None, grasp: str) -> Iterable[Fact]:
 
 
 def _measured(verdict: Record) -> Iterable[Fact]:
-    """Yield what the simulation found."""
     for name, field, meaning in MOTIONS:
         moved = [trial.get(field) for trial in verdict["wrenches"]]
         known = [MICRO * each for each in moved if each is not None]
@@ -221,7 +215,6 @@ def _certified(run: RunFolder, grasp: Grasp) -> str:
 
 
 def _sizes(run: RunFolder, verdict: Record | None) -> Record:
-    """Write the lengths by which torques are divided: the object's radius, the grasp's size."""
     size = None if verdict is None else verdict["settings"]["grasp_size_m"]
     return {
         "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
@@ -262,7 +255,6 @@ def _controls(controls: Record) -> Sequence[Record]:
 
 
 def _commands(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[str]:
-    """Yield shell commands that show the grasp, and that simulate it again."""
     asked = f"--grasp {shlex.quote(grasp.id)}"
     other = "" if run.friction == run.saved.friction else f" --friction {run.friction:g}"
     yield f"graspproof view {GRASPS} {asked}{other}"

@@ -42,7 +42,6 @@ from sim_validate.reports.reached_grasps import (
 from sim_validate.reports.run_folder import RunFolder
 
 ROWS = 20
-"""Largest number of grasps in the table of the possible."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +118,6 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
 
 
 def _described_possible(best: BestFile | None) -> Record | None:
-    """Build the section about the best grasp and the bound; None where nothing was bounded."""
     if best is None:
         return None
     (what, unit), bound, name = MEASURES[best["measure"]], best["bound"], best["grasp"]["id"]
@@ -142,7 +140,6 @@ def _described_possible(best: BestFile | None) -> Record | None:
 
 
 def _judged(run: RunFolder) -> Iterable[Record]:
-    """Yield what each published test says of the grasps of a run, for a row of a table."""
     if run.judgements is None:
         return
     summary: Record = run.judgements["summary"]
@@ -262,7 +259,6 @@ def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
 
 
 def _controls(verdicts: Sequence[Record]) -> list[dict[str, Any]]:
-    """Count the negative controls of each kind that were let go, held, or undecided."""
     kinds = dict[str, dict[str, Any]]()
     for verdict in verdicts:
         for name, control in verdict["controls"].items():

@@ -39,10 +39,7 @@ WAY = "over 60 mm, with open fingers and nothing in the way"
 
 
 def held_in(reaches: "SavedReaches | None", grasp: Grasp) -> PosedHand | None:
-    """Return the hand in the pose in which it stands in a grasp.
-
-    Gives None where no hand was asked for, it does not reach the grasp, or it cannot be drawn.
-    """
+    """Return the hand in the pose in which it stands in a grasp."""
     reach = reach_of(reaches, grasp)
     if reaches is None or reaches.hand is None or reach is None or not reach.reached:
         return None
@@ -96,7 +93,6 @@ def held_by_hand(reaches: "SavedReaches | None", grasp: Grasp) -> float | None:
 
 
 def _where(found: "HandReach") -> str:
-    """Say how many contacts are in regions, of those that are reached."""
     within = found.within_regions or ()
     inside = sum(within)
     if inside == len(within):
@@ -142,7 +138,6 @@ def reach_section(reaches: "SavedReaches | None", grasp: Grasp) -> Record | None
 
 
 def _facts(reaches: "SavedReaches", found: "HandReach") -> Iterable[tuple[str, str, str]]:
-    """Yield name, value and meaning of what is known about the hand in a grasp."""
     if found.reached:
         names = ", ".join(f"{k}: {name}" for k, name in enumerate(reaches.finger_names(found)))
         yield "Fingers used", names, FINGERS
@@ -169,7 +164,6 @@ def _facts(reaches: "SavedReaches", found: "HandReach") -> Iterable[tuple[str, s
 
 
 def _executed(tried: "ExecutedHandRecord") -> Iterable[tuple[str, str, str]]:
-    """Yield name, value and meaning of what came of executing a grasp with the hand."""
     found = tried["execution"]
     if found is None:
         yield "Executed with the hand", "not tried", tried["refused"]

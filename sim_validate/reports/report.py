@@ -41,13 +41,10 @@ class Report:
     """The paths of a written report."""
 
     index: Path
-    """Path of the report's first page."""
     grasps: int
-    """Number of grasps with a page."""
     no_clip: str
     """Reason why clips that were asked for are missing; empty if none is missing."""
     drawn: int
-    """Number of grasps with pictures; the others are copies of these by symmetry."""
 
 
 def write_report(
@@ -105,8 +102,6 @@ def write_report(
 
 @dataclass(frozen=True, slots=True)
 class _Card:
-    """One card of the report: a grasp to draw, the grasps that share its card, and their pages."""
-
     run: RunFolder
     script: str
     """Name of the script with the object's drawing."""
@@ -123,7 +118,6 @@ def _written(
     cards: Sequence[_Card], runs: Runs, out: Path, jobs: int,
     progress: Callable[[int, int], object], ready: Callable[[Path, int, int], object],
 ) -> Report:  # fmt: skip
-    """Draw all cards, and write the first page as soon as `FIRST` of them are drawn."""
     for name in STATIC:
         write_text(out / name, style() if name == STYLE else asset(name))
     for number, run in enumerate(runs):
@@ -151,7 +145,6 @@ def _written(
 def _cards(
     runs: Runs, out: Path, clips: int, *, every_copy: bool
 ) -> Iterator[_Card]:  # fmt: skip
-    """Sort the grasps of every run into cards, in the order to draw them."""
     for number, run in enumerate(runs):
         prefix = f"{number}-" if len(runs) > 1 else ""
         grasps = run.saved.grasps
@@ -167,7 +160,6 @@ def _cards(
 
 
 def _neighbours(cards: Sequence[_Card], place: int) -> Neighbours:
-    """Return the names of the pages of the cards before and after one."""
     before, after = (
         f"{cards[other].task.name}.html" if 0 <= other < len(cards) else None
         for other in (place - 1, place + 1)

@@ -40,17 +40,12 @@ class RunFolder:
     summary: Record
     """All of `verdicts.json` but the verdicts; empty if the file does not exist."""
     regions: Mapping[str, Record]
-    """Records of certified regions, by the grasps' ids; empty if there are none."""
     regions_friction: float | None
-    """Friction for which the regions are certified; None if there are none."""
     executions: Executions | None
     """Grasps as a robot executes them; None if the file does not exist."""
     reaches: "SavedReaches | None" = None
-    """Where a hand stands in the grasps; None if the file does not exist."""
     judgements: Record | None = None
-    """What published tests say of the grasps; None if the file does not exist."""
     possible: BestFile | None = None
-    """The best grasp and the bound on all others; None if the file does not exist."""
     left_out: int = 0
     """Number of grasps in the files that `saved` leaves out."""
 
@@ -133,10 +128,7 @@ def _run(path: Path) -> RunFolder:
 
 
 def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
-    """Read where a hand stands in grasps from the folder of their file.
-
-    Gives None if the folder has no reaches.json.
-    """
+    """Read where a hand stands in grasps from the folder of their file."""
     path = grasps.with_name(REACHES)
     if not path.is_file():
         return None
@@ -151,7 +143,6 @@ def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
 
 
 def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping[str, Record]:
-    """Index records by id, after a check that they are about the contacts of the grasps."""
     _check_contacts(path, [(each["id"], each["contacts_sha256"]) for each in records], saved)
     return {each["id"]: each for each in records}
 
@@ -173,7 +164,6 @@ def _check_contacts(path: Path, listed: Sequence[tuple[str, str]], saved: SavedG
 
 
 def _executions(path: Path, saved: SavedGrasps) -> Executions | None:
-    """Read executions of the grasps; return None if the file does not exist."""
     if not path.is_file():
         return None
     found = load_executions(path)
@@ -183,7 +173,6 @@ def _executions(path: Path, saved: SavedGrasps) -> Executions | None:
 
 
 def _read(path: Path, read: Callable[[str], Read], saved: SavedGrasps) -> Read | None:
-    """Read a file about the same object; return None if the file does not exist."""
     if not path.is_file():
         return None
     try:

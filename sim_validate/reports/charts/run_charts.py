@@ -39,17 +39,14 @@ from sim_validate.reports.agreement import Agreement
 from sim_validate.validation.verdict import AGREEMENT
 
 FIDELITY_WIDTH, FIDELITY_HEIGHT = 360.0, 388.0
-"""Size of a panel [pixels]."""
 FIDELITY_PLACE = (70.0, 28.0, 280.0, 280.0)
 """Left and upper border of what a panel draws in, its width and its height [pixels]."""
 LEAST_SHOWN = 0.5
 """Place of zero on a logarithmic axis, relative to the least value above zero."""
 SURVIVAL_WIDTH = 400.0
-"""Width of the chart [pixels]; its height depends on its key."""
 SURVIVAL_PLACE = (70.0, 28.0, 306.0, 230.0)
 """Left and upper border of what the chart draws in, its width and its height [pixels]."""
 BELOW = 44.0
-"""Height of the numbers and the name below the axis [pixels]."""
 LOOKS: dict[str, tuple[Shape, str]] = {
     "weight": ("square", INK), "misplaced": ("cross", NEUTRAL), "lift": ("up", FINGERS[2]),
     "shake along": ("disc", FINGERS[1]), "shake about": ("diamond", FINGERS[3]),
@@ -63,11 +60,9 @@ STRAIGHT = ("lift", "shake along", "stop")
 TICKS_G = (0.0, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 """Round accelerations at which the axis may have ticks [9.80665 m/s^2]."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Shares of grasps at which the chart has ticks."""
 NARROWEST, WIDEST = 2.0, 1001.0
 """Least and largest multiple of the weight at which the axis may end."""
 BEYOND = 1.1
-"""End of the axis, relative to the largest multiple in the chart."""
 APART = 0.08
 """Least distance between ticks, relative to the length of the axis."""
 SAME = 9
@@ -122,7 +117,6 @@ class Survival:
     """How many grasps survived all of their trials of one kind."""
 
     kind: str
-    """Kind of the trials; shakes along and about axes are two kinds."""
     acceleration_g: float
     """Largest acceleration of the trials [9.80665 m/s^2]."""
     grasps: int
@@ -231,7 +225,6 @@ def survival_sheet(executed: Sequence[Executions]) -> Sheet:
 
 
 def _certified_curve(panel: Panel, multiples: Array, end: float) -> Iterator[Mark]:
-    """Draw the share of grasps that are certified for each multiple of the weight."""
     steps, shares = certified_steps(multiples, end)
     x = np.append(np.repeat(steps, 2)[1:], end)
     line = panel.at(x, np.repeat(shares, 2))
@@ -249,7 +242,6 @@ def certified_steps(multiples: Array, end: float) -> tuple[Array, Array]:
 
 
 def _survival_marks(panel: Panel, mark: Survival) -> Iterator[Mark]:
-    """Draw the marks of a kind of trial: hollow as predicted, filled as simulated."""
     shape, colour = LOOKS[mark.kind]
     shares = np.array([mark.predicted, mark.survived]) / mark.grasps
     places = panel.at(np.full(2, 1.0 + mark.acceleration_g), shares)
