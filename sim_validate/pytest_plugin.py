@@ -189,7 +189,8 @@ class GraspItem(_SuiteItem):
         fails = finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE)
         told = "" if fails else passing(done, suite.compared)
         _note(self, "status", finding.status.value, suite.compared.mesh, told=told)
-        self.user_properties += properties_of(plain(finding.after) or {}).items()
+        if finding.after is not None:
+            self.user_properties += properties_of(plain(finding.after)).items()
         if fails:
             raise UnstableError(f"{why}\n  to accept the change: pytest --grasp-bless {self.path}")
 
@@ -235,8 +236,8 @@ def assert_stable(
         chosen = case_of(case, friction)
         verdict, why = checked(chosen, demands_of(asked))
         name = chosen.grasp.id
-        entry = plain(entry_of(chosen.grasp, verdict, chosen.body.radius)) or {}
-        for key, value in entry.items():
+        entry = entry_of(chosen.grasp, verdict, chosen.body.radius)
+        for key, value in plain(entry).items():
             record_property(f"{name}.{key}", value)
         _note(request.node, f"{name}.status", "unstable" if why else "stable", chosen.source)
         if why:

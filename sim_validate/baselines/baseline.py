@@ -9,7 +9,7 @@ which is what a user has accepted.
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path, PurePath
 from typing import Annotated, Any
@@ -39,11 +39,6 @@ Count = Annotated[int, Field(ge=0)]
 Size = Annotated[float, Field(ge=0.0)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Index = Annotated[int, Field(ge=0)]
-NUMBERS = (
-    "critical_friction", "simulated_critical_friction", "limit_n", "simulated_limit_n",
-    "displacement_m", "rotation_rad",
-)  # fmt: skip
-"""Names of the fields that hold measured numbers."""
 SCHEMA = 1
 MARK = '"grasps_file"'
 
@@ -90,11 +85,11 @@ def execution_entry(grasp: ExecutedGrasp) -> ExecutionEntry:
     trials = () if found is None else found.trials
     controls = () if found is None else found.controls
 
-    def largest(values: Iterator[float]) -> float | None:
-        return rounded(max(values, default=None))
-
-    def least(values: Iterator[float]) -> float | None:
+    def least(values: Iterable[float]) -> float | None:
         return rounded(min(values, default=None))
+
+    def largest(values: Iterable[float]) -> float | None:
+        return rounded(max(values, default=None))
 
     return ExecutionEntry(
         reason=grasp.reason,
@@ -208,11 +203,6 @@ class Entry:
         """Whether the grasp held every wrench."""
         return self.outcome is Outcome.HELD
 
-    @property
-    def noisy_held(self) -> int:
-        """Number of repeats with noise in which the grasp held."""
-        return self.noisy_trials - len(self.noisy_not_held)
-
 
 @dataclass(frozen=True, slots=True, config=STRICT)
 class Baseline:
@@ -244,9 +234,9 @@ class Baseline:
             raise ValueError("two grasps of the baseline have the same id")
 
 
-def plain(entry: Entry | None) -> dict[str, Any] | None:
+def plain(entry: Entry) -> dict[str, Any]:
     """Turn an entry into plain values, which processes can send and any file can hold."""
-    return None if entry is None else to_jsonable_python(fields_of(entry))
+    return to_jsonable_python(fields_of(entry))
 
 
 def fields_of(entry: Entry) -> dict[str, Any]:
@@ -329,29 +319,26 @@ def baseline_to_json(baseline: Baseline) -> str:
 def baseline_from_json(text: str, path: str) -> Baseline:
     """Parse the text of a baseline."""
     with about(path):
-        return _from_text(text)
-
-
-def _from_text(text: str) -> Baseline:
-    record = object_of(text, "baseline")
-    if "grasps_file" not in record:
-        raise InputError("expected a baseline, as `graspproof baseline record` writes it")
-    check_schema(record, SCHEMA)
-    del record["schema"]
-    # an empty list is refused, because it would check nothing
-    record["entries"] = record.pop("grasps", None) or None
-    try:
-        found = TypeAdapter(Baseline).validate_json(json.dumps(record))
-    except ValidationError as error:
-        said = complaint(error, Baseline)
-        raise InputError("grasps" + said.removeprefix("entries")
-                         if said.startswith("entries") else said) from error  # fmt: skip
-    if PurePath(found.grasps_file).is_absolute() or not found.grasps_file.isprintable():
-        raise InputError(
-            "grasps_file: expected a path relative to this baseline's folder, got "
-            f"{shown(found.grasps_file)}; name the file with --grasps"
-        )
-    return found
+        record = object_of(text, "baseline")
+        if "grasps_file" not in record:
+            raise InputError("expected a baseline, as `graspproof baseline record` writes it")
+        check_schema(record, SCHEMA)
+        del record["schema"]
+        # an empty list is refused, because it would check nothing
+        record["entries"] = record.pop("grasps", None) or None
+        try:
+            found = TypeAdapter(Baseline).validate_json(json.dumps(record))
+        except ValidationError as error:
+            said = complaint(error, Baseline)
+            if said.startswith("entries"):
+                said = "grasps" + said.removeprefix("entries")
+            raise InputError(said) from error
+        if PurePath(found.grasps_file).is_absolute() or not found.grasps_file.isprintable():
+            raise InputError(
+                "grasps_file: expected a path relative to this baseline's folder, got "
+                f"{shown(found.grasps_file)}; name the file with --grasps"
+            )
+        return found
 
 
 def read_baseline(path: Path) -> Baseline:

@@ -13,6 +13,7 @@ from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines.explain import not_survived, unstable
 from sim_validate.baselines.part import TABLE, Source, if_changed, present, source_of
+from sim_validate.baselines.settings import check_names
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp
@@ -65,12 +66,7 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
             f"@pytest.mark.grasp takes the path of one file of grasps, got {list(args)}"
         )
     known = ("friction", TABLE) if args else SETTINGS
-    for name in settings:
-        if name not in known:
-            beside = " beside a file of grasps" if args else ""
-            raise InputError(
-                f"@pytest.mark.grasp has no setting {name!r}{beside}; it takes {', '.join(known)}"
-            )
+    check_names(settings, known, "@pytest.mark.grasp")
     friction = _number(settings.get("friction", FRICTION))
     if args:
         return _cases_of_file(folder, folder / args[0], settings)
@@ -164,10 +160,7 @@ class Demands:
 
 def demands_of(asked: Mapping[str, Any]) -> Demands:
     """Build the demands from the arguments of a test."""
-    known = [each.name for each in fields(Demands)]
-    for name in asked:
-        if name not in known:
-            raise InputError(f"assert_stable has no argument {name!r}; it takes {', '.join(known)}")
+    check_names(asked, [each.name for each in fields(Demands)], "assert_stable")
     return Demands(**asked)
 
 

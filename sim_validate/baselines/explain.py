@@ -10,6 +10,7 @@ from sim_validate.baselines.check import Checked
 from sim_validate.baselines.compare import WORDS, Status
 from sim_validate.baselines.part import Present
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, losses_in_words
+from sim_validate.simulation.setup import AXIS_NAMES, WEAKEST
 from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 
@@ -27,7 +28,17 @@ def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
     if failed is not None:
         lines.append(f"  first wrench that was not held: {in_words(failed)}")
     lines += [f"  {not_survived(executed)}"] if executed and not_survived(executed) else []
-    at = None if verdict is None else "" if failed is None else failed.name
+    # `validate` knows no wrenches beside these: the others stand in the baseline's own settings
+    known = (
+        [""]
+        if verdict is not None and failed is None
+        else [
+            each.name
+            for each in (verdict.failures if verdict is not None else ())
+            if each.name in (*AXIS_NAMES, WEAKEST)
+        ]
+    )
+    at = known[0] if known else None
     return "\n".join([*lines, *_next_steps(finding.id, at, files, now)])
 
 
@@ -106,22 +117,22 @@ def _numbers(title: str, entry: Entry) -> Iterator[str]:
     yield f"  {title}: {entry.outcome}{failed}" + (
         "" if moved is None else f", moved {moved:.2g} m"
     )
-    critical = _both(entry.critical_friction, entry.simulated_critical_friction, "")
-    yield f"    critical friction {critical}"
-    yield f"    weakest wrench {_both(entry.limit_n, entry.simulated_limit_n, ' N')}"
+    for name, predicted, simulated, unit in (
+        ("critical friction", entry.critical_friction, entry.simulated_critical_friction, ""),
+        ("weakest wrench", entry.limit_n, entry.simulated_limit_n, " N"),
+    ):
+        found = "not measured in simulation"
+        found = found if simulated is None else f"{simulated:.4g}{unit} simulated"
+        yield f"    {name} {predicted:.4g}{unit} predicted, {found}"
     if entry.noisy_trials:
-        yield f"    with noise {entry.noisy_held} of {entry.noisy_trials} held"
-    if (found := entry.execution) is not None:
-        lost = f"lost {', '.join(found.lost)}" if found.lost else found.reason
-        yield f"    executed: {'survived' if found.survived else lost or 'no trial is possible'}"
-        slips = (found.predicted_first_slip, found.simulated_first_slip)
+        held = entry.noisy_trials - len(entry.noisy_not_held)
+        yield f"    with noise {held} of {entry.noisy_trials} held"
+    if (executed := entry.execution) is not None:
+        lost = f"lost {', '.join(executed.lost)}" if executed.lost else executed.reason
+        yield f"    executed: {'survived' if executed.survived else lost or 'no trial is possible'}"
+        slips = (executed.predicted_first_slip, executed.simulated_first_slip)
         said = ["none" if slip is None else f"{slip:.4g} times the load" for slip in slips]
         yield f"    first slip predicted: {said[0]}; simulated: {said[1]}"
-
-
-def _both(predicted: float, simulated: float | None, unit: str) -> str:
-    said = "not measured in simulation" if simulated is None else f"{simulated:.4g}{unit} simulated"
-    return f"{predicted:.4g}{unit} predicted, {said}"
 
 
 def not_survived(grasp: ExecutedGrasp) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import place, shown
+from grasp_core.files.json_text import shown
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.baseline import Baseline, check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import (
@@ -34,7 +34,13 @@ from sim_validate.baselines.part import (
     testable,
 )
 from sim_validate.baselines.part import TABLE as CHANGED
-from sim_validate.baselines.settings import How, noise_from_table, of_settings, setup_for
+from sim_validate.baselines.settings import (
+    How,
+    check_names,
+    noise_from_table,
+    of_settings,
+    setup_for,
+)
 from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution
 from sim_validate.files.toml_tables import read_tables
 from sim_validate.records.grasps import read_grasps
@@ -188,32 +194,25 @@ def suite_from_toml(path: Path) -> Suite:
 
 def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
     """Build a suite from the settings of a `*.grasps.toml` file."""
-    _check(given, path)
     usual = path.name.removesuffix(ENDING) + ".baseline.json"
-    settings: dict[str, Any] = {"baseline": usual, **given}
-    for name in PATHS:
-        if name in settings:
-            settings[name] = path.parent / settings[name]
     tables = {"noise": noise_from_table, TABLE: asked_execution, CHANGED: if_changed}
     with about(path):
-        for name, read in tables.items():
-            if name in settings:
-                settings[name] = read(settings[name])
+        _check(given)
+        settings: dict[str, Any] = {"baseline": usual, **given}
+        settings |= {name: path.parent / settings[name] for name in PATHS if name in settings}
+        settings |= {name: read(given[name]) for name, read in tables.items() if name in given}
     return Suite(path=path, **settings)
 
 
-def _check(given: Mapping[str, Any], path: Path) -> None:
+def _check(given: Mapping[str, Any]) -> None:
+    check_names(given, KINDS, "the file")
     for name, value in given.items():
-        kind = KINDS.get(name)
-        if kind is None:
-            raise InputError(
-                f"{path}: {place([name])}: no such setting; there are {', '.join(KINDS)}"
-            )
+        kind = KINDS[name]
         if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-            raise InputError(f"{path}: {name}: expected {WORDS[kind]}, got {shown(value)}")
-        if name in PATHS and not str(value).isprintable():
-            raise InputError(f"{path}: {name}: expected the path of a file, got {shown(value)}")
+            raise InputError(f"{name}: expected {WORDS[kind]}, got {shown(value)}")
+        if name in PATHS and not value.isprintable():
+            raise InputError(f"{name}: expected the path of a file, got {shown(value)}")
         if kind is int and value < 0:
-            raise InputError(f"{path}: {name}: expected 0 or more, got {value}")
+            raise InputError(f"{name}: expected 0 or more, got {value}")
     if "grasps" not in given:
-        raise InputError(f"{path}: grasps: expected the path of a grasps.json")
+        raise InputError("grasps: expected the path of a grasps.json")
