@@ -172,7 +172,8 @@ def arrange(
     coefficient(friction)
     fingers = fingers or FingerSettings()
     contacts = grasp.contacts if isinstance(grasp, Grasp) else tuple(grasp)
-    normals = _rounded_units(np.array([contact.normal for contact in contacts]))
+    x, y, z = to_digits(np.array([contact.normal for contact in contacts])).T
+    normals = np.column_stack([x, y, z]) / np.sqrt(x * x + y * y + z * z)[:, None]
     arms = np.array([contact.position for contact in contacts]) - body.center_of_mass
     arms = to_digits(arms, body.radius)
     positions = arms + body.center_of_mass
@@ -190,24 +191,16 @@ def arrange(
         inertia_kg_m2=_inertia(mass, positions, size),
         contacts=arms,
         frames=contact_frames(normals),
-        borders=tuple(_border(body, contact) for contact in contacts),
+        borders=tuple(
+            () if face is None else tuple(piece - body.center_of_mass for piece in face.pieces)
+            for face in (face_under(body, contact) for contact in contacts)
+        ),
         friction=friction,
         drive=_drive(body, positions, normals, fingers, size),
         squeeze=SQUEEZE * largest * _pushes(positions, normals, friction, torsion_m),
         approach=to_digits(-RETREAT * size * _ways_in(grasp, normals, fingers)),
         torsion_m=torsion_m,
     )
-
-
-def _rounded_units(vectors: Array) -> Array:
-    """Round vectors (k, 3) and scale them to unit length, in the same way on every machine."""
-    x, y, z = to_digits(vectors).T
-    return np.column_stack([x, y, z]) / np.sqrt(x * x + y * y + z * z)[:, None]
-
-
-def _border(body: Polyhedron, contact: Contact) -> tuple[Array, ...]:
-    face = face_under(body, contact)
-    return () if face is None else tuple(piece - body.center_of_mass for piece in face.pieces)
 
 
 def _drive(

@@ -7,8 +7,7 @@ contact, and which only this fingertip can touch. So normals are exact on any ob
 The mesh of a convex object can replace the pads, to check that the pads are flush with its surface.
 
 Fingers are spheres on three slides along (normal, tangent, tangent), each with a position servo:
-`ctrl = f / kp` makes it push with force f at its zero position, and the servo on the normal is
-limited to the largest normal force. Rigid fingers have neither slides nor servos.
+`ctrl = f / kp` makes it push with force f at its zero position. Rigid fingers have neither.
 """
 
 from collections.abc import Iterable

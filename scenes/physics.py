@@ -91,9 +91,6 @@ class PhysicsSettings:
             switch(getattr(self, name), name)
         if self.condim not in CONTACT_DIMENSIONS:
             raise InputError(f"condim must be one of {CONTACT_DIMENSIONS}, got {self.condim}")
-        self._check_torsion()
-
-    def _check_torsion(self) -> None:
         if 0.0 < self.torsion_m < LEAST_TORSION_M:
             raise InputError(
                 f"torsion_m must be 0 or at least {LEAST_TORSION_M:g} m, the smallest friction of "

@@ -1,9 +1,7 @@
 """Draws the motion of a scene as a clip, in a separate process, where graphics are available.
 
-The object in a good grasp moves by micrometres, so motions can be shown magnified. The object's
-shifts and turns about the point between the contacts, and the slides of the fingertips, are
-measured from the first sample and multiplied by one factor, so that one still sees which parts move
-together.
+The object in a good grasp moves by micrometres, so motions can be shown magnified: all of them by
+one factor from the first sample, so that one still sees which parts move together.
 """
 
 import importlib
@@ -193,15 +191,10 @@ def magnified(joints: Array, scene: Scene) -> tuple[Array, float]:
     centers = joints[:, :3] + poses.apply(center)
     shifts, slides = centers - centers[0], joints[:, 7:] - joints[0, 7:]
     largest = float((np.linalg.norm(shifts, axis=1) + size * np.linalg.norm(turns, axis=1)).max())
-    factor = _rounded_down(VISIBLE * size / max(largest, VISIBLE * size / MOST))
+    factor = max(VISIBLE * size / max(largest, VISIBLE * size / MOST), 1.0)
+    power = 10.0 ** math.floor(math.log10(factor))
+    factor = math.floor(factor / power) * power
     larger = rotation.from_rotvec(factor * turns)
     places = center + factor * shifts - larger.apply(center)
     quaternions = larger.as_quat(scalar_first=True)
     return np.column_stack([places, quaternions, factor * slides]), factor
-
-
-def _rounded_down(factor: float) -> float:
-    if factor < 1.0:
-        return 1.0
-    power = 10.0 ** math.floor(math.log10(factor))
-    return math.floor(factor / power) * power

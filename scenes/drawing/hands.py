@@ -10,9 +10,6 @@ of latitude and longitude, and those on the border of two octants occur twice, o
 on either side: what lies between the two is a side of the box or a part of a round edge. Where the
 box or the radius has no size, sides without area are left out. So the same rule makes boxes,
 capsules and balls.
-
-A hand is several times as large as what it holds, and most views show its back only. So the view
-also may be from below, and the contacts and the object should be seen past palm and fingers.
 """
 
 import importlib

@@ -41,8 +41,6 @@ Anchor: TypeAlias = Literal["start", "middle", "end"]
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 PALETTE, BITS = 3, 8
 """PNG's number for pixels that name a colour of a palette, and the bits of such a name."""
-HARDEST = 9
-"""Level of compression; higher ones do not exist."""
 PARTS = 4
 """Number of parts of a pixel in which places are written."""
 BASELINE = 0.35
@@ -231,7 +229,7 @@ def _image_png(levels: Indices) -> bytes:
         _chunk(b"IHDR", header),
         _chunk(b"PLTE", ramp_bytes().astype(np.uint8).tobytes() + b"\x00\x00\x00"),
         _chunk(b"tRNS", b"\xff" * LEVELS + b"\x00"),
-        _chunk(b"IDAT", zlib.compress(lines.tobytes(), HARDEST)),
+        _chunk(b"IDAT", zlib.compress(lines.tobytes(), 9)),
         _chunk(b"IEND", b""),
     ])  # fmt: skip
 

@@ -1,10 +1,7 @@
 """Keeps what a baseline says: a header, the part, and a summary of the verdict on each grasp.
 
-A baseline is JSON that people can review: a header, then one line per grasp. A file of grasps holds
-the shape that they were planned on. Once a baseline is written on a changed part, that shape is
-neither the part of the baseline nor, in general, that of the next test. With the shape of the
-baseline at hand, moves of faces are measured from where they were when the baseline was written,
-which is what a user has accepted.
+A baseline is JSON that people can review: a header, then one line per grasp. Once it is written on
+a changed part, it holds that shape, so that moves of faces are measured from what was accepted.
 """
 
 import json

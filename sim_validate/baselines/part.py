@@ -1,12 +1,8 @@
 """Carries grasps over to their part as it is now, if its mesh file has changed since planning.
 
-What is tested is the part on the disk, not the one that the file of grasps remembers, so that a
-change does not pass unnoticed. The file counts as unchanged if its bytes are those that were
-planned from, or if it gives the same solid in some unit: comments, line ends and the order of
-vertices do not count. Grasps keep their ids, so that each is compared with its own entry of the
-baseline. Whoever wants every change to be refused says so.
-
-Faces are called by their numbers on the planned part, because ids of grasps are made of these.
+A mesh file counts as unchanged if its bytes are those that were planned from, or if it gives the
+same solid in some unit. Grasps keep their ids, so that each is compared with its own entry of the
+baseline; faces are called by their numbers on the planned part, of which ids are made.
 """
 
 import hashlib

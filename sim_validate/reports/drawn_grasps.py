@@ -1,8 +1,7 @@
 """Draws one grasp: its picture and the charts of its page; any process can do the work.
 
-Charts of motion need a trial. The first trial that was not held, or else the weakest wrench, is
-simulated again. This gives bit for bit the motion that was judged, unless the trial was stopped
-early. Clips of an executed grasp show its lift, its worst shake, and a trial in which it slipped.
+Charts of motion need a trial: the first that was not held, or else the weakest wrench, is simulated
+again.
 """
 
 from collections.abc import Sequence

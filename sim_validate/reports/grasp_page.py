@@ -63,14 +63,6 @@ FOCUS = "where lines of force meet, in the object's frame"
 
 
 @dataclass(frozen=True, slots=True)
-class Neighbours:
-    """The pages of the previous and the next grasp; None at either end."""
-
-    before: str | None = None
-    after: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Copy:
     """A grasp that a symmetry of the object makes from another."""
 
@@ -81,25 +73,20 @@ class Copy:
     """`ROTATED`, or `MIRRORED` if only a reflection makes it."""
 
 
-@dataclass(frozen=True, slots=True)
-class Kin:
-    """The grasps that symmetries of the object make from a grasp, or the one that it is made from.
-
-    Either is empty.
-    """
-
-    copies: tuple[Copy, ...] = ()
-    first: Copy | None = None
-
-
 def grasp_page(
-    run: RunFolder, grasp: Grasp, drawn: Drawn | None, object_script: str, neighbours: Neighbours,
-    kin: Kin = Kin(),
+    run: RunFolder, grasp: Grasp, object_script: str, drawn: Drawn | None = None, *,
+    neighbours: tuple[str | None, str | None] = (None, None), copies: Sequence[Copy] = (),
+    first: Copy | None = None,
 ) -> str:  # fmt: skip
-    """Write the text of the page about one grasp."""
+    """Write the text of the page about one grasp.
+
+    It leads to the pages before and after it. A grasp that is drawn has copies by symmetry; of
+    these, `first` is the one that is drawn, with the kind of this copy.
+    """
     verdict = run.verdicts.get(grasp.id)
     shown = certified(grasp, run.shaded.get(grasp.id))
     said, tone = said_of_both(verdict, run.executions, run.executed(grasp.id))
+    size = None if verdict is None else verdict["settings"]["grasp_size_m"]
     return page(
         "grasp.html",
         grasp=grasp,
@@ -109,9 +96,10 @@ def grasp_page(
         verdict=verdict,
         verdict_text=said,
         tone=tone,
-        before=neighbours.before,
-        after=neighbours.after,
-        kin=kin,
+        before=neighbours[0],
+        after=neighbours[1],
+        copies=copies,
+        first=first,
         drawn=drawn,
         push=largest_push(verdict),
         executed=execution_section(run.executions, run.executed(grasp.id)),
@@ -121,10 +109,13 @@ def grasp_page(
         facts=list(_facts(run, grasp, verdict)),
         contacts=list(_contacts(shown)),
         certified=_certified(run, grasp),
-        sizes=_sizes(run, verdict),
+        sizes={  # by which torques are divided: the object's radius, the grasp's size
+            "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
+            "grasp": NOTHING if size is None else f"{number(MILLI * size, 3)} mm",
+        },
         trials=[] if verdict is None else [_trial(verdict, each) for each in verdict["wrenches"]],
         controls=[] if verdict is None else _controls(verdict["controls"]),
-        commands=[*_commands(run, grasp, verdict), *([DRAW_ALL] if kin.first else [])],
+        commands=[*_commands(run, grasp, verdict), *([DRAW_ALL] if first else [])],
         drawing=as_text(
             grasp_data(run.saved.body, shown, run.friction, held_in(run.reaches, grasp))
         ),
@@ -212,14 +203,6 @@ def _certified(run: RunFolder, grasp: Grasp) -> str:
     return (
         f"Regions are certified for friction {run.regions_friction:g}: discs of {discs} mm.{where}"
     )
-
-
-def _sizes(run: RunFolder, verdict: Record | None) -> Record:
-    size = None if verdict is None else verdict["settings"]["grasp_size_m"]
-    return {
-        "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
-        "grasp": NOTHING if size is None else f"{number(MILLI * size, 3)} mm",
-    }
 
 
 def _trial(verdict: Record, trial: Record) -> Record:

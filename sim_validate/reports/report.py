@@ -20,7 +20,7 @@ from sim_validate.files.result_folders import (
 )  # fmt: skip
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.reports.drawn_grasps import Drawn, Task, draw, tasks_of
-from sim_validate.reports.grasp_page import MIRRORED, ROTATED, Copy, Kin, Neighbours, grasp_page
+from sim_validate.reports.grasp_page import MIRRORED, ROTATED, Copy, grasp_page
 from sim_validate.reports.index_page import Shown, cards_of, index_page
 from sim_validate.reports.pages import asset, style
 from sim_validate.reports.run_folder import RunFolder, folder_of, runs_in
@@ -124,11 +124,12 @@ def _written(
         data = as_text(object_data(run.saved.body))
         write_text(out / f"object-{number}.js", f"window.graspproofObject = {data};\n")
     tasks = [card.task for card in cards]
+    names = [None, *(f"{task.name}.html" for task in tasks), None]
     shown = list[Shown]()
     no_clip, next_index = "", min(FIRST, len(cards))
     results = chain(each(draw, tasks[:FIRST], jobs=1), each(draw, tasks[FIRST:], jobs=jobs))
     for card, drawn in zip(cards, results, strict=True):
-        around = _neighbours(cards, len(shown))
+        around = names[len(shown)], names[len(shown) + 2]
         shown.append(_pages_of(card, drawn, out, around))
         no_clip = no_clip or drawn.no_clip
         if len(shown) == next_index:
@@ -159,22 +160,14 @@ def _cards(
             yield _Card(run, f"object-{number}.js", task, copies)
 
 
-def _neighbours(cards: Sequence[_Card], place: int) -> Neighbours:
-    before, after = (
-        f"{cards[other].task.name}.html" if 0 <= other < len(cards) else None
-        for other in (place - 1, place + 1)
-    )
-    return Neighbours(before, after)
-
-
-def _pages_of(card: _Card, drawn: Drawn, out: Path, around: Neighbours) -> Shown:
+def _pages_of(card: _Card, drawn: Drawn, out: Path, around: tuple[str | None, str | None]) -> Shown:
     """Write the page of a card's grasp, and those of its copies, which have no pictures."""
     grasps = {grasp.id: grasp for grasp in card.run.saved.grasps}
     first = grasps[card.task.saved.grasps[0].id]
-    text = grasp_page(card.run, first, drawn, card.script, around, Kin(card.copies))
+    text = grasp_page(card.run, first, card.script, drawn, neighbours=around, copies=card.copies)
     write_text(out / card.page, text)
     for copy in card.copies:
-        kin = Kin(first=Copy(first.id, card.page, copy.kind))
-        text = grasp_page(card.run, grasps[copy.id], None, card.script, Neighbours(), kin)
+        drawn_one = Copy(first.id, card.page, copy.kind)
+        text = grasp_page(card.run, grasps[copy.id], card.script, first=drawn_one)
         write_text(out / copy.page, text)
     return Shown(card.run, first, card.page, drawn.hand or drawn.picture, card.copies)

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from grasp_core.closure.contacts import contacts_sha256
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.records.grasps_json import SavedGrasps
@@ -110,6 +111,7 @@ def _run(path: Path) -> RunFolder:
     saved = read_grasps(path / GRASPS)
     tried = _read(path / VERDICTS, verdicts_of, saved)
     certified = _read(path / REGIONS, regions_file_of, saved)
+    judgements_of = partial(record_of, JudgementsFile, wanted=JUDGEMENTS, schema=1)
     verdicts: Sequence[Record] = [] if tried is None else tried["verdicts"]
     regions: Sequence[Record] = [] if certified is None else certified["grasps"]
     return RunFolder(
@@ -122,7 +124,7 @@ def _run(path: Path) -> RunFolder:
         regions_friction=None if certified is None else certified["friction"],
         executions=_executions(path / EXECUTIONS, saved),
         reaches=reaches_beside(path / GRASPS, saved),
-        judgements=_read(path / JUDGEMENTS, _judgements, saved),
+        judgements=_read(path / JUDGEMENTS, judgements_of, saved),
         possible=_read(path / BEST[0], best_of, saved),
     )
 
@@ -136,27 +138,25 @@ def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
 
     found, record = read_reaches(path)
     _check_object(path, record["object"]["content_sha256"], saved)
-    _check_contacts(
-        path, [(each["id"], each["contacts_sha256"]) for each in record["reaches"]], saved
-    )
+    _check_contacts(path, record["reaches"], saved)
     return found
 
 
 def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping[str, Record]:
-    _check_contacts(path, [(each["id"], each["contacts_sha256"]) for each in records], saved)
+    _check_contacts(path, records, saved)
     return {each["id"]: each for each in records}
 
 
-def _check_contacts(path: Path, listed: Sequence[tuple[str, str]], saved: SavedGrasps) -> None:
+def _check_contacts(path: Path, records: Sequence[Record], saved: SavedGrasps) -> None:
     """Refuse a file that lists a grasp twice, or with other contacts than its own."""
     contacts = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
-    for name, found in listed:
-        if contacts.get(name) != found:
+    for each in records:
+        if contacts.get(each["id"]) != each["contacts_sha256"]:
             raise InputError(
-                f"{path}: the contacts of {name} differ from those in {GRASPS} beside it, "
+                f"{path}: the contacts of {each['id']} differ from those in {GRASPS} beside it, "
                 f"or the grasp is not in that file: write {path.name} again, or remove it"
             )
-    if len(dict(listed)) < len(listed):
+    if len({each["id"] for each in records}) < len(records):
         raise InputError(
             f"{path}: the file has two records of one grasp; make {path.name} again with the "
             "command that wrote it"
@@ -168,23 +168,18 @@ def _executions(path: Path, saved: SavedGrasps) -> Executions | None:
         return None
     found = load_executions(path)
     _check_object(path, found.object_sha256, saved)
-    _check_contacts(path, [(each.id, each.contacts_sha256) for each in found.grasps], saved)
+    listed = [{"id": each.id, "contacts_sha256": each.contacts_sha256} for each in found.grasps]
+    _check_contacts(path, listed, saved)
     return found
 
 
 def _read(path: Path, read: Callable[[str], Read], saved: SavedGrasps) -> Read | None:
     if not path.is_file():
         return None
-    try:
+    with about(path):
         found = read(read_text(path))
-    except InputError as error:
-        raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
     _check_object(path, found["object"]["content_sha256"], saved)
     return found
-
-
-def _judgements(text: str) -> JudgementsFile:
-    return record_of(JudgementsFile, text, JUDGEMENTS, schema=1)
 
 
 def _check_object(path: Path, sha256: str, saved: SavedGrasps) -> None:

@@ -70,8 +70,8 @@ def answers(said, heading):
 
 WRONG_MARKERS = [
     ("", "needs the path of a grasps.json, or object="),
-    ("object='wedge', taste=1", "no setting is named \"taste\""),
-    ("'grasps.json', limit=1", "no setting 'limit' beside a file of grasps; it takes friction"),
+    ("object='wedge', taste=1", 'no setting is named "taste"'),
+    ("'grasps.json', limit=1", 'no setting is named "limit"; choose from friction'),
     ("'a.json', 'b.json'", "takes the path of one file of grasps"),
     ("3", "takes the path of one file of grasps"),
     ("'nowhere.json'", "nowhere.json"),
@@ -123,7 +123,7 @@ BAD_DEMANDS = [
     ("assert_stable(grasp_case, trials=2, min_pass_rate=80)", "from 0 to 1, got 80"),
     ("assert_stable(grasp_case, min_margin=float('nan'))", "min_margin must be from 0"),
     ("assert_stable(grasp_case, min_margin='0.2')", "min_margin must be from 0"),
-    ("assert_stable(grasp_case, trial=2)", "no setting is named \"trial\"; choose from wrenches"),
+    ("assert_stable(grasp_case, trial=2)", 'no setting is named "trial"; choose from wrenches'),
     ("assert_stable(grasp_case, wrenches=[[1, 2]])", "must be NamedWrench values"),
     ("assert_stable(grasp_case.grasp)", "expected a grasp_case"),
     ("assert_stable(grasp_case, friction=0.01)", "needs friction above"),
