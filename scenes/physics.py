@@ -121,13 +121,9 @@ class PhysicsSettings:
 
     def contact(self) -> dict[str, float | int | str | tuple[float, ...]]:
         """Return the attributes of each geom that makes contact."""
-        return {
-            "condim": WITH_TORSION if self.torsion_m else self.condim,
-            "solref": self.solref,
-            "solimp": self.solimp,
-            "margin": self.margin,
-            "gap": self.gap,
-        }
+        condim = WITH_TORSION if self.torsion_m else self.condim
+        return {"condim": condim, "solref": self.solref, "solimp": self.solimp,
+                "margin": self.margin, "gap": self.gap}  # fmt: skip
 
 
 WORDS = {
@@ -142,37 +138,24 @@ LEAST_TORSION_M = 1e-5
 """Smallest torsional coefficient above zero: MuJoCo raises smaller ones to this value."""
 MOST_ITERATIONS = 10_000
 COUNTS = {
-    "iterations": (1, MOST_ITERATIONS),
-    "ls_iterations": (1, MOST_ITERATIONS),
-    "noslip_iterations": (0, MOST_ITERATIONS),
-    "ccd_iterations": (1, MOST_ITERATIONS),
-    "sdf_iterations": (1, MOST_ITERATIONS),
-    "sdf_initpoints": (1, MOST_ITERATIONS),
+    "iterations": (1, MOST_ITERATIONS), "ls_iterations": (1, MOST_ITERATIONS),
+    "noslip_iterations": (0, MOST_ITERATIONS), "ccd_iterations": (1, MOST_ITERATIONS),
+    "sdf_iterations": (1, MOST_ITERATIONS), "sdf_initpoints": (1, MOST_ITERATIONS),
     "condim": (1, 6),
-}
+}  # fmt: skip
 RANGES = {
-    "timestep": (1e-5, 0.005),
-    "impratio": (SMALLEST, LARGEST),
-    "tolerance": (0.0, 1.0),
-    "ls_tolerance": (0.0, 1.0),
-    "noslip_tolerance": (0.0, 1.0),
-    "ccd_tolerance": (0.0, 1.0),
-    "sleep_tolerance": (0.0, 1.0),
-    "density": (0.0, LARGEST),
-    "viscosity": (0.0, LARGEST),
-    "margin": (0.0, 1.0),
-    "gap": (0.0, 1.0),
+    "timestep": (1e-5, 0.005), "impratio": (SMALLEST, LARGEST), "tolerance": (0.0, 1.0),
+    "ls_tolerance": (0.0, 1.0), "noslip_tolerance": (0.0, 1.0), "ccd_tolerance": (0.0, 1.0),
+    "sleep_tolerance": (0.0, 1.0), "density": (0.0, LARGEST), "viscosity": (0.0, LARGEST),
+    "margin": (0.0, 1.0), "gap": (0.0, 1.0),
     "torsion_m": (BOUNDS["torsion_m"]["least"], BOUNDS["torsion_m"]["most"]),
-}
+}  # fmt: skip
 """Least and largest value of each number. Shorter time steps take hours; with longer ones the
 phases of a trial would be shorter than a step."""
 VECTORS = {
-    "gravity": (3, 1e4),
-    "wind": (3, 1e4),
-    "magnetic": (3, 1e4),
-    "solref": (2, LARGEST),
+    "gravity": (3, 1e4), "wind": (3, 1e4), "magnetic": (3, 1e4), "solref": (2, LARGEST),
     "solimp": (5, LARGEST),
-}
+}  # fmt: skip
 """Number of components of each vector, and the largest size of a component."""
 CONTACT_SETTINGS = ("solref", "solimp", "condim", "margin", "gap", "torsion_m")
 CHOSEN_FLAGS = ("autoreset", "diagexact", "multiccd")

@@ -31,6 +31,8 @@ SIZE = (480, 360)
 """Width and height of the picture [pixels]."""
 RATE = 25.0
 """Frames per second of a clip."""
+SLOWER = 1.0 / (RATE * 0.01)
+"""Factor by which clips of trials are slower than reality, with a sample of 10 ms in each frame."""
 NEARER = 0.9
 """Share of the fingertips' farthest reach that the picture must show: fingertips may come nearer to
 the picture's border than the object."""
@@ -58,6 +60,16 @@ def write_clip(
     shown = _reach(scene, joints)
     return _written(path, xml=scene.xml, joints=joints, radius=shown, caption=caption,
                     angles=np.broadcast_to(angles_deg, (len(joints), 2)))  # fmt: skip
+
+
+def write_trial_clip(scene: Scene, joints: Array, path: Path, name: str) -> Path:
+    """Draw the magnified motion of a trial as far as it is finite; its caption says the factors."""
+    known = np.isfinite(joints).all(axis=1)
+    if not known.any():
+        raise GraphicsError(f"{name}: nothing finite to draw")
+    larger, factor = magnified(joints[known], scene)
+    motion = f"motion {factor:g} times as large" if factor > 1.0 else "true to scale"
+    return write_clip(scene, larger, path, f"{name}, {motion}, {SLOWER:g} times slower")
 
 
 def write_held_clip(

@@ -117,15 +117,6 @@ def drawing_with_hand(
     return (*shapes, *hand_shapes(held), Shape("contact", points=held.positions))
 
 
-def drawing_alone(extent: Extent, grasp: Grasp) -> tuple[Shape, ...]:
-    """List the shapes that show a grasp without its object, and without friction cones."""
-    shapes = list[Shape]()
-    for finger in range(len(grasp.contacts)):
-        shapes += _bar_and_region(extent, grasp, finger)
-        shapes.append(_force_cone(extent, grasp, finger))
-    return (*shapes, *_family(extent, grasp), Shape("contact", points=grasp.positions))
-
-
 def finger_size(body: Extent) -> float:
     """Return the length by which bars and cones are measured [m]: at most the object's radius."""
     volume = getattr(body, "volume", math.inf)

@@ -131,11 +131,6 @@ class Checked:
     how: str
     """How strictly results were compared, in words."""
 
-    @property
-    def verdicts(self) -> Mapping[str, Verdict]:
-        """Verdicts on the grasps that could be simulated, by id."""
-        return self.measured.verdicts
-
 
 def check(
     before: Baseline, now: Present, where: str, how: How, processors: int, report: Report

@@ -17,7 +17,7 @@ from sim_validate.validation.verdict import Verdict, WrenchVerdict
 def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
     """Explain a change: prediction, simulation, baseline, and commands to run next."""
     (finding,) = done.findings
-    verdict, how = done.verdicts.get(finding.id), done.how
+    verdict, how = done.measured.verdicts.get(finding.id), done.how
     executed = done.measured.executions.get(finding.id)
     lines = [f"{finding.id}: {finding.status.value}", *(f"  {why}" for why in finding.reasons)]
     lines += [f"  {text}" for text in finding.beyond if text not in finding.reasons]
@@ -53,8 +53,7 @@ def passing(done: Checked, now: Present) -> str:
     said += f" {WORDS.get(finding.status, finding.status.value)}"
     if finding.status is Status.IMPROVED:
         said += f" than in the baseline: {'; '.join(finding.beyond)}"
-    touched = now.moves.touched(now.planned_faces(finding.id))
-    return f"{said}; touches {touched}" if touched else said
+    return said
 
 
 def written(path: Path, baseline: Baseline, now: Present) -> str:

@@ -103,18 +103,6 @@ class Moves:
     since: str = ""
     """Since when, such as ` since its baseline was written`; empty for planning."""
 
-    def touched(self, faces: Iterable[int]) -> str:
-        """Say which of some faces moved, such as `face 3, which moved`; empty if none did."""
-        wanted = {*faces}
-        names = (
-            change.old if self.numbers is None else self.numbers.get(change.old)
-            for change in self.faces
-            if change.moved
-        )
-        moved = sorted(name for name in names if name in wanted)
-        many = "face" if len(moved) == 1 else "faces"
-        return f"{many} {', '.join(map(str, moved))}, which moved" if moved else ""
-
 
 @dataclass(frozen=True, slots=True)
 class Source:
@@ -298,10 +286,6 @@ class Present:
     @property
     def _planned_grasps(self) -> Sequence[Grasp]:
         return self.saved.grasps if self.carried is None else [each.old for each in self._moved]
-
-    def planned_faces(self, name: str) -> tuple[int, ...]:
-        """Return the faces of the planned part that a grasp of the file touches."""
-        return next((grasp.faces for grasp in self._planned_grasps if grasp.id == name), ())
 
     def first(self, limit: int | None) -> "Present":
         """Return only the first grasps of the file, up to a limit."""

@@ -140,7 +140,6 @@ def shown_report(asked: showing_flags.Report, reporter: Reporter) -> Report:
             jobs=asked.jobs,
             limit=asked.limit,
             clips=asked.clips,
-            every_copy=asked.every_copy,
             progress=steps.update,
             ready=say_ready,
         )

@@ -24,7 +24,6 @@ from sim_validate.reports.run_folder import GRASPS, RunFolder
 MILLI, MICRO, PERCENT = 1e3, 1e6, 100.0
 ROTATED, MIRRORED = "rotated", "mirrored"
 """Kinds of copies of a grasp, as the pages call them."""
-DRAW_ALL = "graspproof report . --every-copy"
 Fact: TypeAlias = tuple[str, str, str]
 FAMILIES = {
     "concurrent": "the lines of force meet in one point",
@@ -115,7 +114,7 @@ def grasp_page(
         },
         trials=[] if verdict is None else [_trial(verdict, each) for each in verdict["wrenches"]],
         controls=[] if verdict is None else _controls(verdict["controls"]),
-        commands=[*_commands(run, grasp, verdict), *([DRAW_ALL] if first else [])],
+        commands=list(_commands(run, grasp, verdict)),
         drawing=as_text(
             grasp_data(run.saved.body, shown, run.friction, held_in(run.reaches, grasp))
         ),

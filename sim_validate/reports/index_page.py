@@ -53,7 +53,7 @@ class Shown:
     copies: tuple[Copy, ...] = ()
 
 
-def cards_of(run: RunFolder, *, every_copy: bool) -> tuple[Copies, ...]:
+def cards_of(run: RunFolder) -> tuple[Copies, ...]:
     """Sort the grasps of a run into cards: each is a grasp and those that symmetries make of it.
 
     Only grasps whose tests ended alike share a card, so that no problem is hidden behind another
@@ -62,8 +62,6 @@ def cards_of(run: RunFolder, *, every_copy: bool) -> tuple[Copies, ...]:
     Gives places of the grasps in the run, by card, in the order of the cards' first grasps.
     """
     grasps = run.saved.grasps
-    if every_copy:
-        return tuple(map(Copies, range(len(grasps))))
     ended: dict[object, list[int]] = {}
     for place, grasp in enumerate(grasps):
         found = run.executed(grasp.id)

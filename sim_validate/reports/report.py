@@ -6,7 +6,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TypeAlias
 
-from grasp_core.checked import function, path_of, switch, whole
+from grasp_core.checked import function, path_of, whole
 from grasp_core.files.text_files import write_text
 from scenes.drawing.turntable import as_text, object_data
 from sim_validate.files.result_folders import (
@@ -54,7 +54,6 @@ def write_report(
     jobs: int | None = None,
     limit: int | None = None,
     clips: int = 0,
-    every_copy: bool = False,
     progress: Callable[[int, int], object] = _nothing,
     ready: Callable[[Path, int, int], object] = _nothing,
 ) -> Report:
@@ -70,7 +69,6 @@ def write_report(
         limit: Number of grasps to draw per run, those with problems before others; all if None.
         clips: Number of grasps per run of which trials are filmed, those with problems first, where
             there are graphics.
-        every_copy: Whether every grasp gets a card and pictures of its own.
         progress: Called with (drawn, total) after each card.
         ready: Called with (first page, drawn, total) when the first page can be opened while more
             cards are drawn; not where an earlier report stays until the new one is complete.
@@ -88,13 +86,12 @@ def write_report(
         if value is not None:
             whole(value, name, least=1)
     whole(clips, "clips")
-    switch(every_copy, "every_copy")
     function(progress, "progress")
     function(ready, "ready")
     runs = tuple(run.first(limit) for run in runs_in(folder))
     require_report_folder(out)
     with new_pages(out) as place:
-        cards = list(_cards(runs, place, clips, every_copy=every_copy))
+        cards = list(_cards(runs, place, clips))
         ready = ready if place == out else _nothing
         report = _written(cards, runs, place, jobs or available_cores(), progress, ready)
     return replace(report, index=out / INDEX)
@@ -143,13 +140,11 @@ def _written(
     return Report(out / INDEX, grasps, no_clip, len(cards))
 
 
-def _cards(
-    runs: Runs, out: Path, clips: int, *, every_copy: bool
-) -> Iterator[_Card]:  # fmt: skip
+def _cards(runs: Runs, out: Path, clips: int) -> Iterator[_Card]:
     for number, run in enumerate(runs):
         prefix = f"{number}-" if len(runs) > 1 else ""
         grasps = run.saved.grasps
-        classes = cards_of(run, every_copy=every_copy)
+        classes = cards_of(run)
         firsts = [grasps[each.first] for each in classes]
         for found, task in zip(classes, tasks_of(run, firsts, out, prefix, clips), strict=True):
             copies = tuple(

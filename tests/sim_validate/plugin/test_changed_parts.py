@@ -83,7 +83,7 @@ def test_grasps_are_carried_over_to_a_changed_part_and_it_is_said_how_it_changed
     assert f"{part} has changed: {FACE} moved 1.00 mm outward" in " ".join(said.split())
     assert "its grasps were carried over to it" in " ".join(said.split())
     (name,) = json.loads((project / "grasps.json").read_text())["grasps"]
-    assert f"  {name['id']} same; touches face 3, which moved\n" in said
+    assert f"  {name['id']} same\n" in said
     kept = kept_in(project)
     assert kept["status"] == "within bands"
     assert f"{FACE} moved 1.00 mm outward" in kept["mesh_note"]
@@ -117,8 +117,7 @@ def test_a_grasp_that_is_better_fails_only_where_that_is_strict(project):
     better = (
         f"  {record['grasps'][0]['id']} better than in the baseline: critical_friction: 0.2 -> 0."
     )
-    (told,) = [text for text in said.splitlines() if text.startswith(better)]
-    assert told.endswith("; touches face 3, which moved")
+    assert any(text.startswith(better) for text in said.splitlines())
     toml = project / "part.grasps.toml"
     write_text(toml, "strict = true\n" + toml.read_text())
     assert run_pytest(project)[0] == 1
