@@ -106,12 +106,3 @@ def test_a_problem_is_not_hidden_behind_a_copy_that_held(planned):
     cards = cards_of(replace(run, verdicts=verdicts))
     assert len(cards) == len(whole) + 1
     assert [each.places for each in cards if each.first == card.places[-1]] == [card.places[-1:]]
-
-
-def test_the_command_says_when_and_where_the_first_page_can_be_opened(planned, tmp_path, capsys):
-    out = tmp_path / "out"
-    assert main(["report", str(planned), "--out", str(out), "--jobs", "1"]) == Exit.GOOD
-    said = capsys.readouterr().out
-    early, late = said.index("can be opened now"), said.index("in a browser")
-    assert early < late
-    assert f"{out / 'index.html'} can be opened now; {FIRST} of " in said.replace("\n", " ")
