@@ -128,21 +128,15 @@ def _largest_clear(body: Polyhedron, positions: Array, normals: Array, start: fl
     fingertip is assumed to touch the plane of the patch.
     """
     near = _triangles_near(body, positions, normals, start)
-    radii = np.full(len(positions), start)
-    for finger in _meeting(body, positions - start * normals, start, near):
+    radii, meeting = np.full(len(positions), start), near.any(axis=1)
+    if meeting.any() and body.patches is None:  # what counts for one contact counts for all
+        centers = positions - start * normals
+        nearest = nearest_on_surface(body.vertices, body.triangles[near.any(axis=0)], centers)
+        meeting = np.linalg.norm(nearest - centers, axis=1) < _touched(body, start)
+    for finger in np.flatnonzero(meeting):
         triangles = body.triangles[np.flatnonzero(near[finger])]
         radii[finger] = _clear_radius(body, positions[finger], normals[finger], start, triangles)
     return radii
-
-
-def _meeting(body: Polyhedron, centers: Array, radius: float, near: Array) -> Indices:
-    triangles = body.triangles[near.any(axis=0)]
-    if not len(triangles):
-        return np.zeros(0, dtype=np.intp)
-    if body.patches is not None:  # what counts for one contact does not for another
-        return np.flatnonzero(near.any(axis=1))
-    nearest = nearest_on_surface(body.vertices, triangles, centers)
-    return np.flatnonzero(np.linalg.norm(nearest - centers, axis=1) < _touched(body, radius))
 
 
 def _touched(body: Polyhedron, radius: float) -> float:

@@ -5,16 +5,11 @@ centre of mass. Fingers touch the object's own surface, wherever they slide (see
 `scenes.execution.surface`). Gravity is off: the weight, and what a moving palm does to the object,
 are forces on the object.
 
-Each of four fingertips moves on three slides along the axes of its contact, with a position servo
-on each, as in tests of closure (`scenes.mjcf`). The servos' stiffness is the usual one for the size
-of the grasp; fingertips and object have true masses, so servos are damped as a mass between them
-needs.
-
-The shapes of a hand's links, and fingertips that none of them covers, touch the surface. Joints
-have the hand's own angles. The palm is fixed in the world, links are light, and servos have as much
-inertia as their stiffness needs in steps of the test; or, where the test has it so, the hand is as
-heavy as it is, and its root is a free body on a weld to one that moves as told. A weld acts on a
-free body with the inverse mass w (MuJoCo's `body_invweight0`) as a spring of the stiffness
+Fingertips move on slides as in tests of closure (`scenes.mjcf`), but fingertips and object have
+true masses, so servos are damped as a mass between them needs. A hand's palm is fixed in the world,
+and its links are light; or, where the test has it so, the hand is as heavy as it is, and its root
+is a free body on a weld to one that moves as told. A weld acts on a free body with the inverse mass
+w (MuJoCo's `body_invweight0`) as a spring of the stiffness
 
     k d^2 / ((1 - d) w),   k = 1 / (d_max t z)^2                                          (1)
 

@@ -4,9 +4,8 @@ A drawing is a sheet of marks, in pixels from its upper left corner: areas, line
 small images. Pages and notebooks take the sheet as SVG text.
 
 Colours that a dark screen needs otherwise have a class beside the colour; `night_style` gives the
-rules. Where no rules are, as in notebooks, the drawing looks as by day. Coordinates are whole
-quarters of pixels, relative to one another, which takes a third of the text of full numbers, and in
-files a look that comes again stands once.
+rules. Coordinates are whole quarters of pixels, relative to one another, and in files a look that
+comes again stands once, which takes a third of the text.
 """
 
 import importlib

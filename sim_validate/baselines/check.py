@@ -24,6 +24,10 @@ from sim_validate.validation.verdict import Verdict
 Report = Callable[[int, int], None]
 
 
+def _silent(_: int, __: int) -> None:
+    pass
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
     """Verdicts on the grasps of a file, and the baseline made of them."""
@@ -35,7 +39,8 @@ class Measured:
 
 
 def measured(
-    saved: SavedGrasps, about: tuple[str, int | None], how: How, processors: int, report: Report
+    saved: SavedGrasps, about: tuple[str, int | None], how: How, processors: int = 1,
+    report: Report = _silent,
 ) -> Measured:  # fmt: skip
     """Simulate grasps and make a baseline of their verdicts."""
     chosen = saved.grasps[: about[1]]
@@ -133,8 +138,9 @@ class Checked:
 
 
 def check(
-    before: Baseline, now: Present, where: str, how: How, processors: int, report: Report
-) -> Checked:
+    before: Baseline, now: Present, where: str, how: How, processors: int = 1,
+    report: Report = _silent,
+) -> Checked:  # fmt: skip
     """Simulate grasps again and compare them with a baseline."""
     now = now.first(before.limit)
     how = with_planned_fingers(how, before, now.saved)
@@ -155,7 +161,7 @@ def check_one(before: Baseline, now: Present, where: str, how: How, name: str) -
     one = now.first(before.limit).only(name)
     kept = replace(before, entries=tuple(e for e in before.entries if e.id == name), limit=None)
     if one.saved.grasps or one.gone:
-        return check(kept, one, where, how, 1, silent)
+        return check(kept, one, where, how)
     gone = _nothing_measured(kept, one)
     return Checked(compare(kept, gone.baseline, carried=_carried(one)), gone, "")
 
@@ -186,7 +192,3 @@ def demanded(done: Checked) -> Checked:
             finding = replace(finding, status=Status.REGRESSED, reasons=why)
         findings.append(finding)
     return replace(done, findings=tuple(findings))
-
-
-def silent(_: int, __: int) -> None:
-    """Ignore a report of progress."""

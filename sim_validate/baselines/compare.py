@@ -309,7 +309,7 @@ def compare(
     bands, _ = bands_between(before, after, carried)
     other_part = _is_other_part(before, after)
     changed = tuple(_changed(before, after, carried))
-    known = _Known(before, changed, bands, carried if other_part else None)
+    moved = carried.change if carried is not None and other_part else None
     old = {entry.id: entry for entry in before.entries}
     new = {entry.id: entry for entry in after.entries}
     refused = refused or {}
@@ -318,9 +318,9 @@ def compare(
     for name in sorted({*old, *new, *refused, *gone}):
         one, other = old.get(name), new.get(name)
         if name in gone:
-            found.append(known.gone(name, one, gone[name]))
+            found.append(_gone(name, one, gone[name], changed, moved))
         elif one is not None and other is not None:
-            found.append(_compared(one, other, known))
+            found.append(_compared(one, other, before.friction, bands, changed, moved))
         else:
             status, why = Status.MISSING, ("in the baseline, but not among the grasps",)
             if name in refused:
@@ -332,27 +332,6 @@ def compare(
                 status, why = Status.NEW, ("not in the baseline",)
             found.append(Finding(name, status, why, before=one, after=other))
     return tuple(found)
-
-
-@dataclass(frozen=True, slots=True)
-class _Known:
-    before: Baseline
-    changed: tuple[str, ...]
-    bands: Bands
-    carried: Carried | None
-    """How the part has changed since the baseline was recorded; None if it has not."""
-
-    def gone(self, name: str, one: Entry | None, why: str) -> Finding:
-        """Judge a grasp that does not exist on the part as it is now.
-
-        That is no change if it did not exist either when the baseline was recorded.
-        """
-        if self.carried is None and one is None:
-            return Finding(name, Status.SAME, (f"gone, as it was: {why}",))
-        if self.changed:
-            return Finding(name, Status.NOT_COMPARABLE, (*self.changed, why), before=one)
-        change = () if self.carried is None else (self.carried.change,)
-        return Finding(name, Status.GONE, (why, *change), before=one)
 
 
 def _is_other_part(before: Baseline, after: Baseline) -> bool:
@@ -385,16 +364,31 @@ def _settings_changed(where: str, before: Any, after: Any) -> Iterator[str]:
         yield f"{where}: {before} -> {after}"
 
 
-def _compared(one: Entry, other: Entry, known: _Known) -> Finding:
-    changed, bands = known.changed, known.bands
+def _gone(
+    name: str, one: Entry | None, why: str, changed: tuple[str, ...], moved: str | None
+) -> Finding:
+    """Judge a grasp that does not exist on the part, which has moved since the baseline or not.
+
+    That is no change if it did not exist either when the baseline was recorded.
+    """
+    if moved is None and one is None:
+        return Finding(name, Status.SAME, (f"gone, as it was: {why}",))
+    if changed:
+        return Finding(name, Status.NOT_COMPARABLE, (*changed, why), before=one)
+    return Finding(name, Status.GONE, (why,) if moved is None else (why, moved), before=one)
+
+
+def _compared(
+    one: Entry, other: Entry, friction: float, bands: Bands, changed: tuple[str, ...],
+    moved: str | None,
+) -> Finding:  # fmt: skip
     every = differences(one, other, bands)
     texts = tuple(each.text for each in every)
     beyond = tuple(each.text for each in every if each.counts)
-    if known.carried is None and one.contacts_sha256 != other.contacts_sha256:
+    if moved is None and one.contacts_sha256 != other.contacts_sha256:
         changed = (*changed, "the contacts are others")
     if changed:
         return Finding(one.id, Status.NOT_COMPARABLE, changed, texts, beyond, one, other)
-    friction = known.before.friction
     brink = abs(friction - one.critical_friction) <= bands.grey * friction
     decided = all(entry.outcome in (Outcome.HELD, *LET_GO) for entry in (one, other))
     grey = brink and decided and one.held != other.held
@@ -410,6 +404,6 @@ def _compared(one: Entry, other: Entry, known: _Known) -> Finding:
     reasons = tuple(each.text for each in counting if each.worse is (status is Status.REGRESSED))
     if status is Status.GREY:
         reasons = (f"{one.outcome} -> {other.outcome}, at its critical friction",)
-    if known.carried is not None:
-        reasons = (f"{WORDS[status]} on the changed part: {known.carried.change}", *reasons)
+    if moved is not None:
+        reasons = (f"{WORDS[status]} on the changed part: {moved}", *reasons)
     return Finding(one.id, status, reasons, texts, beyond, one, other)

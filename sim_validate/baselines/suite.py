@@ -20,7 +20,6 @@ from sim_validate.baselines.check import (
     demanded,
     measured,
     seen_from,
-    silent,
     with_planned_fingers,
 )
 from sim_validate.baselines.part import (
@@ -153,7 +152,7 @@ class Suite:
         if before is not None:
             how = with_planned_fingers(how, before, now.saved)
         limit = before and before.limit
-        done = measured(testable(now, limit), (self.where, limit), how, 1, silent)
+        done = measured(testable(now, limit), (self.where, limit), how)
         found = complete(done, now)
         write_baseline(self.baseline, found)
         return found

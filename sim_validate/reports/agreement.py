@@ -1,9 +1,8 @@
 """Compares verdicts with the analysis: pairs of predicted and simulated numbers, counts of trials.
 
-Four counts say whether a load was predicted to be resisted, and whether the object held. A trial
-that was predicted to hold and did not, or the reverse, contradicts the analysis or the simulation.
-As in `validate`, neither is counted for loads within `AGREEMENT` of their limit and for trials that
-prove nothing, such as those that diverged.
+A trial that was predicted to hold and did not, or the reverse, contradicts the analysis or the
+simulation. As in `validate`, neither is counted for loads within `AGREEMENT` of their limit and for
+trials that prove nothing, such as those that diverged.
 """
 
 import math

@@ -3,12 +3,9 @@
 Points of simulated over predicted values should lie on the line of equal values.
 
 A squeeze that is certified for s times the weight in any direction carries the weight while the
-palm accelerates by up to (s - 1) g in any direction, as |g + a| <= g + |a|. The curve of survival
-is the share of grasps so certified. Marks are the shares that survived the trials of one kind in
-simulation, at the largest acceleration of these trials; hollow marks are the shares in which no
-slip is predicted. The certificate is for forces through the centre of mass that come slowly.
-Springs that overshoot, and the torques of knocks and of shakes about an axis, can put marks below
-the curve.
+palm accelerates by up to (s - 1) g in any direction, as |g + a| <= g + |a|. The certificate is for
+forces through the centre of mass that come slowly: springs that overshoot, and the torques of
+knocks and of shakes about an axis, can put marks below the curve.
 """
 
 import math
