@@ -16,7 +16,6 @@ from grasp_core.by_value import ByValue, counted, summary, vector
 from grasp_core.checked import LARGEST, instance, number, one_of, several, shown, text, whole
 from grasp_core.errors import InputError
 from grasp_core.frames import poses_along
-from grasp_core.notebooks import InNotebooks
 
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
 """The family of a grasp, by how its four lines of force meet: concurrent, pencil or regulus among
@@ -120,7 +119,7 @@ PUT_OFF = ("critical_friction", "ferrari_canny")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Grasp(ByValue, InNotebooks):
+class Grasp(ByValue):
     """Four contacts in finger order, with a witness that shows why they hold the object.
 
     A planned grasp computes its `critical_friction` and its `ferrari_canny` when they are first

@@ -74,7 +74,6 @@ def _signs() -> Array:
 
 
 def _box(x: float, y: float, z: float) -> Solid:
-    """Make an axis-aligned box with these half-widths about the origin."""
     return hull(_signs() * (x, y, z))
 
 
@@ -82,14 +81,6 @@ def _ring(radius: float, sides: int, z: float, turn: float = 0.0) -> Array:
     angles = 2.0 * np.pi * np.arange(sides) / sides + turn
     around = np.column_stack([np.cos(angles), np.sin(angles)])
     return np.column_stack([radius * np.round(around, DIGITS), np.full(sides, z)])
-
-
-def _tetrahedron() -> Solid:
-    return hull(0.04 * _signs()[[0, 3, 5, 6]])
-
-
-def _octahedron() -> Solid:
-    return hull(0.06 * np.vstack([np.eye(3), -np.eye(3)]))
 
 
 def _dodecahedron() -> Solid:
@@ -127,14 +118,6 @@ def _chamfered_box() -> Solid:
     widths, cut = np.array([0.06, 0.05, 0.04]), 0.02
     corners = _signs()[:, None, :] * (widths - cut * np.eye(3))[None]
     return hull(corners.reshape(-1, 3))
-
-
-def _hexagonal_pyramid() -> Solid:
-    return hull(np.vstack([_ring(0.05, 6, -0.02), [[0.0, 0.0, 0.04]]]))
-
-
-def _prism() -> Solid:
-    return hull(np.vstack([_ring(0.05, 3, -0.04), _ring(0.05, 3, 0.04)]))
 
 
 def _double_wedge_bar() -> Solid:
@@ -192,8 +175,11 @@ def _random(faces: int, seed: int) -> Solid:
         normals = rng.normal(size=(faces, 3))
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         polar = hull(normals)
-        if len(polar.vertices) == faces and _least_offset(polar) > LEAST_POLAR_OFFSET:
-            return hull(0.045 * stretch * _polar_corners(polar))
+        if len(polar.vertices) == faces:
+            corners = _polar_corners(polar)
+            outwards = np.sign(np.linalg.det(polar.vertices[polar.triangles]))
+            if (outwards / np.linalg.norm(corners, axis=1)).min() > LEAST_POLAR_OFFSET:
+                return hull(0.045 * stretch * corners)
     raise InputError(
         f"random-{faces}-{seed}: {MOST_DRAWS} draws made no solid of {faces} faces without a far "
         "corner; take another seed"
@@ -207,16 +193,6 @@ LEAST_POLAR_OFFSET = 0.25
 the object more than four radii away; such thin objects are drawn anew."""
 
 
-def _least_offset(solid: Solid) -> float:
-    corners = _polar_corners(solid)
-    return float(np.min(_facet_signs(solid) / np.linalg.norm(corners, axis=1)))
-
-
-def _facet_signs(solid: Solid) -> Array:
-    """Return +1 for each triangle whose outer side faces away from the origin, else -1."""
-    return np.sign(np.linalg.det(solid.vertices[solid.triangles]))
-
-
 def _polar_corners(solid: Solid) -> Array:
     """Compute the corner p of the polar body for each triangle: p.v = 1 at its vertices v."""
     a, b, c = (solid.vertices[solid.triangles[:, corner]] for corner in range(3))
@@ -226,15 +202,15 @@ def _polar_corners(solid: Solid) -> Array:
 
 
 OBJECTS: dict[str, Callable[[], Solid]] = {
-    "tetrahedron": _tetrahedron,
-    "octahedron": _octahedron,
+    "tetrahedron": lambda: hull(0.04 * _signs()[[0, 3, 5, 6]]),
+    "octahedron": lambda: hull(0.06 * np.vstack([np.eye(3), -np.eye(3)])),
     "dodecahedron": _dodecahedron,
     "icosahedron": _icosahedron,
     "wedge": _wedge,
     "chamfered-box": _chamfered_box,
-    "hexagonal-pyramid": _hexagonal_pyramid,
+    "hexagonal-pyramid": lambda: hull(np.vstack([_ring(0.05, 6, -0.02), [[0.0, 0.0, 0.04]]])),
     "box": lambda: _box(0.05, 0.035, 0.025),
-    "prism": _prism,
+    "prism": lambda: hull(np.vstack([_ring(0.05, 3, -0.04), _ring(0.05, 3, 0.04)])),
     "double-wedge-bar": _double_wedge_bar,
     "hex-nut": _hex_nut,
     "l-bracket": _l_bracket,

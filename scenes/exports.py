@@ -1,22 +1,8 @@
 """Exports the grasps of a plan as one file of another program: MoveIt messages or a glTF scene.
 
-`moveit` is YAML, written with PyYAML. `graspable_object` has the fields of a
-grasping_msgs/GraspableObject. A moveit_msgs/Grasp in it is meant for one hand, so the four
-fingertips are taken as one: the hand's frame is parallel to the object's and stands at the mean of
-the contacts, and the joints `fingerI_x`, `fingerI_y` and `fingerI_z` slide the centre of fingertip
-I along its axes. `grasp_posture` has their places where the fingertips touch and balanced efforts
-whose normal parts add up to one newton; `pre_grasp_posture` has their places where the fingers have
-drawn back. The approach and the retreats of a Grasp are those of a whole hand, and have length
-zero. Fields that are left out keep their defaults. Such a message says nothing about points on the
-object: contacts, normals, each finger's approach and the figures of each grasp are under
-`fingertips`.
-
-`gltf` is a binary scene, written with trimesh. Each grasp is a node whose frame is the object's.
-Below it are the object and, for each finger, a node at the contact whose z axis is the inward
-normal, and a rod. Matrices of nodes are text with every digit; vertices are numbers of 32 bits.
-glTF says that lengths are metres and that y points up; the object's axes are kept as they are.
-Figures of a grasp are in its node's `extras`. There the grasps stand on a square grid, so that each
-can be seen: `offset` says where the frame of one grasp is.
+docs/exports.md describes both. A moveit_msgs/Grasp is meant for one hand, so the four fingertips
+are taken as one, whose frame stands at the mean of the contacts and whose joints slide the
+fingertips. What such messages have no fields for is under `fingertips`.
 
 Sources:
     moveit_msgs/msg/Grasp.msg and GripperTranslation.msg (github.com/moveit/moveit_msgs);
@@ -57,9 +43,7 @@ HEAD = """\
 # fingertips: what such messages have no fields for.
 """
 WIDTH = 120
-"""Number of columns after which lists are broken."""
 SECTIONS = 24
-"""Number of corners of the circles that replace round tips and rods."""
 ROUGHNESS = 0.6
 GraspFormat: TypeAlias = Literal["moveit", "gltf"]
 ENDINGS: Mapping[GraspFormat, tuple[str, ...]] = {"moveit": (".yaml", ".yml"), "gltf": (".glb",)}
@@ -76,21 +60,16 @@ class PlacedGrasp:
     contacts: Array
     """Pose at each contact, (4, 4, 4) [m]: the origin is the contact, z the inward normal."""
     tip_radius: float
-    """Radius of the fingertips, and of the rods behind them [m]."""
     rods: Array
     """Pose of each finger's rod, (4, 4, 4) [m]: the origin is the centre of the tip, and z is the
     direction in which the finger comes in; the rod lies behind the origin."""
     rod_length: float
-    """Length of the rods, which is how far fingers draw back before a grasp [m]."""
     figures: Mapping[str, str | float]
     """What is known of the grasp, by the names that tables have: see `Plan.to_dataframe`."""
 
 
 def placed_grasps(plan: Plan, fingertip_radius_m: float | None) -> tuple[PlacedGrasp, ...]:
-    """Place every grasp of a plan, in order.
-
-    Takes `fingertip_radius_m` [m].
-    """
+    """Place every grasp of a plan, in order."""
     radius, length = fingertip_radius_m, ROD_LENGTH * plan.body.radius
     if plan.finger is not None:
         radius, length = radius or plan.finger.radius_m, plan.finger.approach_m

@@ -77,10 +77,7 @@ class FingerSettings:
 
 
 def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:
-    """Choose a fingertip radius [m] at which nothing overlaps, if a large enough one exists.
-
-    Takes `positions` (k, 3) [m]; `normals` (k, 3).
-    """
+    """Choose a fingertip radius [m] at which nothing overlaps, if a large enough one exists."""
     usual = TIP_RADIUS * body.radius
     clear = float(_largest_clear(body, positions, normals, usual).min())
     largest = min(_largest_apart(positions, normals), clear)
@@ -90,11 +87,7 @@ def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:
 
 
 def clashes(body: Polyhedron, positions: Array, normals: Array, radius: float) -> tuple[str, ...]:
-    """List what fingertips of a radius overlap: each other, or the object beside their contacts.
-
-    Takes `positions` (k, 3) [m]; `normals` (k, 3); `radius` [m]. Gives one sentence for each
-    overlap.
-    """
+    """List what fingertips of a radius overlap: each other, or the object beside their contacts."""
     least = radius * (1.0 - TOUCHING)
     found = [
         f"fingertips {i} and {j} of radius {radius:.3g} m overlap"
@@ -135,22 +128,15 @@ def _largest_clear(body: Polyhedron, positions: Array, normals: Array, start: fl
     fingertip is assumed to touch the plane of the patch.
     """
     near = _triangles_near(body, positions, normals, start)
-    radii = np.full(len(positions), start)
-    for finger in _meeting(body, positions - start * normals, start, near):
+    radii, meeting = np.full(len(positions), start), near.any(axis=1)
+    if meeting.any() and body.patches is None:  # what counts for one contact counts for all
+        centers = positions - start * normals
+        nearest = nearest_on_surface(body.vertices, body.triangles[near.any(axis=0)], centers)
+        meeting = np.linalg.norm(nearest - centers, axis=1) < _touched(body, start)
+    for finger in np.flatnonzero(meeting):
         triangles = body.triangles[np.flatnonzero(near[finger])]
         radii[finger] = _clear_radius(body, positions[finger], normals[finger], start, triangles)
     return radii
-
-
-def _meeting(body: Polyhedron, centers: Array, radius: float, near: Array) -> Indices:
-    """Find the spheres that meet a triangle near them; all are looked at together."""
-    triangles = body.triangles[near.any(axis=0)]
-    if not len(triangles):
-        return np.zeros(0, dtype=np.intp)
-    if body.patches is not None:  # what counts for one contact does not for another
-        return np.flatnonzero(near.any(axis=1))
-    nearest = nearest_on_surface(body.vertices, triangles, centers)
-    return np.flatnonzero(np.linalg.norm(nearest - centers, axis=1) < _touched(body, radius))
 
 
 def _touched(body: Polyhedron, radius: float) -> float:
@@ -174,10 +160,7 @@ def _clear_radius(
 
 
 def _triangles_near(body: Polyhedron, positions: Array, normals: Array, radius: float) -> Array:
-    """Tell which triangles each fingertip of at most a given radius may meet, (k, t).
-
-    Spheres of smaller radius at the same contact lie inside the largest one.
-    """
+    """Tell which triangles each fingertip of at most a given radius may meet, (k, t)."""
     corners = body.vertices[body.triangles]
     middles = corners.mean(axis=1)
     extents = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)

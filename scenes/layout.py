@@ -67,9 +67,7 @@ class FingerDrive(ByValue):
     damping_n_s_per_m: float
     max_normal_force_n: float
     rigid: bool
-    """Whether fingertips are rigidly fixed in place; the numbers of the servos are then unused."""
     indentation_m: float
-    """Depth of a fingertip in its face at the start [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -174,7 +172,8 @@ def arrange(
     coefficient(friction)
     fingers = fingers or FingerSettings()
     contacts = grasp.contacts if isinstance(grasp, Grasp) else tuple(grasp)
-    normals = _rounded_units(np.array([contact.normal for contact in contacts]))
+    x, y, z = to_digits(np.array([contact.normal for contact in contacts])).T
+    normals = np.column_stack([x, y, z]) / np.sqrt(x * x + y * y + z * z)[:, None]
     arms = np.array([contact.position for contact in contacts]) - body.center_of_mass
     arms = to_digits(arms, body.radius)
     positions = arms + body.center_of_mass
@@ -192,24 +191,16 @@ def arrange(
         inertia_kg_m2=_inertia(mass, positions, size),
         contacts=arms,
         frames=contact_frames(normals),
-        borders=tuple(_border(body, contact) for contact in contacts),
+        borders=tuple(
+            () if face is None else tuple(piece - body.center_of_mass for piece in face.pieces)
+            for face in (face_under(body, contact) for contact in contacts)
+        ),
         friction=friction,
         drive=_drive(body, positions, normals, fingers, size),
         squeeze=SQUEEZE * largest * _pushes(positions, normals, friction, torsion_m),
         approach=to_digits(-RETREAT * size * _ways_in(grasp, normals, fingers)),
         torsion_m=torsion_m,
     )
-
-
-def _rounded_units(vectors: Array) -> Array:
-    """Round vectors (k, 3) and scale them to unit length, in the same way on every machine."""
-    x, y, z = to_digits(vectors).T
-    return np.column_stack([x, y, z]) / np.sqrt(x * x + y * y + z * z)[:, None]
-
-
-def _border(body: Polyhedron, contact: Contact) -> tuple[Array, ...]:
-    face = face_under(body, contact)
-    return () if face is None else tuple(piece - body.center_of_mass for piece in face.pieces)
 
 
 def _drive(
@@ -233,10 +224,7 @@ def _drive(
 
 
 def _ways_in(grasp: Grasp | Sequence[Contact], normals: Array, fingers: FingerSettings) -> Array:
-    """Choose the unit direction in which each finger arrives, (k, 3).
-
-    It is the direction asked for, else the planned one, else the contact normal.
-    """
+    """Choose the unit direction in which each finger arrives, (k, 3)."""
     if fingers.approach is None:
         planned = grasp.approach_directions if isinstance(grasp, Grasp) else None
         return normals if planned is None else planned
@@ -245,10 +233,7 @@ def _ways_in(grasp: Grasp | Sequence[Contact], normals: Array, fingers: FingerSe
 
 
 def grasp_size(positions: Array) -> float:
-    """Compute the root mean square distance [m] of contacts from the axis they are closest to.
-
-    Takes `positions` (k, 3) [m].
-    """
+    """Compute the root mean square distance [m] of contacts from the axis they are closest to."""
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     lever = np.linalg.norm(spread[1:]) / math.sqrt(len(positions))
     return _to_digits(float(lever))
@@ -275,9 +260,9 @@ def _inertia(mass: float, positions: Array, size: float) -> Array:
 
 
 def _pushes(positions: Array, normals: Array, friction: float, torsion_m: float) -> Array:
-    """Compute forces in the contact frames, (k, 3), that balance under force closure.
+    """Compute balanced forces in the contact frames, (k, 3), or normal ones without closure.
 
-    The largest normal part is one. Contacts that are not in force closure push along their normals.
+    The largest normal part is one.
     """
     arms, _, _ = unit_size(positions)
     _, _, margins = deepest_forces(arms[None], normals[None], np.array([friction]))

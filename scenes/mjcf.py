@@ -7,8 +7,7 @@ contact, and which only this fingertip can touch. So normals are exact on any ob
 The mesh of a convex object can replace the pads, to check that the pads are flush with its surface.
 
 Fingers are spheres on three slides along (normal, tangent, tangent), each with a position servo:
-`ctrl = f / kp` makes it push with force f at its zero position, and the servo on the normal is
-limited to the largest normal force. Rigid fingers have neither slides nor servos.
+`ctrl = f / kp` makes it push with force f at its zero position. Rigid fingers have neither.
 """
 
 from collections.abc import Iterable
@@ -30,13 +29,7 @@ from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
-from scenes.mjcf_text import (
-    Element,
-    add_element,
-    as_texts,
-    document,
-    quaternion,
-)
+from scenes.mjcf_text import Element, add_element, as_texts, document, quaternion
 from scenes.physics import PhysicsSettings, add_free_body, add_light, begin_scene
 
 Surface = Literal["pads", "mesh"]
@@ -46,7 +39,6 @@ SCALED = (
     "Masses and servos are scaled to suit the grasp: this scene is for tests of force closure. "
     "The command `graspproof scene` with a mass writes the true one, under gravity."
 )
-"""Comment at the top of every scene."""
 AXES = ("normal", "tangent1", "tangent2")
 
 

@@ -16,7 +16,6 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.solvers.ties import first_best
 
 COMPILER = {"angle": "radian", "autolimits": "false", "inertiafromgeom": "false"}
-"""Settings of the compiler, so that no default matters."""
 QUOTE = {'"': "&quot;"}
 """What stands for the sign that ends an attribute."""
 MANY = 50
@@ -47,7 +46,6 @@ class Element:
     """An element of a scene, or a comment, to which further elements can be added."""
 
     tag: str
-    """The element's name; empty for a comment."""
     text: str
     """Its attributes as they are written, each after a blank; or the text of a comment."""
     inside: "list[Element]" = field(default_factory=list["Element"])

@@ -8,7 +8,7 @@ solver of MuJoCo 4.0.0 has a bug).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from grasp_core.arrays import Array, Indices, frozen
@@ -91,9 +91,6 @@ class PhysicsSettings:
             switch(getattr(self, name), name)
         if self.condim not in CONTACT_DIMENSIONS:
             raise InputError(f"condim must be one of {CONTACT_DIMENSIONS}, got {self.condim}")
-        self._check_torsion()
-
-    def _check_torsion(self) -> None:
         if 0.0 < self.torsion_m < LEAST_TORSION_M:
             raise InputError(
                 f"torsion_m must be 0 or at least {LEAST_TORSION_M:g} m, the smallest friction of "
@@ -104,10 +101,6 @@ class PhysicsSettings:
                 f"torsion_m makes contacts of dimension {WITH_TORSION} by itself: leave condim at "
                 f"{WITHOUT_TORSION}, got {self.condim}"
             )
-
-    def with_gravity(self, gravity: tuple[float, float, float]) -> "PhysicsSettings":
-        """Return the settings with another acceleration of gravity [m/s^2]."""
-        return replace(self, gravity=gravity)
 
     def record(self) -> dict[str, Any]:
         """Return the settings by name; two of them only where unusual, as older files have it."""
@@ -128,13 +121,9 @@ class PhysicsSettings:
 
     def contact(self) -> dict[str, float | int | str | tuple[float, ...]]:
         """Return the attributes of each geom that makes contact."""
-        return {
-            "condim": WITH_TORSION if self.torsion_m else self.condim,
-            "solref": self.solref,
-            "solimp": self.solimp,
-            "margin": self.margin,
-            "gap": self.gap,
-        }
+        condim = WITH_TORSION if self.torsion_m else self.condim
+        return {"condim": condim, "solref": self.solref, "solimp": self.solimp,
+                "margin": self.margin, "gap": self.gap}  # fmt: skip
 
 
 WORDS = {
@@ -149,37 +138,24 @@ LEAST_TORSION_M = 1e-5
 """Smallest torsional coefficient above zero: MuJoCo raises smaller ones to this value."""
 MOST_ITERATIONS = 10_000
 COUNTS = {
-    "iterations": (1, MOST_ITERATIONS),
-    "ls_iterations": (1, MOST_ITERATIONS),
-    "noslip_iterations": (0, MOST_ITERATIONS),
-    "ccd_iterations": (1, MOST_ITERATIONS),
-    "sdf_iterations": (1, MOST_ITERATIONS),
-    "sdf_initpoints": (1, MOST_ITERATIONS),
+    "iterations": (1, MOST_ITERATIONS), "ls_iterations": (1, MOST_ITERATIONS),
+    "noslip_iterations": (0, MOST_ITERATIONS), "ccd_iterations": (1, MOST_ITERATIONS),
+    "sdf_iterations": (1, MOST_ITERATIONS), "sdf_initpoints": (1, MOST_ITERATIONS),
     "condim": (1, 6),
-}
+}  # fmt: skip
 RANGES = {
-    "timestep": (1e-5, 0.005),
-    "impratio": (SMALLEST, LARGEST),
-    "tolerance": (0.0, 1.0),
-    "ls_tolerance": (0.0, 1.0),
-    "noslip_tolerance": (0.0, 1.0),
-    "ccd_tolerance": (0.0, 1.0),
-    "sleep_tolerance": (0.0, 1.0),
-    "density": (0.0, LARGEST),
-    "viscosity": (0.0, LARGEST),
-    "margin": (0.0, 1.0),
-    "gap": (0.0, 1.0),
+    "timestep": (1e-5, 0.005), "impratio": (SMALLEST, LARGEST), "tolerance": (0.0, 1.0),
+    "ls_tolerance": (0.0, 1.0), "noslip_tolerance": (0.0, 1.0), "ccd_tolerance": (0.0, 1.0),
+    "sleep_tolerance": (0.0, 1.0), "density": (0.0, LARGEST), "viscosity": (0.0, LARGEST),
+    "margin": (0.0, 1.0), "gap": (0.0, 1.0),
     "torsion_m": (BOUNDS["torsion_m"]["least"], BOUNDS["torsion_m"]["most"]),
-}
+}  # fmt: skip
 """Least and largest value of each number. Shorter time steps take hours; with longer ones the
 phases of a trial would be shorter than a step."""
 VECTORS = {
-    "gravity": (3, 1e4),
-    "wind": (3, 1e4),
-    "magnetic": (3, 1e4),
-    "solref": (2, LARGEST),
+    "gravity": (3, 1e4), "wind": (3, 1e4), "magnetic": (3, 1e4), "solref": (2, LARGEST),
     "solimp": (5, LARGEST),
-}
+}  # fmt: skip
 """Number of components of each vector, and the largest size of a component."""
 CONTACT_SETTINGS = ("solref", "solimp", "condim", "margin", "gap", "torsion_m")
 CHOSEN_FLAGS = ("autoreset", "diagexact", "multiccd")

@@ -23,10 +23,7 @@ except (ImportError, RuntimeError, AttributeError, OSError) as error:
 
 @contextmanager
 def unlogged() -> Iterator[None]:
-    """Keep MuJoCo's warnings from MUJOCO_LOG.TXT and from the console.
-
-    The simulator's data counts the warnings, and `Motion.warnings` reports them.
-    """
+    """Keep MuJoCo's warnings from MUJOCO_LOG.TXT and from the console."""
     before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
     quiet.logto_file = quiet.logto_console = False
     mujoco.MjLogConfig.set(quiet)

@@ -5,16 +5,11 @@ centre of mass. Fingers touch the object's own surface, wherever they slide (see
 `scenes.execution.surface`). Gravity is off: the weight, and what a moving palm does to the object,
 are forces on the object.
 
-Each of four fingertips moves on three slides along the axes of its contact, with a position servo
-on each, as in tests of closure (`scenes.mjcf`). The servos' stiffness is the usual one for the size
-of the grasp; fingertips and object have true masses, so servos are damped as a mass between them
-needs.
-
-The shapes of a hand's links, and fingertips that none of them covers, touch the surface. Joints
-have the hand's own angles. The palm is fixed in the world, links are light, and servos have as much
-inertia as their stiffness needs in steps of the test; or, where the test has it so, the hand is as
-heavy as it is, and its root is a free body on a weld to one that moves as told. A weld acts on a
-free body with the inverse mass w (MuJoCo's `body_invweight0`) as a spring of the stiffness
+Fingertips move on slides as in tests of closure (`scenes.mjcf`), but fingertips and object have
+true masses, so servos are damped as a mass between them needs. A hand's palm is fixed in the world,
+and its links are light; or, where the test has it so, the hand is as heavy as it is, and its root
+is a free body on a weld to one that moves as told. A weld acts on a free body with the inverse mass
+w (MuJoCo's `body_invweight0`) as a spring of the stiffness
 
     k d^2 / ((1 - d) w),   k = 1 / (d_max t z)^2                                          (1)
 
@@ -56,9 +51,7 @@ COMMENT = (
     "The test of another tool: the object has the mass that the test states, and no gravity. "
     "Servos stand open at the start, and are told to close and to squeeze."
 )
-"""Comment at the top of every scene."""
 FINGERS = (1 << 20) - 1
-"""Bits of what fingertips touch: each may have one of its own."""
 ORIGIN = np.zeros((1, 3))
 TIP_MASS_KG = 0.05
 """Mass of a fingertip with the part of its finger that moves with it."""
@@ -67,7 +60,6 @@ OPEN_M, OPEN_SIZES = 0.01, 0.25
 ARMATURE_KG_M2 = 1e-4
 """Least inertia of each joint's motor where links have no masses of their own."""
 RING_RAD = 0.5
-"""Largest angle by which a joint on its servo rings in a step; stiffer servos get more inertia."""
 ROOT, TOLD = "root", "told"
 """Names of the body that a weld holds, and of the one that moves as told."""
 COVERED_M = 1e-6
@@ -85,7 +77,6 @@ class TestedScene(ByValue):
     friction: float
     mass_kg: float
     inertia_kg_m2: Array
-    """Inertia of the object about its centre of mass, along the world axes, (3, 3) [kg m^2]."""
     pushes_n: Array
     """Normal forces with which the fingers are told to squeeze, (k,) [N]."""
     opened: Array
@@ -94,9 +85,7 @@ class TestedScene(ByValue):
     shut: Array
     """Commands with which they just touch, (u,) [m or rad]."""
     squeezing: Array
-    """Commands with which they squeeze, (u,) [m or rad]."""
     fingers: tuple[tuple[str, ...], ...]
-    """Names of the bodies of each finger."""
     axes: Array = field(default_factory=lambda: np.eye(3))
     """Columns are the axes of the test's world, along which it pulls, in the scene's, (3, 3)."""
 
@@ -137,10 +126,7 @@ def _object(
 
 
 def ended(root: Element, opened: Array, told: int = 0) -> str:
-    """Add the keyframe `open` and write the scene.
-
-    Takes `opened` (u,).
-    """
+    """Add the keyframe `open` and write the scene."""
     place = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], opened])
     key = {"name": "open", "qpos": place, "ctrl": opened[told:]}
     moved = {"mpos": opened[:3], "mquat": opened[3:told]} if told else {}
@@ -243,9 +229,7 @@ class Postures:
     palms: Array
     """Poses of the palm in the object's frame, (3, 4, 4)."""
     joints: Array
-    """Joint angles, (3, j) [rad]."""
     pushes_n: Array
-    """Normal forces of the squeeze, (k,) [N]."""
     limits_n_m: Array | None = None
     """Largest torques of the joints' motors, (j,) [N m]; None for none."""
     axes: Array = field(default_factory=lambda: np.eye(3))
@@ -255,11 +239,7 @@ class Postures:
 def planned_postures(
     hand: Hand, body: Polyhedron, reach: HandReach, friction: float, stiffness_n_m_per_rad: float
 ) -> Postures:
-    """Return the postures of a hand that stands in a grasp.
-
-    The hand is open in its pregrasp, if it has one, and squeezes with the balanced forces of the
-    pose, as hard as closure tests do: 0.6 of what the motors can.
-    """
+    """Return the postures of a hand that stands in a grasp."""
     layout = hand_layout(hand, body, reach, friction)
     told = replace(layout, servo_n_m_per_rad=stiffness_n_m_per_rad)
     squeeze = layout.joints + told.commands(layout.squeeze_forces[None])[0]

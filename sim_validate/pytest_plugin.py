@@ -24,7 +24,6 @@ MARKER = (
 LINES = pytest.StashKey[list[dict[str, str]]]()
 """What the terminal says about grasps at the end, kept for a phase of a test and the whole run."""
 MOST_TOLD = 40
-"""Largest number of grasps that the terminal lists for one mesh."""
 TRAVELS = "_graspproof"
 """Name of the attribute that carries these lines on pytest's reports between processes."""
 
@@ -90,8 +89,6 @@ def pytest_runtest_makereport(
 
 
 class _Collecting:
-    """Collects the lines about grasps from all tests."""
-
     def __init__(self, config: pytest.Config) -> None:
         self._lines = config.stash[LINES]
 
@@ -125,7 +122,6 @@ def sections(lines: Sequence[dict[str, str]]) -> list[tuple[str, list[str]]]:
 
 
 def _told(lines: Sequence[dict[str, str]], note: str, indent: str) -> list[str]:
-    """List the grasps on a mesh that pass and are not what they were."""
     said = sorted({line["told"] for line in lines if line["told"] and line["mesh_note"] == note})
     more = len(said) - MOST_TOLD
     cut = [f"and {more} more; --junitxml FILE lists all"] if more > 0 else []
@@ -193,7 +189,8 @@ class GraspItem(_SuiteItem):
         fails = finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE)
         told = "" if fails else passing(done, suite.compared)
         _note(self, "status", finding.status.value, suite.compared.mesh, told=told)
-        self.user_properties += properties_of(plain(finding.after) or {}).items()
+        if finding.after is not None:
+            self.user_properties += properties_of(plain(finding.after)).items()
         if fails:
             raise UnstableError(f"{why}\n  to accept the change: pytest --grasp-bless {self.path}")
 
@@ -239,8 +236,8 @@ def assert_stable(
         chosen = case_of(case, friction)
         verdict, why = checked(chosen, demands_of(asked))
         name = chosen.grasp.id
-        entry = plain(entry_of(chosen.grasp, verdict, chosen.body.radius)) or {}
-        for key, value in entry.items():
+        entry = entry_of(chosen.grasp, verdict, chosen.body.radius)
+        for key, value in plain(entry).items():
             record_property(f"{name}.{key}", value)
         _note(request.node, f"{name}.status", "unstable" if why else "stable", chosen.source)
         if why:

@@ -159,19 +159,9 @@ def kept_by_distance():
 
 PICTURES: dict[str, Callable[[], Sheet]] = {
     make.__name__: make
-    for make in (
-        families,
-        grasp,
-        hand,
-        regions,
-        wrenches,
-        margins,
-        motion,
-        fidelity,
-        survival,
-        misplaced,
-    )
-}
+    for make in (families, grasp, hand, regions, wrenches, margins, motion, fidelity, survival,
+                 misplaced)
+}  # fmt: skip
 
 
 def main() -> None:

@@ -16,7 +16,7 @@ from typing import cast
 
 from grasp_core.checked import function, several, text, whole
 from grasp_core.cones.spanning import count_spanning
-from grasp_core.families.constructions import LEAST_RADIUS
+from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.frames import kept_angle
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron

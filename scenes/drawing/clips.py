@@ -1,9 +1,7 @@
 """Draws the motion of a scene as a clip, in a separate process, where graphics are available.
 
-The object in a good grasp moves by micrometres, so motions can be shown magnified. The object's
-shifts and turns about the point between the contacts, and the slides of the fingertips, are
-measured from the first sample and multiplied by one factor, so that one still sees which parts move
-together.
+The object in a good grasp moves by micrometres, so motions can be shown magnified: all of them by
+one factor from the first sample, so that one still sees which parts move together.
 """
 
 import importlib
@@ -33,6 +31,8 @@ SIZE = (480, 360)
 """Width and height of the picture [pixels]."""
 RATE = 25.0
 """Frames per second of a clip."""
+SLOWER = 1.0 / (RATE * 0.01)
+"""Factor by which clips of trials are slower than reality, with a sample of 10 ms in each frame."""
 NEARER = 0.9
 """Share of the fingertips' farthest reach that the picture must show: fingertips may come nearer to
 the picture's border than the object."""
@@ -43,7 +43,6 @@ of the object."""
 VISIBLE = 0.1
 """Size, in grasp sizes, to which small motions are magnified so that they are easily seen."""
 MOST = 1000.0
-"""Largest factor by which motions are magnified."""
 PATIENCE_S = 300.0
 
 
@@ -61,6 +60,16 @@ def write_clip(
     shown = _reach(scene, joints)
     return _written(path, xml=scene.xml, joints=joints, radius=shown, caption=caption,
                     angles=np.broadcast_to(angles_deg, (len(joints), 2)))  # fmt: skip
+
+
+def write_trial_clip(scene: Scene, joints: Array, path: Path, name: str) -> Path:
+    """Draw the magnified motion of a trial as far as it is finite; its caption says the factors."""
+    known = np.isfinite(joints).all(axis=1)
+    if not known.any():
+        raise GraphicsError(f"{name}: nothing finite to draw")
+    larger, factor = magnified(joints[known], scene)
+    motion = f"motion {factor:g} times as large" if factor > 1.0 else "true to scale"
+    return write_clip(scene, larger, path, f"{name}, {motion}, {SLOWER:g} times slower")
 
 
 def write_held_clip(
@@ -97,7 +106,6 @@ def _turned(turn: Any, quaternions: Array) -> Array:
 
 
 def _written(path: Path, **job_parts: Any) -> Path:
-    """Draw a clip in another process, with the first graphics library that works."""
     require_clip(path)
     with tempfile.TemporaryDirectory() as folder:
         job, out = Path(folder) / "job.npz", Path(folder) / f"clip{path.suffix.lower()}"
@@ -155,7 +163,6 @@ def has_display() -> bool:
 
 
 def _graphics() -> Iterator[str]:
-    """Yield the graphics libraries that MuJoCo may draw with, in the order to try them."""
     chosen = os.environ.get("MUJOCO_GL")
     if chosen is not None:
         yield chosen
@@ -166,10 +173,7 @@ def _graphics() -> Iterator[str]:
 
 
 def _run_frames(graphics: str, arguments: list[str]) -> str:
-    """Run the drawing program; return what went wrong, or an empty text.
-
-    Without arguments the program only tries whether it can draw.
-    """
+    """Run the drawing program; return what went wrong, or an empty text."""
     program = str(Path(__file__).with_name("frames.py"))
     command = [sys.executable, "-P", program, *arguments]
     settings = {**os.environ, "MUJOCO_GL": graphics}
@@ -199,16 +203,10 @@ def magnified(joints: Array, scene: Scene) -> tuple[Array, float]:
     centers = joints[:, :3] + poses.apply(center)
     shifts, slides = centers - centers[0], joints[:, 7:] - joints[0, 7:]
     largest = float((np.linalg.norm(shifts, axis=1) + size * np.linalg.norm(turns, axis=1)).max())
-    factor = _rounded_down(VISIBLE * size / max(largest, VISIBLE * size / MOST))
+    factor = max(VISIBLE * size / max(largest, VISIBLE * size / MOST), 1.0)
+    power = 10.0 ** math.floor(math.log10(factor))
+    factor = math.floor(factor / power) * power
     larger = rotation.from_rotvec(factor * turns)
     places = center + factor * shifts - larger.apply(center)
     quaternions = larger.as_quat(scalar_first=True)
     return np.column_stack([places, quaternions, factor * slides]), factor
-
-
-def _rounded_down(factor: float) -> float:
-    """Round a factor down to one significant digit, but not below 1."""
-    if factor < 1.0:
-        return 1.0
-    power = 10.0 ** math.floor(math.log10(factor))
-    return math.floor(factor / power) * power

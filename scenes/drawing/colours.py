@@ -20,15 +20,12 @@ HAND = "#b9b0a4"
 """Colour of a hand's links: warm and muted, so that it is neither a finger's nor the object's."""
 GOOD, BAD, NEUTRAL = "#0072B2", "#D55E00", "#686e77"
 PAPER = "#ffffff"
-"""Colour of the ground, on which labels stand."""
 NIGHT = {
     INK: "#dfe4ea", GOOD: "#56aee8", NEUTRAL: "#a3adb8", PAPER: "#14181d", BAD: "#ff8a4c",
 }  # fmt: skip
 """Colours that take the place of others where the reader's screen is dark."""
 RAMP = ("#00224e", "#434e6c", "#7d7c78", "#bcaf6f", "#fee838")
-"""Colours of small to large values at equal steps; those between are mixed."""
 LEVELS = 64
-"""Number of colours into which the ramp is cut."""
 
 
 def rgb(colour: str) -> tuple[float, float, float]:

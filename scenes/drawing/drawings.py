@@ -52,7 +52,6 @@ has its plane drawn, in object radii; the foci of built-in objects are within th
 SLACK_RAD = 1e-6
 """Angle by which rounding may make a force cone exceed its friction cone [rad]."""
 POLYGON = 3
-"""Least number of corners of a region that can be filled with colour."""
 MOST_TRIANGLES = 2500
 """Largest number of triangles drawn for the object; finer surfaces are simplified first."""
 
@@ -94,10 +93,7 @@ def between(segments: Sequence[Array]) -> tuple[Array, ...]:
 
 
 def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, ...]:
-    """List the shapes that show an object with a grasp.
-
-    Gives shapes in the object's frame, without force cones wider than this friction allows.
-    """
+    """List the shapes that show an object with a grasp."""
     coefficient(friction)
     check_on_faces(body, grasp)
     shapes = [*glass(body)]
@@ -119,15 +115,6 @@ def drawing_with_hand(
     for finger in range(len(grasp.contacts)):
         shapes += _region(grasp, finger)
     return (*shapes, *hand_shapes(held), Shape("contact", points=held.positions))
-
-
-def drawing_alone(extent: Extent, grasp: Grasp) -> tuple[Shape, ...]:
-    """List the shapes that show a grasp without its object, and without friction cones."""
-    shapes = list[Shape]()
-    for finger in range(len(grasp.contacts)):
-        shapes += _bar_and_region(extent, grasp, finger)
-        shapes.append(_force_cone(extent, grasp, finger))
-    return (*shapes, *_family(extent, grasp), Shape("contact", points=grasp.positions))
 
 
 def finger_size(body: Extent) -> float:
@@ -189,7 +176,6 @@ def _friction_cone(body: Extent, contact: Contact, finger: int, half_angle: floa
 
 
 def _bar_and_region(body: Extent, grasp: Grasp, finger: int) -> list[Shape]:
-    """Return a finger's bar and, where it is more than a point, its region."""
     tip, ways = grasp.contacts[finger].position, grasp.approach_directions
     inward = grasp.contacts[finger].normal if ways is None else ways[finger]
     straight = Shape("finger", finger, polygons=bar(tip, inward, finger_size(body)))
@@ -197,7 +183,6 @@ def _bar_and_region(body: Extent, grasp: Grasp, finger: int) -> list[Shape]:
 
 
 def _region(grasp: Grasp, finger: int) -> list[Shape]:
-    """Return a finger's region, or nothing where it is a point."""
     region = grasp.regions[finger].polygon
     return [Shape("region", finger, polygons=(region,))] if len(region) >= POLYGON else []
 
@@ -214,7 +199,6 @@ def _force_cone(body: Extent, grasp: Grasp, finger: int) -> Shape:
 
 
 def _family(body: Extent, grasp: Grasp) -> list[Shape]:
-    """Return the lines of force, and the shapes that show the grasp's family."""
     if grasp.family == "regulus":
         return _regulus(body, grasp)
     beyond = BEYOND * body.radius
@@ -231,7 +215,6 @@ def _family(body: Extent, grasp: Grasp) -> list[Shape]:
 
 
 def _regulus(body: Extent, grasp: Grasp) -> list[Shape]:
-    """Return the lines along the witness forces, and the ruled surface that they lie on."""
     reach, beyond = REACH * body.radius, BEYOND * body.radius
     ways = grasp.witness.directions
     ruled = rulings(grasp.positions, ways, body.center_of_mass, reach)
@@ -244,7 +227,6 @@ def _regulus(body: Extent, grasp: Grasp) -> list[Shape]:
 
 
 def _planes(grasp: Grasp, beyond: float) -> list[Shape]:
-    """Return the plane of each pair of a pencil; both planes hold the line through the foci."""
     one, two = grasp.focus_points
     along = beyond * _unit(two - one)
     ends = np.array([one - along, two + along])

@@ -1,9 +1,7 @@
 """Draws scenes in motion as animated pictures; it runs as a separate program.
 
-Only `scenes.drawing.clips` starts it, as `python -P frames.py JOB.npz OUT`. It is a separate
-process because MuJoCo chooses its graphics library when it is first imported, and because a broken
-graphics driver may end the whole process. Without arguments it draws an empty scene, to find out
-whether drawing works.
+Only `scenes.drawing.clips` starts it: MuJoCo chooses its graphics library when it is first
+imported, and a broken driver may end the whole process. Without arguments it draws an empty scene.
 """
 
 # pyright: basic, reportAttributeAccessIssue=false
@@ -22,7 +20,6 @@ DISTANCE = 3.2
 SKY, AMBIENT, DIFFUSE = (0.93, 0.95, 0.97), 0.45, 0.45
 """Colour of the background, and strengths of the ambient light and of the light from the camera."""
 INK, LETTERS = (30, 30, 40), 18
-"""Colour and height of the caption's letters [pixels]."""
 
 
 def draw_clip(given: Mapping[str, np.ndarray], out: str) -> None:
@@ -51,13 +48,8 @@ def draw_clip(given: Mapping[str, np.ndarray], out: str) -> None:
             mujoco.mj_kinematics(model, data)
             renderer.update_scene(data, camera)
             frames.append(_captioned(renderer.render(), str(given["caption"])))
-    frames[0].save(
-        Path(out),
-        save_all=True,
-        append_images=frames[1:],
-        duration=round(1000.0 / float(given["rate"])),
-        loop=0,
-    )
+    lasting = round(1000.0 / float(given["rate"]))
+    frames[0].save(Path(out), save_all=True, append_images=frames[1:], duration=lasting, loop=0)
 
 
 def try_out() -> None:
@@ -71,17 +63,9 @@ def try_out() -> None:
 
 
 def _lit(xml: str) -> mujoco.MjModel:
-    """Compile a scene with a bright background and light."""
     spec = mujoco.MjSpec.from_string(xml)
-    spec.add_texture(
-        name="sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-        rgb1=SKY,
-        rgb2=SKY,
-        width=8,
-        height=8,
-    )
+    kind, flat = mujoco.mjtTexture.mjTEXTURE_SKYBOX, mujoco.mjtBuiltin.mjBUILTIN_FLAT
+    spec.add_texture(name="sky", type=kind, builtin=flat, rgb1=SKY, rgb2=SKY, width=8, height=8)
     model = spec.compile()
     model.vis.headlight.ambient[:], model.vis.headlight.diffuse[:] = AMBIENT, DIFFUSE
     return model

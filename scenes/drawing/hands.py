@@ -10,9 +10,6 @@ of latitude and longitude, and those on the border of two octants occur twice, o
 on either side: what lies between the two is a side of the box or a part of a round edge. Where the
 box or the radius has no size, sides without area are left out. So the same rule makes boxes,
 capsules and balls.
-
-A hand is several times as large as what it holds, and most views show its back only. So the view
-also may be from below, and the contacts and the object should be seen past palm and fingers.
 """
 
 import importlib
@@ -48,14 +45,12 @@ FEWEST_CORNERS = 3
 SAME = 1e-9
 """Distance below which corners of a box of size 1 are one: far above rounding."""
 Truths: TypeAlias = NDArray[np.bool_]
-"""Array of truths, of any shape."""
 Ends: TypeAlias = tuple[bool, bool, bool]
 """A truth about each axis of a box."""
 LONG, LEAST = 1.2, 2.5
 """Length of a piece of a part in thicknesses of the part, but at least so many radii of the hand's
 largest fingertip."""
 MOST_PIECES = 6
-"""Largest number of pieces along one axis of a part."""
 OVERLAP = 0.02
 """How far a piece reaches into the next one, as a share of its length, so that no gap is seen."""
 NUMBER_BEYOND = 2.9
@@ -66,7 +61,6 @@ ELEVATIONS = (18, 28, 40, 0, -18, -28, -40)
 HIDDEN = 4.0
 """Fault of a view in which the hand hides all contacts."""
 BEHIND = 1.0
-"""Fault of a view in which the hand hides all of the object's faces that it could show."""
 ALONG = 0.8
 """Fault of a view along the way from the middle of the hand to the object: fingers look short."""
 EDGE_ON = 0.5
@@ -166,9 +160,7 @@ class PosedHand:
     palm_pose: Array
     """Pose of the palm in the object's frame, (4, 4)."""
     fingers: tuple[int, ...]
-    """The hand's finger at each contact."""
     contacts: tuple[Contact, ...]
-    """Where these fingers touch."""
 
     def __post_init__(self) -> None:
         instance(self.hand, Hand, "hand", "load_hand makes one")

@@ -1,4 +1,4 @@
-"""Writes the small pictures with figures by which notebooks show objects, grasps, plans and scenes.
+"""Writes the small pictures with figures by which notebooks show objects, plans and scenes.
 
 A picture takes some hundredths of a second. Figures that a grasp has put off are left out, because
 the first of them may take seconds; `repr` shows them.
@@ -13,22 +13,19 @@ from grasp_core.arrays import Array
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
-from scenes.drawing.drawings import bar, coarse, drawing_alone, drawing_of, glass
+from scenes.drawing.drawings import bar, coarse, drawing_of, glass
 from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG, number_places, sheet_of
 from scenes.drawing.shapes import Shape
 from scenes.drawing.sheets import svg_of
-from scenes.drawing.views import Alone, Extent, View, best_view, view_alone
+from scenes.drawing.views import Alone, Extent, View, best_view
 from scenes.layout import Layout
 from scenes.mjcf import Scene
 
 SIDE = 260
-"""Width and height of a picture [pixels]."""
 MOST_CORNERS = 20_000
 """Largest number of points that are drawn: they take a third of a second, and a megabyte."""
 ROWS = 5
-"""Largest number of grasps in the table of a plan."""
 COLUMNS = 4
-"""Largest number of cells in a row."""
 MM, CM3 = 1e3, 1e6
 Row = Sequence[str]
 
@@ -37,8 +34,6 @@ def html_of(value: object) -> str | None:
     """Return a picture of a value with its figures; None for a value that has no picture."""
     if isinstance(value, Plan):
         return _plan(value)
-    if isinstance(value, Grasp):
-        return _grasp(value)
     if isinstance(value, Scene):
         layout = value.layout
         return card(placed(layout), layout.name, [("friction", f"{layout.friction:g}")])
@@ -63,19 +58,10 @@ def _cells(row: Row) -> str:
 def picture(
     shapes: Sequence[Shape], extent: Extent, view: View, numbers: Array | None = None
 ) -> str:
-    """Draw shapes as a small SVG element; nothing where there are too many of them.
-
-    Takes `numbers` (k, 3) [m].
-    """
+    """Draw shapes as a small SVG element; nothing where there are too many of them."""
     if sum(len(shape.vertices()) for shape in shapes) > MOST_CORNERS:
         return ""
     return svg_of(sheet_of(shapes, extent, view, "picture", numbers=numbers, side=SIDE), paper=True)
-
-
-def held(body: Polyhedron, grasp: Grasp, friction: float) -> str:
-    """Draw an object with a grasp as a small SVG element."""
-    shapes = drawing_of(body, grasp, friction)
-    return picture(shapes, body, best_view(body, grasp), number_places(body, grasp))
 
 
 def placed(layout: Layout) -> str:
@@ -104,23 +90,15 @@ def _alone(body: Polyhedron) -> str:
     return picture(glass(body), body, View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, body))
 
 
-def _grasp(grasp: Grasp) -> str:
-    extent = Alone.of_contacts(grasp.positions)
-    shapes, view = drawing_alone(extent, grasp), view_alone(extent, grasp)
-    return card(picture(shapes, extent, view, number_places(extent, grasp)), grasp.id, [
-        ("family", grasp.family),
-        ("faces", ", ".join(map(str, grasp.faces))),
-        ("radius", _radius(grasp)),
-        ("closure margin", f"{grasp.closure_margin:.4g}"),
-    ])  # fmt: skip
-
-
 def _plan(plan: Plan) -> str:
-    drawing = held(plan.body, plan[0], plan.friction) if len(plan) else _alone(plan.body)
+    body, drawing = plan.body, ""
+    if len(plan):
+        shapes, numbers = drawing_of(body, plan[0], plan.friction), number_places(body, plan[0])
+        drawing = picture(shapes, body, best_view(body, plan[0]), numbers)
     count = f"{len(plan)} grasp{'' if len(plan) == 1 else 's'}"
     title = f"{count} of {plan.body.name} at friction {plan.friction:g}"
     if not len(plan):
-        return card(drawing, title, [(plan.absence or "",)])
+        return card(_alone(body), title, [(plan.absence or "",)])
     rows: list[Row] = [("grasp", "family", "radius", "closure margin")]
     rows += [(g.id, g.family, _radius(g), f"{g.closure_margin:.4g}") for g in plan[:ROWS]]
     return card(drawing, title, [*rows, ("...",)] if len(plan) > ROWS else rows)

@@ -12,7 +12,6 @@ from typing import Any
 ASSETS = Path(__file__).parent / "assets"
 """Folder of the templates, styles and scripts of single drawings."""
 NOTHING = "-"
-"""Text that stands for a missing number."""
 MILLION = 1e6
 """Size from which numbers are written with a power of ten."""
 

@@ -155,7 +155,6 @@ def joined(surface: Surface, chosen: Array) -> tuple[Array, ...]:
 
 
 def _loops(ways: dict[int, list[tuple[int, int]]]) -> list[list[int]]:
-    """Follow edges from corner to corner until they close."""
     loops = list[list[int]]()
     for start in list(ways):
         while ways[start]:
@@ -213,7 +212,6 @@ def _patches(shape: Shape, view: View, width: float) -> Iterator[Patch]:
 
 
 def _each(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
-    """Draw each polygon by itself."""
     colour = colour_of(shape)
     for polygon in shape.polygons:
         flat, near = view.seen(polygon)
@@ -260,7 +258,6 @@ def _solid(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
 
 
 def _cone(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
-    """Draw a clear cone as its outline and its open end."""
     rim = np.array([polygon[1] for polygon in shape.polygons])
     flat, near = view.seen(shape.vertices())
     for part in (convex_hull(flat), view.seen(rim)[0]):
@@ -272,7 +269,6 @@ FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Patch]]] = {
     "force cone": _cone,
     **dict.fromkeys(SOLIDS, _solid),
 }
-"""How the polygons of some roles are drawn; those of the others are drawn one by one."""
 
 
 def _normal(polygon: Array) -> Array:

@@ -19,13 +19,9 @@ LONG_RANGE = 300.0
 NICE = (1.0, 2.0, 5.0, 10.0)
 """Steps between ticks, times powers of ten."""
 EDGE = 8.0
-"""Place of a title, from the left edge of the sheet [pixels]."""
 TICK = 4.0
-"""Length of a tick [pixels]."""
 SMALL = 11.0
-"""Size of the letters of ticks and keys [pixels]."""
 ROW, SAMPLE = 16.0, 18.0
-"""Height of a row of a key, and length of the sample before its text [pixels]."""
 EVEN = 0.2
 """Distance by which a drawn curve may miss its points [pixels]."""
 Shape: TypeAlias = Literal["disc", "square", "diamond", "up", "down", "cross", "plus"]

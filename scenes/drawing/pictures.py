@@ -33,11 +33,9 @@ NUMBER, NUMBER_SHARE = 8.0, 0.028
 """Radius of the circle around a finger's number: at least so many pixels, and such a share of the
 picture's width."""
 FINGER_LABELS = tuple((str(finger), colour) for finger, colour in enumerate(FINGERS))
-"""Text and colour of each finger's number."""
 MOST_NUMBERED = 20
 """Largest number of faces that have their numbers on a picture of the object."""
 POLYGON = 3
-"""Least number of corners of an area."""
 MANY = 60
 """Number of corners of an area above which those that are not seen are left out."""
 AZIMUTH_DEG, ELEVATION_DEG = 35.0, 28.0
@@ -52,7 +50,6 @@ EXPLAINED: tuple[Role, ...] = (
     "finger", "friction cone", "force cone", "region", "line of force", "focus", "plane",
     "ruled surface", "hand",
 )  # fmt: skip
-"""Roles that have an entry in the key."""
 WHOLE: tuple[Role, ...] = ("hand", "fingertip")
 """Roles that are drawn whole, however far from the object they are."""
 
@@ -90,10 +87,7 @@ def write_picture(
 
 
 def write_object_picture(body: Polyhedron, path: Path) -> Path:
-    """Draw an object without fingers, and write the picture to a file.
-
-    Up to `MOST_NUMBERED` planar faces have their numbers on them where they face the viewer.
-    """
+    """Draw an object without fingers, and write the picture to a file."""
     format_of(path)
     view = View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, body)
     has_numbers = body.patches is None and len(body.faces) <= MOST_NUMBERED
@@ -248,7 +242,6 @@ def frame_around(
 
 
 def _entries(shapes: Sequence[Shape]) -> list[Entry]:
-    """Make an entry of the key for each role that occurs among the shapes."""
     found = {shape.role: shape for shape in reversed(shapes)}
     entries = list[Entry]()
     for role in EXPLAINED:

@@ -29,11 +29,9 @@ class Shape:
 
     role: Role
     finger: int | None = None
-    """The finger that the shape belongs to, if any."""
     polygons: tuple[Array, ...] = ()
     """Flat or nearly flat polygons, corners in order, each (k, 3) [m]."""
     lines: tuple[Array, ...] = ()
-    """Polylines, each (k, 3) [m]."""
     points: Array | None = None
     """Single points, (k, 3) [m]; None if the shape has none."""
 

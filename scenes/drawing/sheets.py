@@ -4,9 +4,8 @@ A drawing is a sheet of marks, in pixels from its upper left corner: areas, line
 small images. Pages and notebooks take the sheet as SVG text.
 
 Colours that a dark screen needs otherwise have a class beside the colour; `night_style` gives the
-rules. Where no rules are, as in notebooks, the drawing looks as by day. Coordinates are whole
-quarters of pixels, relative to one another, which takes a third of the text of full numbers, and in
-files a look that comes again stands once.
+rules. Coordinates are whole quarters of pixels, relative to one another, and in files a look that
+comes again stands once, which takes a third of the text.
 """
 
 import importlib
@@ -35,15 +34,12 @@ ASSETS = Path(__file__).parent / "assets"
 FONT_FAMILY, FONT_FILES = "DejaVu Sans", ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf")
 """The letters of PNG files: Latin and Greek ones and signs of DejaVu Sans 2.37."""
 LETTER = 12.0
-"""Size of letters [pixels]."""
 ROUND = 48
 """Number of corners of a polygon that replaces a circle."""
 Anchor: TypeAlias = Literal["start", "middle", "end"]
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 PALETTE, BITS = 3, 8
 """PNG's number for pixels that name a colour of a palette, and the bits of such a name."""
-HARDEST = 9
-"""Level of compression; higher ones do not exist."""
 PARTS = 4
 """Number of parts of a pixel in which places are written."""
 BASELINE = 0.35
@@ -60,7 +56,6 @@ class Area(ByValue):
     """A filled area, bounded by loops that run around it in one direction."""
 
     loops: tuple[Array, ...]
-    """Corners of each loop, (k, 2)."""
     fill: str
     opacity: float = 1.0
 
@@ -70,7 +65,6 @@ class Line(ByValue):
     """Lines of one colour and width."""
 
     lines: tuple[Array, ...]
-    """Points of each line, (k, 2)."""
     colour: str
     width: float = 1.4
     opacity: float = 1.0
@@ -82,7 +76,6 @@ class Dots(ByValue):
     """Round dots of one colour and size."""
 
     points: Array
-    """Their middles, (k, 2)."""
     colour: str
     radius: float = 2.5
     opacity: float = 1.0
@@ -99,7 +92,6 @@ class Words:
     size: float = LETTER
     bold: bool = False
     upwards: bool = False
-    """Whether the text runs upwards, as the name of an upright axis does."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -236,7 +228,7 @@ def _image_png(levels: Indices) -> bytes:
         _chunk(b"IHDR", header),
         _chunk(b"PLTE", ramp_bytes().astype(np.uint8).tobytes() + b"\x00\x00\x00"),
         _chunk(b"tRNS", b"\xff" * LEVELS + b"\x00"),
-        _chunk(b"IDAT", zlib.compress(lines.tobytes(), HARDEST)),
+        _chunk(b"IDAT", zlib.compress(lines.tobytes(), 9)),
         _chunk(b"IEND", b""),
     ])  # fmt: skip
 
@@ -277,7 +269,6 @@ def night_style() -> str:
 
 
 def _style(names: Mapping[Look, str]) -> str:
-    """Write the rules of a file: its looks that have names, and what is other on dark screens."""
     rules = "".join(
         f".{name}{{{';'.join(f'{key}:{value}' for key, value in look if key != 'class')}}}"
         for look, name in names.items()
@@ -286,7 +277,6 @@ def _style(names: Mapping[Look, str]) -> str:
 
 
 def _names(runs: Iterable[tuple[bool, list[Mark]]]) -> dict[Look, str]:
-    """Name the looks that come again."""
     counts = Counter(
         look for plain, marks in runs if not plain for look, _ in groupby(marks, key=_look)
     )
@@ -361,7 +351,6 @@ def _steps(points: Array) -> str:
 
 
 def _plain(mark: Mark) -> str:
-    """Write words or an image."""
     if isinstance(mark, Image):
         data = b64encode(_image_png(mark.levels)).decode()
         return (

@@ -5,7 +5,6 @@ screen shows, and takes a tenth of the text of full numbers.
 """
 
 import json
-from collections.abc import Iterable
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -35,7 +34,6 @@ UNITS = 1000.0
 """Number of units of length in one object radius."""
 MILLI = 1e3
 WIDTH, HEIGHT = 900, 640
-"""Size of the page in a notebook [pixels]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -93,7 +91,7 @@ def show(
 
 def object_data(body: Polyhedron) -> list[dict[str, Any]]:
     """Return the drawing of an object, which all of its grasps share."""
-    return _data(glass(body), body)
+    return [_shape(shape, body) for shape in glass(body)]
 
 
 def grasp_data(
@@ -116,7 +114,7 @@ def grasp_data(
         more = [shape for shape in planned if shape.role not in seen]
         shapes, hidden = (*shown, *more), {shape.role for shape in more}
     return {
-        "shapes": _data(shapes, body),
+        "shapes": [_shape(shape, body) for shape in shapes],
         "numbers": _whole(numbers, body),
         "axes": np.round(view.axes, 4).tolist(),
         "middle": _whole(view.center, body),
@@ -135,22 +133,18 @@ def turntable_page(
         object=body.name,
         family=grasp.family,
         friction=friction,
-        facts=[*_facts(body, grasp), *([] if held is None else [_in_hand(held)])],
+        facts=_facts(body, grasp) + ([] if held is None else [
+            (f"fingers of {held.hand.name}", ", ".join(held.finger_names),
+             "that touch, by finger of the grasp"),
+        ]),
         style=text_of("style.css"),
         script=text_of("turntable.js"),
         object_drawing=as_text(object_data(body)),
         drawing=as_text(grasp_data(body, grasp, friction, held)),
-    )
-
-
-def _in_hand(held: PosedHand) -> tuple[str, str, str]:
-    """Say which fingers of a hand are at the contacts."""
-    names = ", ".join(held.finger_names)
-    return (f"fingers of {held.hand.name}", names, "that touch, by finger of the grasp")
+    )  # fmt: skip
 
 
 def _facts(body: Polyhedron, grasp: Grasp) -> list[tuple[str, str, str]]:
-    """List the figures of a grasp, each with its meaning."""
     kind = "faces" if body.patches is None else "patches"
     disc = f"{number(MILLI * grasp.radius)} mm" if grasp.radius else "none"
     return [
@@ -175,10 +169,6 @@ def as_text(data: object) -> str:
     """Write JSON that can stand inside a page: no HTML tag can begin in it."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
-def _data(shapes: Iterable[Shape], body: Polyhedron) -> list[dict[str, Any]]:
-    return [_shape(shape, body) for shape in shapes]
 
 
 def _shape(shape: Shape, body: Polyhedron) -> dict[str, Any]:

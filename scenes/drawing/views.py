@@ -43,16 +43,10 @@ class Extent(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alone:
-    """The extent of a grasp whose object is not known: a ball around its contacts."""
+    """The extent of what is drawn beside an object, as a ball around it."""
 
     center_of_mass: Array
     radius: float
-
-    @classmethod
-    def of_contacts(cls, positions: Array) -> Self:
-        """Measure contact points, (k, 3) [m]."""
-        mean = positions.mean(axis=0)
-        return cls(mean, float(np.linalg.norm(positions - mean, axis=1).max()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,9 +56,7 @@ class View:
     axes: Array
     """Unit vectors to the right, up and towards the viewer, (3, 3), rows."""
     center: Array
-    """The point that the camera looks at, (3,) [m]."""
     distance: float
-    """Distance of the camera from `center` [m]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axes", frozen(self.axes, (3, 3), "axes"))
@@ -106,18 +98,9 @@ def best_view(body: Polyhedron, grasp: Grasp) -> View:
 
 
 def edge_on(body: Polyhedron, axes: Array) -> Array:
-    """Return the share of an object's surface that is seen nearly as lines in each view, (n,).
-
-    Takes `axes` (n, 3, 3).
-    """
+    """Return the share of an object's surface that is seen nearly as lines in each view, (n,)."""
     areas = np.array([face.area for face in body.faces])
     return (np.abs(axes[:, 2] @ body.normals.T) < EDGE_ON) @ areas / areas.sum()
-
-
-def view_alone(extent: Extent, grasp: Grasp) -> View:
-    """Choose a view that keeps the contacts and fingers of a grasp apart."""
-    angles, _ = views_at(ELEVATIONS)
-    return _clearest(extent, grasp, np.zeros(len(angles)))
 
 
 def _clearest(body: Extent, grasp: Grasp, faults: Array) -> View:

@@ -57,7 +57,6 @@ TIP_MASS_KG = 0.05
 DAMPING_RATIO = 0.5
 """Damping ratio of the held object, unless stated: it overshoots once, by a sixth."""
 UPRIGHT = (0.0, 0.0, -1.0)
-"""Direction of gravity in the frame of an object that stands upright."""
 TOUCH = 1e-6
 """Depth of fingertips in their faces at the start, in object radii. Meshes are stored in single
 precision by the simulator, and a fingertip that does not touch yet would arrive with speed."""
@@ -118,11 +117,9 @@ class HeldLayout:
     inertia_kg_m2: Array
     """Inertia about the centre of mass, along the world axes, (3, 3) [kg m^2]."""
     contacts: Array
-    """Contact points, (k, 3) [m]."""
     frames: Array
     """Columns (inward normal, tangent, tangent) of each contact, (k, 3, 3)."""
     friction: Array
-    """Coulomb coefficients, (k,)."""
     squeeze: Array
     """Contact forces at rest, on the object, world axes, (k, 3) [N]."""
     axes: Array
@@ -132,10 +129,8 @@ class HeldLayout:
     damping: Array
     """Coefficients of the dampers beside the springs, (k, 3) [N s/m]."""
     tip_radius_m: Array
-    """Radii of the fingertips, (k,) [m]."""
     tip_mass_kg: float
     gravity: Array
-    """Acceleration of gravity, (3,) [m/s^2]."""
 
     @property
     def tip_names(self) -> tuple[str, ...]:
@@ -163,26 +158,17 @@ class HeldLayout:
         return self.tip_centers, self.tip_radius_m
 
     def joints(self, reached: Array) -> Array:
-        """Find where the joints of the fingers are.
-
-        Takes `reached` (k, 3) [m].
-        """
+        """Find where the joints of the fingers are."""
         return reached.ravel()
 
     def commands(self, shares: Array, reached: Array | None) -> Array:
-        """Find what the fingers are told, (n, joints).
-
-        Takes `shares` (n, 1) or (n, k); `reached` (k, 3) [m].
-        """
+        """Find what the fingers are told, (n, joints)."""
         base = 0.0 if reached is None else reached
         told = base + shares[:, :, None] * (self.pushes / self.stiffness)
         return told.reshape(len(shares), -1)
 
     def fingers_seen(self, joints: Array, loads: Array, turned: Array) -> FingersSeen:
-        """See what fingers did.
-
-        Takes `joints` (n, joints) [m]; `loads` (n, joints) [N]; `turned` (n, 3, 3).
-        """
+        """See what fingers did."""
         shape = (len(turned), *self.stiffness.shape)
         return FingersSeen(joints.reshape(shape), -loads.reshape(shape), None)
 
@@ -217,10 +203,7 @@ class HeldLayout:
 
     @property
     def fastest_tip(self) -> float:
-        """Return the largest rate at which a loose fingertip swings or comes to rest [1/s].
-
-        They are sqrt(k / m_t) and c / m_t of its springs and dampers.
-        """
+        """Return the largest rate at which a loose fingertip swings or comes to rest [1/s]."""
         swing = math.sqrt(self.stiffest / self.tip_mass_kg)
         return max(swing, float(self.damping.max()) / self.tip_mass_kg)
 
@@ -270,10 +253,7 @@ def held_layout(
 
 
 def _spring_axes(stiffness: Array, frames: Array) -> tuple[Array, Array]:
-    """Return axes in which each stiffness (k, 3, 3) is diagonal, and its diagonal, (k, 3).
-
-    They are the contact's own axes where the spring is as stiff in all directions.
-    """
+    """Return axes in which each stiffness (k, 3, 3) is diagonal, and its diagonal, (k, 3)."""
     values, vectors = np.linalg.eigh(stiffness)
     vectors[:, :, 0] *= np.sign(np.linalg.det(vectors))[:, None]
     alike = values[:, 2] - values[:, 0] <= ISOTROPIC * values[:, 2]

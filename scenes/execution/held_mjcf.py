@@ -25,12 +25,7 @@ from grasp_core.execution.grips import Grip
 from grasp_core.files.text_files import write_parts
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.execution.held import HeldLayout, HeldSettings, held_layout
-from scenes.mjcf_text import (
-    Element,
-    add_element,
-    document,
-    quaternion,
-)
+from scenes.mjcf_text import Element, add_element, document, quaternion
 from scenes.physics import PhysicsSettings, add_free_body, add_light, begin_scene
 
 PALM_ARMATURE = 1e7
@@ -38,14 +33,12 @@ PALM_ARMATURE = 1e7
 PALM_SHARE = 1e-3
 """Mass of the palm itself, relative to the object's: a moving body must have one."""
 FINGERTIPS, TABLE = 1, 2
-"""Bits of what may touch what: fingertips the surface, the table the hull."""
 AWAY = 100.0
 """Distance of the table until it is needed, in object radii."""
 TRUE_MASS = (
     "The object has its true mass and is under gravity. Start from the keyframe `squeeze`, whose "
     "commands make the fingers hold it; with commands of zero they do not push."
 )
-"""Comment at the top of every scene."""
 SPRINGS = ("a", "b", "c")
 """Endings of the names of a fingertip's three slides."""
 SAMPLE_S = 0.005

@@ -27,36 +27,6 @@ TOUCHING = 1e-9
 """How far the two may overlap along an axis and count as touching, in object radii."""
 
 
-class Surface:
-    """Triangles of a surface, found by where they are."""
-
-    def __init__(self, corners: Array, radius: float) -> None:
-        """Sort the triangles by their middles.
-
-        Takes `corners` (t, 3, 3) [m]; `radius` [m].
-        """
-        self.corners, self.slack = corners, TOUCHING * radius
-        middles = corners.mean(axis=1)
-        self.widest = float(np.linalg.norm(corners - middles[:, None], axis=2).max())
-        spatial: Any = importlib.import_module("scipy.spatial")
-        self.tree = spatial.KDTree(middles)
-
-    def clear_depth(self, base: Array, inward: Array, depth: float) -> float:
-        """Return the largest of depth, depth / 2, depth / 4, ... at which a pyramid is inside.
-
-        Args:
-            base: Corners of its base on the surface, (n, 3) [m].
-            inward: Unit normal of the base into the object, (3,).
-            depth: Depth to start from [m].
-        """
-        middle = base.mean(axis=0)
-        extent = float(np.linalg.norm(base - middle, axis=1).max())
-        near = self.tree.query_ball_point(middle, extent + depth + self.widest)
-        kernel = compiled("scenes.execution.clearance_kernel")
-        found = np.array(near, np.int64)
-        return float(kernel.clear_depth(base, inward, depth, self.corners, found, self.slack))
-
-
 SLOPE = 0.05
 """Depth of a pyramid per distance of its base's middle from the nearest edge."""
 THIN = 1e-5
@@ -71,8 +41,12 @@ def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, 
     """
     if is_convex(body):
         return (body.vertices - body.center_of_mass,)
-    surface = Surface(body.vertices[body.triangles] - body.center_of_mass, body.radius)
-    found, thin = list[Array](), THIN * body.radius
+    triangles = body.vertices[body.triangles] - body.center_of_mass
+    middles = triangles.mean(axis=1)
+    widest = float(np.linalg.norm(triangles - middles[:, None], axis=2).max())
+    spatial: Any = importlib.import_module("scipy.spatial")
+    tree, kernel = spatial.KDTree(middles), compiled("scenes.execution.clearance_kernel")
+    found, thin, slack = list[Array](), THIN * body.radius, TOUCHING * body.radius
     for corners, inward in _flat_pieces(body):
         middle = corners.mean(axis=0)
         extent = float(np.linalg.norm(corners - middle, axis=1).max())
@@ -80,7 +54,9 @@ def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, 
             continue
         width = _least_distance(corners, middle)
         if width > thin:
-            depth = surface.clear_depth(corners, inward, SLOPE * width)
+            depth = SLOPE * width
+            near_by = np.array(tree.query_ball_point(middle, extent + depth + widest), np.int64)
+            depth = float(kernel.clear_depth(corners, inward, depth, triangles, near_by, slack))
             found.append(np.vstack([corners, middle + depth * inward]))
     return tuple(found)
 

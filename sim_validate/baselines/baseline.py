@@ -1,15 +1,12 @@
 """Keeps what a baseline says: a header, the part, and a summary of the verdict on each grasp.
 
-A baseline is JSON that people can review: a header, then one line per grasp. A file of grasps holds
-the shape that they were planned on. Once a baseline is written on a changed part, that shape is
-neither the part of the baseline nor, in general, that of the next test. With the shape of the
-baseline at hand, moves of faces are measured from where they were when the baseline was written,
-which is what a user has accepted.
+A baseline is JSON that people can review: a header, then one line per grasp. Once it is written on
+a changed part, it holds that shape, so that moves of faces are measured from what was accepted.
 """
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path, PurePath
 from typing import Annotated, Any
@@ -34,20 +31,13 @@ from sim_validate.simulation.traces import Outcome
 from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 DIGITS = 12
-"""Number of decimal digits to which a baseline keeps numbers."""
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 Count = Annotated[int, Field(ge=0)]
 Size = Annotated[float, Field(ge=0.0)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Index = Annotated[int, Field(ge=0)]
-NUMBERS = (
-    "critical_friction", "simulated_critical_friction", "limit_n", "simulated_limit_n",
-    "displacement_m", "rotation_rad",
-)  # fmt: skip
-"""Names of the fields that hold measured numbers."""
 SCHEMA = 1
 MARK = '"grasps_file"'
-"""Text that stands in every baseline, and in no other file."""
 
 
 @dataclass(frozen=True, slots=True, config=STRICT)
@@ -58,11 +48,8 @@ class ExecutionEntry:
     """Why nothing was executed: no squeeze carries the weight; None if trials were run."""
     trials: Count
     lost: tuple[str, ...]
-    """Names of the trials that were not survived, in order."""
     controls: Count
-    """Number of the execution's negative controls, which must slip."""
     controls_let_go: Count
-    """Number of these controls that slipped, as they must."""
     load_multiple: Size | None
     """Multiple of the object's weight, in any direction, that the squeeze is certified for."""
     predicted_first_slip: Size | None
@@ -77,7 +64,6 @@ class ExecutionEntry:
     """Largest turn of the object against the palm [rad]."""
 
     def __post_init__(self) -> None:
-        """Refuse an entry whose numbers contradict each other."""
         if len(self.lost) > self.trials or self.controls_let_go > self.controls:
             raise ValueError(
                 "`lost` or `controls_let_go` counts more than `trials` or `controls` of the "
@@ -96,11 +82,11 @@ def execution_entry(grasp: ExecutedGrasp) -> ExecutionEntry:
     trials = () if found is None else found.trials
     controls = () if found is None else found.controls
 
-    def largest(values: Iterator[float]) -> float | None:
-        return rounded(max(values, default=None))
-
-    def least(values: Iterator[float]) -> float | None:
+    def least(values: Iterable[float]) -> float | None:
         return rounded(min(values, default=None))
+
+    def largest(values: Iterable[float]) -> float | None:
+        return rounded(max(values, default=None))
 
     return ExecutionEntry(
         reason=grasp.reason,
@@ -129,12 +115,9 @@ class RecordedPart:
     """The changed part that a baseline was written on."""
 
     planned_sha256: str
-    """Hash of the mesh that the grasps were planned on."""
     vertices_m: tuple[tuple[Finite, Finite, Finite], ...]
-    """Vertices of the changed part [m]."""
     triangles: tuple[tuple[Index, Index, Index], ...]
     surface: SurfaceRecord = SurfaceRecord()
-    """What is known of them."""
 
     def body(self, name: str, content_sha256: str) -> Polyhedron:
         """Build the part, with planar faces."""
@@ -175,19 +158,12 @@ class Entry:
 
     id: str
     contacts_sha256: str
-    """Hash of the contact positions and normals, in finger order."""
     outcome: Outcome
-    """`held`, or the outcome of the first wrench that was not held."""
     wrenches: Count
-    """Number of wrenches that were tested."""
     not_held: tuple[str, ...]
-    """Names of the wrenches that were not held, in order."""
     controls: Count
-    """Number of negative controls: contacts that must fail."""
     controls_let_go: Count
-    """Number of negative controls that were let go, as they must be."""
     mismatches: Count
-    """Number of ways in which simulation contradicts the analysis."""
     critical_friction: Size
     simulated_critical_friction: Size | None
     limit_n: Size
@@ -196,12 +172,9 @@ class Entry:
     simulated_limit_n: Size | None
     """Size of the largest wrench that is resisted in the weakest direction, in simulation [N]."""
     displacement_m: Size | None
-    """Largest motion of the object in any trial [m]."""
     rotation_rad: Size | None
     noisy_trials: Count
-    """Number of repeats with noise."""
     noisy_not_held: tuple[Count, ...]
-    """Indices of the repeats with noise in which the grasp did not hold."""
     noisy_close: tuple[Count, ...]
     """Indices of the repeats with noise whose load is very close to the largest that can be
     resisted."""
@@ -209,7 +182,6 @@ class Entry:
     """How the grasp was executed; None if that is not asked for, and then no file mentions it."""
 
     def __post_init__(self) -> None:
-        """Refuse an entry whose numbers contradict each other."""
         if self.held == bool(self.not_held):
             raise ValueError(
                 f"`outcome` {self.outcome.value} contradicts `not_held`, which is {self.not_held}"
@@ -228,33 +200,22 @@ class Entry:
         """Whether the grasp held every wrench."""
         return self.outcome is Outcome.HELD
 
-    @property
-    def noisy_held(self) -> int:
-        """Number of repeats with noise in which the grasp held."""
-        return self.noisy_trials - len(self.noisy_not_held)
-
 
 @dataclass(frozen=True, slots=True, config=STRICT)
 class Baseline:
     """Verdicts on the grasps of one object, and all settings and versions that they depend on."""
 
     grasps_file: str
-    """Path of the file of grasps, relative to the baseline's folder."""
     limit: Annotated[int, Field(ge=1)] | None
     """Number of grasps that are kept, the first ones of the file; None for all."""
     object: str
     content_sha256: str
-    """Hash of the object's mesh."""
     friction: Size
     planned_radius_m: Size | None
-    """Radius of the fingertips that the grasps were planned for, if any [m]."""
     settings: Mapping[str, Any]
-    """Settings of the simulation, and which trials were run."""
     versions: Mapping[str, str]
     arithmetic: str
-    """Hash that tells how the processor rounds."""
     entries: tuple[Entry, ...]
-    """Entries of the grasps, sorted by id."""
     unit: str | None = None
     """Unit of length of the mesh file; None where there is none, or it was not known, and then no
     file mentions it."""
@@ -266,14 +227,13 @@ class Baseline:
     and then no file mentions it."""
 
     def __post_init__(self) -> None:
-        """Refuse a baseline with two entries for one grasp."""
         if len({entry.id for entry in self.entries}) < len(self.entries):
             raise ValueError("two grasps of the baseline have the same id")
 
 
-def plain(entry: Entry | None) -> dict[str, Any] | None:
+def plain(entry: Entry) -> dict[str, Any]:
     """Turn an entry into plain values, which processes can send and any file can hold."""
-    return None if entry is None else to_jsonable_python(fields_of(entry))
+    return to_jsonable_python(fields_of(entry))
 
 
 def fields_of(entry: Entry) -> dict[str, Any]:
@@ -294,10 +254,7 @@ def properties_of(listed: Mapping[str, Any]) -> dict[str, Any]:
 def entry_of(
     grasp: Grasp, verdict: Verdict, radius_m: float, executed: ExecutedGrasp | None = None
 ) -> Entry:
-    """Summarise a verdict as an entry of a baseline.
-
-    Takes `radius_m` [m].
-    """
+    """Summarise a verdict as an entry of a baseline."""
     weakest = next(trial for trial in verdict.wrenches if trial.name == WEAKEST)
     predicted, simulated = _limits(weakest, radius_m)
     friction, repeats = verdict.critical_friction, verdict.robustness
@@ -329,7 +286,6 @@ def entry_of(
 
 
 def _limits(trial: WrenchVerdict, radius_m: float) -> tuple[float, float | None]:
-    """Compute the size of a trial's wrench at its limits, predicted and simulated [N]."""
     scaled = trial.wrench / np.array([1.0] * 3 + [radius_m] * 3)
     predicted = trial.predicted_limit * float(np.linalg.norm(scaled))
     found = trial.simulated_limit
@@ -360,29 +316,26 @@ def baseline_to_json(baseline: Baseline) -> str:
 def baseline_from_json(text: str, path: str) -> Baseline:
     """Parse the text of a baseline."""
     with about(path):
-        return _from_text(text)
-
-
-def _from_text(text: str) -> Baseline:
-    record = object_of(text, "baseline")
-    if "grasps_file" not in record:
-        raise InputError("expected a baseline, as `graspproof baseline record` writes it")
-    check_schema(record, SCHEMA)
-    del record["schema"]
-    # an empty list is refused, because it would check nothing
-    record["entries"] = record.pop("grasps", None) or None
-    try:
-        found = TypeAdapter(Baseline).validate_json(json.dumps(record))
-    except ValidationError as error:
-        said = complaint(error, Baseline)
-        raise InputError("grasps" + said.removeprefix("entries")
-                         if said.startswith("entries") else said) from error  # fmt: skip
-    if PurePath(found.grasps_file).is_absolute() or not found.grasps_file.isprintable():
-        raise InputError(
-            "grasps_file: expected a path relative to this baseline's folder, got "
-            f"{shown(found.grasps_file)}; name the file with --grasps"
-        )
-    return found
+        record = object_of(text, "baseline")
+        if "grasps_file" not in record:
+            raise InputError("expected a baseline, as `graspproof baseline record` writes it")
+        check_schema(record, SCHEMA)
+        del record["schema"]
+        # an empty list is refused, because it would check nothing
+        record["entries"] = record.pop("grasps", None) or None
+        try:
+            found = TypeAdapter(Baseline).validate_json(json.dumps(record))
+        except ValidationError as error:
+            said = complaint(error, Baseline)
+            if said.startswith("entries"):
+                said = "grasps" + said.removeprefix("entries")
+            raise InputError(said) from error
+        if PurePath(found.grasps_file).is_absolute() or not found.grasps_file.isprintable():
+            raise InputError(
+                "grasps_file: expected a path relative to this baseline's folder, got "
+                f"{shown(found.grasps_file)}; name the file with --grasps"
+            )
+        return found
 
 
 def read_baseline(path: Path) -> Baseline:

@@ -1,20 +1,20 @@
 """Simulates grasps, makes a baseline of the verdicts, and compares it with the recorded one."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from grasp_core.errors import InputError
 from grasp_core.provenance import arithmetic, versions
 from grasp_core.records.grasps_json import SavedGrasps
-from grasp_core.values import Grasp
 from sim_validate.baselines.baseline import Baseline, entry_of
 from sim_validate.baselines.compare import Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.part import Present
 from sim_validate.baselines.settings import How, settings_of
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
-from sim_validate.execution.settings import AskedExecution
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.parallel.processes import each, processes
 from sim_validate.simulation.gate import require_faithful
@@ -22,7 +22,10 @@ from sim_validate.validation.validation import Job, prepared, verdict_of
 from sim_validate.validation.verdict import Verdict
 
 Report = Callable[[int, int], None]
-"""Function that is called with (done, total) after each grasp."""
+
+
+def _silent(_: int, __: int) -> None:
+    pass
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,45 +33,43 @@ class Measured:
     """Verdicts on the grasps of a file, and the baseline made of them."""
 
     baseline: Baseline
-    """Baseline without the grasps that could not be simulated."""
     verdicts: Mapping[str, Verdict]
-    """Verdicts by the ids of their grasps."""
     refused: Mapping[str, str]
-    """Reasons why grasps could not be simulated, by id."""
     executions: Mapping[str, ExecutedGrasp] = field(default_factory=dict[str, ExecutedGrasp])
-    """Executions by the ids of their grasps; empty if none are asked for."""
 
 
 def measured(
-    saved: SavedGrasps, about: tuple[str, int | None], how: How, processors: int, report: Report
+    saved: SavedGrasps, about: tuple[str, int | None], how: How, processors: int = 1,
+    report: Report = _silent,
 ) -> Measured:  # fmt: skip
-    """Simulate grasps and make a baseline of their verdicts.
-
-    Takes `report` (done, total).
-    """
+    """Simulate grasps and make a baseline of their verdicts."""
     chosen = saved.grasps[: about[1]]
     if not chosen:
         raise InputError(f"{about[0]}: expected at least one grasp to simulate, found none")
     require_faithful(how.setup, saved.friction, saved.body.radius)
     jobs = [Job(saved.body, grasp, saved.friction, how.agenda, how.setup) for grasp in chosen]
-    executing = _executing(saved, chosen, how.execution)
+    executing = list[ExecutionJob]()
+    if how.execution is not None:
+        settings = how.execution.settings_for(saved.body)
+        executing = [
+            ExecutionJob(saved.body, grasp, saved.friction, settings, enough=False)
+            for grasp in chosen
+        ]
     total = len(jobs) + len(executing)
     verdicts, refused = dict[str, Verdict](), dict[str, str]()
     count = processes(len(jobs), processors)
-    for grasp, answer in zip(
-        chosen, each(_try, prepared(jobs, processors), jobs=count), strict=True
-    ):
+    judged = each(partial(_or_refusal, verdict_of), prepared(jobs, processors), jobs=count)
+    for grasp, answer in zip(chosen, judged, strict=True):
         if isinstance(answer, Verdict):
             verdicts[grasp.id] = answer
         else:
             refused[grasp.id] = answer
         report(len(verdicts) + len(refused), total)
     executions = dict[str, ExecutedGrasp]()
-    for done, (job, found) in enumerate(
-        zip(executing, each(_executed, executing, jobs=processors), strict=True), start=1
-    ):
+    answers = each(partial(_or_refusal, executed_grasp), executing, jobs=processors)
+    for done, (job, found) in enumerate(zip(executing, answers, strict=True), start=1):
         if isinstance(found, str):
-            refused.setdefault(job.grasp.id, found)
+            refused.setdefault(job.grasp.id, f"the execution is refused: {found}")
         else:
             executions[job.grasp.id] = found
         report(len(jobs) + done, total)
@@ -92,30 +93,12 @@ def measured(
     return Measured(kept, verdicts, refused, executions)
 
 
-def _executing(
-    saved: SavedGrasps, chosen: Sequence[Grasp], asked: AskedExecution | None
-) -> list[ExecutionJob]:
-    if asked is None:
-        return []
-    settings = asked.settings_for(saved.body)
-    return [
-        ExecutionJob(saved.body, grasp, saved.friction, settings, enough=False) for grasp in chosen
-    ]
-
-
-def _try(job: Job) -> Verdict | str:
+def _or_refusal(work: Callable[[Any], Any], job: Any) -> Any:
+    """Return what a job gives, or why it is refused."""
     try:
-        return verdict_of(job)
+        return work(job)
     except InputError as error:
         return str(error)
-
-
-def _executed(job: ExecutionJob) -> ExecutedGrasp | str:
-    """Execute one grasp, or say why it is refused."""
-    try:
-        return executed_grasp(job)
-    except InputError as error:
-        return f"the execution is refused: {error}"
 
 
 def complete(found: Measured, now: Present) -> Baseline:
@@ -127,10 +110,7 @@ def complete(found: Measured, now: Present) -> Baseline:
 
 
 def with_planned_fingers(how: How, before: Baseline, saved: SavedGrasps) -> How:
-    """Replace the fingertips of the setup by those that the grasps are planned for now.
-
-    A radius that was not the planned one when the baseline was recorded stays.
-    """
+    """Replace the fingertips of the setup by those that the grasps are planned for now."""
     fingers = how.setup.fingers
     if fingers.radius_m != before.planned_radius_m:
         return how
@@ -156,19 +136,12 @@ class Checked:
     how: str
     """How strictly results were compared, in words."""
 
-    @property
-    def verdicts(self) -> Mapping[str, Verdict]:
-        """Verdicts on the grasps that could be simulated, by id."""
-        return self.measured.verdicts
-
 
 def check(
-    before: Baseline, now: Present, where: str, how: How, processors: int, report: Report
-) -> Checked:
-    """Simulate grasps again and compare them with a baseline.
-
-    Takes `report` (done, total).
-    """
+    before: Baseline, now: Present, where: str, how: How, processors: int = 1,
+    report: Report = _silent,
+) -> Checked:  # fmt: skip
+    """Simulate grasps again and compare them with a baseline."""
     now = now.first(before.limit)
     how = with_planned_fingers(how, before, now.saved)
     if now.gone and not now.saved.grasps:
@@ -188,7 +161,7 @@ def check_one(before: Baseline, now: Present, where: str, how: How, name: str) -
     one = now.first(before.limit).only(name)
     kept = replace(before, entries=tuple(e for e in before.entries if e.id == name), limit=None)
     if one.saved.grasps or one.gone:
-        return check(kept, one, where, how, 1, silent)
+        return check(kept, one, where, how)
     gone = _nothing_measured(kept, one)
     return Checked(compare(kept, gone.baseline, carried=_carried(one)), gone, "")
 
@@ -210,16 +183,12 @@ def demanded(done: Checked) -> Checked:
 
     A grasp that has no entry now, or whose settings differ from the baseline's, stays as it is.
     """
-    return replace(done, findings=tuple(map(_surviving, done.findings)))
-
-
-def _surviving(finding: Finding) -> Finding:
-    now = None if finding.after is None else finding.after.execution
-    if now is None or now.survived or finding.status is Status.NOT_COMPARABLE:
-        return finding
-    why = "the grasp must survive its execution, but does not"
-    return replace(finding, status=Status.REGRESSED, reasons=(why, *finding.reasons))
-
-
-def silent(_: int, __: int) -> None:
-    """Ignore a report of progress."""
+    findings = list[Finding]()
+    for finding in done.findings:
+        now = None if finding.after is None else finding.after.execution
+        lost = now is not None and not now.survived
+        if lost and finding.status is not Status.NOT_COMPARABLE:
+            why = ("the grasp must survive its execution, but does not", *finding.reasons)
+            finding = replace(finding, status=Status.REGRESSED, reasons=why)
+        findings.append(finding)
+    return replace(done, findings=tuple(findings))

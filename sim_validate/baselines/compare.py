@@ -21,13 +21,11 @@ from sim_validate.execution.verdict import may_slip
 from sim_validate.simulation.traces import LET_GO, Outcome
 
 DIGITS_OF_CHANGE = 2
-"""Number of digits of a difference that the numbers before and after show."""
 LEAST_DIGITS = 4
-"""Least number of digits of a number that changed."""
 DECISIVE = ("graspproof", "mujoco", "machine")
-"""Packages and other components whose version may change any result."""
 ASIDE = "python"
-"""Component whose version changes no result."""
+PREDICTED = ("load_multiple", "predicted_first_slip")
+"""Numbers of an execution that the analysis gives."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +50,6 @@ class Bands:
     """Whether exactly the same repeats with noise must hold; otherwise repeats with a load close to
     the limit may change."""
     friction: float = 0.0
-    """Differences of critical frictions that never count, beside `least`."""
     same_part: bool = True
     """Whether the part is the same; on another one, other negative controls may exist."""
 
@@ -73,7 +70,7 @@ def differences(one: Entry, other: Entry, bands: Bands) -> tuple[Difference, ...
     return (
         *_of_wrenches(one, other),
         *_of_controls(one, other, bands),
-        *_of_numbers(one, other, bands),
+        *_of_numbers(one, other, _rows(bands)),
         *_of_repeats(one, other, bands),
         *_of_executions(one.execution, other.execution, bands),
     )
@@ -109,28 +106,44 @@ def _of_controls(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]
         yield Difference(text, worse=other.controls < one.controls, counts=bands.same_part)
 
 
-def _of_numbers(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
-    """Compare the measured numbers; a larger number is worse, except for wrench limits."""
-    rows = (
-        ("critical_friction", bands.predicted, bands.least + bands.friction, 1.0),
-        ("simulated_critical_friction", bands.simulated, bands.least + bands.friction, 1.0),
+Rows = tuple[tuple[str, float, float, float], ...]
+"""Name, relative and absolute band, and sign of each number: of 1 a larger number is worse."""
+
+
+def _rows(bands: Bands) -> Rows:
+    critical = bands.least + bands.friction
+    return (
+        ("critical_friction", bands.predicted, critical, 1.0),
+        ("simulated_critical_friction", bands.simulated, critical, 1.0),
         ("limit_n", bands.predicted, bands.least, -1.0),
         ("simulated_limit_n", bands.simulated, bands.least, -1.0),
         ("displacement_m", 0.0, bands.displacement_m, 1.0),
         ("rotation_rad", 0.0, bands.rotation_rad, 1.0),
     )
+
+
+def _of_numbers(
+    one: Entry | ExecutionEntry, other: Entry | ExecutionEntry, rows: Rows, aside: bool = False
+) -> Iterator[Difference]:
+    """Compare measured numbers; in executions None is infinite, so more than any number.
+
+    What an execution measures does not count where it is put aside.
+    """
+    execution = isinstance(one, ExecutionEntry)
     for name, relative, absolute, sign in rows:
         before, after = getattr(one, name), getattr(other, name)
         if before == after:
             continue
-        moved = name in ("displacement_m", "rotation_rad")
+        text, counts = f"{before} -> {after}", True
         if before is None or after is None:
-            yield Difference(f"{name}: {before} -> {after}", after is None, of_holding=moved)
-            continue
-        change = after - before
-        counts = not abs(change) <= relative * before + absolute
-        text = f"{name}: {_figures(before, after, relative * before + absolute)}"
-        yield Difference(text, sign * change > 0.0, counts=counts, of_holding=moved)
+            worse = (before if execution else after) is None
+        else:
+            band = relative * before + absolute
+            text, worse = _figures(before, after, band), sign * (after - before) > 0.0
+            counts = abs(after - before) > band and not (aside and name not in PREDICTED)
+        said = f"execution: {name}: {text}" if execution else f"{name}: {text}"
+        holding = not execution and name in ("displacement_m", "rotation_rad")
+        yield Difference(said, worse, counts, holding)
 
 
 def _figures(before: float, after: float, band: float) -> str:
@@ -180,42 +193,18 @@ def _of_executions(
     if before != after:
         text = f"execution: controls that did not slip: {before} -> {after}"
         yield Difference(text, worse=after > before)
-    yield from _of_execution_numbers(one, other, bands)
-
-
-def _of_execution_numbers(
-    one: ExecutionEntry, other: ExecutionEntry, bands: Bands
-) -> Iterator[Difference]:
-    """Compare measured numbers; a first slip of None is infinite, so more than any number.
-
-    How far a contact slides, once it slips, depends on rounding too much to count by itself.
-    """
-    if not (one.trials and other.trials):
-        return
-    slides = any(may_slip(entry.predicted_first_slip) for entry in (one, other))
-    rows = (
-        ("load_multiple", bands.predicted, bands.least, -1.0),
-        ("predicted_first_slip", bands.predicted, bands.least, -1.0),
-        ("simulated_first_slip", bands.simulated, bands.least, -1.0),
-        ("slip_m", 0.0, bands.displacement_m, 1.0),
-        ("displacement_m", 0.0, bands.displacement_m, 1.0),
-        ("turn_rad", 0.0, bands.rotation_rad, 1.0),
-    )
-    for name, relative, absolute, sign in rows:
-        before, after = getattr(one, name), getattr(other, name)
-        if before == after:
-            continue
-        if before is None or after is None:
-            yield Difference(f"execution: {name}: {before} -> {after}", worse=before is None)
-            continue
-        change = after - before
-        moved = name not in ("load_multiple", "predicted_first_slip")
-        counts = abs(change) > relative * before + absolute and not (
-            slides and moved and bands.grey > 0.0
+    if one.trials and other.trials:
+        # how far a contact slides, once it slips, depends on rounding too much to count by itself
+        slides = any(may_slip(entry.predicted_first_slip) for entry in (one, other))
+        rows = (
+            ("load_multiple", bands.predicted, bands.least, -1.0),
+            ("predicted_first_slip", bands.predicted, bands.least, -1.0),
+            ("simulated_first_slip", bands.simulated, bands.least, -1.0),
+            ("slip_m", 0.0, bands.displacement_m, 1.0),
+            ("displacement_m", 0.0, bands.displacement_m, 1.0),
+            ("turn_rad", 0.0, bands.rotation_rad, 1.0),
         )
-        figures = _figures(before, after, relative * before + absolute)
-        text = f"execution: {name}: {figures}"
-        yield Difference(text, sign * change > 0.0, counts=counts)
+        yield from _of_numbers(one, other, rows, aside=slides and bands.grey > 0.0)
 
 
 class Status(StrEnum):
@@ -223,17 +212,13 @@ class Status(StrEnum):
 
     SAME = "same"
     WITHIN = "within bands"
-    """Numbers differ only as much as other versions or processors make them differ."""
     GREY = "grey zone"
     """The verdict differs, on a grasp too close to its critical friction for a sure result."""
     IMPROVED = "improved"
     REGRESSED = "regressed"
     NOT_COMPARABLE = "not comparable"
-    """The object, the contacts or the settings differ, so the results cannot be compared."""
     MISSING = "missing"
-    """The grasp is in the baseline, but not among the present grasps."""
     NEW = "new"
-    """The grasp is among the present grasps, but not in the baseline."""
     GONE = "gone"
     """The part has changed, and the grasp does not exist on it: a contact has no place, or the
     contacts are no longer in force closure."""
@@ -251,7 +236,6 @@ WORDS = {
     Status.SAME: "same", Status.WITHIN: "same", Status.GREY: "same", Status.IMPROVED: "better",
     Status.REGRESSED: "worse",
 }  # fmt: skip
-"""What a grasp that was carried over to a changed part is called, by its status."""
 EXACT = Bands(
     predicted=1e-9, simulated=1e-9, least=0.0, displacement_m=1e-7, rotation_rad=1e-6,
     grey=0.0, exact=True,
@@ -280,9 +264,7 @@ class Carried:
     """What a comparison must know of a part that has changed since its grasps were planned."""
 
     change: str
-    """Which faces moved and by how much, in words."""
     gone: Mapping[str, str]
-    """Why grasps do not exist on the changed part, by id."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,9 +274,7 @@ class Finding:
     id: str
     status: Status
     reasons: tuple[str, ...] = ()
-    """Reasons for the status, one sentence each."""
     differences: tuple[str, ...] = ()
-    """Every difference from the baseline, one sentence each."""
     beyond: tuple[str, ...] = ()
     """Those of the differences that are beyond their bands."""
     before: Entry | None = None
@@ -309,16 +289,14 @@ def bands_between(
         bands = replace(OTHER_PART, friction=FRICTION_BAND * before.friction)
         return bands, "with the bands of a changed part"
     names = sorted({*before.versions, *after.versions} - {ASIDE})
+    changed = [name for name in names if before.versions.get(name) != after.versions.get(name)]
     others = [
-        f"{name} {before.versions.get(name)} -> {after.versions.get(name)}"
-        for name in names
-        if before.versions.get(name) != after.versions.get(name)
+        f"{name} {before.versions.get(name)} -> {after.versions.get(name)}" for name in changed
     ]
-    if any(name in DECISIVE and before.versions.get(name) != after.versions.get(name)
-           for name in names):  # fmt: skip
+    if any(name in DECISIVE for name in changed):
         return OTHER_VERSIONS, f"with the bands of other versions: {', '.join(others)}"
     if others or before.arithmetic != after.arithmetic:
-        why = ", ".join([*others, *(["another processor"] if not others else [])])
+        why = ", ".join(others) or "another processor"
         return OTHER_PROCESSOR, f"with the bands of rounding: {why}"
     return EXACT, "exactly"
 
@@ -331,7 +309,7 @@ def compare(
     bands, _ = bands_between(before, after, carried)
     other_part = _is_other_part(before, after)
     changed = tuple(_changed(before, after, carried))
-    known = _Known(before, changed, bands, carried if other_part else None)
+    moved = carried.change if carried is not None and other_part else None
     old = {entry.id: entry for entry in before.entries}
     new = {entry.id: entry for entry in after.entries}
     refused = refused or {}
@@ -340,46 +318,20 @@ def compare(
     for name in sorted({*old, *new, *refused, *gone}):
         one, other = old.get(name), new.get(name)
         if name in gone:
-            found.append(known.gone(name, one, gone[name]))
+            found.append(_gone(name, one, gone[name], changed, moved))
         elif one is not None and other is not None:
-            found.append(_compared(one, other, known))
-        elif name in refused:
-            status = Status.NOT_COMPARABLE if changed else Status.REGRESSED
-            why = (*changed, f"refused: {refused[name]}")
-            found.append(Finding(name, status, why, before=one, after=other))
-        elif other_part and carried is None:
-            found.append(Finding(name, Status.NOT_COMPARABLE, changed, before=one, after=other))
-        elif one is None:
-            reasons = ("not in the baseline",)
-            found.append(Finding(name, Status.NEW, reasons, before=one, after=other))
+            found.append(_compared(one, other, before.friction, bands, changed, moved))
         else:
-            reasons = ("in the baseline, but not among the grasps",)
-            found.append(Finding(name, Status.MISSING, reasons, before=one, after=other))
+            status, why = Status.MISSING, ("in the baseline, but not among the grasps",)
+            if name in refused:
+                status = Status.NOT_COMPARABLE if changed else Status.REGRESSED
+                why = (*changed, f"refused: {refused[name]}")
+            elif other_part and carried is None:
+                status, why = Status.NOT_COMPARABLE, changed
+            elif one is None:
+                status, why = Status.NEW, ("not in the baseline",)
+            found.append(Finding(name, status, why, before=one, after=other))
     return tuple(found)
-
-
-@dataclass(frozen=True, slots=True)
-class _Known:
-    """What is the same in the comparison of every grasp."""
-
-    before: Baseline
-    changed: tuple[str, ...]
-    """Reasons why no grasp can be compared."""
-    bands: Bands
-    carried: Carried | None
-    """How the part has changed since the baseline was recorded; None if it has not."""
-
-    def gone(self, name: str, one: Entry | None, why: str) -> Finding:
-        """Judge a grasp that does not exist on the part as it is now.
-
-        That is no change if it did not exist either when the baseline was recorded.
-        """
-        if self.carried is None and one is None:
-            return Finding(name, Status.SAME, (f"gone, as it was: {why}",))
-        if self.changed:
-            return Finding(name, Status.NOT_COMPARABLE, (*self.changed, why), before=one)
-        change = () if self.carried is None else (self.carried.change,)
-        return Finding(name, Status.GONE, (why, *change), before=one)
 
 
 def _is_other_part(before: Baseline, after: Baseline) -> bool:
@@ -387,16 +339,13 @@ def _is_other_part(before: Baseline, after: Baseline) -> bool:
 
 
 def _changed(before: Baseline, after: Baseline, carried: Carried | None) -> Iterator[str]:
-    """Yield the reasons why two baselines cannot be compared."""
     if carried is None and _is_other_part(before, after):
-        same = before.object == after.object
         named = f"{before.object} -> {after.object}"
-        if same:
-            named = (
-                f"{before.object} has another shape than in the baseline; write the baseline again "
-                "with --grasp-bless if that is meant"
-            )
-        yield f"the object is another one: {named}"
+        again = (
+            f"{before.object} has another shape than in the baseline; write the baseline again "
+            "with --grasp-bless if that is meant"
+        )
+        yield f"the object is another one: {again if before.object == after.object else named}"
     if before.friction != after.friction:
         yield f"friction: {before.friction} -> {after.friction}"
     if before.planned_radius_m != after.planned_radius_m:
@@ -415,38 +364,46 @@ def _settings_changed(where: str, before: Any, after: Any) -> Iterator[str]:
         yield f"{where}: {before} -> {after}"
 
 
-def _compared(one: Entry, other: Entry, known: _Known) -> Finding:
-    changed, bands = known.changed, known.bands
+def _gone(
+    name: str, one: Entry | None, why: str, changed: tuple[str, ...], moved: str | None
+) -> Finding:
+    """Judge a grasp that does not exist on the part, which has moved since the baseline or not.
+
+    That is no change if it did not exist either when the baseline was recorded.
+    """
+    if moved is None and one is None:
+        return Finding(name, Status.SAME, (f"gone, as it was: {why}",))
+    if changed:
+        return Finding(name, Status.NOT_COMPARABLE, (*changed, why), before=one)
+    return Finding(name, Status.GONE, (why,) if moved is None else (why, moved), before=one)
+
+
+def _compared(
+    one: Entry, other: Entry, friction: float, bands: Bands, changed: tuple[str, ...],
+    moved: str | None,
+) -> Finding:  # fmt: skip
     every = differences(one, other, bands)
     texts = tuple(each.text for each in every)
     beyond = tuple(each.text for each in every if each.counts)
-    if known.carried is None and one.contacts_sha256 != other.contacts_sha256:
+    if moved is None and one.contacts_sha256 != other.contacts_sha256:
         changed = (*changed, "the contacts are others")
     if changed:
         return Finding(one.id, Status.NOT_COMPARABLE, changed, texts, beyond, one, other)
-    grey = _is_grey(one, other, known.before.friction, bands)
+    brink = abs(friction - one.critical_friction) <= bands.grey * friction
+    decided = all(entry.outcome in (Outcome.HELD, *LET_GO) for entry in (one, other))
+    grey = brink and decided and one.held != other.held
     counting = [each for each in every if each.counts and not (grey and each.of_holding)]
-    status = _status(counting, grey=grey, same=one == other)
+    if any(each.worse for each in counting):
+        status = Status.REGRESSED
+    elif grey:
+        status = Status.GREY
+    elif counting:
+        status = Status.IMPROVED
+    else:
+        status = Status.SAME if one == other else Status.WITHIN
     reasons = tuple(each.text for each in counting if each.worse is (status is Status.REGRESSED))
     if status is Status.GREY:
         reasons = (f"{one.outcome} -> {other.outcome}, at its critical friction",)
-    if known.carried is not None:
-        reasons = (f"{WORDS[status]} on the changed part: {known.carried.change}", *reasons)
+    if moved is not None:
+        reasons = (f"{WORDS[status]} on the changed part: {moved}", *reasons)
     return Finding(one.id, status, reasons, texts, beyond, one, other)
-
-
-def _status(counting: list[Difference], *, grey: bool, same: bool) -> Status:
-    if any(each.worse for each in counting):
-        return Status.REGRESSED
-    if grey:
-        return Status.GREY
-    if counting:
-        return Status.IMPROVED
-    return Status.SAME if same else Status.WITHIN
-
-
-def _is_grey(one: Entry, other: Entry, friction: float, bands: Bands) -> bool:
-    """Tell whether a verdict changed on a grasp that is close to its critical friction."""
-    brink = abs(friction - one.critical_friction) <= bands.grey * friction
-    decided = all(entry.outcome in (Outcome.HELD, *LET_GO) for entry in (one, other))
-    return brink and decided and one.held != other.held

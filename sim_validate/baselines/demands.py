@@ -13,6 +13,7 @@ from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines.explain import not_survived, unstable
 from sim_validate.baselines.part import TABLE, Source, if_changed, present, source_of
+from sim_validate.baselines.settings import check_names
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp
@@ -22,7 +23,6 @@ from sim_validate.validation.validation import validate
 from sim_validate.validation.verdict import Verdict
 
 FRICTION = 0.5
-"""Friction of grasps for which the test gives none."""
 SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit", "scale")
 
 
@@ -66,12 +66,7 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
             f"@pytest.mark.grasp takes the path of one file of grasps, got {list(args)}"
         )
     known = ("friction", TABLE) if args else SETTINGS
-    for name in settings:
-        if name not in known:
-            beside = " beside a file of grasps" if args else ""
-            raise InputError(
-                f"@pytest.mark.grasp has no setting {name!r}{beside}; it takes {', '.join(known)}"
-            )
+    check_names(settings, known, "@pytest.mark.grasp")
     friction = _number(settings.get("friction", FRICTION))
     if args:
         return _cases_of_file(folder, folder / args[0], settings)
@@ -83,7 +78,6 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
 
 
 def _cases_of_file(folder: Path, path: Path, settings: Mapping[str, Any]) -> list[GraspCase]:
-    """Read the grasps of a file, and carry them over to their part as it is now."""
     saved = read_grasps(path)
     friction = _number(settings.get("friction", saved.friction))
     _check_any(saved.grasps, saved.body, friction)
@@ -122,7 +116,6 @@ def _planned(body: Polyhedron, wanted: Mapping[str, Any]) -> Sequence[Grasp]:
 
 
 def _body(folder: Path, wanted: dict[str, Any]) -> Polyhedron:
-    """Load the object, and remove its settings from the wanted ones."""
     name = wanted.pop("object", None)
     lengths = {each: wanted.pop(each) for each in ("unit", "scale") if each in wanted}
     if not isinstance(name, str):
@@ -141,9 +134,7 @@ class Demands:
     """
 
     wrenches: Sequence[NamedWrench] = ()
-    """Wrenches that the grasp must hold in full."""
     trials: int = 0
-    """Number of repeats with noise."""
     noise: Noise = field(default_factory=Noise)
     min_pass_rate: float = 0.0
     """Least share of the repeats with noise in which the grasp must hold."""
@@ -152,7 +143,6 @@ class Demands:
     random_wrenches: int = 0
     seed: int = 0
     setup: Setup = field(default_factory=Setup)
-    """How trials are simulated."""
 
     def __post_init__(self) -> None:
         for name, most in (("min_pass_rate", 1.0), ("min_margin", LARGEST_FRICTION)):
@@ -170,18 +160,12 @@ class Demands:
 
 def demands_of(asked: Mapping[str, Any]) -> Demands:
     """Build the demands from the arguments of a test."""
-    known = [each.name for each in fields(Demands)]
-    for name in asked:
-        if name not in known:
-            raise InputError(f"assert_stable has no argument {name!r}; it takes {', '.join(known)}")
+    check_names(asked, [each.name for each in fields(Demands)], "assert_stable")
     return Demands(**asked)
 
 
 def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:
-    """Simulate a grasp, and say in what it falls short of the demands.
-
-    Gives the verdict, and sentences on what the grasp lacks, empty if it meets all demands.
-    """
+    """Simulate a grasp, and say in what it falls short of the demands."""
     agenda = Agenda(
         random_wrenches=demands.random_wrenches,
         wrenches=tuple(demands.wrenches),
@@ -197,7 +181,6 @@ def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:
 
 
 def _lacking(verdict: Verdict, demands: Demands) -> Iterator[str]:
-    """Yield the demands that are not met."""
     found = verdict.robustness
     if found is not None and found.held < demands.min_pass_rate * len(found.trials):
         lower, upper = found.interval
@@ -217,10 +200,7 @@ def _lacking(verdict: Verdict, demands: Demands) -> Iterator[str]:
 def survival(
     given: Sequence[Any], friction: float | None, settings: ExecutionSettings | None
 ) -> tuple[GraspCase, ExecutedGrasp, str]:
-    """Execute a grasp, and say why it does not survive.
-
-    Gives the case, its execution, and sentences on what went wrong, empty if the object survived.
-    """
+    """Execute a grasp, and say why it does not survive."""
     if settings is None and given:
         given, settings = given[:-1], given[-1]
     if not isinstance(settings, ExecutionSettings):

@@ -10,13 +10,14 @@ from sim_validate.baselines.check import Checked
 from sim_validate.baselines.compare import WORDS, Status
 from sim_validate.baselines.part import Present
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, losses_in_words
+from sim_validate.simulation.setup import AXIS_NAMES, WEAKEST
 from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 
 def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
     """Explain a change: prediction, simulation, baseline, and commands to run next."""
     (finding,) = done.findings
-    verdict, how = done.verdicts.get(finding.id), done.how
+    verdict, how = done.measured.verdicts.get(finding.id), done.how
     executed = done.measured.executions.get(finding.id)
     lines = [f"{finding.id}: {finding.status.value}", *(f"  {why}" for why in finding.reasons)]
     lines += [f"  {text}" for text in finding.beyond if text not in finding.reasons]
@@ -27,7 +28,17 @@ def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
     if failed is not None:
         lines.append(f"  first wrench that was not held: {in_words(failed)}")
     lines += [f"  {not_survived(executed)}"] if executed and not_survived(executed) else []
-    at = None if verdict is None else "" if failed is None else failed.name
+    # `validate` knows no wrenches beside these: the others stand in the baseline's own settings
+    known = (
+        [""]
+        if verdict is not None and failed is None
+        else [
+            each.name
+            for each in (verdict.failures if verdict is not None else ())
+            if each.name in (*AXIS_NAMES, WEAKEST)
+        ]
+    )
+    at = known[0] if known else None
     return "\n".join([*lines, *_next_steps(finding.id, at, files, now)])
 
 
@@ -42,8 +53,7 @@ def passing(done: Checked, now: Present) -> str:
     said += f" {WORDS.get(finding.status, finding.status.value)}"
     if finding.status is Status.IMPROVED:
         said += f" than in the baseline: {'; '.join(finding.beyond)}"
-    touched = now.moves.touched(now.planned_faces(finding.id))
-    return f"{said}; touches {touched}" if touched else said
+    return said
 
 
 def written(path: Path, baseline: Baseline, now: Present) -> str:
@@ -56,7 +66,6 @@ def written(path: Path, baseline: Baseline, now: Present) -> str:
 
 
 def _next_steps(name: str, at: str | None, files: tuple[Path, Path], now: Present) -> Iterator[str]:
-    """Yield the commands that show a grasp, and that check all of them."""
     baseline, grasps = (shlex.quote(str(path)) for path in files)
     chosen = f" --wrench={shlex.quote(at)}" if at else ""
     check = f"  all of them: graspproof baseline check {baseline} --grasps {grasps}"
@@ -74,7 +83,6 @@ def _next_steps(name: str, at: str | None, files: tuple[Path, Path], now: Presen
 
 
 def _to_see(name: str, chosen: str, grasps: str) -> str:
-    """Return the commands that simulate a grasp, and then one of its trials with a clip."""
     which = f"--grasp {shlex.quote(name)}{chosen} --grasps {grasps}"
     return (
         f"  to see it: graspproof validate {grasps} --out seen; "
@@ -108,30 +116,26 @@ def _numbers(title: str, entry: Entry) -> Iterator[str]:
     yield f"  {title}: {entry.outcome}{failed}" + (
         "" if moved is None else f", moved {moved:.2g} m"
     )
-    critical = _both(entry.critical_friction, entry.simulated_critical_friction, "")
-    yield f"    critical friction {critical}"
-    yield f"    weakest wrench {_both(entry.limit_n, entry.simulated_limit_n, ' N')}"
+    for name, predicted, simulated, unit in (
+        ("critical friction", entry.critical_friction, entry.simulated_critical_friction, ""),
+        ("weakest wrench", entry.limit_n, entry.simulated_limit_n, " N"),
+    ):
+        found = "not measured in simulation"
+        found = found if simulated is None else f"{simulated:.4g}{unit} simulated"
+        yield f"    {name} {predicted:.4g}{unit} predicted, {found}"
     if entry.noisy_trials:
-        yield f"    with noise {entry.noisy_held} of {entry.noisy_trials} held"
-    if (found := entry.execution) is not None:
-        lost = f"lost {', '.join(found.lost)}" if found.lost else found.reason
-        yield f"    executed: {'survived' if found.survived else lost or 'no trial is possible'}"
-        slips = (found.predicted_first_slip, found.simulated_first_slip)
+        held = entry.noisy_trials - len(entry.noisy_not_held)
+        yield f"    with noise {held} of {entry.noisy_trials} held"
+    if (executed := entry.execution) is not None:
+        lost = f"lost {', '.join(executed.lost)}" if executed.lost else executed.reason
+        yield f"    executed: {'survived' if executed.survived else lost or 'no trial is possible'}"
+        slips = (executed.predicted_first_slip, executed.simulated_first_slip)
         said = ["none" if slip is None else f"{slip:.4g} times the load" for slip in slips]
         yield f"    first slip predicted: {said[0]}; simulated: {said[1]}"
 
 
-def _both(predicted: float, simulated: float | None, unit: str) -> str:
-    """Write a number as predicted and as simulated."""
-    said = "not measured in simulation" if simulated is None else f"{simulated:.4g}{unit} simulated"
-    return f"{predicted:.4g}{unit} predicted, {said}"
-
-
 def not_survived(grasp: ExecutedGrasp) -> str:
-    """Say why a grasp does not survive its execution: trials, numbers, predictions.
-
-    Gives lines about the grasp; empty if it survived every trial and every control slipped.
-    """
+    """Say why a grasp does not survive its execution: trials, numbers, predictions."""
     found = grasp.execution
     if found is None:
         return f"{grasp.id} was not executed: {grasp.reason}"

@@ -1,16 +1,12 @@
 """Carries grasps over to their part as it is now, if its mesh file has changed since planning.
 
-What is tested is the part on the disk, not the one that the file of grasps remembers, so that a
-change does not pass unnoticed. The file counts as unchanged if its bytes are those that were
-planned from, or if it gives the same solid in some unit: comments, line ends and the order of
-vertices do not count. Grasps keep their ids, so that each is compared with its own entry of the
-baseline. Whoever wants every change to be refused says so.
-
-Faces are called by their numbers on the planned part, because ids of grasps are made of these.
+A mesh file counts as unchanged if its bytes are those that were planned from, or if it gives the
+same solid in some unit. Grasps keep their ids, so that each is compared with its own entry of the
+baseline; faces are called by their numbers on the planned part, of which ids are made.
 """
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -23,27 +19,23 @@ from grasp_core.files.text_files import read_bytes
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.records.grasps_json import RECORDED, SavedGrasps
-from grasp_core.transferring.changed_part import (
-    fitting_lengths,
-    fitting_unit,
-    load_changed_part,
-)
+from grasp_core.transferring.changed_part import fitting_lengths, fitting_unit, load_changed_part
 from grasp_core.transferring.face_changes import (
     ANGLE_DEG,
     FaceChange,
-    Likeness,
     added_faces,
     changes_in_words,
     check_planar,
     face_changes,
     likeness,
 )
-from grasp_core.transferring.transfer import Transfer, transfer
+from grasp_core.transferring.transfer import CarriedGrasp, Transfer, transfer
+from grasp_core.values import Grasp
 from sim_validate.baselines.baseline import Baseline, RecordedPart, recorded_part
+from sim_validate.baselines.settings import check_names
 
 NOTE, FAIL = "note", "fail"
 TABLE = "changed_part"
-"""Name of the table of `IfChanged` in a `*.grasps.toml` file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +80,6 @@ class IfChanged:
 
 
 CARRY = IfChanged()
-KNOWN = tuple(each.name for each in fields(IfChanged))
 
 
 def if_changed(table: object) -> IfChanged:
@@ -96,11 +87,7 @@ def if_changed(table: object) -> IfChanged:
     if not isinstance(table, Mapping):
         raise InputError(f"{TABLE}: expected a table of settings, got {shown(table)}")
     given = {**cast("Mapping[str, Any]", table)}
-    for name in given:
-        if name not in KNOWN:
-            raise InputError(
-                f"{TABLE}: no setting is named {shown(name)}; choose from {', '.join(KNOWN)}"
-            )
+    check_names(given, [each.name for each in fields(IfChanged)], TABLE)
     return settings_of(IfChanged, given, [TABLE])
 
 
@@ -118,36 +105,6 @@ class Moves:
     since: str = ""
     """Since when, such as ` since its baseline was written`; empty for planning."""
 
-    @property
-    def in_words(self) -> str:
-        """Say in one line which faces moved and by how much."""
-        return changes_in_words(self.faces, self.added, self.numbers)
-
-    def touched(self, faces: Iterable[int]) -> str:
-        """Say which of some faces moved, such as `face 3, which moved`; empty if none did."""
-        wanted = {*faces}
-        names = (
-            change.old if self.numbers is None else self.numbers.get(change.old)
-            for change in self.faces
-            if change.moved
-        )
-        moved = sorted(name for name in names if name in wanted)
-        many = "face" if len(moved) == 1 else "faces"
-        return f"{many} {', '.join(map(str, moved))}, which moved" if moved else ""
-
-
-def moves_since_baseline(
-    then: Polyhedron, planned: Polyhedron, now: Polyhedron, rule: Likeness
-) -> Moves:
-    """Compare a part with what it was when its baseline was written."""
-    numbers = {
-        change.new: change.old
-        for change in face_changes(planned, then, rule)
-        if change.new is not None
-    }
-    found = face_changes(then, now, rule)
-    return Moves(found, added_faces(found, now), numbers, " since its baseline was written")
-
 
 @dataclass(frozen=True, slots=True)
 class Source:
@@ -156,7 +113,6 @@ class Source:
     file: Path | None = None
     """Path of the mesh file; None if it was not found, or the grasps come from no file."""
     note: str = ""
-    """A sentence that says the mesh file was not found; empty otherwise."""
     changed: bool = False
     """Whether the file holds another solid than the one that was planned on."""
     unit: str = ""
@@ -237,7 +193,6 @@ class Present:
     unit: str = ""
     """Unit of length of the changed part's file; empty where the part is as it was."""
     asked: IfChanged = CARRY
-    """What to do if the part has changed."""
     recorded_unit: str | None = None
     """Unit of the mesh file when the baseline was written; None if that is not known."""
     since: Moves | None = None
@@ -257,16 +212,21 @@ class Present:
     @property
     def gone(self) -> dict[str, str]:
         """Return why grasps of the file do not exist on the changed part, by id."""
-        found = () if self.carried is None else self.carried.grasps
-        return {each.old.id: each.reason for each in found if each.grasp is None}
+        return {each.old.id: each.reason for each in self._moved if each.grasp is None}
+
+    @property
+    def _moved(self) -> tuple[CarriedGrasp, ...]:
+        return () if self.carried is None else self.carried.grasps
 
     @property
     def change(self) -> str:
         """Say which faces moved and by how much; empty where the part is as it was."""
-        if self.source.file is None or not (self.moves.faces or self.rescaled):
+        moves = self.moves
+        if self.source.file is None or not (moves.faces or self.rescaled):
             return ""
-        said = [self.rescaled, self.moves.in_words if self.moves.faces else "no face moved"]
-        return f"{self.source.file} has changed{self.moves.since}: {'; '.join(filter(None, said))}"
+        words = changes_in_words(moves.faces, moves.added, moves.numbers) if moves.faces else ""
+        said = [self.rescaled, words or "no face moved"]
+        return f"{self.source.file} has changed{moves.since}: {'; '.join(filter(None, said))}"
 
     @property
     def rescaled(self) -> str:
@@ -322,30 +282,24 @@ class Present:
 
     def id_on_part(self, name: str) -> str | None:
         """Return the id that a grasp of the file has on the changed part; None if it is gone."""
-        found = () if self.carried is None else self.carried.grasps
-        return next((each.grasp.id for each in found if each.old.id == name and each.grasp), None)
+        named = (each.grasp for each in self._moved if each.old.id == name)
+        return next((grasp.id for grasp in named if grasp), None)
 
-    def planned_faces(self, name: str) -> tuple[int, ...]:
-        """Return the faces of the planned part that a grasp of the file touches."""
-        grasps = self.saved.grasps if self.carried is None else [e.old for e in self.carried.grasps]
-        return next((grasp.faces for grasp in grasps if grasp.id == name), ())
+    @property
+    def _planned_grasps(self) -> Sequence[Grasp]:
+        return self.saved.grasps if self.carried is None else [each.old for each in self._moved]
 
     def first(self, limit: int | None) -> "Present":
         """Return only the first grasps of the file, up to a limit."""
-        if self.carried is None:
-            return replace(self, saved=replace(self.saved, grasps=self.saved.grasps[:limit]))
-        kept = self.carried.grasps[:limit]
-        return self._with(replace(self.carried, grasps=kept))
+        return self.only(*(grasp.id for grasp in self._planned_grasps[:limit]))
 
-    def only(self, name: str) -> "Present":
-        """Return only the grasp with an id; none if the file has no such grasp."""
+    def only(self, *names: str) -> "Present":
+        """Return only the grasps with these ids, of those that the file has."""
         if self.carried is None:
-            one = tuple(grasp for grasp in self.saved.grasps if grasp.id == name)
-            return replace(self, saved=replace(self.saved, grasps=one))
-        kept = tuple(each for each in self.carried.grasps if each.old.id == name)
-        return self._with(replace(self.carried, grasps=kept))
-
-    def _with(self, carried: Transfer) -> "Present":
+            chosen = tuple(grasp for grasp in self.saved.grasps if grasp.id in names)
+            return replace(self, saved=replace(self.saved, grasps=chosen))
+        kept = tuple(each for each in self._moved if each.old.id in names)
+        carried = replace(self.carried, grasps=kept)
         return replace(self, saved=_tested(self.saved, carried), carried=carried)
 
     def against(self, before: Baseline) -> "Present":
@@ -363,7 +317,14 @@ class Present:
             return found
         rule = likeness(planned, self.asked.distance_m, self.asked.angle_deg)
         then = part.body(planned.name, before.content_sha256)
-        return replace(found, since=moves_since_baseline(then, planned, now, rule))
+        numbers = {
+            change.new: change.old
+            for change in face_changes(planned, then, rule)
+            if change.new is not None
+        }
+        faces = face_changes(then, now, rule)
+        since = Moves(faces, added_faces(faces, now), numbers, " since its baseline was written")
+        return replace(found, since=since)
 
 
 def present(saved: SavedGrasps, path: Path, source: Source, asked: IfChanged = CARRY) -> Present:
@@ -407,7 +368,6 @@ def _carried(saved: SavedGrasps, path: Path, file: Path, asked: IfChanged) -> tu
 
 
 def _tested(saved: SavedGrasps, carried: Transfer) -> SavedGrasps:
-    """Return the carried grasps with their old ids."""
     grasps = tuple(
         replace(each.grasp, id=each.old.id) for each in carried.grasps if each.grasp is not None
     )

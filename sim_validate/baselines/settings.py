@@ -1,6 +1,6 @@
 """Reads and writes the simulation settings and the choice of trials in a baseline's file."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,15 +11,11 @@ from pydantic_core import to_jsonable_python
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import complaint, shown
+from grasp_core.files.json_text import settings_of as read_settings
 from grasp_core.records.grasps_json import SavedGrasps
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface
-from sim_validate.execution.settings import (
-    TABLE,
-    AskedExecution,
-    asked_execution,
-    execution_table,
-)
+from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution, execution_table
 from sim_validate.records.setup_toml import setup_from_file, setup_from_tables, tables_of
 from sim_validate.simulation.setup import (
     Agenda,
@@ -34,8 +30,6 @@ Count = Annotated[int, Field(ge=0)]
 
 
 class _Settings(BaseModel):
-    """The simulation settings in a baseline's file."""
-
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     setup: dict[str, Any]
@@ -56,7 +50,6 @@ class How:
     setup: Setup
     agenda: Agenda
     execution: AskedExecution | None = None
-    """How the grasps are executed besides; None to leave it out."""
 
 
 def settings_of(how: How) -> dict[str, Any]:
@@ -99,15 +92,17 @@ def of_settings(settings: Mapping[str, Any], path: str) -> How:
 
 def noise_from_table(given: Mapping[str, Any]) -> Noise:
     """Build noise settings from some of their fields."""
-    known = [each.name for each in fields(Noise)]
-    for name, value in given.items():
+    check_names(given, [each.name for each in fields(Noise)], "noise")
+    return read_settings(Noise, given, ["noise"])
+
+
+def check_names(given: Mapping[str, Any], known: Collection[str], where: str) -> None:
+    """Refuse a setting that does not exist."""
+    for name in given:
         if name not in known:
             raise InputError(
-                f"noise: no field is named {shown(name)}; choose from {', '.join(known)}"
+                f"{where}: no setting is named {shown(name)}; choose from {', '.join(known)}"
             )
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise InputError(f"noise.{name}: expected a number, got {shown(value)}")
-    return Noise(**given)
 
 
 def setup_for(saved: SavedGrasps, path: Path | None) -> Setup:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import place, shown
+from grasp_core.files.json_text import shown
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.baseline import Baseline, check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import (
@@ -20,7 +20,6 @@ from sim_validate.baselines.check import (
     demanded,
     measured,
     seen_from,
-    silent,
     with_planned_fingers,
 )
 from sim_validate.baselines.part import (
@@ -34,7 +33,13 @@ from sim_validate.baselines.part import (
     testable,
 )
 from sim_validate.baselines.part import TABLE as CHANGED
-from sim_validate.baselines.settings import How, noise_from_table, of_settings, setup_for
+from sim_validate.baselines.settings import (
+    How,
+    check_names,
+    noise_from_table,
+    of_settings,
+    setup_for,
+)
 from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution
 from sim_validate.files.toml_tables import read_tables
 from sim_validate.records.grasps import read_grasps
@@ -47,7 +52,6 @@ KINDS: Mapping[str, type] = {
     "limits": str, "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
     "survives": bool, "execution": dict, "changed_part": dict,
 }  # fmt: skip
-"""Types of the file's settings, by name."""
 WORDS = {str: "text", bool: "true or false", int: "a whole number", dict: "a table"}
 PATHS = ("grasps", "object", "baseline", "setup", "wrenches")
 DIRECT = ("limits", "random_wrenches", "trials", "seed")
@@ -59,19 +63,14 @@ class Suite:
     """Grasps that must stay as stable as they were; a setting of None is the baseline's."""
 
     path: Path
-    """Path of the `*.grasps.toml` file itself."""
     grasps: Path
-    """Path of the grasps.json."""
     baseline: Path
     object: Path | None = None
     """The mesh file that the grasps were planned from; None to search beside them for the object's
     name."""
     strict: bool = False
-    """Whether improved grasps fail, too."""
     setup: Path | None = None
-    """TOML file of simulation settings."""
     wrenches: Path | None = None
-    """JSON file of wrenches that each grasp must hold in full."""
     limits: str | None = None
     """How the largest multiple of each wrench is found in simulation."""
     random_wrenches: int | None = None
@@ -80,11 +79,8 @@ class Suite:
     noise: Noise | None = None
     seed: int | None = None
     survives: bool = False
-    """Whether each grasp must survive its execution, whatever the baseline says."""
     execution: AskedExecution | None = None
-    """How grasps are executed besides."""
     changed_part: IfChanged = CARRY
-    """What to do if the part has changed since the grasps were planned."""
 
     @cached_property
     def saved(self) -> SavedGrasps:
@@ -156,13 +152,12 @@ class Suite:
         if before is not None:
             how = with_planned_fingers(how, before, now.saved)
         limit = before and before.limit
-        done = measured(testable(now, limit), (self.where, limit), how, 1, silent)
+        done = measured(testable(now, limit), (self.where, limit), how)
         found = complete(done, now)
         write_baseline(self.baseline, found)
         return found
 
     def _kept_if_any(self) -> Baseline | None:
-        """Read the baseline that will be overwritten, if it exists."""
         try:
             return self.kept if self.baseline.is_file() else None
         except InputError as error:
@@ -198,32 +193,25 @@ def suite_from_toml(path: Path) -> Suite:
 
 def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
     """Build a suite from the settings of a `*.grasps.toml` file."""
-    _check(given, path)
     usual = path.name.removesuffix(ENDING) + ".baseline.json"
-    settings: dict[str, Any] = {"baseline": usual, **given}
-    for name in PATHS:
-        if name in settings:
-            settings[name] = path.parent / settings[name]
     tables = {"noise": noise_from_table, TABLE: asked_execution, CHANGED: if_changed}
     with about(path):
-        for name, read in tables.items():
-            if name in settings:
-                settings[name] = read(settings[name])
+        _check(given)
+        settings: dict[str, Any] = {"baseline": usual, **given}
+        settings |= {name: path.parent / settings[name] for name in PATHS if name in settings}
+        settings |= {name: read(given[name]) for name, read in tables.items() if name in given}
     return Suite(path=path, **settings)
 
 
-def _check(given: Mapping[str, Any], path: Path) -> None:
+def _check(given: Mapping[str, Any]) -> None:
+    check_names(given, KINDS, "the file")
     for name, value in given.items():
-        kind = KINDS.get(name)
-        if kind is None:
-            raise InputError(
-                f"{path}: {place([name])}: no such setting; there are {', '.join(KINDS)}"
-            )
+        kind = KINDS[name]
         if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-            raise InputError(f"{path}: {name}: expected {WORDS[kind]}, got {shown(value)}")
-        if name in PATHS and not str(value).isprintable():
-            raise InputError(f"{path}: {name}: expected the path of a file, got {shown(value)}")
+            raise InputError(f"{name}: expected {WORDS[kind]}, got {shown(value)}")
+        if name in PATHS and not value.isprintable():
+            raise InputError(f"{name}: expected the path of a file, got {shown(value)}")
         if kind is int and value < 0:
-            raise InputError(f"{path}: {name}: expected 0 or more, got {value}")
+            raise InputError(f"{name}: expected 0 or more, got {value}")
     if "grasps" not in given:
-        raise InputError(f"{path}: grasps: expected the path of a grasps.json")
+        raise InputError("grasps: expected the path of a grasps.json")

@@ -227,9 +227,6 @@ class Report:
     """Folder of a run, with its grasps.json; or a folder of such folders."""
     limit: Count | None = None
     """Draw only this many grasps per run, those with problems before others; if not given, all."""
-    every_copy: bool = False
-    """Draw every grasp. If not given, grasps that a symmetry of the object makes from one another
-    share a card and one set of pictures."""
     clips: Annotated[int, at_least(0, up_to=MOST_COUNT)] = 0
     """Number of grasps per run of which clips of trials are made, those with problems first, if
     graphics are available."""

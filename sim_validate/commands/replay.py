@@ -3,10 +3,8 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
-
 from grasp_core.files.text_files import write_text
-from scenes.drawing.clips import RATE, GraphicsError, magnified, write_clip
+from scenes.drawing.clips import GraphicsError, write_trial_clip
 from scenes.mjcf import write_scene
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
@@ -17,8 +15,6 @@ from sim_validate.replaying import Recorded, Replayed, Wanted, recorded_in, repl
 SHOWN = 12
 """Number of rows of the motion that are shown; the trace file has all of them."""
 MICRO = 1e6
-SLOWER = 1.0 / (RATE * 0.01)
-"""Factor by which clips are slower than reality; a clip shows ten milliseconds in each frame."""
 
 
 def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
@@ -65,13 +61,9 @@ def _written(found: Replayed, command: command_flags.Replay, reporter: Reporter)
     folder.mkdir(parents=True, exist_ok=True)
     yield write_scene(found.scene, folder / "scene.xml")
     yield write_text(folder / "trace.csv", trace_text(found))
-    known = np.isfinite(found.watched.joints).all(axis=1)
-    joints, factor = magnified(found.watched.joints[known], found.scene)
-    motion = f"motion {factor:g} times as large" if factor > 1.0 else "true to scale"
-    motion += f", {SLOWER:g} times slower"
-    caption = f"{found.name}: {found.hold.outcome.value}, {motion}"
+    name = f"{found.name}: {found.hold.outcome.value}"
     try:
-        yield write_clip(found.scene, joints, folder / "clip.gif", caption)
+        yield write_trial_clip(found.scene, found.watched.joints, folder / "clip.gif", name)
     except GraphicsError as error:
         reporter.warn(f"no clip: {error}")
     reporter.say(f"wrote {folder}")

@@ -8,13 +8,16 @@ from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.shells import SMALL
 from grasp_core.transferring.changed_part import SURE_GROWTH, given_center, growth
-from grasp_core.transferring.face_changes import (check_planar)
-from grasp_core.transferring.transfer import (CHANGES, CarriedGrasp, Change, GraspFigures, Transfer, transfer)
-from sim_validate.cli import (flag_groups)
-from grasp_core.transferring.judging import (CHANGES, Change, GraspFigures)
-from grasp_core.transferring.like_faces import (check_planar)
-from grasp_core.transferring.transfer import (CarriedGrasp, Transfer, transfer)
-from sim_validate.cli import (command_flags, flag_groups)
+from grasp_core.transferring.face_changes import check_planar
+from grasp_core.transferring.transfer import (
+    CHANGES,
+    CarriedGrasp,
+    Change,
+    GraspFigures,
+    Transfer,
+    transfer,
+)
+from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.objects import load_object, saved_grasps

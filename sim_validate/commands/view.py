@@ -139,7 +139,6 @@ def shown_report(asked: command_flags.Report, reporter: Reporter) -> Report:
             jobs=asked.jobs,
             limit=asked.limit,
             clips=asked.clips,
-            every_copy=asked.every_copy,
             progress=steps.update,
             ready=say_ready,
         )

@@ -72,11 +72,10 @@ def _best() -> None:
 
 
 def _clearance() -> None:
-    from scenes.execution.surface import Surface
+    from scenes.execution.surface import touched_solids
 
-    body = example_object("tetrahedron")
-    corners = body.vertices[body.triangles]
-    Surface(corners, body.radius).clear_depth(corners[0], body.normals[0], body.radius)
+    body = example_object("l-bracket")
+    touched_solids(body, body.vertices[:1], body.radius)
 
 
 def _hand_checks() -> None:

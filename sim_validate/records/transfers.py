@@ -6,11 +6,16 @@ from grasp_core.files.json_text import text_of
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.provenance import versions
 from grasp_core.records.grasps_json import SavedGrasps, plan_to_json
-from grasp_core.transferring.face_changes import (FaceChange)
-from grasp_core.transferring.transfer import (FRICTION_BAND, QUALITY_BAND, CarriedContact, CarriedGrasp, GraspFigures, Transfer)
-from sim_validate.records.fields import (object_record)
-from grasp_core.transferring.judging import (FRICTION_BAND, QUALITY_BAND, GraspFigures)
-from grasp_core.transferring.transfer import (CarriedContact, CarriedGrasp, Transfer)
+from grasp_core.transferring.face_changes import FaceChange
+from grasp_core.transferring.transfer import (
+    FRICTION_BAND,
+    QUALITY_BAND,
+    CarriedContact,
+    CarriedGrasp,
+    GraspFigures,
+    Transfer,
+)
+from sim_validate.records.fields import object_record
 
 TRANSFER = "transfer.json"
 """Name of the file in a folder of results."""

@@ -1,9 +1,8 @@
 """Compares verdicts with the analysis: pairs of predicted and simulated numbers, counts of trials.
 
-Four counts say whether a load was predicted to be resisted, and whether the object held. A trial
-that was predicted to hold and did not, or the reverse, contradicts the analysis or the simulation.
-As in `validate`, neither is counted for loads within `AGREEMENT` of their limit and for trials that
-prove nothing, such as those that diverged.
+A trial that was predicted to hold and did not, or the reverse, contradicts the analysis or the
+simulation. As in `validate`, neither is counted for loads within `AGREEMENT` of their limit and for
+trials that prove nothing, such as those that diverged.
 """
 
 import math
@@ -18,7 +17,6 @@ from sim_validate.simulation.traces import LET_GO, Outcome
 from sim_validate.validation.verdict import AGREEMENT
 
 Record = Mapping[str, Any]
-"""An object of a JSON file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +24,7 @@ class Agreement:
     """Predicted and simulated values of one quantity, such as the critical friction."""
 
     quantity: str
-    """Name of the quantity, with its unit."""
     pairs: tuple[tuple[float, float], ...]
-    """Pairs of a predicted and a simulated value."""
     below: int = 0
     """Number of grasps that held even at the least friction tried, so no value was found."""
 
@@ -52,7 +48,6 @@ class Quadrants:
     not_resisted_held: int = 0
     not_resisted_let_go: int = 0
     neither: int = 0
-    """Number of trials that do not count, because they diverged or are too near the limit."""
 
 
 def frictions_in(verdicts: Iterable[Record]) -> Agreement:
@@ -116,7 +111,6 @@ def _place(trial: Record, wanted: bool | None) -> str:
 HELD = Outcome.HELD.value
 GONE = tuple(outcome.value for outcome in LET_GO)
 GOOD, BAD, QUIET = "good", "bad", "quiet"
-"""Kinds of verdict, which are also the style classes of the pages."""
 
 
 def said_of(verdict: Record | None) -> tuple[str, str]:

@@ -1,8 +1,7 @@
 """Draws one grasp: its picture and the charts of its page; any process can do the work.
 
-Charts of motion need a trial. The first trial that was not held, or else the weakest wrench, is
-simulated again. This gives bit for bit the motion that was judged, unless the trial was stopped
-early. Clips of an executed grasp show its lift, its worst shake, and a trial in which it slipped.
+Charts of motion need a trial: the first that was not held, or else the weakest wrench, is simulated
+again.
 """
 
 from collections.abc import Sequence
@@ -12,11 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.errors import InputError
+from grasp_core.errors import about
 from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import ContactRegion, Grasp, four
-from scenes.drawing.clips import GraphicsError, magnified, write_clip
+from scenes.drawing.clips import GraphicsError, write_trial_clip
 from scenes.drawing.hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
 from scenes.drawing.sheets import svg_of
@@ -25,7 +24,7 @@ from scenes.fingertips import FingerSettings
 from sim_validate.execution.jobs import ExecutionJob, film, worth_seeing
 from sim_validate.files.result_folders import CLIPS, PICTURES
 from sim_validate.records.executions import EXECUTIONS, Executions
-from sim_validate.replaying import Replayed, Wanted, of_verdict, replayed
+from sim_validate.replaying import Wanted, of_verdict, replayed
 from sim_validate.reports.agreement import Record
 from sim_validate.reports.charts.margin_charts import margin_panels
 from sim_validate.reports.charts.motion_charts import motion_panels
@@ -39,23 +38,17 @@ class Task:
     """A grasp to draw, in a form that can be sent to another process."""
 
     saved: SavedGrasps
-    """The grasp and its object."""
     friction: float
     verdict: Record | None
     regions: Record | None
-    """Record of the grasp's certified regions, if it has any."""
     executions: Executions | None
-    """The execution of this grasp alone, if it was executed."""
     held: PosedHand | None
     """The hand in the grasp; None if there is none, or it does not reach the grasp."""
     source: Path
     """Path of the file with the verdict, which error messages name."""
     folder: Path
-    """Folder of the report."""
     name: str
-    """Beginning of the names of the grasp's files."""
     clip: bool
-    """Whether to draw clips of trials, too."""
 
     @property
     def grasp(self) -> Grasp:
@@ -69,7 +62,6 @@ class FilmedTrial:
 
     path: str
     trial: str
-    """Name of the trial."""
     fate: str
 
 
@@ -88,10 +80,8 @@ class Drawn:
     """Panels of the chart of motion; none if no trial was simulated."""
     clip: str | None = None
     trial: str = ""
-    """Name of the wrench in the trial that is shown."""
     outcome: str = ""
     executed: tuple[FilmedTrial, ...] = ()
-    """Clips of the execution's trials."""
     no_clip: str = ""
     """Reason why no clip could be drawn; empty if there is a clip or none was asked for."""
 
@@ -163,25 +153,18 @@ def _with_motion(task: Task, verdict: Record, drawn: Drawn) -> Drawn:
     drawn = replace(
         drawn, motion=tuple(map(svg_of, panels)), trial=found.name, outcome=found.hold.outcome.value
     )
-    return _with_clip(task, found, drawn) if task.clip else drawn
-
-
-def _with_clip(task: Task, found: Replayed, drawn: Drawn) -> Drawn:
+    if not task.clip:
+        return drawn
     path = task.folder / CLIPS / f"{task.name}.webp"
-    known = np.isfinite(found.watched.joints).all(axis=1)
-    if not known.any():
-        return replace(drawn, no_clip=f"{task.name}: nothing finite to draw")
-    joints, factor = magnified(found.watched.joints[known], found.scene)
-    caption = f"{found.name}: {found.hold.outcome.value}, motion {factor:g} times as large"
+    name = f"{found.name}: {drawn.outcome}"
     try:
-        write_clip(found.scene, joints, path, caption)
+        write_trial_clip(found.scene, found.watched.joints, path, name)
     except GraphicsError as error:
         return replace(drawn, no_clip=str(error))
     return replace(drawn, clip=f"{CLIPS}/{path.name}")
 
 
 def _with_executed(task: Task, executions: Executions, drawn: Drawn) -> Drawn:
-    """Film the trials of an execution in which something can be seen."""
     (found,) = executions.grasps
     if found.execution is None:
         return drawn
@@ -194,11 +177,10 @@ def _with_executed(task: Task, executions: Executions, drawn: Drawn) -> Drawn:
     for place, trial in enumerate(worth_seeing(found.execution)):
         path = task.folder / CLIPS / f"{task.name}-executed-{place}.webp"
         try:
-            film(job, trial.name, path)
+            with about(f"{task.source.with_name(EXECUTIONS)}: {found.id}"):
+                film(job, trial.name, path)
         except GraphicsError as error:
             return replace(drawn, no_clip=str(error))
-        except InputError as error:
-            raise InputError(f"{task.source.with_name(EXECUTIONS)}: {found.id}: {error}") from error
         filmed.append(FilmedTrial(f"{CLIPS}/{path.name}", trial.name, trial.fate))
     return replace(drawn, executed=tuple(filmed))
 

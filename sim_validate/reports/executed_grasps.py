@@ -4,7 +4,6 @@ import math
 import shlex
 from collections.abc import Iterable
 from dataclasses import asdict
-from operator import attrgetter
 from typing import cast
 
 import numpy as np
@@ -22,16 +21,10 @@ from sim_validate.records.executions import Executions, executions_summary
 from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record, said_of
 
 MILLI = 1e3
-FLAGS = {
-    "mass_kg": "mass-kg", "push_n": "push-n", "stiffness_n_per_m": "tip-stiffness-n-per-m",
-    "tip_radius_m": "tip-radius-m", "hand.tip_mass_kg": "tip-mass-kg",
-    "hand.damping_ratio": "damping-ratio", "hand.down": "down", "trials": "trials",
-    "lift_m": "lift-m", "lift_s": "lift-s", "shake_g": "shake-g", "shake_hz": "shake-hz",
-    "stop_m_per_s2": "stop-m-per-s2", "stop_from_m_per_s": "stop-from-m-per-s",
-    "knock_n_s": "knock-n-s", "off_mm": "off-mm", "off_deg": "off-deg",
-    "misplacements": "misplacements", "seed": "seed", "most_mm": "max-mm", "most_deg": "max-deg",
+OTHER_FLAGS = {
+    "stiffness_n_per_m": "tip-stiffness-n-per-m", "most_mm": "max-mm", "most_deg": "max-deg",
 }  # fmt: skip
-"""Flag of `graspproof execute` for each setting."""
+"""Flags of `graspproof execute` that are not named as their settings."""
 ALWAYS = ("mass_kg", "seed")
 """Settings whose usual value depends on the object or on the plan."""
 FAILED, LOST = "failed", "lost"
@@ -77,11 +70,12 @@ def execution_row(found: ExecutedGrasp | None) -> Record:
     said, tone = said_of_execution(found)
     execution = None if found is None else found.execution
     trials = () if execution is None else execution.trials
+    least = 0.0 if found is None else found.least_predicted_loss
     return {
         "said": said,
         "tone": tone,
         "loss": _slip(None if execution is None else execution.least_predicted_loss),
-        "least_loss": _in_scripts(0.0 if found is None else found.least_predicted_loss),
+        "least_loss": "Infinity" if math.isinf(least) else f"{least:.6g}",  # as scripts read it
         "payload": number(None if execution is None else execution.payload_kg, 3),
         "multiple": number(None if execution is None else execution.load_multiple, 3),
         "survived": f"{sum(trial.survived for trial in trials)} of {len(trials)}",
@@ -115,12 +109,17 @@ def described_executions(executions: Executions) -> str:
 def execution_settings(executions: Executions) -> Iterable[tuple[str, str]]:
     """Yield names and values of everything that the executions of a run were asked for."""
     yield "execution.friction", f"{executions.friction:g}"
-    for name, value in asdict(executions.settings).items():
-        if isinstance(value, dict):
-            inner = cast("dict[str, object]", value)
-            yield from ((f"execution.{name}.{each}", str(own)) for each, own in inner.items())
-        else:
-            yield f"execution.{name}", str(value)
+    for name, value in _flat(executions.settings).items():
+        yield f"execution.{name}", str(value)
+
+
+def _flat(settings: ExecutionSettings) -> dict[str, object]:
+    """Return the settings by name, those of the hand in their place."""
+    found = dict[str, object]()
+    for name, value in asdict(settings).items():
+        inside = {f"hand.{each}": own for each, own in value.items()} if name == "hand" else {}
+        found |= inside or {name: value}
+    return found
 
 
 def execution_section(executions: Executions | None, found: ExecutedGrasp | None) -> Record | None:
@@ -151,17 +150,14 @@ def execution_section(executions: Executions | None, found: ExecutedGrasp | None
 
 
 def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
-    """Write the shell command that executes a grasp again, with the same settings.
-
-    The simulator's own settings are no flags, so the command takes the usual ones.
-    """
+    """Write the shell command that executes a grasp again, with the same settings."""
     words = ["graspproof", "execute", path, "--grasp", grasp_id]
     words += ["--friction", repr(executions.friction)]
-    usual = ExecutionSettings(executions.settings.mass_kg).used
-    for name, flag in FLAGS.items():
-        value = attrgetter(name)(executions.settings)
-        if name in ALWAYS or value != attrgetter(name)(usual):
-            words += [f"--{flag}", *_words(value)]
+    usual = _flat(ExecutionSettings(executions.settings.mass_kg).used)
+    for name, value in _flat(executions.settings).items():
+        if name in ALWAYS or value != usual[name]:
+            own = name.removeprefix("hand.")
+            words += [f"--{OTHER_FLAGS.get(own, own.replace('_', '-'))}", *_words(value)]
     return shlex.join(words)
 
 
@@ -176,7 +172,6 @@ def _words(value: object) -> list[str]:
 
 
 def _facts(executions: Executions, found: Execution | None) -> Iterable[tuple[str, str]]:
-    """Yield names and values of what the fingers and the object were, and of the squeeze."""
     settings = executions.settings
     yield "Mass", f"{settings.mass_kg:.4g} kg, at friction {executions.friction:g}"
     yield "Push of a finger", f"at most {settings.push_n:.4g} N"
@@ -219,13 +214,7 @@ def _trial(trial: ExecutionTrial, settings: ExecutionSettings) -> Record:
     }
 
 
-def _in_scripts(multiple: float) -> str:
-    """Write a multiple of a load as scripts of the page read it."""
-    return "Infinity" if math.isinf(multiple) else f"{multiple:.6g}"
-
-
 def _slip(multiple: float | None) -> str:
-    """Write the multiple of a load at which a contact slips."""
     if multiple is None:
         return NOTHING
     return NEVER if math.isinf(multiple) else f"{multiple:.2f}"

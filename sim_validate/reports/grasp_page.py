@@ -24,10 +24,7 @@ from sim_validate.reports.run_folder import GRASPS, RunFolder
 MILLI, MICRO, PERCENT = 1e3, 1e6, 100.0
 ROTATED, MIRRORED = "rotated", "mirrored"
 """Kinds of copies of a grasp, as the pages call them."""
-DRAW_ALL = "graspproof report . --every-copy"
-"""Command that draws copies, too."""
 Fact: TypeAlias = tuple[str, str, str]
-"""Name, value and meaning of a measured number."""
 FAMILIES = {
     "concurrent": "the lines of force meet in one point",
     "pencil": "two pairs of lines, which meet in points of a common line",
@@ -55,7 +52,6 @@ MOTIONS = (
         "before that, at high friction: the fingers give way a little",
     ),
 )  # fmt: skip
-"""Names, fields and meanings of the two motions that a page tells."""
 MEASURES = {
     "ferrari-canny": ("Ferrari-Canny quality", " N"),
     "weight": ("weight held in every orientation, for normal forces of sum 1 N", " N"),
@@ -63,14 +59,6 @@ MEASURES = {
 }
 """What each measure of the best grasp says of a grasp, and its unit."""
 FOCUS = "where lines of force meet, in the object's frame"
-
-
-@dataclass(frozen=True, slots=True)
-class Neighbours:
-    """The pages of the previous and the next grasp; None at either end."""
-
-    before: str | None = None
-    after: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,26 +72,20 @@ class Copy:
     """`ROTATED`, or `MIRRORED` if only a reflection makes it."""
 
 
-@dataclass(frozen=True, slots=True)
-class Kin:
-    """The grasps that symmetries of the object make from a grasp, or the one that it is made from.
-
-    Either is empty.
-    """
-
-    copies: tuple[Copy, ...] = ()
-    first: Copy | None = None
-    """The grasp that stands for its copies and has pictures; its `kind` is that of this copy."""
-
-
 def grasp_page(
-    run: RunFolder, grasp: Grasp, drawn: Drawn | None, object_script: str, neighbours: Neighbours,
-    kin: Kin = Kin(),
+    run: RunFolder, grasp: Grasp, object_script: str, drawn: Drawn | None = None, *,
+    neighbours: tuple[str | None, str | None] = (None, None), copies: Sequence[Copy] = (),
+    first: Copy | None = None,
 ) -> str:  # fmt: skip
-    """Write the text of the page about one grasp."""
+    """Write the text of the page about one grasp.
+
+    It leads to the pages before and after it. A grasp that is drawn has copies by symmetry; of
+    these, `first` is the one that is drawn, with the kind of this copy.
+    """
     verdict = run.verdicts.get(grasp.id)
     shown = certified(grasp, run.shaded.get(grasp.id))
     said, tone = said_of_both(verdict, run.executions, run.executed(grasp.id))
+    size = None if verdict is None else verdict["settings"]["grasp_size_m"]
     return page(
         "grasp.html",
         grasp=grasp,
@@ -113,9 +95,10 @@ def grasp_page(
         verdict=verdict,
         verdict_text=said,
         tone=tone,
-        before=neighbours.before,
-        after=neighbours.after,
-        kin=kin,
+        before=neighbours[0],
+        after=neighbours[1],
+        copies=copies,
+        first=first,
         drawn=drawn,
         push=largest_push(verdict),
         executed=execution_section(run.executions, run.executed(grasp.id)),
@@ -125,10 +108,13 @@ def grasp_page(
         facts=list(_facts(run, grasp, verdict)),
         contacts=list(_contacts(shown)),
         certified=_certified(run, grasp),
-        sizes=_sizes(run, verdict),
+        sizes={  # by which torques are divided: the object's radius, the grasp's size
+            "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
+            "grasp": NOTHING if size is None else f"{number(MILLI * size, 3)} mm",
+        },
         trials=[] if verdict is None else [_trial(verdict, each) for each in verdict["wrenches"]],
         controls=[] if verdict is None else _controls(verdict["controls"]),
-        commands=[*_commands(run, grasp, verdict), *([DRAW_ALL] if kin.first else [])],
+        commands=list(_commands(run, grasp, verdict)),
         drawing=as_text(
             grasp_data(run.saved.body, shown, run.friction, held_in(run.reaches, grasp))
         ),
@@ -136,7 +122,6 @@ def grasp_page(
 
 
 def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[Fact]:
-    """Yield the measured numbers of the page's list."""
     planned = run.saved.friction
     at_plan = "" if planned == run.friction else f", at friction {planned:g} as planned"
     yield "Family", grasp.family, FAMILIES[grasp.family]
@@ -177,7 +162,6 @@ def possible_facts(best: BestFile | None, grasp: str) -> Iterable[Fact]:
 
 
 def _measured(verdict: Record) -> Iterable[Fact]:
-    """Yield what the simulation found."""
     for name, field, meaning in MOTIONS:
         moved = [trial.get(field) for trial in verdict["wrenches"]]
         known = [MICRO * each for each in moved if each is not None]
@@ -220,15 +204,6 @@ def _certified(run: RunFolder, grasp: Grasp) -> str:
     )
 
 
-def _sizes(run: RunFolder, verdict: Record | None) -> Record:
-    """Write the lengths by which torques are divided: the object's radius, the grasp's size."""
-    size = None if verdict is None else verdict["settings"]["grasp_size_m"]
-    return {
-        "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
-        "grasp": NOTHING if size is None else f"{number(MILLI * size, 3)} mm",
-    }
-
-
 def _trial(verdict: Record, trial: Record) -> Record:
     moved, size = trial["displacement_m"], wrench_size(verdict, trial)
     limit, found = trial["predicted_limit"], trial["simulated_limit"]
@@ -262,7 +237,6 @@ def _controls(controls: Record) -> Sequence[Record]:
 
 
 def _commands(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[str]:
-    """Yield shell commands that show the grasp, and that simulate it again."""
     asked = f"--grasp {shlex.quote(grasp.id)}"
     other = "" if run.friction == run.saved.friction else f" --friction {run.friction:g}"
     yield f"graspproof view {GRASPS} {asked}{other}"

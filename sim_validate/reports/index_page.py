@@ -10,9 +10,7 @@ from grasp_core.values import Grasp
 from scenes.drawing.pages import number
 from scenes.drawing.sheets import svg_of
 from sim_validate.records.best import BestFile, shares_of_bound
-from sim_validate.records.executions import Executions
 from sim_validate.reports.agreement import (
-    Agreement,
     Record,
     frictions_in,
     let_go,
@@ -42,7 +40,6 @@ from sim_validate.reports.reached_grasps import (
 from sim_validate.reports.run_folder import RunFolder
 
 ROWS = 20
-"""Largest number of grasps in the table of the possible."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +53,7 @@ class Shown:
     copies: tuple[Copy, ...] = ()
 
 
-def cards_of(run: RunFolder, *, every_copy: bool) -> tuple[Copies, ...]:
+def cards_of(run: RunFolder) -> tuple[Copies, ...]:
     """Sort the grasps of a run into cards: each is a grasp and those that symmetries make of it.
 
     Only grasps whose tests ended alike share a card, so that no problem is hidden behind another
@@ -65,8 +62,6 @@ def cards_of(run: RunFolder, *, every_copy: bool) -> tuple[Copies, ...]:
     Gives places of the grasps in the run, by card, in the order of the cards' first grasps.
     """
     grasps = run.saved.grasps
-    if every_copy:
-        return tuple(map(Copies, range(len(grasps))))
     ended: dict[object, list[int]] = {}
     for place, grasp in enumerate(grasps):
         found = run.executed(grasp.id)
@@ -86,9 +81,11 @@ def cards_of(run: RunFolder, *, every_copy: bool) -> tuple[Copies, ...]:
 
 def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int = 0) -> str:
     """Write the text of the report's first page."""
-    verdicts = all_verdicts(runs)
+    verdicts = [verdict for run in runs for verdict in run.verdicts.values()]
+    executed = [run.executions for run in runs if run.executions and run.executions.grasps]
     cards = [_card(each) for each in shown]
-    found = agreements(verdicts)
+    frictions, limits = frictions_in(verdicts), limits_in(verdicts)
+    found = [frictions, limits] if limits.pairs else [frictions]
     return page(
         "index.html",
         names=", ".join(dict.fromkeys(run.saved.body.name for run in runs)),
@@ -105,21 +102,28 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         quadrants=quadrants_in(verdicts),
         agreements=found,
         fidelity=list(map(svg_of, fidelity_panels(found))) if verdicts else [],
-        limits=any(each.pairs for each in found[1:]),
+        limits=bool(limits.pairs),
         mismatches=[f"{each['id']}: {line}" for each in verdicts for line in each["mismatches"]],
         controls=_controls(verdicts),
-        executions=_executions(all_executions(runs)),
-        judged=[row for run in runs for row in _judged(run)],
+        executions={
+            "runs": [described_executions(each) for each in executed],
+            "sentence": survival_sentence(executed),
+            "chart": svg_of(survival_sheet(executed)),
+        } if executed else None,
+        judged=[
+            {"name": name, "object": run.saved.body.name, **counts}
+            for run in runs if run.judgements is not None
+            for name, counts in run.judgements["summary"].items()
+        ],
         possible=[
             {"object": run.saved.body.name, **found}
             for run in runs
             if (found := _described_possible(run.possible)) is not None
         ],
-    )
+    )  # fmt: skip
 
 
 def _described_possible(best: BestFile | None) -> Record | None:
-    """Build the section about the best grasp and the bound; None where nothing was bounded."""
     if best is None:
         return None
     (what, unit), bound, name = MEASURES[best["measure"]], best["bound"], best["grasp"]["id"]
@@ -139,42 +143,6 @@ def _described_possible(best: BestFile | None) -> Record | None:
         ],
         "more": max(0, len(ranked) - ROWS),
     }
-
-
-def _judged(run: RunFolder) -> Iterable[Record]:
-    """Yield what each published test says of the grasps of a run, for a row of a table."""
-    if run.judgements is None:
-        return
-    summary: Record = run.judgements["summary"]
-    for name, counts in summary.items():
-        yield {"name": name, "object": run.saved.body.name, **counts}
-
-
-def all_verdicts(runs: Iterable[RunFolder]) -> list[Record]:
-    """List the verdicts of several runs, in order."""
-    return [verdict for run in runs for verdict in run.verdicts.values()]
-
-
-def all_executions(runs: Iterable[RunFolder]) -> list[Executions]:
-    """List the executions of several runs, in order, where there are any."""
-    found = [run.executions for run in runs if run.executions is not None]
-    return [executions for executions in found if executions.grasps]
-
-
-def _executions(executed: Sequence[Executions]) -> Record | None:
-    if not executed:
-        return None
-    return {
-        "runs": [described_executions(each) for each in executed],
-        "sentence": survival_sentence(executed),
-        "chart": svg_of(survival_sheet(executed)),
-    }
-
-
-def agreements(verdicts: Sequence[Record]) -> list[Agreement]:
-    """Compare predicted and simulated critical frictions and, if simulated, largest wrenches."""
-    frictions, limits = frictions_in(verdicts), limits_in(verdicts)
-    return [frictions, limits] if limits.pairs else [frictions]
 
 
 def _card(shown: Shown) -> dict[str, Any]:
@@ -262,7 +230,6 @@ def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
 
 
 def _controls(verdicts: Sequence[Record]) -> list[dict[str, Any]]:
-    """Count the negative controls of each kind that were let go, held, or undecided."""
     kinds = dict[str, dict[str, Any]]()
     for verdict in verdicts:
         for name, control in verdict["controls"].items():

@@ -6,7 +6,6 @@ from scenes.drawing import pages
 from scenes.drawing.sheets import night_style
 
 ASSETS = Path(__file__).parent / "assets"
-"""Folder of the templates and scripts of reports."""
 
 
 def page(template: str, **values: object) -> str:

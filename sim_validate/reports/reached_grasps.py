@@ -39,10 +39,7 @@ WAY = "over 60 mm, with open fingers and nothing in the way"
 
 
 def held_in(reaches: "SavedReaches | None", grasp: Grasp) -> PosedHand | None:
-    """Return the hand in the pose in which it stands in a grasp.
-
-    Gives None where no hand was asked for, it does not reach the grasp, or it cannot be drawn.
-    """
+    """Return the hand in the pose in which it stands in a grasp."""
     reach = reach_of(reaches, grasp)
     if reaches is None or reaches.hand is None or reach is None or not reach.reached:
         return None
@@ -71,7 +68,10 @@ def said_of_reach(reaches: "SavedReaches | None", grasp: Grasp) -> tuple[str, st
         return f"{name}: not asked", QUIET
     if not found.reached:
         return f"{name}: not reached, {REASONS[found.reason]}", QUIET
-    said, tone = [f"{name}: reached, {_where(found)}"], GOOD
+    within = found.within_regions or ()
+    inside = f"{sum(within)} of {len(within)} contacts "
+    said = [f"{name}: reached, {'' if all(within) else inside}within regions"]
+    tone = GOOD
     if (held := reaches.simulated.get(grasp.id)) is not None:
         strength = f"held: {number(held['weakest_n'])} N with its motors"
         said.append(strength if held["held"] else "not held in simulation")
@@ -93,15 +93,6 @@ def held_by_hand(reaches: "SavedReaches | None", grasp: Grasp) -> float | None:
     """
     held = None if reaches is None else reaches.simulated.get(grasp.id)
     return None if held is None else float(held["weakest_n"])
-
-
-def _where(found: "HandReach") -> str:
-    """Say how many contacts are in regions, of those that are reached."""
-    within = found.within_regions or ()
-    inside = sum(within)
-    if inside == len(within):
-        return "within regions"
-    return f"{inside} of {len(within)} contacts within regions"
 
 
 def described_reaches(reaches: "SavedReaches | None") -> str:
@@ -142,7 +133,6 @@ def reach_section(reaches: "SavedReaches | None", grasp: Grasp) -> Record | None
 
 
 def _facts(reaches: "SavedReaches", found: "HandReach") -> Iterable[tuple[str, str, str]]:
-    """Yield name, value and meaning of what is known about the hand in a grasp."""
     if found.reached:
         names = ", ".join(f"{k}: {name}" for k, name in enumerate(reaches.finger_names(found)))
         yield "Fingers used", names, FINGERS
@@ -152,8 +142,10 @@ def _facts(reaches: "SavedReaches", found: "HandReach") -> Iterable[tuple[str, s
         yield "Margin of closure there", margin, f"at friction {number(reaches.friction)}"
     yield "Least clearance", f"{number(MILLI * found.clearance_m)} mm", CLEARANCE
     if found.reached:
-        yield "Fingers open", _found(found.pregrasp), OPENING
-        yield "Straight way in", _found(found.approach), WAY
+        for name, way, meaning in (
+            ("Fingers open", found.pregrasp, OPENING), ("Straight way in", found.approach, WAY)
+        ):  # fmt: skip
+            yield name, "none found" if way is None else "found", meaning
     if (carried := reaches.payloads.get(found.grasp)) is not None:
         yield "Payload in any orientation", f"{number(carried['lower_kg'])} kg", CARRIED
     if (held := reaches.simulated.get(found.grasp)) is not None:
@@ -169,7 +161,6 @@ def _facts(reaches: "SavedReaches", found: "HandReach") -> Iterable[tuple[str, s
 
 
 def _executed(tried: "ExecutedHandRecord") -> Iterable[tuple[str, str, str]]:
-    """Yield name, value and meaning of what came of executing a grasp with the hand."""
     found = tried["execution"]
     if found is None:
         yield "Executed with the hand", "not tried", tried["refused"]
@@ -182,10 +173,6 @@ def _executed(tried: "ExecutedHandRecord") -> Iterable[tuple[str, str, str]]:
     yield "Payload of the squeeze", f"{number(found['payload_kg'])} kg", PAYLOAD
     if (enough := enough_of(tried["enough"], ("executed", "enough"))) is not None:
         yield "What would be enough", str(enough), ""
-
-
-def _found(value: object) -> str:
-    return "none found" if value is None else "found"
 
 
 def reach_commands(reaches: "SavedReaches | None", grasp: Grasp, path: str) -> Sequence[str]:

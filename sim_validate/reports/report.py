@@ -6,7 +6,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TypeAlias
 
-from grasp_core.checked import function, path_of, switch, whole
+from grasp_core.checked import function, path_of, whole
 from grasp_core.files.text_files import write_text
 from scenes.drawing.turntable import as_text, object_data
 from sim_validate.files.result_folders import (
@@ -20,7 +20,7 @@ from sim_validate.files.result_folders import (
 )  # fmt: skip
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.reports.drawn_grasps import Drawn, Task, draw, tasks_of
-from sim_validate.reports.grasp_page import MIRRORED, ROTATED, Copy, Kin, Neighbours, grasp_page
+from sim_validate.reports.grasp_page import MIRRORED, ROTATED, Copy, grasp_page
 from sim_validate.reports.index_page import Shown, cards_of, index_page
 from sim_validate.reports.pages import asset, style
 from sim_validate.reports.run_folder import RunFolder, folder_of, runs_in
@@ -41,13 +41,10 @@ class Report:
     """The paths of a written report."""
 
     index: Path
-    """Path of the report's first page."""
     grasps: int
-    """Number of grasps with a page."""
     no_clip: str
     """Reason why clips that were asked for are missing; empty if none is missing."""
     drawn: int
-    """Number of grasps with pictures; the others are copies of these by symmetry."""
 
 
 def write_report(
@@ -57,7 +54,6 @@ def write_report(
     jobs: int | None = None,
     limit: int | None = None,
     clips: int = 0,
-    every_copy: bool = False,
     progress: Callable[[int, int], object] = _nothing,
     ready: Callable[[Path, int, int], object] = _nothing,
 ) -> Report:
@@ -73,7 +69,6 @@ def write_report(
         limit: Number of grasps to draw per run, those with problems before others; all if None.
         clips: Number of grasps per run of which trials are filmed, those with problems first, where
             there are graphics.
-        every_copy: Whether every grasp gets a card and pictures of its own.
         progress: Called with (drawn, total) after each card.
         ready: Called with (first page, drawn, total) when the first page can be opened while more
             cards are drawn; not where an earlier report stays until the new one is complete.
@@ -91,13 +86,12 @@ def write_report(
         if value is not None:
             whole(value, name, least=1)
     whole(clips, "clips")
-    switch(every_copy, "every_copy")
     function(progress, "progress")
     function(ready, "ready")
     runs = tuple(run.first(limit) for run in runs_in(folder))
     require_report_folder(out)
     with new_pages(out) as place:
-        cards = list(_cards(runs, place, clips, every_copy=every_copy))
+        cards = list(_cards(runs, place, clips))
         ready = ready if place == out else _nothing
         report = _written(cards, runs, place, jobs or available_cores(), progress, ready)
     return replace(report, index=out / INDEX)
@@ -105,8 +99,6 @@ def write_report(
 
 @dataclass(frozen=True, slots=True)
 class _Card:
-    """One card of the report: a grasp to draw, the grasps that share its card, and their pages."""
-
     run: RunFolder
     script: str
     """Name of the script with the object's drawing."""
@@ -123,18 +115,18 @@ def _written(
     cards: Sequence[_Card], runs: Runs, out: Path, jobs: int,
     progress: Callable[[int, int], object], ready: Callable[[Path, int, int], object],
 ) -> Report:  # fmt: skip
-    """Draw all cards, and write the first page as soon as `FIRST` of them are drawn."""
     for name in STATIC:
         write_text(out / name, style() if name == STYLE else asset(name))
     for number, run in enumerate(runs):
         data = as_text(object_data(run.saved.body))
         write_text(out / f"object-{number}.js", f"window.graspproofObject = {data};\n")
     tasks = [card.task for card in cards]
+    names = [None, *(f"{task.name}.html" for task in tasks), None]
     shown = list[Shown]()
     no_clip, next_index = "", min(FIRST, len(cards))
     results = chain(each(draw, tasks[:FIRST], jobs=1), each(draw, tasks[FIRST:], jobs=jobs))
     for card, drawn in zip(cards, results, strict=True):
-        around = _neighbours(cards, len(shown))
+        around = names[len(shown)], names[len(shown) + 2]
         shown.append(_pages_of(card, drawn, out, around))
         no_clip = no_clip or drawn.no_clip
         if len(shown) == next_index:
@@ -148,14 +140,11 @@ def _written(
     return Report(out / INDEX, grasps, no_clip, len(cards))
 
 
-def _cards(
-    runs: Runs, out: Path, clips: int, *, every_copy: bool
-) -> Iterator[_Card]:  # fmt: skip
-    """Sort the grasps of every run into cards, in the order to draw them."""
+def _cards(runs: Runs, out: Path, clips: int) -> Iterator[_Card]:
     for number, run in enumerate(runs):
         prefix = f"{number}-" if len(runs) > 1 else ""
         grasps = run.saved.grasps
-        classes = cards_of(run, every_copy=every_copy)
+        classes = cards_of(run)
         firsts = [grasps[each.first] for each in classes]
         for found, task in zip(classes, tasks_of(run, firsts, out, prefix, clips), strict=True):
             copies = tuple(
@@ -166,23 +155,14 @@ def _cards(
             yield _Card(run, f"object-{number}.js", task, copies)
 
 
-def _neighbours(cards: Sequence[_Card], place: int) -> Neighbours:
-    """Return the names of the pages of the cards before and after one."""
-    before, after = (
-        f"{cards[other].task.name}.html" if 0 <= other < len(cards) else None
-        for other in (place - 1, place + 1)
-    )
-    return Neighbours(before, after)
-
-
-def _pages_of(card: _Card, drawn: Drawn, out: Path, around: Neighbours) -> Shown:
+def _pages_of(card: _Card, drawn: Drawn, out: Path, around: tuple[str | None, str | None]) -> Shown:
     """Write the page of a card's grasp, and those of its copies, which have no pictures."""
     grasps = {grasp.id: grasp for grasp in card.run.saved.grasps}
     first = grasps[card.task.saved.grasps[0].id]
-    text = grasp_page(card.run, first, drawn, card.script, around, Kin(card.copies))
+    text = grasp_page(card.run, first, card.script, drawn, neighbours=around, copies=card.copies)
     write_text(out / card.page, text)
     for copy in card.copies:
-        kin = Kin(first=Copy(first.id, card.page, copy.kind))
-        text = grasp_page(card.run, grasps[copy.id], None, card.script, Neighbours(), kin)
+        drawn_one = Copy(first.id, card.page, copy.kind)
+        text = grasp_page(card.run, grasps[copy.id], card.script, first=drawn_one)
         write_text(out / copy.page, text)
     return Shown(card.run, first, card.page, drawn.hand or drawn.picture, card.copies)

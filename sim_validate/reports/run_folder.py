@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from grasp_core.closure.contacts import contacts_sha256
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.records.grasps_json import SavedGrasps
@@ -40,17 +41,12 @@ class RunFolder:
     summary: Record
     """All of `verdicts.json` but the verdicts; empty if the file does not exist."""
     regions: Mapping[str, Record]
-    """Records of certified regions, by the grasps' ids; empty if there are none."""
     regions_friction: float | None
-    """Friction for which the regions are certified; None if there are none."""
     executions: Executions | None
     """Grasps as a robot executes them; None if the file does not exist."""
     reaches: "SavedReaches | None" = None
-    """Where a hand stands in the grasps; None if the file does not exist."""
     judgements: Record | None = None
-    """What published tests say of the grasps; None if the file does not exist."""
     possible: BestFile | None = None
-    """The best grasp and the bound on all others; None if the file does not exist."""
     left_out: int = 0
     """Number of grasps in the files that `saved` leaves out."""
 
@@ -115,6 +111,7 @@ def _run(path: Path) -> RunFolder:
     saved = read_grasps(path / GRASPS)
     tried = _read(path / VERDICTS, verdicts_of, saved)
     certified = _read(path / REGIONS, regions_file_of, saved)
+    judgements_of = partial(record_of, JudgementsFile, wanted=JUDGEMENTS, schema=1)
     verdicts: Sequence[Record] = [] if tried is None else tried["verdicts"]
     regions: Sequence[Record] = [] if certified is None else certified["grasps"]
     return RunFolder(
@@ -127,16 +124,13 @@ def _run(path: Path) -> RunFolder:
         regions_friction=None if certified is None else certified["friction"],
         executions=_executions(path / EXECUTIONS, saved),
         reaches=reaches_beside(path / GRASPS, saved),
-        judgements=_read(path / JUDGEMENTS, _judgements, saved),
+        judgements=_read(path / JUDGEMENTS, judgements_of, saved),
         possible=_read(path / BEST[0], best_of, saved),
     )
 
 
 def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
-    """Read where a hand stands in grasps from the folder of their file.
-
-    Gives None if the folder has no reaches.json.
-    """
+    """Read where a hand stands in grasps from the folder of their file."""
     path = grasps.with_name(REACHES)
     if not path.is_file():
         return None
@@ -144,28 +138,25 @@ def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
 
     found, record = read_reaches(path)
     _check_object(path, record["object"]["content_sha256"], saved)
-    _check_contacts(
-        path, [(each["id"], each["contacts_sha256"]) for each in record["reaches"]], saved
-    )
+    _check_contacts(path, record["reaches"], saved)
     return found
 
 
 def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping[str, Record]:
-    """Index records by id, after a check that they are about the contacts of the grasps."""
-    _check_contacts(path, [(each["id"], each["contacts_sha256"]) for each in records], saved)
+    _check_contacts(path, records, saved)
     return {each["id"]: each for each in records}
 
 
-def _check_contacts(path: Path, listed: Sequence[tuple[str, str]], saved: SavedGrasps) -> None:
+def _check_contacts(path: Path, records: Sequence[Record], saved: SavedGrasps) -> None:
     """Refuse a file that lists a grasp twice, or with other contacts than its own."""
     contacts = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
-    for name, found in listed:
-        if contacts.get(name) != found:
+    for each in records:
+        if contacts.get(each["id"]) != each["contacts_sha256"]:
             raise InputError(
-                f"{path}: the contacts of {name} differ from those in {GRASPS} beside it, "
+                f"{path}: the contacts of {each['id']} differ from those in {GRASPS} beside it, "
                 f"or the grasp is not in that file: write {path.name} again, or remove it"
             )
-    if len(dict(listed)) < len(listed):
+    if len({each["id"] for each in records}) < len(records):
         raise InputError(
             f"{path}: the file has two records of one grasp; make {path.name} again with the "
             "command that wrote it"
@@ -173,29 +164,22 @@ def _check_contacts(path: Path, listed: Sequence[tuple[str, str]], saved: SavedG
 
 
 def _executions(path: Path, saved: SavedGrasps) -> Executions | None:
-    """Read executions of the grasps; return None if the file does not exist."""
     if not path.is_file():
         return None
     found = load_executions(path)
     _check_object(path, found.object_sha256, saved)
-    _check_contacts(path, [(each.id, each.contacts_sha256) for each in found.grasps], saved)
+    listed = [{"id": each.id, "contacts_sha256": each.contacts_sha256} for each in found.grasps]
+    _check_contacts(path, listed, saved)
     return found
 
 
 def _read(path: Path, read: Callable[[str], Read], saved: SavedGrasps) -> Read | None:
-    """Read a file about the same object; return None if the file does not exist."""
     if not path.is_file():
         return None
-    try:
+    with about(path):
         found = read(read_text(path))
-    except InputError as error:
-        raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
     _check_object(path, found["object"]["content_sha256"], saved)
     return found
-
-
-def _judgements(text: str) -> JudgementsFile:
-    return record_of(JudgementsFile, text, JUDGEMENTS, schema=1)
 
 
 def _check_object(path: Path, sha256: str, saved: SavedGrasps) -> None:

@@ -9,9 +9,8 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.by_value import (ByValue, counted, summary, vector)
-from scenes.example_objects import (example_object)
-from grasp_core.by_value import (ByValue)
+from grasp_core.by_value import ByValue, counted, summary, vector
+from scenes.example_objects import example_object
 
 FRICTION = 0.5
 

@@ -112,7 +112,6 @@ CALLS = [
         "jobs": optional(AT_LEAST_ONE),
         "limit": optional(AT_LEAST_ONE),
         "clips": COUNT,
-        "every_copy": SWITCH,
         "progress": {"none": None, "number": 3, "text": "a"},
         "ready": {"none": None, "number": 3, "text": "a"},
     }, succeeds_in="tests/sim_validate/reports/test_report.py"),

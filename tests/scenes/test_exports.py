@@ -215,11 +215,6 @@ def test_equal_plans_give_equal_bytes(plan, written, tmp_path, to):
     assert other.read_bytes() == first
 
 
-def test_a_radius_of_its_own_replaces_the_planned_one(written):
-    tips = yaml.safe_load(written("moveit", fingertip_radius_m=0.002).read_text())["fingertips"]
-    assert [each["fingertip_radius_m"] for each in tips] == [0.002] * 3
-
-
 def test_without_planned_fingers_they_come_along_the_normals(tmp_path):
     plan = gc.plan(scenes.example_object("tetrahedron"), 0.5, limit=1)
     path = scenes.export_grasps(plan, tmp_path / "a.glb", "gltf")

@@ -6,7 +6,6 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.geometry.nearest_points import nearest_on_surface
 from scenes import fingertips
 from scenes.fingertips import clashes, fitting_radius
 from scenes.layout import arrange
@@ -98,14 +97,6 @@ def test_opposite_fingertips_never_overlap_and_close_ones_do_from_half_their_dis
     assert len(clashes(body, at[[0, 2]], normals[[0, 2]], 0.00201)) == 1
 
 
-def test_a_point_of_the_surface_is_nearest_to_itself_and_a_far_one_to_a_vertex():
-    body = scenes.example_object("box")
-    face = body.faces[0]
-    far = 10.0 * body.vertices[0]
-    found = nearest_on_surface(body.vertices, body.triangles, np.array([face.centroid, far]))
-    np.testing.assert_allclose(found, [face.centroid, body.vertices[0]], atol=1e-12)
-
-
 def test_settings_of_a_user_are_kept():
     body = scenes.example_object("wedge")
     grasp = gc.plan(body, limit=1).grasps[0]
@@ -141,8 +132,3 @@ def test_fingers_arrive_on_their_planned_lines():
 def test_bad_numbers_are_refused(bad):
     with pytest.raises(gc.InputError, match=f"{next(iter(bad))} must be a number from 1e-09"):
         scenes.FingerSettings(**bad)
-
-
-def test_a_direction_of_approach_must_point_somewhere():
-    with pytest.raises(gc.InputError, match="approach must not be the zero vector"):
-        scenes.FingerSettings(approach=(0.0, 0.0, 0.0))

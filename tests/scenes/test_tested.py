@@ -95,12 +95,6 @@ def test_stiff_servos_get_inertia_so_that_steps_are_short_beside_their_ring():
     assert stiff.damping(0.002) > 1.0
 
 
-def test_fingertips_without_torsion_are_hard():
-    hard = replace(PHYSICS, torsion_m=0.0)
-    scene = fingertip_scene(BODY, GRASP, 0.7, 0.2, hard, FingerSettings())
-    assert (loaded(scene)[0].geom_condim[1:] == 3).all()
-
-
 def welded(weld):
     """The Allegro hand on a weld at a dodecahedron, as its file has it."""
     body, hand = scaled("dodecahedron", 0.035), gc.load_hand("allegro")

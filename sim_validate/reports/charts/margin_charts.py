@@ -34,7 +34,6 @@ from scenes.fingertips import FingerSettings
 LONGITUDES, LATITUDES = 21, 11
 """Numbers of a map's nodes: around, where the first is also the last, and from pole to pole."""
 WIDTH, HEIGHT = 440.0, 300.0
-"""Size of a panel [pixels]."""
 EDGE = 12.0
 """Width of the margins beside the scale of colours [pixels]."""
 MIDDLE, HALF = np.array([220.0, 130.0]), 100.0
@@ -53,8 +52,6 @@ NAMED = {
     "+x": (0.0, 0.0), "+y": (90.0, 0.0), "-y": (-90.0, 0.0), "+z": (0.0, 80.0), "-z": (0.0, -80.0),
     "-x": (172.0, 0.0),
 }  # fmt: skip
-"""Longitudes and latitudes of the labels that name directions on a map [deg]; the labels of z are a
-little off the poles."""
 
 
 def margin_figure(
@@ -109,7 +106,6 @@ def margins(
 def _limits(
     body: Polyhedron, grasp: Grasp, friction: float, largest: float, wrenches: Array
 ) -> Array:
-    """Compute how far each wrench of a map is resisted, (LATITUDES, LONGITUDES)."""
     different, same = np.unique(np.round(wrenches, SAME), axis=0, return_inverse=True)
     found = wrench_limits(
         grasp, None, friction, different, max_normal_force=largest, center=body.center_of_mass
@@ -119,7 +115,6 @@ def _limits(
 
 
 def _nodes() -> tuple[Array, Array]:
-    """Return longitudes and latitudes of a map's nodes, (LATITUDES, LONGITUDES) each [rad]."""
     around = np.linspace(-np.pi, np.pi, LONGITUDES)
     longitudes, latitudes = np.meshgrid(around, np.linspace(-0.5 * np.pi, 0.5 * np.pi, LATITUDES))
     return longitudes, latitudes
@@ -141,7 +136,6 @@ def on_map(longitudes: Array, latitudes: Array) -> tuple[Array, Array]:
 
 
 def _map(values: Array, kind: str, unit: str) -> Sheet:
-    """Draw a map, and the scale of its colours below it."""
     low, high = float(values.min()), float(values.max())
     title = f"largest {kind} resisted [{unit}]"
     rim = MIDDLE + HALF * circle(np.zeros(2), 1.0) * np.array([2.0, 1.0])
@@ -165,7 +159,6 @@ def _map(values: Array, kind: str, unit: str) -> Sheet:
 
 
 def _label(name: str, middle: Array) -> tuple[Mark, Mark]:
-    """Write the name of a direction on a map."""
     box = np.array([(-12.0, -8.0), (12.0, -8.0), (12.0, 8.0), (-12.0, 8.0)])
     x, y = middle.tolist()
     return Area((box + middle,), PAPER, 0.85), Words(x, y, name, "middle", SMALL)
@@ -209,7 +202,6 @@ def pixels(values: Array, low: float, high: float) -> Indices:
 
 
 def _between(values: Array, rows: Array, columns: Array) -> Array:
-    """Interpolate between the nodes of a map."""
     i = np.clip(rows.astype(int), 0, LATITUDES - 2)
     j = np.clip(columns.astype(int), 0, LONGITUDES - 2)
     a, b = np.clip(rows - i, 0.0, 1.0), np.clip(columns - j, 0.0, 1.0)

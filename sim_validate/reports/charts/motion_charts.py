@@ -12,7 +12,6 @@ from scenes.drawing.sheets import Mark, Sheet
 from sim_validate.replaying import Replayed
 
 WIDTH, HEIGHT = 300.0, 316.0
-"""Size of a panel [pixels]."""
 PLACE = (50.0, 28.0, 236.0, 180.0)
 """Left and upper border of what a panel draws in, its width and its height [pixels]."""
 KEY = 3.0 * ROW + 6.0
@@ -29,10 +28,7 @@ LEAST_PUSH = 1e-3
 
 
 def motion_panels(found: Replayed, threshold_m: float) -> tuple[Sheet, Sheet, Sheet]:
-    """Draw displacement, normal forces and use of friction over the time of one trial.
-
-    Takes `threshold_m` [m]. Friction is lowered to the one under test at time zero.
-    """
+    """Draw displacement, normal forces and use of friction over the time of one trial."""
     watched = found.watched
     share = friction_used(watched.pushes_n, watched.friction)
     return (
@@ -43,7 +39,6 @@ def motion_panels(found: Replayed, threshold_m: float) -> tuple[Sheet, Sheet, Sh
 
 
 def _moved(found: Replayed, threshold_m: float) -> Sheet:
-    """Draw how far the object moved and each finger slid, on a logarithmic axis."""
     trace = found.watched.trace
     finite = trace.displacements_m[np.isfinite(trace.displacements_m)]
     highest = 2.0 * MICRO * max(threshold_m, float(finite.max(initial=0.0)))
@@ -64,7 +59,6 @@ def _moved(found: Replayed, threshold_m: float) -> Sheet:
 
 
 def _of_fingers(title: str, times: Array, values: Array, limit: tuple[float, str] | None) -> Sheet:
-    """Draw a curve for each finger and, if there is one, a limit with its name."""
     finite = values[np.isfinite(values)]
     top = max(1.1 * float(finite.max(initial=0.0)), 1e-9)
     low = min(0.0, float(finite.min(initial=0.0)))

@@ -3,12 +3,9 @@
 Points of simulated over predicted values should lie on the line of equal values.
 
 A squeeze that is certified for s times the weight in any direction carries the weight while the
-palm accelerates by up to (s - 1) g in any direction, as |g + a| <= g + |a|. The curve of survival
-is the share of grasps so certified. Marks are the shares that survived the trials of one kind in
-simulation, at the largest acceleration of these trials; hollow marks are the shares in which no
-slip is predicted. The certificate is for forces through the centre of mass that come slowly.
-Springs that overshoot, and the torques of knocks and of shakes about an axis, can put marks below
-the curve.
+palm accelerates by up to (s - 1) g in any direction, as |g + a| <= g + |a|. The certificate is for
+forces through the centre of mass that come slowly: springs that overshoot, and the torques of
+knocks and of shakes about an axis, can put marks below the curve.
 """
 
 import math
@@ -39,17 +36,14 @@ from sim_validate.reports.agreement import Agreement
 from sim_validate.validation.verdict import AGREEMENT
 
 FIDELITY_WIDTH, FIDELITY_HEIGHT = 360.0, 388.0
-"""Size of a panel [pixels]."""
 FIDELITY_PLACE = (70.0, 28.0, 280.0, 280.0)
 """Left and upper border of what a panel draws in, its width and its height [pixels]."""
 LEAST_SHOWN = 0.5
 """Place of zero on a logarithmic axis, relative to the least value above zero."""
 SURVIVAL_WIDTH = 400.0
-"""Width of the chart [pixels]; its height depends on its key."""
 SURVIVAL_PLACE = (70.0, 28.0, 306.0, 230.0)
 """Left and upper border of what the chart draws in, its width and its height [pixels]."""
 BELOW = 44.0
-"""Height of the numbers and the name below the axis [pixels]."""
 LOOKS: dict[str, tuple[Shape, str]] = {
     "weight": ("square", INK), "misplaced": ("cross", NEUTRAL), "lift": ("up", FINGERS[2]),
     "shake along": ("disc", FINGERS[1]), "shake about": ("diamond", FINGERS[3]),
@@ -63,11 +57,9 @@ STRAIGHT = ("lift", "shake along", "stop")
 TICKS_G = (0.0, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 """Round accelerations at which the axis may have ticks [9.80665 m/s^2]."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Shares of grasps at which the chart has ticks."""
 NARROWEST, WIDEST = 2.0, 1001.0
 """Least and largest multiple of the weight at which the axis may end."""
 BEYOND = 1.1
-"""End of the axis, relative to the largest multiple in the chart."""
 APART = 0.08
 """Least distance between ticks, relative to the length of the axis."""
 SAME = 9
@@ -122,7 +114,6 @@ class Survival:
     """How many grasps survived all of their trials of one kind."""
 
     kind: str
-    """Kind of the trials; shakes along and about axes are two kinds."""
     acceleration_g: float
     """Largest acceleration of the trials [9.80665 m/s^2]."""
     grasps: int
@@ -231,7 +222,6 @@ def survival_sheet(executed: Sequence[Executions]) -> Sheet:
 
 
 def _certified_curve(panel: Panel, multiples: Array, end: float) -> Iterator[Mark]:
-    """Draw the share of grasps that are certified for each multiple of the weight."""
     steps, shares = certified_steps(multiples, end)
     x = np.append(np.repeat(steps, 2)[1:], end)
     line = panel.at(x, np.repeat(shares, 2))
@@ -249,7 +239,6 @@ def certified_steps(multiples: Array, end: float) -> tuple[Array, Array]:
 
 
 def _survival_marks(panel: Panel, mark: Survival) -> Iterator[Mark]:
-    """Draw the marks of a kind of trial: hollow as predicted, filled as simulated."""
     shape, colour = LOOKS[mark.kind]
     shares = np.array([mark.predicted, mark.survived]) / mark.grasps
     places = panel.at(np.full(2, 1.0 + mark.acceleration_g), shares)

@@ -24,7 +24,6 @@ from scenes.drawing.sheets import Area, Line, Mark, Sheet, beside, circle, outli
 from scenes.drawing.views import View, best_view
 
 WIDTH, HEIGHT = 300.0, 338.0
-"""Size of a panel [pixels]."""
 PLACE = (62.0, 28.0, 224.0)
 """Left and upper border of the square in which a panel draws, and its side [pixels]."""
 AROUND = 0.55
@@ -122,7 +121,6 @@ def _shadow(
     wrenches: WrenchSet, plane: Array, radius: float, *, names: tuple[str, str, str],
     facet: bool = False,
 ) -> Sheet:  # fmt: skip
-    """Draw a projection, with the disc of the largest ball and perhaps the limiting facet."""
     border = shadow_of(wrenches, plane)
     ball = max(radius, 0.0)
     points = np.vstack([border, [[0.0, 0.0], [ball, ball], [-ball, -ball]]])
@@ -148,7 +146,6 @@ def _shadow(
 
 
 def _hatched(panel: Panel, radius: float) -> list[Mark]:
-    """Hatch the disc of the largest ball with lines that rise at 45 degrees."""
     heights = radius * np.linspace(-1.0, 1.0, HATCHES + 2)[1:-1]
     long = np.sqrt(np.maximum(radius**2 - heights**2, 0.0))
     ends = np.stack([

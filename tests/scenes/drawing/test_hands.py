@@ -1,6 +1,5 @@
 """A hand is drawn where it stands, and its fingertips touch where the contacts are."""
 
-import itertools
 import math
 from dataclasses import replace
 
@@ -10,8 +9,6 @@ import pytest
 import scenes
 from grasp_core.errors import InputError
 from grasp_core.values import Contact
-from scenes.drawing.colours import FINGERS as COLOURS
-from scenes.drawing.colours import HAND
 from scenes.drawing.drawings import drawing_with_hand
 from scenes.drawing.hands import (
     STEPS,
@@ -24,7 +21,6 @@ from scenes.drawing.hands import (
     view_of_hand,
 )
 from scenes.drawing.pictures import grasp_sheet, write_picture
-from scenes.drawing.shapes import colour_of
 from scenes.drawing.sheets import Dots, Words
 from tests.grasp_core.hands.gripping import plain_hand
 from tests.scenes.drawing.standing import FRICTION, ROUNDING, held, standing
@@ -86,13 +82,6 @@ def surface_gaps(frame, shape, points):
     local = np.abs((local - shape.position) @ shape.rotation) - shape.half_sizes
     outside = np.linalg.norm(np.maximum(local, 0.0), axis=1)
     return outside + np.minimum(local.max(axis=1), 0.0) - shape.radius
-
-
-def test_links_have_one_quiet_colour_and_fingertips_those_of_their_contacts():
-    shapes = hand_shapes(held())
-    assert {colour_of(shape) for shape in shapes if shape.role == "hand"} == {HAND}
-    assert {colour_of(shape) for shape in tips_of(shapes)} == set(COLOURS)
-    assert HAND not in COLOURS
 
 
 def three():
@@ -227,10 +216,3 @@ def test_long_parts_are_cut_into_pieces():
     )]  # fmt: skip
     halved = 2.0 * palm.half_sizes * [1.0, 0.5, 0.5]
     np.testing.assert_allclose(diagonals, np.linalg.norm(halved), rtol=0.02)  # pieces overlap so
-
-
-def test_the_same_pose_gives_the_same_drawing():
-    for one, two in itertools.pairwise([hand_shapes(held()), hand_shapes(held())]):
-        assert len(one) == len(two)
-        for a, b in zip(one, two, strict=True):
-            np.testing.assert_array_equal(a.vertices(), b.vertices())

@@ -1,6 +1,5 @@
 """Sides of rounded boxes are flat, close without gaps, and are on the surface."""
 
-import itertools
 import math
 from collections import Counter
 
@@ -78,10 +77,3 @@ def test_pieces_of_a_rounded_box_make_the_whole():
 def area(side):
     arms = side[1:] - side[0]
     return 0.5 * np.linalg.norm(np.cross(arms[:-1], arms[1:]).sum(axis=0))
-
-
-def test_every_octant_has_its_corner():
-    corners = np.vstack(rounded_box(-HALF, HALF, 0.0, WHOLE))
-    wanted = {tuple(np.rint(sign * HALF / 1e-9).astype(int)) for sign in
-              map(np.array, itertools.product((-1.0, 1.0), repeat=3))}  # fmt: skip
-    assert {tuple(row) for row in np.rint(corners / 1e-9).astype(int)} == wanted

@@ -11,7 +11,8 @@ from scipy.spatial import ConvexHull
 
 import grasp_core as gc
 import scenes
-from scenes.execution.surface import Surface, touched_solids
+from grasp_core.compiled import compiled
+from scenes.execution.surface import touched_solids
 from tests.scenes.meshes import dented_ball
 
 NEAR = 1e-6
@@ -140,5 +141,6 @@ def test_only_what_is_within_reach_is_there():
 def test_a_pyramid_below_a_flat_sheet_is_as_deep_as_it_may_be():
     """Nothing is near it but the triangles of its own plane."""
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    sheet = Surface(square[np.array([[0, 1, 2], [0, 2, 3]])], 1.0)
-    assert sheet.clear_depth(square, np.array([0.0, 0.0, -1.0]), 0.05) == 0.05
+    sheet, below = square[np.array([[0, 1, 2], [0, 2, 3]])], np.array([0.0, 0.0, -1.0])
+    kernel = compiled("scenes.execution.clearance_kernel")
+    assert kernel.clear_depth(square, below, 0.05, sheet, np.arange(2), 1e-9) == 0.05

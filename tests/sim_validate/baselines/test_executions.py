@@ -7,10 +7,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-import sim_validate as sv
-from scenes.example_objects import example_object
 from sim_validate.baselines.baseline import (
-    ExecutionEntry,
     baseline_from_json,
     baseline_to_json,
     execution_entry,
@@ -19,7 +16,6 @@ from sim_validate.baselines.baseline import (
 )
 from sim_validate.baselines.check import Checked, Measured, demanded
 from sim_validate.baselines.compare import Status, compare
-from sim_validate.baselines.demands import survival
 from sim_validate.baselines.explain import not_survived
 from sim_validate.baselines.settings import How, of_settings, settings_of
 from sim_validate.baselines.suite import suite_from_tables
@@ -166,16 +162,3 @@ def test_a_loss_names_trial_numbers_and_prediction():
 def test_settings_of_a_suite_are_checked(tmp_path, settings, message):
     with pytest.raises(gc.InputError, match=message):
         suite_from_tables({"grasps": "grasps.json", **settings}, tmp_path / "a.grasps.toml")
-
-
-def test_a_test_that_gives_no_settings_is_told_what_to_give():
-    wedge = example_object("wedge")
-    with pytest.raises(gc.InputError, match=r"expected ExecutionSettings as `settings`, got 0\.5"):
-        survival((wedge, None, 0.5), None, None)
-    with pytest.raises(gc.InputError, match="assert_survives: expected a grasp_case"):
-        survival((wedge,), None, sv.ExecutionSettings(mass_kg=1.0))
-
-
-def test_an_entry_is_strict():
-    with pytest.raises(ValueError, match="valid integer"):
-        ExecutionEntry(**{**dataclasses.asdict(KEPT), "trials": "2"})

@@ -68,8 +68,8 @@ def test_a_grasp_that_slips_says_at_which_wrench(blessed, tmp_path):
     assert "held -> slipped at far too much" in said
     assert "first wrench that was not held: far too much [0.0, 0.0, 90.0" in said
     assert "predicted limit 0." in said
-    line = next(line for line in said.splitlines() if "graspproof replay" in line)
-    assert "--wrench='far too much'" in line
+    assert "graspproof replay" not in said  # of what `validate` does not simulate
+    assert f"graspproof baseline check {baseline}" in said
 
 
 @pytest.mark.parametrize(
@@ -95,22 +95,12 @@ def test_the_file_of_results_has_the_status_and_figures_of_each_grasp(blessed, t
     assert "graspproof replay" in said
 
 
-def test_without_a_baseline_it_is_said_how_to_make_one(blessed, tmp_path):
-    for name in ("grasps.json", "wedge.grasps.toml"):
-        (tmp_path / name).write_bytes((blessed / name).read_bytes())
-    code, said = run_pytest(tmp_path)
-    assert code == 1
-    assert "this baseline does not exist yet; write it with pytest --grasp-bless" in said
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", "grasps: expected the path"),
-        ("grasp = 1", "no such setting"),
+        ("grasp = 1", "no setting is named"),
         ('grasps = "g.json"\nstrict = 1', "strict: expected true or false"),
-        ('grasps = "nowhere.json"', "nowhere.json"),
-        ("grasps = ", "not TOML"),
     ],
 )
 def test_a_bad_file_is_named(tmp_path, text, message):

@@ -25,10 +25,6 @@ def test_better_grasps_on_an_unchanged_part_and_baselines_have_sections_of_their
     ]
 
 
-def test_a_quiet_run_says_nothing():
-    assert sections([line(), line()]) == []
-
-
 def test_a_long_list_is_cut():
     lines = [line(f"{number:03d} same", note=NOTE) for number in range(MOST_TOLD + 3)]
     ((_, texts),) = sections(lines)

@@ -9,7 +9,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.wrench_sets import WrenchSet
 from scenes.drawing.colours import BAD, GOOD, LEVELS
-from scenes.drawing.panels import thinned, ticks_between
+from scenes.drawing.panels import thinned
 from scenes.drawing.sheets import Area, Dots, Image, png_of, svg_of
 from sim_validate.replaying import Recorded, replayed
 from sim_validate.reports.agreement import (
@@ -29,7 +29,7 @@ from sim_validate.reports.charts.margin_charts import (
 )
 from sim_validate.reports.charts.motion_charts import friction_used, motion_panels
 from sim_validate.reports.charts.run_charts import fidelity_panels
-from sim_validate.reports.charts.wrench_charts import shadow_of, wrench_figure, wrench_panels
+from sim_validate.reports.charts.wrench_charts import shadow_of, wrench_panels
 from sim_validate.simulation.setup import Agenda, Setup
 from tests.scenes.drawing.whole import assert_whole
 from tests.sim_validate.rigs import grasps
@@ -201,11 +201,6 @@ def test_pairs_are_of_what_was_measured():
     assert limits_in(listed).worst == pytest.approx(0.05)
 
 
-def test_ticks_are_round_numbers_in_the_range():
-    assert ticks_between(0.9, 12.0) == [1.0, 2.0, 5.0, 10.0]
-    assert ticks_between(0.011, 90.0) == pytest.approx([0.1, 1.0, 10.0])
-
-
 @pytest.mark.parametrize("unit", [1.0, 1e-4])
 def test_what_differs_stands_out(unit):
     pairs = ((unit, 1.01 * unit), (unit, 1.5 * unit), (0.0, 0.3 * unit))
@@ -233,12 +228,6 @@ def test_a_trial_that_blew_up_is_drawn(trial):
             assert_whole(sheet)
             assert "nan" not in svg_of(sheet)
             assert len(png_of(sheet)) > 2000
-
-
-def test_panels_stand_side_by_side_in_a_figure(wedge):
-    panels, figure = wrench_panels(*wedge, FRICTION), wrench_figure(*wedge, FRICTION)
-    assert figure.width == sum(sheet.width for sheet in panels)
-    assert_whole(figure)
 
 
 def test_the_scale_of_a_map_ends_at_its_least_and_largest_value(wedge):
@@ -290,13 +279,6 @@ def test_labels_of_charts_are_whole(kind, wedge, trial):
     assert len(sheets) >= 2
     for sheet in sheets:
         assert_whole(sheet)
-
-
-def test_a_page_takes_less_for_its_charts_than_three_pictures_would(wedge, trial):
-    """Pictures of the same charts took 45 kB."""
-    sheets = [*wrench_panels(*wedge, FRICTION), *margin_panels(*wedge, FRICTION),
-              *motion_panels(trial, 1e-5)]  # fmt: skip
-    assert sum(len(svg_of(sheet)) for sheet in sheets) < 45_000
 
 
 def test_a_thinned_curve_misses_no_point_by_a_fifth_of_a_pixel():

@@ -63,7 +63,7 @@ def test_the_page_of_a_copy_has_its_own_numbers_and_leads_to_the_pictures(planne
     (run,) = runs_in(planned)
     grasps, radius = run.saved.grasps, run.saved.body.radius
     count = 0
-    for card in cards_of(run, every_copy=False):
+    for card in cards_of(run):
         first = grasps[card.first]
         page = Page((report.index.parent / "grasps" / f"{first.id}.html").read_text())
         assert any(tag == "img" for tag, _ in page.tags)
@@ -74,7 +74,6 @@ def test_the_page_of_a_copy_has_its_own_numbers_and_leads_to_the_pictures(planne
             assert f"../grasps/{copy.id}.html" in page.links
             assert f"../grasps/{first.id}.html" in found.links
             assert not any(tag == "img" for tag, _ in found.tags)
-            assert "graspproof report . --every-copy" in " ".join(found.said)
             assert ("mirrored" if place in card.mirrored else "rotated") in " ".join(found.said)
             shapes = json.loads(found.data["drawing"])["shapes"]
             (contacts,) = (shape["points"] for shape in shapes if shape["role"] == "contact")
@@ -82,13 +81,6 @@ def test_the_page_of_a_copy_has_its_own_numbers_and_leads_to_the_pictures(planne
             np.testing.assert_allclose(points, copy.positions, atol=radius / UNITS)
             count += 1
     assert count == report.grasps - report.drawn > 0
-
-
-def test_every_copy_is_drawn_if_asked_for(planned, tmp_path):
-    report = write_report(planned, tmp_path / "all", jobs=1, limit=6, every_copy=True)
-    assert report.grasps == report.drawn == 6
-    assert len(cards_in(report.index.read_text())) == 6
-    assert len(list((tmp_path / "all" / "pictures").iterdir())) == 6
 
 
 def test_the_first_page_is_ready_before_the_others_are_drawn(drawn):
@@ -102,30 +94,15 @@ def test_the_first_page_is_ready_before_the_others_are_drawn(drawn):
     assert "are being drawn" not in report.index.read_text()
 
 
-def test_a_small_report_is_whole_when_its_first_page_appears(planned, tmp_path):
-    called = []
-    write_report(planned, tmp_path / "out", jobs=1, limit=2, ready=lambda *_: called.append(1))
-    assert not called
-
-
 def test_a_problem_is_not_hidden_behind_a_copy_that_held(planned):
     (run,) = runs_in(planned)
-    whole = cards_of(run, every_copy=False)
+    whole = cards_of(run)
     card = next(each for each in whole if len(each.places) > 1)
     held = {"outcome": "held", "held": True, "controls": {}, "mismatches": []}
     verdicts = {grasp.id: held for grasp in run.saved.grasps}
-    assert cards_of(replace(run, verdicts=verdicts), every_copy=False) == whole
+    assert cards_of(replace(run, verdicts=verdicts)) == whole
     last = run.saved.grasps[card.places[-1]].id
     verdicts |= {last: {**held, "outcome": "slipped", "held": False}}
-    cards = cards_of(replace(run, verdicts=verdicts), every_copy=False)
+    cards = cards_of(replace(run, verdicts=verdicts))
     assert len(cards) == len(whole) + 1
     assert [each.places for each in cards if each.first == card.places[-1]] == [card.places[-1:]]
-
-
-def test_the_command_says_when_and_where_the_first_page_can_be_opened(planned, tmp_path, capsys):
-    out = tmp_path / "out"
-    assert main(["report", str(planned), "--out", str(out), "--jobs", "1"]) == Exit.GOOD
-    said = capsys.readouterr().out
-    early, late = said.index("can be opened now"), said.index("in a browser")
-    assert early < late
-    assert f"{out / 'index.html'} can be opened now; {FIRST} of " in said.replace("\n", " ")

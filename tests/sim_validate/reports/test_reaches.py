@@ -18,7 +18,6 @@ from tests.scenes.drawing.standing import (
     FRICTION,
     GRASP,
     POSITIONS,
-    held,
     run_with_hand,
     small_plan,
     standing,
@@ -97,20 +96,6 @@ def test_the_page_turns_the_hand_and_has_its_figures(report):
         assert part in said
 
 
-def test_what_turns_is_seen_whole(report):
-    """The camera looks at the middle of object and hand, and every corner is in front of it."""
-    page = Page((report / "grasps" / f"{GRASP}.html").read_text())
-    drawing = json.loads(page.data["drawing"])
-    corners = np.vstack([
-        polygon for shape in drawing["shapes"] if shape["solid"] for polygon in shape["polygons"]
-    ])  # fmt: skip
-    far = np.linalg.norm(corners - drawing["middle"], axis=1)
-    assert far.max() < drawing["distance"] / 8.0
-    assert far.max() > 2.0 * UNITS  # the hand is larger than the object
-    tips = (held().tips - standing()[0].center_of_mass) / standing()[0].radius * UNITS
-    assert np.linalg.norm(tips - drawing["middle"], axis=1).max() < far.max()
-
-
 def test_a_grasp_that_is_not_reached_says_why(report):
     page = Page((report / "grasps" / f"{OTHER}.html").read_text())
     assert "hand" not in {shape["role"] for shape in json.loads(page.data["drawing"])["shapes"]}
@@ -166,37 +151,19 @@ def of_other_contacts(record):
     record["reaches"][0]["contacts_sha256"] = "0" * 64
 
 
-def unknown_finger(record):
-    record["reaches"][0]["pose"]["contacts"][0]["finger"] = "sixth"
-
-
-def short(record):
-    record["reaches"][0]["pose"]["joints_rad"].pop()
-
-
 def contradiction(record):
     record["reaches"][0]["reached"] = False
-
-
-def huge(record):
-    record["hand"]["model"]["palm"][0]["half_sizes_m"][0] = 1e9
 
 
 def other_object(record):
     record["object"]["content_sha256"] = "0" * 64
 
 
-def unknown_field(record):
-    record["hand"]["model"]["colour"] = "red"
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
         (twice, "two records of one grasp"), (of_other_contacts, "contacts of .* differ"),
-        (unknown_finger, "unknown fingers"), (short, "got 15 angles"),
-        (contradiction, "exactly where `reached` is true"), (huge, "half_sizes"),
-        (other_object, "another object"), (unknown_field, "colour"),
+        (contradiction, "exactly where `reached` is true"), (other_object, "another object"),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )  # fmt: skip

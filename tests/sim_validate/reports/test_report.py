@@ -320,21 +320,10 @@ def test_regions_for_more_friction_are_not_shown(copy, tmp_path):
     assert "Regions are certified" not in said
 
 
-def test_figures_of_the_plan_say_its_friction(small_run, tmp_path):
-    shutil.copy(small_run / "grasps.json", tmp_path / "grasps.json")
-    asked = ["validate", str(tmp_path / "grasps.json"), "--limit", "1", "--friction", "0.4"]
-    assert main([*asked, "--out", str(tmp_path), "-q"]) == Exit.GOOD
-    folder = write_report(tmp_path, jobs=1, limit=1).index.parent / "grasps"
-    said = " ".join(Page(next(folder.iterdir()).read_text()).said)
-    assert said.count("at friction 0.5 as planned") == 3
-    assert "--friction 0.4" in said
-
-
 @pytest.mark.parametrize(
     ("change", "says"),
     [
         ({"outcome": "timeout", "held": False, "mismatches": ["not found"]}, "timeout"),
-        ({"outcome": "slipped", "held": False}, "slipped"),
         ({"mismatches": ["not found"]}, "contradicts the analysis"),
     ],
 )
@@ -355,23 +344,15 @@ def test_a_control_that_says_nothing_is_bad_news(small_run):
     ("file", "change", "says"),
     [
         ("verdicts.json", lambda each: each.pop("gate"), r"verdicts\.json: gate: missing"),
-        ("verdicts.json", lambda each: each["verdicts"][0].update(wrenches=3), "wrenches"),
-        ("verdicts.json", lambda each: each["verdicts"][0]["wrenches"][0].update(wrench=[1]),
-         r"verdicts\[0\]\.wrenches\[0\]\.wrench"),
         ("verdicts.json", lambda each: each["object"].update(content_sha256="0"), "another object"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(contacts_sha256="0"), "contacts"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(id="c-9-9-9-9"), "in that file"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(held=False),
          r"verdicts\[0\]\.held: False contradicts the outcome held"),
-        ("verdicts.json", lambda each: each["verdicts"][0].update(outcome="splendid"),
-         r"verdicts\[0\]\.outcome: expected"),
         ("verdicts.json", lambda each: each["summary"].update(grasps_held=99),
          r"summary\.grasps_held: expected .*, got 99"),
-        ("verdicts.json", lambda each: each["verdicts"].clear(), r"summary\.grasps: expected 0"),
         ("verdicts.json", lambda each: each["verdicts"].append(each["verdicts"][0]), "twice|got"),
         ("regions.json", lambda each: each["grasps"][0].update(contacts_sha256="0"), "contacts"),
-        ("regions.json", lambda each: each["grasps"][0]["regions"].pop(), "at least 4 items"),
-        ("regions.json", lambda each: each["grasps"].append(3), r"grasps\[3\]: expected an object"),
     ],
 )  # fmt: skip
 def test_files_that_are_not_ours_are_refused(copy, file, change, says):
@@ -387,11 +368,3 @@ def test_a_folder_without_a_run_is_refused(tmp_path, capsys):
     assert main(["report", str(tmp_path / "none")]) == Exit.INPUT
     assert "expected the folder of a run" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
-
-
-def test_the_command_says_where_the_report_is(copy, tmp_path, capsys):
-    asked = ["report", str(copy), "--out", str(tmp_path / "out"), "--jobs", "1"]
-    assert main([*asked, "--json"]) == Exit.GOOD
-    shown = capsys.readouterr()
-    assert json.loads(shown.out) == {"report": str(tmp_path / "out" / "index.html"), "grasps": 3}
-    assert "open" in shown.err
