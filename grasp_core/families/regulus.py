@@ -212,15 +212,12 @@ def place_regulus(
 
     The merit is minus the largest offset t; no placement means none for the slopes tried.
     """
-    half_angle = cones[0].half_angle
-    if all(cone.half_angle == half_angle for cone in cones):
-        axes = np.array([[cone.axis for cone in cones]])
-        attempt = Attempts(np.arange(FINGERS)[None], axes, np.array([half_angle]))
-        (merit,), (chosen,) = regulus_bounds(face_table(pieces), attempt)
-        first, second, side = (int(each) for each in chosen)
-        best = _best_of(pieces, cones, [(first, second, side)] if first >= 0 else [])
+    known = _best_choice(pieces, cones)
+    if known is not None:
+        merit, choices = known
+        best = _best_of(pieces, cones, choices)
         # whole programs, solved again, have to confirm what compiled code chose
-        if _merit(best) == merit or abs(_merit(best) - float(merit)) <= RESIDUAL:
+        if _merit(best) == merit or abs(_merit(best) - merit) <= RESIDUAL:
             return best
     return _best_of(pieces, cones, CHOICES)
 
@@ -239,6 +236,21 @@ def regulus_bounds(
     chosen = np.empty((len(bounds), 3), dtype=np.int64)
     compiled(KERNEL).regulus_bounds(table, attempts, terms, bounds, chosen)
     return bounds, chosen
+
+
+def _best_choice(
+    pieces: Sequence[FacePiece], cones: Sequence[ForceCone]
+) -> tuple[float, tuple[Choice, ...]] | None:
+    """Find the best choices of slopes and side, with their merit; None if half-angles differ."""
+    half_angle = cones[0].half_angle
+    if any(cone.half_angle != half_angle for cone in cones):
+        return None
+    attempt = Attempts(
+        np.arange(FINGERS)[None], np.array([[cone.axis for cone in cones]]), np.array([half_angle])
+    )
+    (merit,), (chosen,) = regulus_bounds(face_table(pieces), attempt)
+    first, second, side = (int(each) for each in chosen)
+    return float(merit), ((first, second, side),) if first >= 0 else ()
 
 
 def _best_of(
