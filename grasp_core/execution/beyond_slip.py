@@ -96,14 +96,10 @@ def _moved(motion: Array, most_m: float, most_rad: float) -> Array:
 class _Followed:
     """Loads on their way: the last balance of each, and where each was lost first."""
 
-    multiples: Array
-    """Multiple of the last balance, (m,)."""
-    forces: Array
-    """Contact forces then, (m, k, 3) [N]."""
-    motion: Array
-    """Motion then, (m, 6) [m, rad]."""
-    share: Array
-    """That motion as a part of what is allowed, (m,)."""
+    multiples: Array  # multiple of the last balance, (m,)
+    forces: Array  # contact forces then, (m, k, 3) [N]
+    motion: Array  # motion then, (m, 6) [m, rad]
+    share: Array  # that motion as a part of what is allowed, (m,)
     lost: Array
     """Least multiple at which the object is known to be lost, (m,); infinite if none is."""
     beyond: Array
@@ -159,10 +155,7 @@ def _try(
 def _in_parts(
     grip: Grip, forces: Array, motion: Array, loads: Array, reach: Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Solve (2) for one load after the other, (PARTS, m, 6), each from the balance before.
-
-    Gives the forces and motions of the last, and for which each balance was found, (m,).
-    """
+    """Solve (2) for one load after the other, (PARTS, m, 6), each from the balance before."""
     found = np.ones(len(forces), dtype=bool)
     for load in loads:
         forces, motion, met = _balanced(grip, forces, motion, load, reach)
@@ -216,10 +209,7 @@ def _small_motions(grip: Grip) -> tuple[Array, Array, Array]:
 
 
 def _returned(tried: Array, friction: Array) -> tuple[Array, Array]:
-    """Bring contact forces, (m, k, 3), back to their cones along the tangent.
-
-    Gives the forces, and their derivatives by those given, (m, k, 3, 3).
-    """
+    """Return forces, (m, k, 3), to their cones along the tangent, with derivatives."""
     pushing = tried[..., 0] > 0.0
     n = np.where(pushing, tried[..., 0], 0.0)
     across = np.linalg.norm(tried[..., 1:], axis=-1)

@@ -72,14 +72,10 @@ AT_REST = 1e-9
 class Held:
     """A grip in equilibrium under a load."""
 
-    grip: Grip
-    """The grip in this pose: arms, normals and forces as they are now."""
-    moved: Array
-    """Displacement of the centre of mass, (3,) [m]."""
-    rotation: Array
-    """Orientation of the object against the one at rest, (3, 3)."""
-    tips: Array
-    """Displacements of the tips' centres, (k, 3) [m]."""
+    grip: Grip  # the grip in this pose: arms, normals and forces as they are now
+    moved: Array  # displacement of the centre of mass, (3,) [m]
+    rotation: Array  # orientation of the object against the one at rest, (3, 3)
+    tips: Array  # displacements of the tips' centres, (k, 3) [m]
     load: Array
     """External wrench on the object, (6,) [N, N m], about the centre of mass."""
 
@@ -164,8 +160,6 @@ class FirstSlip(ByValue):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Limits:
-    """What fingers and joints can do."""
-
     push_n: float
     motors: Motors
 
@@ -250,10 +244,7 @@ def _check_rest(grip: Grip, max_push_n: float) -> None:
 
 
 def slip_steps(local: Array, change: Array, friction: Array) -> Array:
-    """Solve (1) for each contact: the least s >= 0 at which it slips, (k,); infinite if never.
-
-    Takes `local` (normal, tangent, tangent) or (k, 3); `change` (k, 3); `friction` (k,).
-    """
+    """Solve (1) for each contact: the least s >= 0 at which it slips, (k,); infinite if never."""
     n, t, a, b = local[:, 0], local[:, 1:], change[:, 0], change[:, 1:]
     # q2 s^2 + 2 q1 s + q0 is the squared cone less the squared tangential force, q0 >= 0
     mu2 = friction**2
@@ -272,17 +263,13 @@ def slip_steps(local: Array, change: Array, friction: Array) -> Array:
 
 
 def _push_steps(local: Array, change: Array, most: float) -> Array:
-    """Find the further multiple at which each push reaches the limit, (k,)."""
     left, a = np.maximum(most - local[:, 0], 0.0), change[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(a > 0.0, left / a, np.inf)
 
 
 def _next_event(held: Held, load: Array, most: _Limits) -> tuple[float, Event, int]:
-    """Find the next multiple of a load at which something happens, as the response stays.
-
-    Gives the further multiple, what happens, and the index of the contact or joint.
-    """
+    """Find how much further a load can grow, what happens there, and to which contact."""
     grip = held.grip
     local, change = grip.local_squeeze, grip.response @ load
     slips = slip_steps(local, change, grip.friction)

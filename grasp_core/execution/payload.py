@@ -190,7 +190,6 @@ def _body(grip: Grip, max_push_n: float, motors: Motors | None) -> WrenchBody:
 
 
 def _free_mass(body: WrenchBody) -> FreeMass:
-    """Bound the mass that forces chosen anew hold, by rays until the bounds meet."""
     rays = [_ray(body, direction) for direction in FIRST]
     none = NOTHING * body.max_normal_force / GRAVITY_M_PER_S2
     # where a direction is hardly resisted, so is one of these or the one that its facet faces

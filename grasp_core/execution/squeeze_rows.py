@@ -61,8 +61,7 @@ class JointTorques:
 
     levers: Array
     """Rows of L for forces in the contacts' frames, over the longest lever, (joints, 3k)."""
-    limits: Array
-    """Limits c, (joints,) [N]."""
+    limits: Array  # limits c, (joints,) [N]
     start: Array
     """What links and offset ask for in each group, g + L f0, (groups, joints) [N]."""
     change: Array
@@ -70,10 +69,7 @@ class JointTorques:
 
     @classmethod
     def of(cls, motors: Motors, frames: Array, offset: Array, change: Array) -> "JointTorques":
-        """Take the joints of contacts with given responses.
-
-        Takes `frames` (k, 3, 3); `offset` (groups k, 3) [N]; `change` (groups k, 3, m) [N].
-        """
+        """Take the joints of contacts with frames (k, 3, 3) and the responses of all groups."""
         k, joints = len(frames), len(motors.limits)
         groups = len(offset) // k
         local = in_frames(motors.levers, frames)
@@ -139,8 +135,7 @@ class Cuts(ByValue):
 
     angles: Array
     """Angles of the tangent directions in their contacts' frames, (r,) [rad]."""
-    cases: Indices
-    """Index of each row's case, (r,)."""
+    cases: Indices  # index of each row's case, (r,)
 
     @classmethod
     def first(cls, count: int) -> "Cuts":
@@ -159,12 +154,9 @@ class Rows:
 
     R: Array
     """(rows, 3k): rows (1), then both of (2) for all cases, then both of (3) for all joints."""
-    c: Array
-    """What loads of scale one take, (rows,) [N]."""
-    b: Array
-    """What the offset leaves, (rows,) [N]."""
-    d: Array
-    """One where the row is a limit on a push, else zero, (rows,)."""
+    c: Array  # what loads of scale one take, (rows,) [N]
+    b: Array  # what the offset leaves, (rows,) [N]
+    d: Array  # one where the row is a limit on a push, else zero, (rows,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,10 +167,8 @@ class Survival:
     """Matrix from local squeezes to wrenches, torques over the grip's size, (6, 3k)."""
     offset: Array
     """Forces (n0, t0) that the offset adds in each case, (cases, 3) [N]."""
-    change: Array
-    """The rows (a, B) of each case, (cases, 3, m) [N]."""
-    friction: Array
-    """Coulomb coefficient of each case, (cases,)."""
+    change: Array  # the rows (a, B) of each case, (cases, 3, m) [N]
+    friction: Array  # Coulomb coefficient of each case, (cases,)
     joints: JointTorques
     """Torques of the joints, in a group for the cases under the loads, and one for those at rest.
     """

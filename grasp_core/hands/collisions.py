@@ -71,14 +71,11 @@ def surface_tree(body: Polyhedron) -> SurfaceTree:
 class Clearances:
     """Least distances of a hand's parts, negative where they overlap, at most `FAR` [m]."""
 
-    itself: float
-    """Between links that must not overlap."""
+    itself: float  # between links that must not overlap
     object: float
     """From the object, of all shapes but those that stand for touching fingertips."""
-    tips: float
-    """From the object, of those fingertips: zero where they touch."""
-    table: float
-    """From the table; `FAR` where there is none."""
+    tips: float  # from the object, of those fingertips: zero where they touch
+    table: float  # from the table; `FAR` where there is none
 
 
 def clearances(
@@ -115,8 +112,7 @@ class TipGaps:
     """Distances of the tips from the surface, negative where they overlap, (k,) [m]."""
     on_tips: Array
     """Points of the tips' hulls there, (k, 3) [m]: middles of tips that are balls."""
-    on_object: Array
-    """Points of the surface there, (k, 3) [m]."""
+    on_object: Array  # points of the surface there, (k, 3) [m]
 
 
 def tip_gaps(
@@ -150,7 +146,6 @@ def tip_distances(
 
 
 def _shapes(hand: Hand, arrays: HandArrays, joints: Array, palm_pose: Array) -> tuple[Array, Array]:
-    """Return axes and middles of the shapes of a hand in the object's frame."""
     found = places(hand, joints, palm_pose)
     turned, middles = np.empty_like(arrays.shape_rotations), np.empty_like(arrays.shape_positions)
     compiled("grasp_core.hands.collisions_kernel").place_shapes(

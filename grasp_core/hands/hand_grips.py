@@ -57,10 +57,8 @@ class HandGrip(Grip):
     joint_axes: Array
     """Unit vectors w_a of each finger's joints, from the palm outwards, (k, m, 3); zero for joints
     that a finger does not have."""
-    joint_arms: Array
-    """Arms x - p_a from them to the contact, (k, m, 3) [m]."""
-    servo_n_m_per_rad: float
-    """Stiffness k_q of every servo."""
+    joint_arms: Array  # arms x - p_a from them to the contact, (k, m, 3) [m]
+    servo_n_m_per_rad: float  # stiffness k_q of every servo
 
     def sound(self) -> bool:
         """Return whether the fields are those of contacts and of fingers that can move them."""

@@ -79,7 +79,6 @@ def turned_motors(hand: Hand, reach: HandReach) -> tuple[Motors, Array, tuple[Co
 
 
 def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
-    """Return where the hand's links are, the levers of its contacts and the torque limits."""
     found = places(hand, stance.joints, stance.palm_pose)
     points = np.array([contact.position for contact in stance.contacts])
     levers, own = np.zeros((len(hand.joints), len(points), 3)), chains(hand)

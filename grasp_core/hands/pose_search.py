@@ -155,40 +155,31 @@ class Asked:
     body: Polyhedron
     grasp: Grasp
     friction: float
-    up: Array
-    """Unit normal of the table, (3,)."""
-    height: float
-    """Its height along it; minus infinity for none [m]."""
+    up: Array  # unit normal of the table, (3,)
+    height: float  # its height along it; minus infinity for none [m]
     clearance: float
     """Least distance of everything from what it must not touch [m], but for links whose tips touch
     the object: they must only not overlap it."""
-    regions: bool
-    """Whether contacts may be anywhere in their regions."""
+    regions: bool  # whether contacts may be anywhere in their regions
     seed: int
-    most_starts: int
-    """Largest number of starts for each choice of contacts."""
+    most_starts: int  # largest number of starts for each choice of contacts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundPose:
     """A pose in which a hand holds an object."""
 
-    used: Indices
-    """Indices of the grasp's contacts at which fingers stand, (k,)."""
-    fingers: Indices
-    """The finger at each of them, (k,)."""
-    joints: Array
-    """Joint angles, (j,) [rad]."""
-    palm_pose: Array
-    """Pose of the palm in the object's frame, (4, 4)."""
+    used: Indices  # indices of the grasp's contacts at which fingers stand, (k,)
+    fingers: Indices  # the finger at each of them, (k,)
+    joints: Array  # joint angles, (j,) [rad]
+    palm_pose: Array  # pose of the palm in the object's frame, (4, 4)
     certificate: ClosureCertificate
     """Proof of force closure with the contacts that are reached."""
     within: tuple[bool, ...]
     """Whether each contact is in its region, or at the planned contact."""
     touching: Array
     """Points of blocks that touch, in the last links' frames, (k, 3) [m]; NaN for balls."""
-    starts: int = 1
-    """Number of starts that were tried."""
+    starts: int = 1  # number of starts that were tried
 
 
 def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | Counter[str]:
@@ -268,7 +259,6 @@ def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Target
 
 
 def _are_within(aims: Targets, points: Array, slack: float) -> tuple[bool, ...]:
-    """Return which contacts are in the regions that fingers aimed at."""
     return tuple(is_within(aims, k, point, slack) for k, point in enumerate(points))
 
 

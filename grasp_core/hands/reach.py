@@ -192,7 +192,6 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
 
 
 def _table(body: Polyhedron, down: ArrayLike | None) -> tuple[Array, float]:
-    """Return the unit normal of the table that an object lies on, and its height along it."""
     if down is None:
         return np.array([0.0, 0.0, 1.0]), -np.inf
     way = frozen(down, (3,), "table_down")
@@ -204,7 +203,6 @@ def _table(body: Polyhedron, down: ArrayLike | None) -> tuple[Array, float]:
 
 
 def _unclosed(asked: Asked, choices: ContactChoices) -> HandReach:
-    """Say that there are no contacts to stand at, with the proofs."""
     count, name = len(asked.hand.fingers), asked.hand.name
     fewer = f"{name} has {count} fingers, and no {count} of the grasp's {FINGERS} contacts alone"
     at = f"at friction {asked.friction:g}"
@@ -220,7 +218,6 @@ def _unclosed(asked: Asked, choices: ContactChoices) -> HandReach:
 
 
 def _why(tally: Counter[str]) -> tuple[ReachReason, str]:
-    """Say what was in the way most often."""
     tried = f"from {tally.total()} starts no pose was found"
     blocked = {name: tally[name] for name in OVERLAPS if tally[name]}
     if blocked:
@@ -245,13 +242,10 @@ class Stance:
 
     hand: Hand
     """The hand, with a ball at its contact in place of each fingertip that is a block."""
-    joints: Array
-    """Joint angles, (j,) [rad]."""
-    palm_pose: Array
-    """Pose of the palm in the object's frame, (4, 4)."""
+    joints: Array  # joint angles, (j,) [rad]
+    palm_pose: Array  # pose of the palm in the object's frame, (4, 4)
     contacts: tuple[Contact, ...]
-    fingers: tuple[int, ...]
-    """The hand's finger at each contact."""
+    fingers: tuple[int, ...]  # the hand's finger at each contact
     forces: Array
     """Balanced contact forces strictly inside the friction cones, of any size, (k, 3)."""
 

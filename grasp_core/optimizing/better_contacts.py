@@ -162,7 +162,6 @@ def _clear_of_edges(room: FacePiece, point: Array) -> Array:
 def _random_starts(
     faces: ContactFaces, rooms: Sequence[FacePiece], rng: np.random.Generator
 ) -> Iterator[Array]:
-    """Yield the best of some random contact sets in force closure, (4, 2) each."""
     trials = [
         np.array([rng.dirichlet(np.ones(len(room.corners))) @ room.corners for room in rooms])
         for _ in range(RANDOM_TRIALS)
@@ -175,7 +174,6 @@ def _random_starts(
 def _certified(
     body: Polyhedron, grasp: Grasp, faces: ContactFaces, y: Array, rng: np.random.Generator
 ) -> Grasp | None:
-    """Return the grasp at these contacts if closure and a general witness confirm it, else None."""
     plain = closed_at(faces.pieces, faces.positions(y), faces.friction, 0.0)
     if plain is None:
         return None

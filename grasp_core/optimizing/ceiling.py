@@ -125,7 +125,6 @@ def quality_ceiling(
 
 
 def _grounds(body: Polyhedron, faces: Sequence[int], insets: Array) -> tuple[Grounds, Indices]:
-    """Return the convex pieces of four faces, and the finger that may be on each."""
     each = partial(whole, name="faces", most=len(body.faces) - 1)
     given = several(faces, each, "faces", "indices")
     if len(given) != FINGERS:
@@ -147,7 +146,6 @@ def _grounds(body: Polyhedron, faces: Sequence[int], insets: Array) -> tuple[Gro
 
 
 def _lowered(grounds: Grounds, owners: Indices, friction: float, asked: "_Asked") -> CutTree:
-    """Refute smaller and smaller thresholds, and return the proof of the least."""
     alone = np.eye(3)[None]
     proved = Slack.of(friction, len(alone), FERRARI_CANNY)
     searched = Slack.of(friction, len(alone), FERRARI_CANNY, SEARCHED_BELOW)
@@ -176,18 +174,12 @@ def _lowered(grounds: Grounds, owners: Indices, friction: float, asked: "_Asked"
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """How near a bound should come to what is attained, and for how many cases."""
-
     known: float
     gap: float
     parts: int
 
     def bounds(self, first: float) -> list[float]:
-        """Return the bounds below a first one to try, falling, each by the gap.
-
-        They are multiples of what is known, or of the smallest bound where next to nothing is:
-        nothing that is found on the way moves them.
-        """
+        """Return the bounds to try, falling: multiples of what is known, each by the gap."""
         least, share = max(self.known, SMALLEST), 1.0 - AIMED * self.gap
         rising = [least / share if self.known >= SMALLEST else least]
         while rising[-1] < first * share:  # each is larger by `AIMED` of `SMALLEST_GAP` at least

@@ -20,8 +20,7 @@ from scenes.hand_files.model_text import listed
 class Line:
     """A joint's angle as a linear function: `offset + ratio * angle of the root`."""
 
-    root: int
-    """The joint that moves freely; -1 for a constant angle."""
+    root: int  # the joint that moves freely; -1 for a constant angle
     ratio: float
     offset: float
 
@@ -88,12 +87,10 @@ def _lines(model: HandModel, used: set[int], name: str) -> dict[int, Line]:
 
 
 def _free(model: HandModel, own: list[int]) -> int:
-    """Choose the free joint of joints that move together; the first is the one they follow."""
     return next((joint for joint in own if not np.isnan(model.torques[joint])), own[0])
 
 
 def _from(free: Line, line: Line, joint: int) -> Line:
-    """Express a joint's line by the angle of another joint with the same root."""
     ratio = line.ratio / free.ratio
     return Line(joint, ratio, line.offset - ratio * free.offset)
 
@@ -119,13 +116,11 @@ def _refuse_loops(model: HandModel, used: set[int], name: str) -> None:
 
 
 def _moving(model: HandModel, body: int) -> set[int]:
-    """Return the joints that move a body."""
     path = path_of_body(model, body)
     return {j for j, own in enumerate(model.raw.jnt_bodyid.tolist()) if own in path}
 
 
 def _refuse(model: HandModel, joints: set[int], name: str, why: str) -> None:
-    """Refuse joints, if there are any."""
     if joints:
         named = [model.joint_names[j] or f"joint{j}" for j in sorted(joints - {-1})]
         raise InputError(
@@ -135,7 +130,6 @@ def _refuse(model: HandModel, joints: set[int], name: str, why: str) -> None:
 
 
 def _notes(model: HandModel, used: set[int], aside: list[str]) -> tuple[str, ...]:
-    """Say what moves otherwise than in the file."""
     notes = list[str]()
     if aside:
         notes.append(

@@ -40,8 +40,7 @@ class Tip:
 
     name: str
     body: int
-    geom: int | None
-    """Its geom; None for a site."""
+    geom: int | None  # its geom; None for a site
     site: int | None
 
 
@@ -49,8 +48,7 @@ class Tip:
 class Chains:
     """Joints of fingers, and to which link each body is fixed."""
 
-    palm: int
-    """The palm's body."""
+    palm: int  # the palm's body
     tips: tuple[Tip, ...]
     joints: tuple[tuple[int, ...], ...]
     """For each finger its joints, from the palm outwards; fingers may have the first ones in
@@ -131,7 +129,6 @@ def _nearest(model: HandModel, body: int, name: str, file: str) -> int:
 
 
 def _solid(model: HandModel) -> list[int]:
-    """Return the geoms that collide with anything."""
     return [
         g for g, bits in enumerate(model.geom_bits)
         if bits.any() and model.geom_kinds[g] not in {"plane", "hfield"}
@@ -151,7 +148,6 @@ def _joints_of(model: HandModel, body: int) -> tuple[int, ...]:
 
 
 def _owners(model: HandModel, palm: int, used: set[int]) -> tuple[int, ...]:
-    """Find which joint of a finger moves each body."""
     found = list[int]()
     for body in range(len(model.raw.body_parentid)):
         moving = [j for b in path_of_body(model, body) for j in _joints_of(model, b) if j in used]
@@ -161,11 +157,7 @@ def _owners(model: HandModel, palm: int, used: set[int]) -> tuple[int, ...]:
 
 
 def frames(model: HandModel, found: Chains) -> dict[int, tuple[Array, Array]]:
-    """Return rotation and position of each link's frame in the world at the reference angles.
-
-    A link's frame stands on its joint's axis, turned like the joint's body; that of -1 is the
-    palm's body.
-    """
+    """Return axes and origin of each joint's link, as its body's; -1 is the palm's body."""
     placed = {-1: (model.rotations[found.palm], model.positions[found.palm])}
     for joint in (joint for chain in found.joints for joint in chain):
         body = int(model.raw.jnt_bodyid[joint])

@@ -58,8 +58,7 @@ class ModelText:
     """The text of a model that names no file on disk."""
 
     xml: str
-    files: dict[str, bytes]
-    """The files that it names, by the names in it."""
+    files: dict[str, bytes]  # the files that it names, by the names in it
     notes: tuple[str, ...] = ()
     """What was read otherwise than it is written, a sentence each."""
 
@@ -104,10 +103,7 @@ def _check_followed(path: Path, root: Any) -> None:
 
 
 def _with_shapes(root: Any) -> tuple[str, ...]:
-    """Let the visual shapes of a URDF link collide where it has no others, and drop all others.
-
-    Gives notes about the links whose visual shapes collide, and those that have none to be read.
-    """
+    """Let visual shapes of URDF links collide where there are no others; return notes."""
     lent, bare = list[str](), list[str]()
     for link in root.findall("link"):
         visuals, known = link.findall("visual"), link.find("collision") is not None
@@ -231,7 +227,6 @@ def _roots(home: Path, package: str) -> list[Path]:
 
 
 def _is_called(folder: Path, package: str) -> bool:
-    """Return whether the manifest in a folder gives the name of a package."""
     try:
         with (folder / MANIFEST).open("rb") as file:
             said = re.search(rb"<name>\s*([\w.-]+)\s*</name>", file.read(LARGEST_MANIFEST))
@@ -241,7 +236,6 @@ def _is_called(folder: Path, package: str) -> bool:
 
 
 def _bytes(path: Path, most: int, model: Path) -> bytes:
-    """Read a file of a size up to `most`."""
     try:
         with path.open("rb") as file:
             content = file.read(most + 1)

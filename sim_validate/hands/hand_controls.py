@@ -39,12 +39,9 @@ class HandControl(ByValue):
 
     name: str
     """Kind of the control: `overloaded`, `weak_motors`, `dead_motor` or `low_friction`."""
-    explanation: str
-    """What was changed, as a sentence."""
-    friction: float
-    """Coulomb coefficient at every contact."""
-    limits: Array
-    """Largest torque of each joint, (joints,) [N m]."""
+    explanation: str  # what was changed, as a sentence
+    friction: float  # Coulomb coefficient at every contact
+    limits: Array  # largest torque of each joint, (joints,) [N m]
     share: float
     """What is applied, over the limit that was predicted before the change."""
     proof: WrenchLimit

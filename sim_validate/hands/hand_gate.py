@@ -85,7 +85,6 @@ def cube() -> Polyhedron:
 
 
 def _outward() -> Array:
-    """Return the outward normals at the contacts, (4, 3)."""
     x, y = np.eye(3)[:2]
     return np.array([x, y, -x, -y])
 
@@ -121,7 +120,6 @@ def stance(friction: float) -> HandReach:
 def _limits(
     scene: HandScene, body: Polyhedron, reach: HandReach, setup: Setup
 ) -> tuple[Check, ...]:
-    """Measure (1)."""
     friction, press = scene.layout.friction, TORQUE / HEIGHT
     exact = {
         "across the contacts": (np.eye(6)[2], 4.0 * friction * press),
@@ -143,7 +141,6 @@ def _limits(
 
 
 def _displaced(scene: HandScene, setup: Setup) -> Check:
-    """Measure (2)."""
     smooth = limited(scene, scene.layout.motors.limits, SLIPPERY)
     layout = smooth.layout
     # without the grasp's own friction forces, which slippery contacts do not carry

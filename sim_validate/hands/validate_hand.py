@@ -162,8 +162,6 @@ def validate_hand(
 
 
 class _Bout:
-    """A hand on the bench, with the trials of an agenda."""
-
     def __init__(
         self, body: Polyhedron, contacts: tuple[Contact, ...], scene: HandScene, agenda: Agenda,
         setup: Setup,

@@ -59,10 +59,7 @@ MOST_JOBS = 256
 
 
 def lowered_twists(searching: Searching, rng: np.random.Generator) -> Array:
-    """Return twists in which all polygons together resist little, and let the search know them.
-
-    Gives unit twists, (n, 6).
-    """
+    """Return unit twists, (n, 6), that polygons resist little, and let the search know them."""
     grounds, loads = searching.grounds, searching.measure.loads
     points = [grounds.places(p, at) for p, at in enumerate(grounds.polygons())]
     on = np.repeat(np.arange(len(points)), [len(each) for each in points])

@@ -22,12 +22,9 @@ CROSSING_STEPS = 4
 class Pieces(NamedTuple):
     """The convex pieces of faces on which contacts lie, at unit size."""
 
-    normals: Array
-    """Inward unit normals, (p, 3)."""
-    origins: Array
-    """Points whose plane coordinates are zero, (p, 3)."""
-    frames: Array
-    """Orthonormal columns spanning the planes, (p, 3, 2)."""
+    normals: Array  # inward unit normals, (p, 3)
+    origins: Array  # points whose plane coordinates are zero, (p, 3)
+    frames: Array  # orthonormal columns spanning the planes, (p, 3, 2)
     friction: float
 
 

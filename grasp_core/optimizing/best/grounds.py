@@ -69,18 +69,13 @@ KERNEL = "grasp_core.optimizing.best.cuts_kernel"
 class Grounds(ByValue):
     """Convex polygons on which contacts may be, at unit size about the centre of mass."""
 
-    faces: Indices
-    """The face of each polygon, (p,)."""
-    normals: Array
-    """Inward unit normals, (p, 3)."""
-    origins: Array
-    """Points whose plane coordinates are zero, (p, 3)."""
-    frames: Array
-    """Orthonormal columns that span the planes, (p, 3, 2)."""
+    faces: Indices  # the face of each polygon, (p,)
+    normals: Array  # inward unit normals, (p, 3)
+    origins: Array  # points whose plane coordinates are zero, (p, 3)
+    frames: Array  # orthonormal columns that span the planes, (p, 3, 2)
     corners: Array
     """Corners in plane coordinates, in order, zero where there are fewer, (p, 24, 2)."""
-    counts: Indices
-    """How many corners each has, (p,)."""
+    counts: Indices  # how many corners each has, (p,)
 
     def __post_init__(self) -> None:
         shapes = {"normals": (None, 3), "origins": (None, 3), "frames": (None, 3, 2),
@@ -165,7 +160,6 @@ def _small(corners: Array) -> list[Array]:
 
 
 def _is_convex(corners: Array) -> bool:
-    """Return whether a polygon turns one way at all corners, and once around in all."""
     edges = np.roll(corners, -1, axis=0) - corners
     following = np.roll(edges, -1, axis=0)
     turns = edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0]
@@ -176,10 +170,7 @@ def _is_convex(corners: Array) -> bool:
 
 
 def exact_maps(body: Polyhedron, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> Array:
-    """Return the symmetries of an object that map pieces and loads exactly enough, (g, 3, 3).
-
-    Only the identity is returned if they do not form a group.
-    """
+    """Return symmetries that map pieces and loads exactly enough, (g, 3, 3); only 1 if no group."""
     alone = np.eye(3)[None]
     found = symmetries(body)
     every = np.concatenate([alone, found.rotations[1:], found.reflections])

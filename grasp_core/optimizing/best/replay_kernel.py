@@ -22,12 +22,9 @@ DEEPEST = 4096
 class Planes(NamedTuple):
     """The planes of the pieces."""
 
-    normals: Array
-    """Inward unit normals, (p, 3)."""
-    origins: Array
-    """Points whose plane coordinates are zero, (p, 3)."""
-    frames: Array
-    """Orthonormal columns, (p, 3, 2)."""
+    normals: Array  # inward unit normals, (p, 3)
+    origins: Array  # points whose plane coordinates are zero, (p, 3)
+    frames: Array  # orthonormal columns, (p, 3, 2)
     friction: float
 
 

@@ -125,10 +125,8 @@ def stopping(seconds: float | None) -> Generator[Stop]:
 class Found:
     """Contacts whose quality, or multiple of a task's loads, is known."""
 
-    pieces: tuple[int, ...]
-    """The piece of each contact, (4,)."""
-    at: Array
-    """Plane coordinates, (4, 2)."""
+    pieces: tuple[int, ...]  # the piece of each contact, (4,)
+    at: Array  # plane coordinates, (4, 2)
     quality: FerrariCanny | ResistedLoads
 
     def __post_init__(self) -> None:
@@ -274,8 +272,7 @@ class Searching:
     spare: float = 0.0
     """How far below threshold times demand a support still counts as an answer."""
     pool: Any = None
-    nodes: int = 0
-    """How many nodes were visited in all levels."""
+    nodes: int = 0  # how many nodes were visited in all levels
 
     def __post_init__(self) -> None:
         self.pool = self.empty_pool()
@@ -320,11 +317,7 @@ class Searching:
     def refute(
         self, nodes: Nodes, threshold: float, known: float
     ) -> tuple[Steps | None, list[Found]]:
-        """Try to refute that contacts of the first nodes reach a threshold.
-
-        Gives the tree, or None if it was stopped or contacts reach the threshold; contacts found
-        that surpass what is known.
-        """
+        """Try to refute a threshold: return the tree or None, and contacts above what is known."""
         corners, counts, fresh = nodes
         trunk = part_from((on_grid(corners, SEARCH_DIGITS), counts, fresh), self.pool)
         self._search(trunk, threshold, known, PART_DEPTH)
@@ -351,7 +344,6 @@ class Searching:
     def _together(
         self, threads: ThreadPoolExecutor, wave: Sequence[Part], threshold: float, known: float
     ) -> None:
-        """Search the parts of a wave; an interrupt stops all of them."""
         try:
             for ended in [
                 threads.submit(self._search, part, threshold, known, MOST_DEPTH) for part in wave
@@ -397,7 +389,6 @@ class Searching:
             yield why
 
     def _is_refuted(self, part: Part, work: Any, threshold: float, known: float) -> bool:
-        """Return whether contacts found are below the threshold; learn the twist that shows it."""
         found = self.measured(work.on, work.middle)
         if found.quality.lower > known:
             part.found.append(found)
@@ -432,7 +423,6 @@ class Searching:
 
 
 def _next(waiting: deque[_Waiting]) -> Part:
-    """Make a part of the node that has waited longest, below the part that left it."""
     above, node, pool = waiting.popleft()
     above.parts.append(part_from(node, pool))
     return above.parts[-1]

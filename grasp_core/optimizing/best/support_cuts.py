@@ -202,7 +202,6 @@ class CutTree(ByValue):
         return bool(fits) and (alone or fitting(self.maps, self.grounds, self.measure))
 
     def _has_owners(self) -> bool:
-        """Return whether each piece has an owner, and each of four fingers has a piece."""
         owners = self.owners
         if owners is None or not is_indices(owners, len(self.grounds.counts)):
             return False
