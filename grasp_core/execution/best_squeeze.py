@@ -159,7 +159,8 @@ class _Round:
     def more_cuts(self) -> Cuts:
         """Return the rows so far and those that the squeeze breaks most."""
         broken = np.flatnonzero(self.scales[: len(self.angles)] < self.upper * (1.0 - ROUNDING))
-        return self.cuts.with_rows(self.angles[broken], broken)
+        angles = np.append(self.cuts.angles, self.angles[broken])
+        return Cuts(angles, np.append(self.cuts.cases, broken))
 
 
 def _solved(

@@ -176,7 +176,8 @@ def _balanced(
     """
     scale = np.repeat([1.0, 1.0 / grip.size], 3)
     rest = grip.local_squeeze
-    stiff, maps, softening = _small_motions(grip)
+    stiff, maps = grip.response @ grip.grasp_stiffness, grip.local_maps  # D_i and W_i F_i
+    softening = grip.grasp_stiffness + np.einsum("kij,kjl->il", maps, stiff)  # C of (2)
     rows, columns = stiff.reshape(-1, WRENCH), maps.transpose(1, 0, 2).reshape(WRENCH, -1)
     most = MET * float(np.abs(rest).max())
     motion = start.copy()
@@ -199,13 +200,6 @@ def _balanced(
         step = np.where(found[:, None], 0.0, solved[..., 0] * scale)
         motion = motion + step / np.maximum(np.abs(step / reach).max(axis=1, keepdims=True), 1.0)
     return after, motion, found
-
-
-def _small_motions(grip: Grip) -> tuple[Array, Array, Array]:
-    """Return D_i of (1), (k, 3, 6), W_i F_i, (k, 6, 3), and C of (2), (6, 6)."""
-    stiff = grip.response @ grip.grasp_stiffness
-    maps = grip.local_maps
-    return stiff, maps, grip.grasp_stiffness + np.einsum("kij,kjl->il", maps, stiff)
 
 
 def _returned(tried: Array, friction: Array) -> tuple[Array, Array]:

@@ -180,7 +180,12 @@ class HandPayload(ByValue):
                 return False
             hand = replace(self.hand)  # without what it has kept
             most = hand.most(self.facet, self.motor_multipliers)
-            return most <= self.upper * (1.0 + ROUNDING) and self._holds(hand)
+            if not most <= self.upper * (1.0 + ROUNDING):
+                return False
+            if self.lower == 0.0:  # claims nothing, by nothing
+                return not (len(self.gravities) or len(self.triangles))
+            covered = ball_in(self.gravities, self.triangles) >= 1.0 - ROUNDING  # (3)
+            return covered and hand.holds(self.lower, self.gravities, self.forces)
 
     def _has_numbers(self) -> bool:
         n = len(self.gravities) if is_array(self.gravities, None, 3) else 0
@@ -193,13 +198,6 @@ class HandPayload(ByValue):
             and is_array(self.facet, WRENCH)
             and is_array(self.motor_multipliers, len(self.hand.motors.limits))
         )
-
-    def _holds(self, hand: "CarryingHand") -> bool:
-        """Return whether the lower mass is held wherever gravity points, by (3)."""
-        if self.lower == 0.0:  # claims nothing, by nothing
-            return not (len(self.gravities) or len(self.triangles))
-        covered = ball_in(self.gravities, self.triangles) >= 1.0 - ROUNDING
-        return covered and hand.holds(self.lower, self.gravities, self.forces)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -351,7 +349,14 @@ def _searched(hand: CarryingHand, gap: float) -> tuple[HandPayload, Ray]:
     Gives a certificate whose forces may not be balanced well enough, and the ray with its upper
     bound.
     """
-    rays, weakest = _first_rays(hand)
+    # no forces are larger than all fingers' together
+    mass = hand.push_n * float((1.0 + hand.friction).sum()) / GRAVITY_M_PER_S2
+    rays = [_ray(hand, mass, way) for way in FIRST]
+    weakest = _weakest(rays)
+    # one step of Newton's is enough: the bound is then within 1e-5 of where further steps lead
+    if weakest.nothing < weakest.most < mass:
+        rays = [_ray(hand, weakest.most, way) for way in FIRST]
+        weakest = _weakest([weakest, *rays])
     mass, lowered = rays[0].mass, gap
     while True:
         mass = min(mass, weakest.most / (1.0 + gap))
@@ -371,22 +376,6 @@ def _searched(hand: CarryingHand, gap: float) -> tuple[HandPayload, Ray]:
         else:
             # the hull grows as the mass falls; steps are doubled, so that a few tens end it
             mass, lowered = mass / (1.0 + lowered), 2.0 * lowered
-
-
-def _first_rays(hand: CarryingHand) -> tuple[list[Ray], Ray]:
-    """Cast the first rays at a mass that is a little too large, by a step of Newton's from above.
-
-    Gives the rays at that mass, and of all rays the one with the least bound.
-    """
-    # no forces are larger than all fingers' together
-    mass = hand.push_n * float((1.0 + hand.friction).sum()) / GRAVITY_M_PER_S2
-    rays = [_ray(hand, mass, way) for way in FIRST]
-    weakest = _weakest(rays)
-    # once is enough: the bound is then within 1e-5 of where further steps lead
-    if weakest.nothing < weakest.most < mass:
-        rays = [_ray(hand, weakest.most, way) for way in FIRST]
-        weakest = _weakest([weakest, *rays])
-    return rays, weakest
 
 
 def _ray(hand: CarryingHand, mass: float, way: Array) -> Ray:

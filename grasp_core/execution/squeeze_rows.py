@@ -94,9 +94,7 @@ class JointTorques:
         """Build the rows (3), R f + s c <= b, of all groups: R (rows, 3k), c (rows,), b (rows,)."""
         one_way = np.tile(self.levers, (len(self.start), 1))
         swing = self.swing.ravel()
-        room = np.concatenate(
-            [(self.limits - self.start).ravel(), (self.limits + self.start).ravel()]
-        )
+        room = np.append(self.limits - self.start, self.limits + self.start)
         return np.vstack([one_way, -one_way]), np.append(swing, swing), room
 
     def under(self, local: Array) -> Array:
@@ -123,11 +121,6 @@ class JointTorques:
         way = self.change[0, joint] / self.swing[0, joint]
         return way if self.under(local)[0, joint] >= 0.0 else -way
 
-    def is_reached(self, joint: int, local: Array, place: Array) -> bool:
-        """Return whether a load, scale times z as `place`, takes a joint to its limit."""
-        torque = self.under(local)[0, joint] + self.change[0, joint] @ place
-        return bool(abs(torque) >= self.limits[joint])
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Cuts(ByValue):
@@ -142,10 +135,6 @@ class Cuts(ByValue):
         """Return evenly spread rows of each of `count` cases."""
         angles = np.tile(np.linspace(0.0, 2.0 * np.pi, STARTS, endpoint=False), count)
         return cls(angles, np.repeat(np.arange(count), STARTS))
-
-    def with_rows(self, angles: Array, cases: Indices) -> "Cuts":
-        """Return these rows and more, (n,) each."""
-        return Cuts(np.append(self.angles, angles), np.append(self.cases, cases))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
