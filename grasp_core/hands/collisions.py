@@ -60,11 +60,9 @@ def surface_tree(body: Polyhedron) -> SurfaceTree:
     return SurfaceTree(
         np.ascontiguousarray(corners),
         np.divide(across, sizes, out=np.zeros_like(across), where=sizes > 0.0),
-        order.astype(np.int64),
-        np.array([middle for middle, _ in balls]),
-        np.array([radius for _, radius in balls]),
-        np.array(links, np.int64),
-    )
+        order.astype(np.int64), np.array([middle for middle, _ in balls]),
+        np.array([radius for _, radius in balls]), np.array(links, np.int64),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,14 +77,9 @@ class Clearances:
 
 
 def clearances(
-    hand: Hand,
-    body: Polyhedron,
-    joints: Array,
-    palm_pose: Array,
-    fingers: Indices,
-    up: Array | None = None,
-    height: float = 0.0,
-) -> Clearances:
+    hand: Hand, body: Polyhedron, joints: Array, palm_pose: Array, fingers: Indices,
+    up: Array | None = None, height: float = 0.0,
+) -> Clearances:  # fmt: skip
     """Measure the distances of a hand from itself, an object and a table."""
     arrays, tree = hand_arrays(hand), surface_tree(body)
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
@@ -108,10 +101,8 @@ def clearances(
 class TipGaps:
     """Where fingertips are nearest to an object, or deepest in it."""
 
-    gaps: Array
-    """Distances of the tips from the surface, negative where they overlap, (k,) [m]."""
-    on_tips: Array
-    """Points of the tips' hulls there, (k, 3) [m]: middles of tips that are balls."""
+    gaps: Array  # distances of tips from the surface, negative in it, (k,) [m]
+    on_tips: Array  # points of tips' hulls there, middles of balls, (k, 3) [m]
     on_object: Array  # points of the surface there, (k, 3) [m]
 
 
@@ -122,8 +113,7 @@ def tip_gaps(
     arrays, tree = hand_arrays(hand), surface_tree(body)
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
     kernel = compiled("grasp_core.hands.collisions_kernel")
-    near, other = np.empty((len(fingers), 3)), np.empty((len(fingers), 3))
-    apart = np.empty(len(fingers))
+    near, other, apart = *np.empty((2, len(fingers), 3)), np.empty(len(fingers))
     for k, finger in enumerate(fingers):
         apart[k] = kernel.tip_surface(arrays, turned, middles, tree, finger, near[k], other[k])
         if apart[k] <= SAME:

@@ -55,12 +55,10 @@ class Coupling(ByValue):
 class Drives:
     """All joints of a hand by (1), and the angles that they can have."""
 
-    drivers: Indices
-    """Number of the joint that each follows; its own where it moves freely, (j,)."""
+    drivers: Indices  # the joint that each follows, itself where it is free, (j,)
     ratios: Array  # (j,)
     offsets: Array  # (j,) [rad]
-    ranges: Array
-    """Lowest and highest angles, those of the followers included, (j, 2) [rad]."""
+    ranges: Array  # lowest and highest angles, as followers allow, (j, 2) [rad]
 
     @property
     def free(self) -> Indices:

@@ -111,12 +111,8 @@ class HandReach(ByValue):
             fingers = frozen_indices(self.fingers, (len(kept),), "fingers")
             object.__setattr__(self, "used", kept)
             object.__setattr__(self, "fingers", fingers)
-        shapes = {
-            "joints": (None,),
-            "palm_pose": (POSE, POSE),
-            "pregrasp": (None,),
-            "approach": (3,),
-        }
+        shapes = {"joints": (None,), "palm_pose": (POSE, POSE), "pregrasp": (None,),
+                  "approach": (3,)}  # fmt: skip
         for name, shape in shapes.items():
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
@@ -194,12 +190,17 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
 def _table(body: Polyhedron, down: ArrayLike | None) -> tuple[Array, float]:
     if down is None:
         return np.array([0.0, 0.0, 1.0]), -np.inf
-    way = frozen(down, (3,), "table_down")
+    up = -direction(down, "table_down")
+    return up, float((body.vertices @ up).min())
+
+
+def direction(down: ArrayLike, name: str) -> Array:
+    """Scale a direction to unit length, (3,)."""
+    way = frozen(down, (3,), name)
     length = float(np.linalg.norm(way))
     if length == 0.0:
-        raise InputError("table_down must be a direction, got a vector of length zero")
-    up = -way / length
-    return up, float((body.vertices @ up).min())
+        raise InputError(f"{name} must be a direction, got a vector of length zero")
+    return way / length
 
 
 def _unclosed(asked: Asked, choices: ContactChoices) -> HandReach:
@@ -240,14 +241,12 @@ def _why(tally: Counter[str]) -> tuple[ReachReason, str]:
 class Stance:
     """A hand in a pose at its contacts."""
 
-    hand: Hand
-    """The hand, with a ball at its contact in place of each fingertip that is a block."""
+    hand: Hand  # with a ball at its contact in place of each block
     joints: Array  # joint angles, (j,) [rad]
     palm_pose: Array  # pose of the palm in the object's frame, (4, 4)
     contacts: tuple[Contact, ...]
     fingers: tuple[int, ...]  # the hand's finger at each contact
-    forces: Array
-    """Balanced contact forces strictly inside the friction cones, of any size, (k, 3)."""
+    forces: Array  # balanced, strictly inside the cones, of any size, (k, 3)
 
     @property
     def tip_radii(self) -> Array:
@@ -303,11 +302,7 @@ def with_balls(
     hand: Hand, joints: Array, palm_pose: Array, fingers: Iterable[int],
     contacts: Iterable[Contact],
 ) -> Hand:  # fmt: skip
-    """Put a ball that touches at its contact in place of each fingertip that is a block.
-
-    Scenes and drawings know fingertips as balls on the last links. Which part of a block touches is
-    the pose's.
-    """
+    """Put a ball at its contact in place of each block: scenes and drawings know tips as balls."""
     touching = {f: each for f, each in zip(fingers, contacts, strict=True)
                 if hand.fingers[f].tip.corners is not None}  # fmt: skip
     if not touching:

@@ -38,9 +38,9 @@ from grasp_core.checked import instance, path_of
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_motors import direction, hand_motors
+from grasp_core.hands.hand_motors import hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians
-from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
+from grasp_core.hands.reach import HandReach, Stance, direction, stance_of, uncoupled
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
@@ -128,7 +128,7 @@ def hand_layout(
     armature = float(to_digits(np.array(drive.mass_kg * lever**2)))
     own = {each.name: getattr(base, each.name) for each in fields(base)}
     own["squeeze"] = to_digits(SQUEEZE * np.einsum("kij,ki->kj", base.frames, squeeze))
-    gravity = np.zeros(3) if down is None else GRAVITY_M_PER_S2 * direction(down)
+    gravity = np.zeros(3) if down is None else GRAVITY_M_PER_S2 * direction(down, "down")
     centers = base.contacts - (radii - drive.indentation_m)[:, None] * base.frames[:, :, 0]
     joints = touching(replace(stance, palm_pose=pose), centers)
     return HandLayout(
