@@ -63,6 +63,8 @@ MOST_MAPS = 128
 ASIDE = (0.37, 0.11)
 """Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
 KERNEL = "grasp_core.optimizing.best.cuts_kernel"
+SHAPES = {"normals": (3,), "origins": (3,), "frames": (3, 2), "corners": (ROOM, 2)}
+"""Shapes of the arrays of a polygon in `Grounds`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -78,10 +80,8 @@ class Grounds(ByValue):
     counts: Indices  # how many corners each has, (p,)
 
     def __post_init__(self) -> None:
-        shapes = {"normals": (None, 3), "origins": (None, 3), "frames": (None, 3, 2),
-                  "corners": (None, ROOM, 2)}  # fmt: skip
-        for name, shape in shapes.items():
-            object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
+        for name, shape in SHAPES.items():
+            object.__setattr__(self, name, frozen(getattr(self, name), (None, *shape), name))
         for name in ("faces", "counts"):
             object.__setattr__(self, name, frozen_indices(getattr(self, name), (None,), name))
 
@@ -91,10 +91,7 @@ class Grounds(ByValue):
         if not (
             0 < n <= MOST_PIECES
             and is_indices(self.faces, n)
-            and is_array(self.normals, n, 3)
-            and is_array(self.origins, n, 3)
-            and is_array(self.frames, n, 3, 2)
-            and is_array(self.corners, n, ROOM, 2)
+            and all(is_array(getattr(self, name), n, *shape) for name, shape in SHAPES.items())
             and bool((self.counts >= 3).all() and (self.counts <= ROOM).all())  # noqa: PLR2004
         ):
             return False

@@ -28,7 +28,10 @@ def are_contacts_of(grasp: Grasp, wrenches: WrenchSet, proof: CutTree) -> bool:
         return False
     if (wrenches.friction != proof.friction).any() or wrenches.width != 3:  # noqa: PLR2004
         return False
-    normals, arms = _contacts(wrenches)
+    each = wrenches.G.reshape(2, 3, FINGERS, 3).transpose(0, 2, 1, 3)
+    turns = each[1] @ each[0].transpose(0, 2, 1)
+    normals = each[0, :, :, 0]
+    arms = np.stack([turns[:, 2, 1], turns[:, 0, 2], turns[:, 1, 0]], axis=1)
     away, levers = grasp.positions - grasp.positions.mean(axis=0), arms - arms.mean(axis=0)
     size = float((away * levers).sum() / (levers * levers).sum())
     return bool(
@@ -36,12 +39,6 @@ def are_contacts_of(grasp: Grasp, wrenches: WrenchSet, proof: CutTree) -> bool:
         and np.abs(away - size * levers).max() <= SAME * size
         and np.abs(grasp.normals - normals).max() <= SAME
     ) and all(_is_on(proof, *contact) for contact in zip(arms, normals, strict=True))
-
-
-def _contacts(wrenches: WrenchSet) -> tuple[Array, Array]:
-    each = wrenches.G.reshape(2, 3, FINGERS, 3).transpose(0, 2, 1, 3)
-    turns = each[1] @ each[0].transpose(0, 2, 1)
-    return each[0, :, :, 0], np.stack([turns[:, 2, 1], turns[:, 0, 2], turns[:, 1, 0]], axis=1)
 
 
 def _is_on(proof: CutTree, point: Array, normal: Array) -> bool:
