@@ -17,7 +17,7 @@ from grasp_core.hands.collisions import overlapping_pairs
 from grasp_core.hands.couplings import Coupling
 from grasp_core.hands.hand import PALM, Fingertip, Hand, HandFinger, Joint, Link, LinkShape
 from grasp_core.hands.kinematics import rotation_about
-from scenes.hand_files.couplings import Followers, followers
+from scenes.hand_files.couplings import followers
 from scenes.hand_files.fingers import Chains, TipBall, chains, frames, tip_ball
 from scenes.hand_files.model import HandModel, compiled_hand
 from scenes.hand_files.model_text import model_text
@@ -42,7 +42,11 @@ def hand_from_file(path: Path, fingertips: tuple[str, ...]) -> Hand:
         HandFinger(tip.name, _links(model, found, placed, shapes, chain, coupled.ranges), ball)
         for tip, chain, (ball, _) in zip(found.tips, found.joints, balls, strict=True)
     ]
-    own = own_chains(fingers, _couplings(model, coupled))
+    rules = tuple(
+        Coupling(_joint_name(model, joint), _joint_name(model, line.root), line.ratio, line.offset)
+        for joint, line in sorted(coupled.lines.items())
+    )
+    own = own_chains(fingers, rules)
     palm = tuple(shapes.get(-1, ()))
     hand = Hand(
         path.stem, palm, own.fingers, (f"{path.name}; {AS_BOXES}",),
@@ -65,13 +69,6 @@ def _tips_elsewhere(model: HandModel, found: Chains) -> tuple[str, ...]:
     if not names:
         return ()
     return (f"fingertips without shapes are the nearest shape of their link: {', '.join(names)}",)
-
-
-def _couplings(model: HandModel, coupled: Followers) -> tuple[Coupling, ...]:
-    return tuple(
-        Coupling(_joint_name(model, joint), _joint_name(model, line.root), line.ratio, line.offset)
-        for joint, line in sorted(coupled.lines.items())
-    )
 
 
 def _close_by(hand: Hand, originals: dict[str, str]) -> set[tuple[str, str]]:
@@ -242,10 +239,8 @@ class OwnChains:
     """Fingers with chains of their own."""
 
     fingers: tuple[HandFinger, ...]
-    couplings: tuple[Coupling, ...]
-    """Couplings that were given, and those of the copies."""
-    originals: dict[str, str]
-    """For the name of each copy, the name of the link that it moves with."""
+    couplings: tuple[Coupling, ...]  # those that were given, and of the copies
+    originals: dict[str, str]  # for each copy, the link that it moves with
 
     @property
     def notes(self) -> tuple[str, ...]:

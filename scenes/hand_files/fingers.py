@@ -51,8 +51,7 @@ class Chains:
     palm: int  # the palm's body
     tips: tuple[Tip, ...]
     joints: tuple[tuple[int, ...], ...]
-    """For each finger its joints, from the palm outwards; fingers may have the first ones in
-    common."""
+    """For each finger its joints, from the palm outwards; the first may be common."""
     owners: tuple[int, ...]
     """For each body, the joint that moves it, -1 for the palm's, -2 where it is no part of it."""
 
@@ -172,11 +171,9 @@ class TipBall:
 
     center: Array
     radius: float
-    corners: Array | None = None
-    """Corners of the block, (m, 3) [m]; None for a ball."""
+    corners: Array | None = None  # of the block, (m, 3) [m]; None for a ball
     rounding: float = 0.0
-    cover: LinkShape | None = None
-    """Box that covers the block, in place of its geom; None to keep the geom."""
+    cover: LinkShape | None = None  # box that covers the block, in place of its geom
 
 
 def tip_ball(model: HandModel, tip: Tip, joint: Array, name: str) -> TipBall:

@@ -78,17 +78,15 @@ class Chains:
     hand: Hand
     joints: Array  # joint angles of the pose, (j,) [rad]
     armature_kg_m2: float  # inertia that each joint has besides that of its links
-    tips: tuple[Mapping[str, object], ...]
-    """Attributes of each finger's fingertip: what it touches, and how."""
-    light_kg: float = NOMINAL_KG
-    """Mass of a link whose own is not known, or does not count [kg]."""
+    tips: tuple[Mapping[str, object], ...]  # attributes of each finger's fingertip
+    light_kg: float = NOMINAL_KG  # of links whose masses do not count
     weighs: bool = False  # whether gravity pulls at links whose masses are known
     touches: int = 0
     """Bits of what palm and links touch besides each other; last links touch none of it, as their
     fingertips do."""
     contact: Mapping[str, object] | None = None  # attributes of these contacts
     inertials: Mapping[str, Mapping[str, object]] = field(default_factory=dict[str, Any])
-    """Mass and inertia of links by name, in place of those above."""
+    """Inertials of links by name, in place of those above."""
     stops: bool = False  # whether joints stop at the ends of their ranges
 
 

@@ -77,8 +77,7 @@ class HandLayout(Layout):
     palm_pose: Array  # pose of the palm in the world frame, (4, 4)
     used_fingers: tuple[int, ...]  # the hand's finger at each contact
     motors: Motors
-    gravity: Array
-    """Acceleration of gravity that pulls at the links, (3,) [m/s^2]; zero for none."""
+    gravity: Array  # acceleration that pulls at the links, (3,) [m/s^2]
     servo_n_m_per_rad: float  # stiffness of the joints' servos
     damping_n_m_s_per_rad: float
     armature_kg_m2: float  # inertia that each joint has besides that of its links

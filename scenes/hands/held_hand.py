@@ -75,8 +75,7 @@ class HeldHandLayout(HeldLayout):
     servo_n_m_per_rad: float
     damping_n_m_s_per_rad: float
     armature_kg_m2: float  # inertia that each joint has besides that of its links
-    inertias: Array
-    """Inertia of each fingertip along its springs by (1), (k, 3) [kg]."""
+    inertias: Array  # of fingertips along their springs by (1), (k, 3) [kg]
 
     @property
     def tip_names(self) -> tuple[str, ...]:

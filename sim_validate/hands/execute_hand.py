@@ -129,8 +129,7 @@ class HandJob:
     body: Polyhedron
     reach: HandReach
     friction: float
-    settings: ExecutionSettings | None = None
-    """How to execute the grasp; None where it is only to hold test wrenches."""
+    settings: ExecutionSettings | None = None  # None where it only holds wrenches
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,11 +137,9 @@ class ExecutedHand:
     """What came of executing one grasp with a hand."""
 
     grasp: str
-    execution: Execution | None
-    """The trials; None where the grasp cannot be executed."""
+    execution: Execution | None  # None where the grasp cannot be executed
     refused: str = ""  # why the grasp cannot be executed; empty if it was
-    enough: Enough | None = None
-    """The push, and stiffness, that would be enough for the trials, as in `Execution.enough`."""
+    enough: Enough | None = None  # what would be enough, as in `Execution.enough`
 
     @property
     def survived(self) -> bool:

@@ -170,14 +170,9 @@ class _Bout:
         self.case = HandCase(body, contacts, self.layout.friction, self.layout.motors, setup)
         self.rig = self._rig(scene)
         self.loads = planned_loads(
-            body,
-            contacts,
-            self.layout.friction,
-            self.rig.idle,
-            agenda,
-            setup,
+            body, contacts, self.layout.friction, self.rig.idle, agenda, setup,
             motors=self.layout.motors,
-        )
+        )  # fmt: skip
 
     def _rig(self, scene: HandScene) -> Rig:
         bench = Bench(scene, threads=self.setup.threads, timeout_s=self.setup.timeout_s)

@@ -60,10 +60,7 @@ def support(at: Array, a: float, b: float, friction: float) -> float:
 
 @loop("numpy")
 def cut(corners: Array, count: int, at: Array, friction: float, t: float, out: Array) -> int:
-    """Fill in the corners of what is left of a polygon where the support reaches t.
-
-    Takes `at` (6,). Gives how many corners the rest has: zero if no point answers.
-    """
+    """Fill in what is left of a polygon where the support reaches t; return how many corners."""
     heights = np.empty(MOST_CORNERS)
     reached, runs = 0, 0
     for k in range(count):

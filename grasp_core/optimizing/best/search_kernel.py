@@ -416,10 +416,7 @@ def run(search: Search, budget: int, part_depth: int) -> int:
 
 @loop("numpy")
 def _visit(search: Search, node: int, now: int) -> bool:
-    """Replace a node by its children; False if its middle may reach the threshold, or it is tiny.
-
-    Where it is tiny, the first of `work.on` is negative.
-    """
+    """Replace a node by children; False if its middle may reach t, or it is tiny (on[0] < 0)."""
     look_again(search, node)
     best, cost = choose(search, node)
     if cost > 0.0 and _is_single(search, node):
@@ -453,10 +450,7 @@ def _is_single(search: Search, node: int) -> bool:
 
 @loop("numpy")
 def _lowered(search: Search, node: int, now: int) -> tuple[int, bool]:
-    """Lower what all corners of a node resist; return the new twist or -1, and if that refutes.
-
-    Supports count with what is spared of an answer, as in `answer_to`.
-    """
+    """Lower what all corners of a node resist; return the new twist or -1, and if that refutes."""
     work, stack, pieces = search.work, search.stack, search.pieces
     least, first = np.inf, 0
     for k in range(search.pool.size[0]):

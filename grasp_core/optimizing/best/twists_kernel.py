@@ -209,10 +209,7 @@ def _steepest(
     pieces: Pieces, demand: Demand, points: Array, on: Indices, m: int, y: Array, slope: Array,
     hardest: Array,
 ) -> float:  # fmt: skip
-    """Return the multiple that a twist allows, as if it asked for a little at least, and its slope.
-
-    The slope, (6,), is that of the support over the demand: (w - multiple * load) / demand.
-    """
+    """Return the multiple that a twist allows, asked for a little at least; fill in its slope."""
     found = highest(pieces, points, on, m, y, slope)
     if demand.kind == USUAL:
         return found
