@@ -21,11 +21,7 @@ its sides and its distance: differences, products and sums lose about one each."
 
 
 def nearest_facet(points: Array) -> tuple[Array, float, Indices]:
-    """Find the facet of the hull of points (n, 3) that is nearest to the origin, inside the hull.
-
-    Gives the facet's outward unit normal, (3,), its distance from the origin, and all triangles of
-    the hull, (t, 3).
-    """
+    """Find the hull's facet nearest to zero: normal, distance; and all triangles, (t, 3)."""
     spatial: Any = importlib.import_module("scipy.spatial")
     hull = spatial.ConvexHull(points)
     equations: Array = hull.equations
@@ -60,10 +56,7 @@ def least_distance(corners: Array) -> float:
 
 
 def ball_in(points: Array, triangles: Any) -> float:
-    """Return the radius of the ball that triangles of points (n, 3) show to be in the hull by (1).
-
-    The radius is minus infinity where the triangles, (t, 3), are not such ones.
-    """
+    """Return the radius of the ball that triangles show by (1) to be in a hull, or -inf."""
     if not (is_indices(triangles, None, 3) and len(triangles)):
         return -np.inf
     if triangles.min() < 0 or triangles.max() >= len(points) or not _is_closed(triangles):

@@ -133,8 +133,7 @@ class _Round:
     multipliers: Array
     balance: Array
     max_push_n: float
-    angles: Array
-    """Worst angle of each case, (cases,) [rad]."""
+    angles: Array  # worst angle of each case, (cases,) [rad]
     scales: Array
     """Scale at which each case slips, then at which each exceeds its limit, then at which each
     joint does under the loads, and at rest, (2 cases + groups joints,)."""
@@ -160,14 +159,14 @@ class _Round:
     def more_cuts(self) -> Cuts:
         """Return the rows so far and those that the squeeze breaks most."""
         broken = np.flatnonzero(self.scales[: len(self.angles)] < self.upper * (1.0 - ROUNDING))
-        return self.cuts.with_rows(self.angles[broken], broken)
+        angles = np.append(self.cuts.angles, self.angles[broken])
+        return Cuts(angles, np.append(self.cuts.cases, broken))
 
 
 def _solved(
     start: Grip, loads: LoadSet, survival: Survival, cuts: Cuts, most: float | None,
     motors: Motors | None,
 ) -> _Round:  # fmt: skip
-    """Solve the program with some rows, and judge its squeeze with the response that it has."""
     local, multipliers = _program(survival, cuts, most)
     grip = start.squeezed(np.einsum("kij,kj->ki", start.frames, local))
     own = Survival.of(grip, loads, motors)
@@ -185,10 +184,7 @@ def _solved(
 
 
 def _program(survival: Survival, cuts: Cuts, most: float | None) -> tuple[Array, Array]:
-    """Find the nearest optimal squeeze, (k, 3) local [N], and the multipliers of rows and balance.
-
-    Unknowns are the squeeze and the scale, or the squeeze and the push limit, all of order one.
-    """
+    """Find the nearest optimal squeeze, (k, 3) local [N], and multipliers of all rows."""
     k, change = survival.contacts, np.linalg.norm(survival.change, axis=(1, 2))
     used = np.repeat([1.0, 1.0 - AT_REST], k)[: len(change)]  # under the loads, and at rest
     rows = replace(survival, friction=used * survival.friction).rows(cuts)
@@ -240,7 +236,6 @@ def _refusal(most: float | None, *, strong: bool) -> str:
 
 
 def _certified(found: _Round, loads: LoadSet, motors: Motors | None) -> BestSqueeze:
-    """Prove what a squeeze survives, with the share of `SAFE` that suffices."""
     reactions = found.survival.reactions(found.grip.local_squeeze)
     for share in SAFE:
         scale = found.reached * (1.0 - share)

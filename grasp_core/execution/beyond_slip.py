@@ -96,14 +96,10 @@ def _moved(motion: Array, most_m: float, most_rad: float) -> Array:
 class _Followed:
     """Loads on their way: the last balance of each, and where each was lost first."""
 
-    multiples: Array
-    """Multiple of the last balance, (m,)."""
-    forces: Array
-    """Contact forces then, (m, k, 3) [N]."""
-    motion: Array
-    """Motion then, (m, 6) [m, rad]."""
-    share: Array
-    """That motion as a part of what is allowed, (m,)."""
+    multiples: Array  # multiple of the last balance, (m,)
+    forces: Array  # contact forces then, (m, k, 3) [N]
+    motion: Array  # motion then, (m, 6) [m, rad]
+    share: Array  # that motion as a part of what is allowed, (m,)
     lost: Array
     """Least multiple at which the object is known to be lost, (m,); infinite if none is."""
     beyond: Array
@@ -159,10 +155,7 @@ def _try(
 def _in_parts(
     grip: Grip, forces: Array, motion: Array, loads: Array, reach: Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Solve (2) for one load after the other, (PARTS, m, 6), each from the balance before.
-
-    Gives the forces and motions of the last, and for which each balance was found, (m,).
-    """
+    """Solve (2) for one load after the other, (PARTS, m, 6), each from the balance before."""
     found = np.ones(len(forces), dtype=bool)
     for load in loads:
         forces, motion, met = _balanced(grip, forces, motion, load, reach)
@@ -183,7 +176,8 @@ def _balanced(
     """
     scale = np.repeat([1.0, 1.0 / grip.size], 3)
     rest = grip.local_squeeze
-    stiff, maps, softening = _small_motions(grip)
+    stiff, maps = grip.response @ grip.grasp_stiffness, grip.local_maps  # D_i and W_i F_i
+    softening = grip.grasp_stiffness + np.einsum("kij,kjl->il", maps, stiff)  # C of (2)
     rows, columns = stiff.reshape(-1, WRENCH), maps.transpose(1, 0, 2).reshape(WRENCH, -1)
     most = MET * float(np.abs(rest).max())
     motion = start.copy()
@@ -208,18 +202,8 @@ def _balanced(
     return after, motion, found
 
 
-def _small_motions(grip: Grip) -> tuple[Array, Array, Array]:
-    """Return D_i of (1), (k, 3, 6), W_i F_i, (k, 6, 3), and C of (2), (6, 6)."""
-    stiff = grip.response @ grip.grasp_stiffness
-    maps = grip.local_maps
-    return stiff, maps, grip.grasp_stiffness + np.einsum("kij,kjl->il", maps, stiff)
-
-
 def _returned(tried: Array, friction: Array) -> tuple[Array, Array]:
-    """Bring contact forces, (m, k, 3), back to their cones along the tangent.
-
-    Gives the forces, and their derivatives by those given, (m, k, 3, 3).
-    """
+    """Return forces, (m, k, 3), to their cones along the tangent, with derivatives."""
     pushing = tried[..., 0] > 0.0
     n = np.where(pushing, tried[..., 0], 0.0)
     across = np.linalg.norm(tried[..., 1:], axis=-1)

@@ -180,7 +180,12 @@ class HandPayload(ByValue):
                 return False
             hand = replace(self.hand)  # without what it has kept
             most = hand.most(self.facet, self.motor_multipliers)
-            return most <= self.upper * (1.0 + ROUNDING) and self._holds(hand)
+            if not most <= self.upper * (1.0 + ROUNDING):
+                return False
+            if self.lower == 0.0:  # claims nothing, by nothing
+                return not (len(self.gravities) or len(self.triangles))
+            covered = ball_in(self.gravities, self.triangles) >= 1.0 - ROUNDING  # (3)
+            return covered and hand.holds(self.lower, self.gravities, self.forces)
 
     def _has_numbers(self) -> bool:
         n = len(self.gravities) if is_array(self.gravities, None, 3) else 0
@@ -194,13 +199,6 @@ class HandPayload(ByValue):
             and is_array(self.motor_multipliers, len(self.hand.motors.limits))
         )
 
-    def _holds(self, hand: "CarryingHand") -> bool:
-        """Return whether the lower mass is held wherever gravity points, by (3)."""
-        if self.lower == 0.0:  # claims nothing, by nothing
-            return not (len(self.gravities) or len(self.triangles))
-        covered = ball_in(self.gravities, self.triangles) >= 1.0 - ROUNDING
-        return covered and hand.holds(self.lower, self.gravities, self.forces)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CarryingHand(ByValue):
@@ -209,16 +207,11 @@ class CarryingHand(ByValue):
     Everything is along the object's axes and about its centre of mass.
     """
 
-    arms: Array
-    """Contact points from the centre of mass, (k, 3) [m]."""
-    normals: Array
-    """Unit normals into the object, (k, 3)."""
-    friction: Array
-    """Coulomb coefficients, (k,)."""
-    max_push_n: float
-    """Largest normal force of a fingertip [N]."""
-    motors: Motors
-    """The joints behind the contacts, without gravity."""
+    arms: Array  # contact points from the centre of mass, (k, 3) [m]
+    normals: Array  # unit normals into the object, (k, 3)
+    friction: Array  # Coulomb coefficients, (k,)
+    max_push_n: float  # largest normal force of a fingertip [N]
+    motors: Motors  # the joints behind the contacts, without gravity
     weights: Array
     """Torque W of each joint that carries the weight of the links, per unit vector of the direction
     of gravity, (joints, 3) [N m]."""
@@ -318,22 +311,14 @@ class CarryingHand(ByValue):
 class Ray:
     """The farthest gravity along a direction under which a mass and the links are held."""
 
-    mass: float
-    """The mass m [kg]."""
-    direction: Array
-    """Unit vector d of the direction, (3,)."""
-    reach: float
-    """Largest t with t (m d, d) in C."""
-    forces: Array
-    """Contact forces that hold it, (k, 3) [N]."""
-    facet: Array
-    """Twist y in (5), (6,)."""
-    multipliers: Array
-    """Multipliers u in it, (joints,)."""
-    most: float
-    """Largest mass that it allows [kg]."""
-    push_n: float
-    """Largest push of a finger [N]."""
+    mass: float  # the mass m [kg]
+    direction: Array  # unit vector d of the direction, (3,)
+    reach: float  # largest t with t (m d, d) in C
+    forces: Array  # contact forces that hold it, (k, 3) [N]
+    facet: Array  # twist y in (5), (6,)
+    multipliers: Array  # multipliers u in it, (joints,)
+    most: float  # largest mass that it allows [kg]
+    push_n: float  # largest push of a finger [N]
 
     @property
     def nothing(self) -> float:
@@ -343,10 +328,7 @@ class Ray:
 
 
 def carried_mass(hand: CarryingHand, gap: float = GAP) -> HandPayload:
-    """Bound the mass that a hand holds in every orientation, by rays until the bounds meet.
-
-    Gives both bounds with their proofs; a lower bound of zero where no mass is shown to be held.
-    """
+    """Bound the mass that a hand holds in every orientation, by rays until the bounds meet."""
     number(gap, "gap", least=FINEST_GAP, below=1.0)
     first, weakest = _searched(hand, gap)
     found, push = first, hand.push_n
@@ -367,7 +349,14 @@ def _searched(hand: CarryingHand, gap: float) -> tuple[HandPayload, Ray]:
     Gives a certificate whose forces may not be balanced well enough, and the ray with its upper
     bound.
     """
-    rays, weakest = _first_rays(hand)
+    # no forces are larger than all fingers' together
+    mass = hand.push_n * float((1.0 + hand.friction).sum()) / GRAVITY_M_PER_S2
+    rays = [_ray(hand, mass, way) for way in FIRST]
+    weakest = _weakest(rays)
+    # one step of Newton's is enough: the bound is then within 1e-5 of where further steps lead
+    if weakest.nothing < weakest.most < mass:
+        rays = [_ray(hand, weakest.most, way) for way in FIRST]
+        weakest = _weakest([weakest, *rays])
     mass, lowered = rays[0].mass, gap
     while True:
         mass = min(mass, weakest.most / (1.0 + gap))
@@ -389,22 +378,6 @@ def _searched(hand: CarryingHand, gap: float) -> tuple[HandPayload, Ray]:
             mass, lowered = mass / (1.0 + lowered), 2.0 * lowered
 
 
-def _first_rays(hand: CarryingHand) -> tuple[list[Ray], Ray]:
-    """Cast the first rays at a mass that is a little too large, by a step of Newton's from above.
-
-    Gives the rays at that mass, and of all rays the one with the least bound.
-    """
-    # no forces are larger than all fingers' together
-    mass = hand.push_n * float((1.0 + hand.friction).sum()) / GRAVITY_M_PER_S2
-    rays = [_ray(hand, mass, way) for way in FIRST]
-    weakest = _weakest(rays)
-    # once is enough: the bound is then within 1e-5 of where further steps lead
-    if weakest.nothing < weakest.most < mass:
-        rays = [_ray(hand, weakest.most, way) for way in FIRST]
-        weakest = _weakest([weakest, *rays])
-    return rays, weakest
-
-
 def _ray(hand: CarryingHand, mass: float, way: Array) -> Ray:
     """Find how far a mass and the links are held along a direction, a unit vector (3,)."""
     weight = np.append(GRAVITY_M_PER_S2 * mass * way, np.zeros(3))
@@ -417,15 +390,11 @@ def _ray(hand: CarryingHand, mass: float, way: Array) -> Ray:
 
 
 def _weakest(rays: list[Ray]) -> Ray:
-    """Return the ray with the least bound, the first of several that are equal."""
     return rays[first_best([-ray.most for ray in rays])]
 
 
 def _ends(hand: CarryingHand, rays: list[Ray], mass: float) -> tuple[Array, Array]:
-    """Mix the ends of rays with links alone to points of S(m') for a mass m' up to the rays'.
-
-    Gives the points by (7), (n, 3), and the shares a of the rays' forces that hold them, (n,).
-    """
+    """Mix ends of rays to points of S(m'), (n, 3), by (7), with the shares a of forces, (n,)."""
     ways = np.array([ray.direction for ray in rays])
     reach, masses = np.array([(ray.reach, ray.mass) for ray in rays]).T
     # 1 / s, the largest share of a motor's torque that the links ask for
@@ -437,7 +406,6 @@ def _ends(hand: CarryingHand, rays: list[Ray], mass: float) -> tuple[Array, Arra
 def _held(
     hand: CarryingHand, mass: float, weakest: Ray, ends: Array, forces: Array, triangles: Indices
 ) -> HandPayload:
-    """Make the certificate of a mass, without the points that are no corners of the hull."""
     used, corners = np.unique(triangles, return_inverse=True)
     numbered = corners.reshape(-1, 3).astype(np.int64)
     numbered.setflags(write=False)
@@ -448,7 +416,6 @@ def _held(
 
 
 def _nothing_held(hand: CarryingHand, weakest: Ray) -> HandPayload:
-    """Make the certificate of no mass, which needs no forces."""
     none = np.zeros((0, 3), dtype=np.int64)
     forces = np.zeros((0, len(hand.friction), 3))
     return _held(hand, 0.0, weakest, np.zeros((0, 3)), forces, none)

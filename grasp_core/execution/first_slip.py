@@ -72,14 +72,10 @@ AT_REST = 1e-9
 class Held:
     """A grip in equilibrium under a load."""
 
-    grip: Grip
-    """The grip in this pose: arms, normals and forces as they are now."""
-    moved: Array
-    """Displacement of the centre of mass, (3,) [m]."""
-    rotation: Array
-    """Orientation of the object against the one at rest, (3, 3)."""
-    tips: Array
-    """Displacements of the tips' centres, (k, 3) [m]."""
+    grip: Grip  # the grip in this pose: arms, normals and forces as they are now
+    moved: Array  # displacement of the centre of mass, (3,) [m]
+    rotation: Array  # orientation of the object against the one at rest, (3, 3)
+    tips: Array  # displacements of the tips' centres, (k, 3) [m]
     load: Array
     """External wrench on the object, (6,) [N, N m], about the centre of mass."""
 
@@ -164,8 +160,6 @@ class FirstSlip(ByValue):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Limits:
-    """What fingers and joints can do."""
-
     push_n: float
     motors: Motors
 
@@ -250,10 +244,7 @@ def _check_rest(grip: Grip, max_push_n: float) -> None:
 
 
 def slip_steps(local: Array, change: Array, friction: Array) -> Array:
-    """Solve (1) for each contact: the least s >= 0 at which it slips, (k,); infinite if never.
-
-    Takes `local` (normal, tangent, tangent) or (k, 3); `change` (k, 3); `friction` (k,).
-    """
+    """Solve (1) for each contact: the least s >= 0 at which it slips, (k,); infinite if never."""
     n, t, a, b = local[:, 0], local[:, 1:], change[:, 0], change[:, 1:]
     # q2 s^2 + 2 q1 s + q0 is the squared cone less the squared tangential force, q0 >= 0
     mu2 = friction**2
@@ -271,23 +262,18 @@ def slip_steps(local: Array, change: Array, friction: Array) -> Array:
     return np.minimum(np.where(np.isnan(slips), 0.0, slips), lifts)
 
 
-def _push_steps(local: Array, change: Array, most: float) -> Array:
-    """Find the further multiple at which each push reaches the limit, (k,)."""
-    left, a = np.maximum(most - local[:, 0], 0.0), change[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(a > 0.0, left / a, np.inf)
-
-
 def _next_event(held: Held, load: Array, most: _Limits) -> tuple[float, Event, int]:
-    """Find the next multiple of a load at which something happens, as the response stays.
-
-    Gives the further multiple, what happens, and the index of the contact or joint.
-    """
+    """Find how much further a load can grow, what happens there, and to which contact."""
     grip = held.grip
     local, change = grip.local_squeeze, grip.response @ load
     slips = slip_steps(local, change, grip.friction)
-    limits = _push_steps(local, change, most.push_n)
-    torques = torque_steps(*most.torques(held, load), most.motors.limits)
+    room, grows = np.maximum(most.push_n - local[:, 0], 0.0), change[:, 0]
+    asked, rates = most.torques(held, load)
+    # (2): a torque grows towards the limit of its own sign, or falls to that of the other
+    left = np.maximum(most.motors.limits - np.sign(rates) * asked, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        limits = np.where(grows > 0.0, room / grows, np.inf)
+        torques = np.where(rates != 0.0, left / np.abs(rates), np.inf)
     if torques.min(initial=np.inf) < min(limits.min(), slips.min()):
         return float(torques.min()), "torque limit", int(np.argmin(torques))
     if limits.min() < slips.min():
@@ -343,7 +329,11 @@ def _followed(
         multiple -= over
         held = under(held, start, multiple * load)
     for _ in range(CORRECTIONS):
-        excess = torque_excess(*most.torques(held, load), most.motors.limits)
+        torques, rates = most.torques(held, load)
+        growing = np.sign(torques) * rates
+        with np.errstate(divide="ignore", invalid="ignore"):
+            back = (np.abs(torques) - most.motors.limits) / growing
+        excess = float(np.max(np.where(growing > 0.0, back, 0.0), initial=0.0))
         if excess <= MET * multiple:
             break
         multiple -= excess
@@ -376,19 +366,3 @@ def _ended(held: Held, multiple: float, event: Event, place: int) -> FirstSlip:
         multiple, event, contact, held.forces, held.grip.arms, held.grip.normals,
         float(np.linalg.norm(held.moved)), math.atan2(sine, cosine), joint,
     )  # fmt: skip
-
-
-def torque_steps(torques: Array, rates: Array, limits: Array) -> Array:
-    """Find the further multiple of a load at which each torque reaches its limit, (joints,)."""
-    # a torque grows towards the limit of its own sign, or falls to that of the other
-    left = np.maximum(limits - np.sign(rates) * torques, 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(rates != 0.0, left / np.abs(rates), np.inf)
-
-
-def torque_excess(torques: Array, rates: Array, limits: Array) -> float:
-    """Find how much less load brings joints that are just beyond their limits back, or zero."""
-    growing = np.sign(torques) * rates
-    with np.errstate(divide="ignore", invalid="ignore"):
-        back = (np.abs(torques) - limits) / growing
-    return float(np.max(np.where(growing > 0.0, back, 0.0), initial=0.0))

@@ -85,10 +85,7 @@ BALANCED = 1e-6
 
 
 def springs(stiffness: ArrayLike, count: int) -> Array:
-    """Return one checked matrix for each fingertip, (count, 3, 3), of one number or one each.
-
-    Takes `stiffness` [N/m].
-    """
+    """Return checked matrices [N/m] of fingertips, (count, 3, 3), of one number or one each."""
     if real_array(stiffness, "stiffness").ndim < len(("finger", "row", "column")):
         each = frozen_each(stiffness, count, "stiffness")
         stiffness = each[:, None, None] * np.eye(3)

@@ -119,7 +119,12 @@ class Payload(ByValue):
                 and is_number(self.free.upper, least=self.free.lower)
                 and self._are_rays()
                 and _outer(self.free.rays) <= self.free.upper * (1.0 + ROUNDING)
-                and self._contains_ball()
+                and is_indices(self.free.triangles, None, 3)
+                and (
+                    self.free.lower == 0.0
+                    or ball_in(_ends(self.free.rays), self.free.triangles) * (1.0 + ROUNDING)
+                    >= self.free.lower
+                )
             )
 
     def _are_rays(self) -> bool:
@@ -132,14 +137,6 @@ class Payload(ByValue):
             and bounds(body, ray)
             for ray in self.free.rays
         )
-
-    def _contains_ball(self) -> bool:
-        if not is_indices(self.free.triangles, None, 3):
-            return False
-        if self.free.lower == 0.0:
-            return True
-        radius = ball_in(_ends(self.free.rays), self.free.triangles)
-        return self.free.lower <= radius * (1.0 + ROUNDING)
 
 
 def payload(
@@ -190,7 +187,6 @@ def _body(grip: Grip, max_push_n: float, motors: Motors | None) -> WrenchBody:
 
 
 def _free_mass(body: WrenchBody) -> FreeMass:
-    """Bound the mass that forces chosen anew hold, by rays until the bounds meet."""
     rays = [_ray(body, direction) for direction in FIRST]
     none = NOTHING * body.max_normal_force / GRAVITY_M_PER_S2
     # where a direction is hardly resisted, so is one of these or the one that its facet faces

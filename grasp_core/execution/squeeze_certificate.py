@@ -95,20 +95,18 @@ class BestSqueeze(ByValue):
         hand.
         """
         with np.errstate(all="ignore"):
-            if not self._has_numbers():
-                return False
             # without what the grip has kept, which may be anything
-            return replace(self, grip=replace(self.grip))._is_proved()
+            return self._has_numbers() and replace(self, grip=replace(self.grip))._is_proved()
 
     def _is_proved(self) -> bool:
-        if not (self.grip.sound() and self.grip.stable):
+        grip, motors = self.grip, self.motors
+        if not (grip.sound() and grip.stable):
             return False
-        motors = self.motors
-        if motors is not None and not (
-            is_a(motors, Motors) and motors.sound(len(self.grip.friction))
-        ):
+        if motors is not None and not is_a(motors, Motors):
             return False
-        survival = Survival.of(self.grip, self.loads, self.motors)
+        if motors is not None and not motors.sound(len(grip.friction)):
+            return False
+        survival = Survival.of(grip, self.loads, motors)
         return (
             self._fits(survival)
             and self._survives(survival)
@@ -162,8 +160,10 @@ class BestSqueeze(ByValue):
     def _ends(self, survival: Survival) -> bool:
         further = self.scale * (1.0 + NEAR) + no_scale(survival, self.max_push_n)
         if self.joint >= 0:
-            place = further * self.direction
-            return survival.joints.is_reached(self.joint, self.grip.local_squeeze, place)
+            joints = survival.joints
+            torque = joints.under(self.grip.local_squeeze)[0, self.joint]
+            torque += joints.change[0, self.joint] @ (further * self.direction)
+            return bool(abs(torque) >= joints.limits[self.joint])
         reactions = survival.reactions(self.grip.local_squeeze)
         start, change = reactions.start[self.contact], reactions.change[self.contact]
         normal, *across = (start + further * change @ self.direction).tolist()

@@ -61,8 +61,7 @@ class JointTorques:
 
     levers: Array
     """Rows of L for forces in the contacts' frames, over the longest lever, (joints, 3k)."""
-    limits: Array
-    """Limits c, (joints,) [N]."""
+    limits: Array  # limits c, (joints,) [N]
     start: Array
     """What links and offset ask for in each group, g + L f0, (groups, joints) [N]."""
     change: Array
@@ -70,10 +69,7 @@ class JointTorques:
 
     @classmethod
     def of(cls, motors: Motors, frames: Array, offset: Array, change: Array) -> "JointTorques":
-        """Take the joints of contacts with given responses.
-
-        Takes `frames` (k, 3, 3); `offset` (groups k, 3) [N]; `change` (groups k, 3, m) [N].
-        """
+        """Take the joints of contacts with frames (k, 3, 3) and the responses of all groups."""
         k, joints = len(frames), len(motors.limits)
         groups = len(offset) // k
         local = in_frames(motors.levers, frames)
@@ -98,9 +94,7 @@ class JointTorques:
         """Build the rows (3), R f + s c <= b, of all groups: R (rows, 3k), c (rows,), b (rows,)."""
         one_way = np.tile(self.levers, (len(self.start), 1))
         swing = self.swing.ravel()
-        room = np.concatenate(
-            [(self.limits - self.start).ravel(), (self.limits + self.start).ravel()]
-        )
+        room = np.append(self.limits - self.start, self.limits + self.start)
         return np.vstack([one_way, -one_way]), np.append(swing, swing), room
 
     def under(self, local: Array) -> Array:
@@ -127,11 +121,6 @@ class JointTorques:
         way = self.change[0, joint] / self.swing[0, joint]
         return way if self.under(local)[0, joint] >= 0.0 else -way
 
-    def is_reached(self, joint: int, local: Array, place: Array) -> bool:
-        """Return whether a load, scale times z as `place`, takes a joint to its limit."""
-        torque = self.under(local)[0, joint] + self.change[0, joint] @ place
-        return bool(abs(torque) >= self.limits[joint])
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Cuts(ByValue):
@@ -139,18 +128,13 @@ class Cuts(ByValue):
 
     angles: Array
     """Angles of the tangent directions in their contacts' frames, (r,) [rad]."""
-    cases: Indices
-    """Index of each row's case, (r,)."""
+    cases: Indices  # index of each row's case, (r,)
 
     @classmethod
     def first(cls, count: int) -> "Cuts":
         """Return evenly spread rows of each of `count` cases."""
         angles = np.tile(np.linspace(0.0, 2.0 * np.pi, STARTS, endpoint=False), count)
         return cls(angles, np.repeat(np.arange(count), STARTS))
-
-    def with_rows(self, angles: Array, cases: Indices) -> "Cuts":
-        """Return these rows and more, (n,) each."""
-        return Cuts(np.append(self.angles, angles), np.append(self.cases, cases))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,12 +143,9 @@ class Rows:
 
     R: Array
     """(rows, 3k): rows (1), then both of (2) for all cases, then both of (3) for all joints."""
-    c: Array
-    """What loads of scale one take, (rows,) [N]."""
-    b: Array
-    """What the offset leaves, (rows,) [N]."""
-    d: Array
-    """One where the row is a limit on a push, else zero, (rows,)."""
+    c: Array  # what loads of scale one take, (rows,) [N]
+    b: Array  # what the offset leaves, (rows,) [N]
+    d: Array  # one where the row is a limit on a push, else zero, (rows,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,10 +156,8 @@ class Survival:
     """Matrix from local squeezes to wrenches, torques over the grip's size, (6, 3k)."""
     offset: Array
     """Forces (n0, t0) that the offset adds in each case, (cases, 3) [N]."""
-    change: Array
-    """The rows (a, B) of each case, (cases, 3, m) [N]."""
-    friction: Array
-    """Coulomb coefficient of each case, (cases,)."""
+    change: Array  # the rows (a, B) of each case, (cases, 3, m) [N]
+    friction: Array  # Coulomb coefficient of each case, (cases,)
     joints: JointTorques
     """Torques of the joints, in a group for the cases under the loads, and one for those at rest.
     """

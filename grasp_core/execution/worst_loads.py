@@ -63,8 +63,7 @@ class Reactions:
     """Forces (normal, tangent, tangent) under the offset w0, (k, 3) [N]."""
     change: Array
     """Their change over the ellipsoid, the rows (a, B) of each contact, (k, 3, m) [N]."""
-    friction: Array
-    """Coulomb coefficients, (k,)."""
+    friction: Array  # Coulomb coefficients, (k,)
 
     @classmethod
     def of(cls, grip: Grip, loads: LoadSet) -> "Reactions":
@@ -147,7 +146,6 @@ class Reactions:
         return 0.5 * (low + high)
 
     def _certificates(self, scale: float) -> tuple[Array, Array]:
-        """Return the first two terms of (4), (k, 1 + m, 1 + m), and the diagonal matrix in it."""
         rows = np.concatenate([self.start[:, :, None], scale * self.change], axis=2)
         normal, across = rows[:, 0], rows[:, 1:]
         inside = self.friction[:, None, None] ** 2 * normal[:, :, None] * normal[:, None]

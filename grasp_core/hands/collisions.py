@@ -60,36 +60,26 @@ def surface_tree(body: Polyhedron) -> SurfaceTree:
     return SurfaceTree(
         np.ascontiguousarray(corners),
         np.divide(across, sizes, out=np.zeros_like(across), where=sizes > 0.0),
-        order.astype(np.int64),
-        np.array([middle for middle, _ in balls]),
-        np.array([radius for _, radius in balls]),
-        np.array(links, np.int64),
-    )
+        order.astype(np.int64), np.array([middle for middle, _ in balls]),
+        np.array([radius for _, radius in balls]), np.array(links, np.int64),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class Clearances:
     """Least distances of a hand's parts, negative where they overlap, at most `FAR` [m]."""
 
-    itself: float
-    """Between links that must not overlap."""
+    itself: float  # between links that must not overlap
     object: float
     """From the object, of all shapes but those that stand for touching fingertips."""
-    tips: float
-    """From the object, of those fingertips: zero where they touch."""
-    table: float
-    """From the table; `FAR` where there is none."""
+    tips: float  # from the object, of those fingertips: zero where they touch
+    table: float  # from the table; `FAR` where there is none
 
 
 def clearances(
-    hand: Hand,
-    body: Polyhedron,
-    joints: Array,
-    palm_pose: Array,
-    fingers: Indices,
-    up: Array | None = None,
-    height: float = 0.0,
-) -> Clearances:
+    hand: Hand, body: Polyhedron, joints: Array, palm_pose: Array, fingers: Indices,
+    up: Array | None = None, height: float = 0.0,
+) -> Clearances:  # fmt: skip
     """Measure the distances of a hand from itself, an object and a table."""
     arrays, tree = hand_arrays(hand), surface_tree(body)
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
@@ -111,12 +101,9 @@ def clearances(
 class TipGaps:
     """Where fingertips are nearest to an object, or deepest in it."""
 
-    gaps: Array
-    """Distances of the tips from the surface, negative where they overlap, (k,) [m]."""
-    on_tips: Array
-    """Points of the tips' hulls there, (k, 3) [m]: middles of tips that are balls."""
-    on_object: Array
-    """Points of the surface there, (k, 3) [m]."""
+    gaps: Array  # distances of tips from the surface, negative in it, (k,) [m]
+    on_tips: Array  # points of tips' hulls there, middles of balls, (k, 3) [m]
+    on_object: Array  # points of the surface there, (k, 3) [m]
 
 
 def tip_gaps(
@@ -126,8 +113,7 @@ def tip_gaps(
     arrays, tree = hand_arrays(hand), surface_tree(body)
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
     kernel = compiled("grasp_core.hands.collisions_kernel")
-    near, other = np.empty((len(fingers), 3)), np.empty((len(fingers), 3))
-    apart = np.empty(len(fingers))
+    near, other, apart = *np.empty((2, len(fingers), 3)), np.empty(len(fingers))
     for k, finger in enumerate(fingers):
         apart[k] = kernel.tip_surface(arrays, turned, middles, tree, finger, near[k], other[k])
         if apart[k] <= SAME:
@@ -150,7 +136,6 @@ def tip_distances(
 
 
 def _shapes(hand: Hand, arrays: HandArrays, joints: Array, palm_pose: Array) -> tuple[Array, Array]:
-    """Return axes and middles of the shapes of a hand in the object's frame."""
     found = places(hand, joints, palm_pose)
     turned, middles = np.empty_like(arrays.shape_rotations), np.empty_like(arrays.shape_positions)
     compiled("grasp_core.hands.collisions_kernel").place_shapes(

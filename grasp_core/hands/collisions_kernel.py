@@ -54,10 +54,7 @@ def near_links(hand: HandArrays, middles: Array, limit: float, near: NDArray[np.
 
 @loop()
 def may_be_near(middles: Array, reaches: Array, i: int, j: int, limit: float) -> bool:
-    """Return whether two shapes may be as near as a limit, by the balls that hold them.
-
-    A call with few arguments costs less than one with a whole hand.
-    """
+    """Return whether balls of two shapes are as near as a limit; few arguments make calls cheap."""
     square = 0.0
     for k in range(3):
         square += (middles[i, k] - middles[j, k]) ** 2
@@ -92,10 +89,7 @@ def is_block(hand: HandArrays, s: int) -> bool:
 
 @loop()
 def core_in(hand: HandArrays, R: Array, middle: Array, s: int) -> tuple[Array, float]:
-    """Return corners (m, 3) whose hull is a shape but for its rounding, and that.
-
-    For a shape that covers a block they are the block's.
-    """
+    """Return corners (m, 3) whose hull is a shape, or its block, but for a rounding, and that."""
     if not is_block(hand, s):
         corners = np.empty((8, 3))
         corners_of(hand.shape_sizes[s], R, middle, corners)
@@ -112,10 +106,7 @@ def _from_block(
     hand: HandArrays, turned: Array, middles: Array, block: int, s: int, limit: float, way: Array,
     point: Array,
 ) -> float:  # fmt: skip
-    """Return the distance of a shape from a block, `pair_distance` with the block first.
-
-    It is minus infinity if they overlap by more than their roundings.
-    """
+    """Return `pair_distance` from a block; -inf if they overlap by more than their roundings."""
     finger, local, between = hand.shape_tips[block], np.empty(3), np.empty((3, 3))
     own = hand.cover_corners[hand.tip_firsts[finger] : hand.tip_firsts[finger + 1]]
     relative_frame(turned, middles, block, s, local, between)
@@ -210,10 +201,7 @@ def tip_surface(
     hand: HandArrays, turned: Array, middles: Array, tree: SurfaceTree, finger: int, near: Array,
     other: Array,
 ) -> float:  # fmt: skip
-    """Return the distance of a surface from the hull of a tip's corners, zero if they overlap.
-
-    The tip touches where the distance is its rounding.
-    """
+    """Return a surface's distance from a tip's hull, zero in it; its rounding where it touches."""
     s, square = hand.tip_shapes[finger], 0.0
     if is_block(hand, s):
         corners, _ = core_in(hand, turned[s], middles[s], s)
@@ -319,11 +307,7 @@ def of_table(
 def free_postures(
     hand: HandArrays, angles: Array, apart: float, widest: float, kept: Indices, tips: Array
 ) -> int:
-    """Choose joint angles at which a hand is free of itself and its fingertips are near each other.
-
-    Takes `angles` (n, j) [rad]; `apart`, `widest` [m]; `kept` (m,); `tips` (m, f, 3) [m]. Gives how
-    many were chosen, at most m.
-    """
+    """Choose angles, (n, j), at which a hand is free and tips are near; return how many."""
     count, fingers, found = len(hand.axes), len(hand.tip_radii), 0
     R, p, W = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty((count, 3))
     turned, middles = np.empty((len(hand.shape_links), 3, 3)), np.empty((len(hand.shape_links), 3))

@@ -55,14 +55,10 @@ class Coupling(ByValue):
 class Drives:
     """All joints of a hand by (1), and the angles that they can have."""
 
-    drivers: Indices
-    """Number of the joint that each follows; its own where it moves freely, (j,)."""
-    ratios: Array
-    """(j,)."""
-    offsets: Array
-    """(j,) [rad]."""
-    ranges: Array
-    """Lowest and highest angles, those of the followers included, (j, 2) [rad]."""
+    drivers: Indices  # the joint that each follows, itself where it is free, (j,)
+    ratios: Array  # (j,)
+    offsets: Array  # (j,) [rad]
+    ranges: Array  # lowest and highest angles, as followers allow, (j, 2) [rad]
 
     @property
     def free(self) -> Indices:
@@ -102,7 +98,6 @@ def drives(names: Sequence[str], ranges: Array, couplings: Sequence[Coupling]) -
 def _attainable(
     names: Sequence[str], ranges: Array, drivers: Indices, ratios: Array, offsets: Array
 ) -> Array:
-    """Return the angles of joints at which the joints that follow them are in their ranges too."""
     ends = np.sort((ranges - offsets[:, None]) / ratios[:, None], axis=1)
     found = ranges.copy()
     for k in np.unique(drivers[drivers != np.arange(len(drivers))]).tolist():

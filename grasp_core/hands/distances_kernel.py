@@ -150,56 +150,6 @@ def edges_of(corners: Array, starts: Array, along: Array) -> None:
 
 
 @loop()
-def _gap(axis: Array, h: Array, points: Array) -> float:
-    """Return how far a box |x_i| <= h_i and points are apart along an axis; -inf for no axis."""
-    length = np.sqrt(dotted(axis, axis))
-    if length < PARALLEL:
-        return -np.inf
-    reach = (abs(axis[0]) * h[0] + abs(axis[1]) * h[1] + abs(axis[2]) * h[2]) / length
-    low, high = np.inf, -np.inf
-    for k in range(len(points)):
-        height = dotted(axis, points[k]) / length
-        low, high = min(low, height), max(high, height)
-    return max(low - reach, -high - reach)
-
-
-@loop()
-def box_triangle(h: Array, T: Array, limit: float) -> float:
-    """Return the signed distance of the box |x_i| <= h_i from a triangle, (3, 3) in its frame."""
-    axis, unit, sides = np.empty(3), np.zeros(3), np.empty((CORNERS, 3))
-    for k in range(CORNERS):
-        for j in range(3):
-            sides[k, j] = T[(k + 1) % CORNERS, j] - T[k, j]
-    cross(sides[0], sides[1], axis)
-    widest = _gap(axis / max(np.sqrt(dotted(axis, axis)), 1e-300), h, T)
-    for j in range(3):
-        unit[:] = 0.0
-        unit[j] = 1.0
-        widest = max(widest, _gap(unit, h, T))
-        if widest > limit:
-            return widest
-        for k in range(CORNERS):
-            length = np.sqrt(dotted(sides[k], sides[k]))
-            if length > 0.0:
-                cross(unit, sides[k] / length, axis)
-                widest = max(widest, _gap(axis, h, T))
-    if widest <= 0.0 or widest > limit:
-        return widest
-    corners, starts, along = np.empty((8, 3)), np.empty((12, 3)), np.empty((12, 3))
-    corners_of(h, np.eye(3), np.zeros(3), corners)
-    edges_of(corners, starts, along)
-    best, near, between, weights = np.inf, np.empty(3), np.empty(3), np.empty(2)
-    for k in range(CORNERS):
-        best = min(best, point_box(T[k], h))
-    for k in range(BOX_CORNERS):
-        best = min(best, point_triangle(corners[k], T, near, weights))
-    for e in range(BOX_EDGES):
-        for k in range(CORNERS):
-            best = min(best, segment_segment(starts[e], along[e], T[k], sides[k], between, near))
-    return np.sqrt(best)
-
-
-@loop()
 def _try_axis(axis: Array, h: Array, points: Array, widest: float, best: Array) -> float:
     """Return the larger of `widest` and the gap along an axis, and keep the axis if it is that."""
     length = np.sqrt(dotted(axis, axis))
@@ -218,6 +168,42 @@ def _try_axis(axis: Array, h: Array, points: Array, widest: float, best: Array) 
             best[j] = sign * axis[j] / length
         return gap
     return widest
+
+
+@loop()
+def box_triangle(h: Array, T: Array, limit: float) -> float:
+    """Return the signed distance of the box |x_i| <= h_i from a triangle, (3, 3) in its frame."""
+    axis, unit, sides, way = np.empty(3), np.zeros(3), np.empty((CORNERS, 3)), np.empty(3)
+    for k in range(CORNERS):
+        for j in range(3):
+            sides[k, j] = T[(k + 1) % CORNERS, j] - T[k, j]
+    cross(sides[0], sides[1], axis)
+    widest = _try_axis(axis / max(np.sqrt(dotted(axis, axis)), 1e-300), h, T, -np.inf, way)
+    for j in range(3):
+        unit[:] = 0.0
+        unit[j] = 1.0
+        widest = _try_axis(unit, h, T, widest, way)
+        if widest > limit:
+            return widest
+        for k in range(CORNERS):
+            length = np.sqrt(dotted(sides[k], sides[k]))
+            if length > 0.0:
+                cross(unit, sides[k] / length, axis)
+                widest = _try_axis(axis, h, T, widest, way)
+    if widest <= 0.0 or widest > limit:
+        return widest
+    corners, starts, along = np.empty((8, 3)), np.empty((12, 3)), np.empty((12, 3))
+    corners_of(h, np.eye(3), np.zeros(3), corners)
+    edges_of(corners, starts, along)
+    best, near, between, weights = np.inf, np.empty(3), np.empty(3), np.empty(2)
+    for k in range(CORNERS):
+        best = min(best, point_box(T[k], h))
+    for k in range(BOX_CORNERS):
+        best = min(best, point_triangle(corners[k], T, near, weights))
+    for e in range(BOX_EDGES):
+        for k in range(CORNERS):
+            best = min(best, segment_segment(starts[e], along[e], T[k], sides[k], between, near))
+    return np.sqrt(best)
 
 
 @loop()
@@ -326,10 +312,7 @@ def _holds_origin(S: Array, w: Array) -> bool:
 
 @loop()
 def _nearer(S: Array, w: Array, at: Array) -> int:
-    """Choose the corner of a triangle S that the point w replaces, and fill in the nearest point.
-
-    Gives the corner's number, or -1 if no such triangle is nearer to the origin than `at`.
-    """
+    """Fill in the nearest point of S with w; return the corner that w replaces, -1 for none."""
     tried, zero, chosen, least = np.empty((3, 3)), np.zeros(3), -1, dotted(at, at)
     near, weights = np.empty(3), np.empty(2)
     for n in range(3):
@@ -352,10 +335,7 @@ def _nearer(S: Array, w: Array, at: Array) -> int:
 def hull_hull(
     corners: Array, others: Array, limit: float, near: Array, other: Array
 ) -> float:  # fmt: skip
-    """Return the distance between the hulls of two sets of corners, zero where they overlap.
-
-    It is that of two planes between which no hull is, so that rounding never makes it too large.
-    """
+    """Return the distance of two hulls, zero where they overlap; rounding never enlarges it."""
     at, S, w, zero = corners[0] - others[0], np.empty((3, 3)), np.empty(3), np.zeros(3)
     pairs, weights, apart = np.zeros((3, 2), np.int64), np.empty(2), 0.0
     for n in range(3):
@@ -397,11 +377,7 @@ def hull_surface(
     hull: Array, within: float, corners: Array, middles: Array, radii: Array, links: Indices,
     near: Array, other: Array,
 ) -> float:  # fmt: skip
-    """Return the distance of the hull of corners (m, 3) from a surface, zero where they overlap.
-
-    Takes `middles` (n, 3); `radii` (n,); `links` (n, 2); `near`, `other` (3,). Gives the distance,
-    or infinity if the surface is not within the given one.
-    """
+    """Return the distance of a hull, (m, 3), from a surface: zero in it, inf if not within."""
     stack, gaps, depth, gap2 = np.empty(DEEPEST, np.int64), np.empty(DEEPEST), 1, np.empty(2)
     best, found, p, s, middle = within, np.inf, np.empty(3), np.empty(3), np.empty((1, 3))
     stack[0], gaps[0] = 0, 0.0
@@ -435,11 +411,7 @@ def nearest(
     p: Array, within: float, corners: Array, middles: Array, radii: Array, links: Indices,
     near: Array,
 ) -> int:  # fmt: skip
-    """Fill in the point of a surface nearest to a point, and return its triangle.
-
-    Takes `p`, `near` (3,); `middles` (n, 3); `radii` (n,); `links` (n, 2). Gives the triangle's
-    place in the tree, or -1 if none is within the distance.
-    """
+    """Fill in the surface's point nearest to p; return its triangle, or -1 if not within."""
     stack, gaps, found, depth = np.empty(DEEPEST, np.int64), np.empty(DEEPEST), -1, 1
     best, at, gap2, weights = within * within, np.empty(3), np.empty(2), np.empty(2)
     stack[0], gaps[0] = 0, 0.0

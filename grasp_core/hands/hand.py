@@ -42,7 +42,6 @@ PALM = "palm"
 
 
 def _rotation(value: ArrayLike, name: str) -> Array:
-    """Check a rotation matrix, (3, 3)."""
     turned = frozen(value, (3, 3), name)
     off = float(np.abs(turned @ turned.T - np.eye(3)).max())
     if off > RIGID_SLACK or np.linalg.det(turned) < 0.0:
@@ -308,7 +307,6 @@ class Hand(ByValue):
 
 
 def _pairs(given: Iterable[Any], names: set[str]) -> tuple[tuple[str, str], ...]:
-    """Check pairs of names of links."""
     each: Any = partial(instance, kind=tuple, name="ignored_pairs")
     listed: tuple[Any, ...] = several(given, each, "ignored_pairs", "pairs of names")
     for pair in cast("tuple[tuple[str, ...], ...]", listed):

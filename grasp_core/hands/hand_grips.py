@@ -54,13 +54,9 @@ STIFFEST = 1e12
 class HandGrip(Grip):
     """Contacts held by fingers whose joints have servos, with commands that stay as they are."""
 
-    joint_axes: Array
-    """Unit vectors w_a of each finger's joints, from the palm outwards, (k, m, 3); zero for joints
-    that a finger does not have."""
-    joint_arms: Array
-    """Arms x - p_a from them to the contact, (k, m, 3) [m]."""
-    servo_n_m_per_rad: float
-    """Stiffness k_q of every servo."""
+    joint_axes: Array  # w_a from the palm outwards, (k, m, 3); zero for none
+    joint_arms: Array  # arms x - p_a from them to the contact, (k, m, 3) [m]
+    servo_n_m_per_rad: float  # stiffness k_q of every servo
 
     def sound(self) -> bool:
         """Return whether the fields are those of contacts and of fingers that can move them."""

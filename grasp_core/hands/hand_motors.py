@@ -27,11 +27,10 @@ from grasp_core.execution.carried_mass import GAP, CarryingHand, HandPayload, ca
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.kinematics import HandPlaces, places
-from grasp_core.hands.reach import HandReach, Stance, stance_of
+from grasp_core.hands.reach import HandReach, Stance, direction, stance_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
-from grasp_core.values import Contact
 
 
 def hand_motors(
@@ -56,7 +55,7 @@ def hand_motors(
     """
     stance = stance_of(hand, reach)
     switch(any_orientation, "any_orientation")
-    way = None if down is None else direction(down)
+    way = None if down is None else direction(down, "down")
     found, levers, limits = _joints(hand, stance)
     if any_orientation:
         return Motors.in_any_orientation(levers, limits, GRAVITY_M_PER_S2 * _weights(hand, found))
@@ -65,21 +64,7 @@ def hand_motors(
     return Motors.of(levers, limits, GRAVITY_M_PER_S2 * _weights(hand, found) @ way)
 
 
-def turned_motors(hand: Hand, reach: HandReach) -> tuple[Motors, Array, tuple[Contact, ...]]:
-    """Derive what joints and links of a hand ask for when it is turned with its object.
-
-    Gives motors without gravity; the torque of each joint that carries the weight of the links, per
-    unit vector of the direction of gravity, (joints, 3) [N m]; and the contacts.
-    """
-    stance = stance_of(hand, reach)
-    found, levers, limits = _joints(hand, stance)
-    weights = frozen_copy(GRAVITY_M_PER_S2 * _weights(hand, found))
-    Motors.in_any_orientation(levers, limits, weights)  # refuses motors that are too weak
-    return Motors.of(levers, limits), weights, stance.contacts
-
-
 def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
-    """Return where the hand's links are, the levers of its contacts and the torque limits."""
     found = places(hand, stance.joints, stance.palm_pose)
     points = np.array([contact.position for contact in stance.contacts])
     levers, own = np.zeros((len(hand.joints), len(points), 3)), chains(hand)
@@ -95,15 +80,6 @@ def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
         )
     limits = np.array([joint.torque_limit_n_m for joint in hand.free_joints])
     return found, hand.drives.carried(levers.reshape(len(levers), -1)), limits
-
-
-def direction(down: ArrayLike) -> Array:
-    """Scale a direction to unit length, (3,)."""
-    way = frozen(down, (3,), "down")
-    length = float(np.linalg.norm(way))
-    if length == 0.0:
-        raise InputError("down must be a direction, got a vector of length zero")
-    return way / length
 
 
 def chains(hand: Hand) -> list[range]:
@@ -165,10 +141,13 @@ def hand_payload(
     """
     check_body(body)
     most = positive(max_push_n, "max_push_n")
-    motors, weights, contacts = turned_motors(hand, reach)
-    count = len(contacts)
-    points = np.array([contact.position for contact in contacts])
+    stance = stance_of(hand, reach)
+    found, levers, limits = _joints(hand, stance)
+    weights = frozen_copy(GRAVITY_M_PER_S2 * _weights(hand, found))
+    Motors.in_any_orientation(levers, limits, weights)  # refuses motors that are too weak
+    motors, count = Motors.of(levers, limits), len(stance.contacts)
+    points = np.array([contact.position for contact in stance.contacts])
     arms = frozen(points - body.center_of_mass, (count, 3), "contacts", most=LARGEST)
-    normals = frozen_copy(np.array([contact.normal for contact in contacts]))
+    normals = frozen_copy(np.array([contact.normal for contact in stance.contacts]))
     mu = contact_frictions(friction, count)
     return carried_mass(CarryingHand(arms, normals, mu, most, motors, weights), gap)

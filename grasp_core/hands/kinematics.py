@@ -26,21 +26,14 @@ from grasp_core.hands.hand_arrays import hand_arrays
 class HandPlaces:
     """Where the parts of a hand are, for n sets of joint angles; read-only arrays."""
 
-    link_rotations: Array
-    """Axes of the links' frames, (n, joints, 3, 3)."""
-    link_positions: Array
-    """Origins of these frames, (n, joints, 3) [m]."""
-    joint_axes: Array
-    """Unit vectors of the joints' axes, (n, joints, 3)."""
-    tips: Array
-    """Middles of the fingertips' balls, (n, fingers, 3) [m]."""
+    link_rotations: Array  # axes of the links' frames, (n, joints, 3, 3)
+    link_positions: Array  # origins of these frames, (n, joints, 3) [m]
+    joint_axes: Array  # unit vectors of the joints' axes, (n, joints, 3)
+    tips: Array  # middles of the fingertips' balls, (n, fingers, 3) [m]
 
 
 def places(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) -> HandPlaces:
-    """Compute where links and fingertips are.
-
-    Takes `joints` (j,) or (n, j) [rad]; `palm_pose` (4, 4) or (n, 4, 4).
-    """
+    """Compute where links and fingertips are at angles (j,) or (n, j), and one palm pose or n."""
     angles = np.atleast_2d(real_array(joints, "joints"))
     arrays = hand_arrays(hand)
     count, length = len(angles), len(arrays.axes)
@@ -64,10 +57,7 @@ def places(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) ->
 
 
 def tip_jacobians(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) -> Array:
-    """Compute how the middles of fingertips move with the joints, by (1).
-
-    Gives derivatives, (n, fingers, 3, joints) [m/rad]; zero for the joints of other fingers.
-    """
+    """Compute the derivatives (1) of fingertips' middles, (n, fingers, 3, joints) [m/rad]."""
     found = places(hand, joints, palm_pose)
     starts = hand_arrays(hand).starts
     J = np.zeros((*found.tips.shape, len(hand.joints)))

@@ -157,7 +157,6 @@ ROUND = 0.005
 
 
 def _rotation(quaternion: Row) -> Array:
-    """Return the rotation matrix of a quaternion of any length, (3, 3)."""
     w, x, y, z = quaternion
     a, b, c, d = np.array([w, x, y, z]) / math.sqrt(w * w + x * x + y * y + z * z)
     return np.array(
@@ -190,7 +189,6 @@ def _finger(
 
 
 def _allegro(name: str = "allegro", tips: tuple[float, float] = ALLEGRO_TIPS) -> Hand:
-    """Return the right Allegro hand, with fingertips at some places along the last links [m]."""
 
     def along(half_z: float) -> LinkShape:  # the box of a link that begins at its joint
         return _box((0.0, 0.0, half_z), (WIDTH_X, WIDTH_Y, half_z))
@@ -244,7 +242,6 @@ def _leap_shape(row: Row) -> LinkShape:
 
 
 def _cover(corners: Array) -> LinkShape:
-    """Return a box with rounded edges that covers a block."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     middle, half = 0.5 * (low + high), 0.5 * (high - low) - ROUND
     out = np.linalg.norm(np.maximum(np.abs(corners - middle) - half, 0.0), axis=1)
@@ -252,7 +249,6 @@ def _cover(corners: Array) -> LinkShape:
 
 
 def _leap() -> Hand:
-    """Return the right LEAP hand."""
 
     def finger(
         name: str, rows: Iterable[tuple[Any, ...]], boxes: tuple[Rows, ...], tip: Row, block: Rows

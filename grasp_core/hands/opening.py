@@ -39,17 +39,15 @@ def opened(asked: Asked, found: FoundPose) -> tuple[Array | None, Array | None]:
     joints = _open_joints(asked, found)
     if joints is None:
         return None, None
-    for way in _ways(asked, found):
-        if _is_free(asked, found, joints, way):
-            return joints, way
-    return joints, None
+    ways = (way for way in _ways(asked, found) if _is_free(asked, found, joints, way))
+    return joints, next(ways, None)
 
 
 def _open_joints(asked: Asked, found: FoundPose) -> Array | None:
     """Return joint angles at which fingertips are off the surface and nothing overlaps."""
     arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
     kernel = compiled("grasp_core.hands.pose_kernel")
-    contacts = found.certificate
+    contacts, clear = found.certificate, asked.clearance
     for gap in GAPS_M:
         aims = _aims(asked, found)._replace(
             origins=contacts.positions - gap * contacts.normals, normals=np.array(contacts.normals),
@@ -58,16 +56,13 @@ def _open_joints(asked: Asked, found: FoundPose) -> Array | None:
         pose: Pose = kernel.empty_pose(arrays, len(found.used))
         pose.palm[:], pose.origin[:] = found.palm_pose[:3, :3], found.palm_pose[:3, 3]
         pose.q[:] = found.joints
-        wanted = Wanted(
-            asked.clearance, asked.clearance, asked.clearance, 0.0, 0.0, overlaps=True,
-            palm_moves=False,
-        )  # fmt: skip
+        wanted = Wanted(clear, clear, clear, 0.0, 0.0, overlaps=True, palm_moves=False)
         sums = kernel.empty_sums(arrays, aims)
         kernel.settle(arrays, tree, aims, wanted, pose, sums, STEPS, 1e3 * 0.1 * gap)
         compiled("grasp_core.hands.pose_rows_kernel").place(arrays, aims, pose)
         away = np.einsum("ki,ki->k", contacts.positions - pose.fronts, contacts.normals)
         open_by = away - arrays.tip_roundings[found.fingers]
-        if open_by.min() >= LEAST_GAP * gap and not blocking(asked, pose, None, asked.clearance):
+        if open_by.min() >= LEAST_GAP * gap and not blocking(asked, pose, None, clear):
             return pose.q
     return None
 
@@ -97,10 +92,8 @@ def _ways(asked: Asked, found: FoundPose) -> Array:
 
 def _is_free(asked: Asked, found: FoundPose, joints: Array, way: Array) -> bool:
     """Return whether the open hand is free at all steps of a straight way in."""
-    arrays = hand_arrays(asked.hand)
-    aims = _aims(asked, found)
-    kernel = compiled("grasp_core.hands.pose_kernel")
-    pose: Pose = kernel.empty_pose(arrays, len(found.used))
+    arrays, aims = hand_arrays(asked.hand), _aims(asked, found)
+    pose: Pose = compiled("grasp_core.hands.pose_kernel").empty_pose(arrays, len(found.used))
     pose.palm[:], pose.q[:] = found.palm_pose[:3, :3], joints
     for back in np.arange(TICK, LINE + 0.5 * TICK, TICK):
         pose.origin[:] = found.palm_pose[:3, 3] - back * way

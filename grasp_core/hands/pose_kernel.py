@@ -137,10 +137,7 @@ def settle(
     hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums,
     most_steps: int, good: float,
 ) -> int:  # fmt: skip
-    """Move a hand, changing `pose` in place, until it touches and overlaps no more.
-
-    Takes `good` [mm]. Gives the number of steps.
-    """
+    """Move a hand until it touches and overlaps no more; return the number of steps."""
     A, step, new = np.empty_like(sums.H), np.empty_like(sums.g), empty_pose(hand, len(pose.tips))
     tried = empty_sums(hand, targets)
     new.palm[:], new.origin[:], new.q[:] = pose.palm, pose.origin, pose.q

@@ -288,10 +288,7 @@ def _farthest(
 
 @loop()
 def _last_links(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums) -> None:
-    """Add the residuals of last links: behind the planes that tips touch, and tips on the table.
-
-    A block as a whole is behind the plane that it touches, and counts on the table.
-    """
+    """Add residuals of last links behind their tips' planes, and of tips over the table."""
     x, down, zero = np.empty(3), -targets.up, np.zeros(3)
     for k in range(len(targets.fingers)):
         finger = targets.fingers[k]

@@ -68,19 +68,13 @@ def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: fl
         for row in _edges(region.polygon, normals[finger])
     ]
     return Targets(
-        np.arange(len(used), dtype=np.int64),
-        grasp.positions[used],
-        normals,
+        np.arange(len(used), dtype=np.int64), grasp.positions[used], normals,
         np.array([plane_tangents(*normal) for normal in normals.tolist()]),
-        np.where(aimed, 0.0, 1.0),
-        np.full((len(used), 3), np.nan),
-        SOFT,
+        np.where(aimed, 0.0, 1.0), np.full((len(used), 3), np.nan), SOFT,
         np.array([row[0] for row in rows], np.int64),
         np.array([row[1] for row in rows]).reshape(-1, 3),
-        np.array([row[2] for row in rows]).reshape(-1, 3),
-        np.array(up),
-        height,
-    )
+        np.array([row[2] for row in rows]).reshape(-1, 3), np.array(up), height,
+    )  # fmt: skip
 
 
 def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
@@ -93,33 +87,19 @@ def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
     return list(zip(starts, inward, strict=True))
 
 
-def is_within(targets: Targets, contact: int, position: Array, slack: float) -> bool:
-    """Return whether a position is in the region that one finger aimed at."""
-    if targets.pinned[contact] > 0.0:
-        return bool(np.linalg.norm(position - targets.origins[contact]) <= slack)
-    own = targets.edge_contacts == contact
-    inside = np.einsum("ej,ej->e", position - targets.edge_points[own], targets.edge_inward[own])
-    return bool(inside.min(initial=np.inf) >= -slack)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactChoices:
     """Which of a grasp's contacts may be used, and proofs about those that may not."""
 
-    closed: tuple[tuple[int, ...], ...]
-    """Indices of contacts at which fingers may stand, the best choice first."""
-    open: tuple[ClosureCertificate, ...] = ()
-    """Proofs that contacts are not in force closure, one for each choice that is left out."""
-    undecided: int = 0
-    """Number of choices whose closure could be neither proved nor disproved."""
+    closed: tuple[tuple[int, ...], ...]  # indices of contacts, the best choice first
+    open: tuple[ClosureCertificate, ...] = ()  # a refutation for each other choice
+    undecided: int = 0  # choices that are neither proved nor disproved to close
 
 
 def contact_choices(grasp: Grasp, friction: float, fingers: int) -> ContactChoices:
-    """Choose contacts for the fingers of a hand.
+    """Choose all contacts, or as many as fingers that alone are closed, the largest margin first.
 
-    Gives all contacts, if there is a finger for each. Otherwise the choices of as many contacts as
-    there are fingers which alone are in force closure, the largest margin first; equal ones, by
-    `solvers.ties`, stay in the order of their indices.
+    Equal margins, by `solvers.ties`, stay in the order of their indices.
     """
     if fingers >= FINGERS:
         return ContactChoices((tuple(range(FINGERS)),))
@@ -155,40 +135,28 @@ class Asked:
     body: Polyhedron
     grasp: Grasp
     friction: float
-    up: Array
-    """Unit normal of the table, (3,)."""
-    height: float
-    """Its height along it; minus infinity for none [m]."""
+    up: Array  # unit normal of the table, (3,)
+    height: float  # its height along it; minus infinity for none [m]
     clearance: float
     """Least distance of everything from what it must not touch [m], but for links whose tips touch
     the object: they must only not overlap it."""
-    regions: bool
-    """Whether contacts may be anywhere in their regions."""
+    regions: bool  # whether contacts may be anywhere in their regions
     seed: int
-    most_starts: int
-    """Largest number of starts for each choice of contacts."""
+    most_starts: int  # largest number of starts for each choice of contacts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundPose:
     """A pose in which a hand holds an object."""
 
-    used: Indices
-    """Indices of the grasp's contacts at which fingers stand, (k,)."""
-    fingers: Indices
-    """The finger at each of them, (k,)."""
-    joints: Array
-    """Joint angles, (j,) [rad]."""
-    palm_pose: Array
-    """Pose of the palm in the object's frame, (4, 4)."""
-    certificate: ClosureCertificate
-    """Proof of force closure with the contacts that are reached."""
-    within: tuple[bool, ...]
-    """Whether each contact is in its region, or at the planned contact."""
-    touching: Array
-    """Points of blocks that touch, in the last links' frames, (k, 3) [m]; NaN for balls."""
-    starts: int = 1
-    """Number of starts that were tried."""
+    used: Indices  # indices of the grasp's contacts at which fingers stand, (k,)
+    fingers: Indices  # the finger at each of them, (k,)
+    joints: Array  # joint angles, (j,) [rad]
+    palm_pose: Array  # pose of the palm in the object's frame, (4, 4)
+    certificate: ClosureCertificate  # with the contacts that are reached
+    within: tuple[bool, ...]  # whether each contact is in its region, or as planned
+    touching: Array  # points of blocks in the last links' frames, else NaN, (k, 3)
+    starts: int = 1  # number of starts that were tried
 
 
 def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | Counter[str]:
@@ -244,11 +212,9 @@ def _tried(asked: Asked, used: Indices, aims: Targets, start: Start) -> FoundPos
 
 
 def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Targets, Array] | None:
-    """Move a hand that is near until its fingertips rest on the surface itself.
+    """Move a hand that is near until its fingertips rest on the surface: planes and contacts.
 
     Which point of a block touches is only known then, so that its region is asked for again.
-
-    Gives the planes that are touched and the contacts, (k, 3); None if fingertips do not rest.
     """
     arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
     kernel = compiled("grasp_core.hands.pose_kernel")
@@ -268,8 +234,15 @@ def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Target
 
 
 def _are_within(aims: Targets, points: Array, slack: float) -> tuple[bool, ...]:
-    """Return which contacts are in the regions that fingers aimed at."""
-    return tuple(is_within(aims, k, point, slack) for k, point in enumerate(points))
+    """Return which contacts are in the regions that fingers aimed at, or at pinned points."""
+    within = list[bool]()
+    for k, point in enumerate(points):
+        own = aims.edge_contacts == k
+        inside = np.einsum("ej,ej->e", point - aims.edge_points[own], aims.edge_inward[own])
+        pinned = aims.pinned[k] > 0.0
+        off = np.linalg.norm(point - aims.origins[k]) if pinned else -inside.min(initial=np.inf)
+        within.append(bool(off <= slack))
+    return tuple(within)
 
 
 def blocking(asked: Asked, pose: Pose, fingers: Indices | None, clearance: float) -> str:

@@ -111,12 +111,8 @@ class HandReach(ByValue):
             fingers = frozen_indices(self.fingers, (len(kept),), "fingers")
             object.__setattr__(self, "used", kept)
             object.__setattr__(self, "fingers", fingers)
-        shapes = {
-            "joints": (None,),
-            "palm_pose": (POSE, POSE),
-            "pregrasp": (None,),
-            "approach": (3,),
-        }
+        shapes = {"joints": (None,), "palm_pose": (POSE, POSE), "pregrasp": (None,),
+                  "approach": (3,)}  # fmt: skip
         for name, shape in shapes.items():
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
@@ -192,19 +188,22 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
 
 
 def _table(body: Polyhedron, down: ArrayLike | None) -> tuple[Array, float]:
-    """Return the unit normal of the table that an object lies on, and its height along it."""
     if down is None:
         return np.array([0.0, 0.0, 1.0]), -np.inf
-    way = frozen(down, (3,), "table_down")
-    length = float(np.linalg.norm(way))
-    if length == 0.0:
-        raise InputError("table_down must be a direction, got a vector of length zero")
-    up = -way / length
+    up = -direction(down, "table_down")
     return up, float((body.vertices @ up).min())
 
 
+def direction(down: ArrayLike, name: str) -> Array:
+    """Scale a direction to unit length, (3,)."""
+    way = frozen(down, (3,), name)
+    length = float(np.linalg.norm(way))
+    if length == 0.0:
+        raise InputError(f"{name} must be a direction, got a vector of length zero")
+    return way / length
+
+
 def _unclosed(asked: Asked, choices: ContactChoices) -> HandReach:
-    """Say that there are no contacts to stand at, with the proofs."""
     count, name = len(asked.hand.fingers), asked.hand.name
     fewer = f"{name} has {count} fingers, and no {count} of the grasp's {FINGERS} contacts alone"
     at = f"at friction {asked.friction:g}"
@@ -220,7 +219,6 @@ def _unclosed(asked: Asked, choices: ContactChoices) -> HandReach:
 
 
 def _why(tally: Counter[str]) -> tuple[ReachReason, str]:
-    """Say what was in the way most often."""
     tried = f"from {tally.total()} starts no pose was found"
     blocked = {name: tally[name] for name in OVERLAPS if tally[name]}
     if blocked:
@@ -243,17 +241,12 @@ def _why(tally: Counter[str]) -> tuple[ReachReason, str]:
 class Stance:
     """A hand in a pose at its contacts."""
 
-    hand: Hand
-    """The hand, with a ball at its contact in place of each fingertip that is a block."""
-    joints: Array
-    """Joint angles, (j,) [rad]."""
-    palm_pose: Array
-    """Pose of the palm in the object's frame, (4, 4)."""
+    hand: Hand  # with a ball at its contact in place of each block
+    joints: Array  # joint angles, (j,) [rad]
+    palm_pose: Array  # pose of the palm in the object's frame, (4, 4)
     contacts: tuple[Contact, ...]
-    fingers: tuple[int, ...]
-    """The hand's finger at each contact."""
-    forces: Array
-    """Balanced contact forces strictly inside the friction cones, of any size, (k, 3)."""
+    fingers: tuple[int, ...]  # the hand's finger at each contact
+    forces: Array  # balanced, strictly inside the cones, of any size, (k, 3)
 
     @property
     def tip_radii(self) -> Array:
@@ -309,11 +302,7 @@ def with_balls(
     hand: Hand, joints: Array, palm_pose: Array, fingers: Iterable[int],
     contacts: Iterable[Contact],
 ) -> Hand:  # fmt: skip
-    """Put a ball that touches at its contact in place of each fingertip that is a block.
-
-    Scenes and drawings know fingertips as balls on the last links. Which part of a block touches is
-    the pose's.
-    """
+    """Put a ball at its contact in place of each block: scenes and drawings know tips as balls."""
     touching = {f: each for f, each in zip(fingers, contacts, strict=True)
                 if hand.fingers[f].tip.corners is not None}  # fmt: skip
     if not touching:

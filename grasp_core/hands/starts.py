@@ -45,32 +45,23 @@ ROUND = 9
 class Postures:
     """Joint angles at which a hand is free of itself."""
 
-    joints: Array
-    """Joint angles, (n, j) [rad]."""
-    tips: Array
-    """Middles of the fingertips in the palm's frame, (n, f, 3) [m]."""
+    joints: Array  # joint angles, (n, j) [rad]
+    tips: Array  # middles of the fingertips in the palm's frame, (n, f, 3) [m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
     """Where a search starts."""
 
-    fingers: Indices
-    """The finger for each contact, (k,)."""
-    joints: Array
-    """Joint angles, (j,) [rad]."""
-    rotation: Array
-    """Axes of the palm's frame, (3, 3)."""
-    position: Array
-    """Its origin, (3,) [m]."""
+    fingers: Indices  # the finger for each contact, (k,)
+    joints: Array  # joint angles, (j,) [rad]
+    rotation: Array  # axes of the palm's frame, (3, 3)
+    position: Array  # its origin, (3,) [m]
 
 
 @lru_cache(maxsize=16)
 def postures(hand: Hand, seed: int) -> Postures:
-    """Choose postures of a hand at random; equal hands and seeds share them.
-
-    Gives at most `POSTURES` of them; none if the hand is nowhere free of itself.
-    """
+    """Choose at most `POSTURES` postures at random; equal hands and seeds share them."""
     arrays, rng = hand_arrays(hand), np.random.default_rng(seed)
     low, high = arrays.ranges.T
     share = rng.uniform(*INNER, (TRIES, len(low)))

@@ -126,11 +126,7 @@ class ContactFaces:
         return wrench_set_quality(self.wrenches(y), gap)
 
     def wrenches(self, y: Array) -> WrenchSet:
-        """Return the wrenches of contacts, rounded to a grid.
-
-        A polytope that grows where it is weakest often has to choose between several equally near
-        planes.
-        """
+        """Return wrenches on a grid: polytopes often choose between several equally near planes."""
         friction = np.full(len(y), self.friction)
         return WrenchSet.at(self.positions(y), self.normals, friction).on_grid()
 

@@ -125,7 +125,7 @@ def optimize_contacts(
         y, found = ends[place]
         if found.lower <= surpassing(before.lower):
             break
-        moved = _certified(body, grasp, faces, y, rng)
+        moved = certified(body, f"o-{grasp.id}", pieces, faces.positions(y), friction, rng)
         if moved is not None and ((after := _quality(body, moved, friction)).lower > before.upper):
             return Improvement(moved, before, after, clearances)
     return Improvement(grasp, before, before, clearances)
@@ -162,7 +162,6 @@ def _clear_of_edges(room: FacePiece, point: Array) -> Array:
 def _random_starts(
     faces: ContactFaces, rooms: Sequence[FacePiece], rng: np.random.Generator
 ) -> Iterator[Array]:
-    """Yield the best of some random contact sets in force closure, (4, 2) each."""
     trials = [
         np.array([rng.dirichlet(np.ones(len(room.corners))) @ room.corners for room in rooms])
         for _ in range(RANDOM_TRIALS)
@@ -172,21 +171,18 @@ def _random_starts(
     return (trials[i] for i in best[:RANDOM_STARTS] if rated[i] > 0.0)
 
 
-def _certified(
-    body: Polyhedron, grasp: Grasp, faces: ContactFaces, y: Array, rng: np.random.Generator
-) -> Grasp | None:
-    """Return the grasp at these contacts if closure and a general witness confirm it, else None."""
-    plain = closed_at(faces.pieces, faces.positions(y), faces.friction, 0.0)
-    if plain is None:
-        return None
-    placement = of_general_type(faces.pieces, plain, faces.friction, rng)
+def certified(
+    body: Polyhedron, name: str, pieces: tuple[FacePiece, ...], points: Array, friction: float,
+    rng: np.random.Generator,
+) -> Grasp | None:  # fmt: skip
+    """Return the grasp at points, (4, 3) at unit size, or None where no certificate confirms it."""
+    plain = closed_at(pieces, points, friction, 0.0)
+    placement = plain and of_general_type(pieces, plain, friction, rng)
     if placement is None:
         return None
-    theta = math.atan(faces.friction)
-    cones = tuple(ForceCone(piece.normal, theta) for piece in faces.pieces)
-    points = regions_of(point_region, faces.pieces, cones, placement)
-    candidate = Candidate(
-        f"o-{grasp.id}", grasp.faces, "regulus", faces.pieces, cones, placement, points
-    )
-    found = certify(candidate, faces.friction)
-    return None if found is None else to_grasp(body, faces.friction, found)
+    a, b, c, d = (piece.face for piece in pieces)
+    cones = tuple(ForceCone(piece.normal, math.atan(friction)) for piece in pieces)
+    regions = regions_of(point_region, pieces, cones, placement)
+    candidate = Candidate(name, (a, b, c, d), "regulus", pieces, cones, placement, regions)
+    found = certify(candidate, friction)
+    return None if found is None else to_grasp(body, friction, found)

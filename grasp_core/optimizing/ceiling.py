@@ -121,11 +121,10 @@ def quality_ceiling(
             f"{radii.tolist()}"
         )
     grounds, owners = _grounds(body, faces, radii / body.radius)
-    return QualityCeiling(_lowered(grounds, owners, friction, _Asked(known, gap, parts)))
+    return QualityCeiling(_lowered(grounds, owners, friction, known, gap, parts))
 
 
 def _grounds(body: Polyhedron, faces: Sequence[int], insets: Array) -> tuple[Grounds, Indices]:
-    """Return the convex pieces of four faces, and the finger that may be on each."""
     each = partial(whole, name="faces", most=len(body.faces) - 1)
     given = several(faces, each, "faces", "indices")
     if len(given) != FINGERS:
@@ -146,19 +145,20 @@ def _grounds(body: Polyhedron, faces: Sequence[int], insets: Array) -> tuple[Gro
     return grounds, np.array([finger for finger, _ in own])[places]
 
 
-def _lowered(grounds: Grounds, owners: Indices, friction: float, asked: "_Asked") -> CutTree:
-    """Refute smaller and smaller thresholds, and return the proof of the least."""
+def _lowered(
+    grounds: Grounds, owners: Indices, friction: float, known: float, gap: float, parts: int
+) -> CutTree:
     alone = np.eye(3)[None]
     proved = Slack.of(friction, len(alone), FERRARI_CANNY)
     searched = Slack.of(friction, len(alone), FERRARI_CANNY, SEARCHED_BELOW)
-    stop = StopAfter(asked.parts)
+    stop = StopAfter(parts)
     searching = Searching(grounds, friction, 1, stop)
     nodes = first_nodes(grounds, alone, owners)
     twists = lowered_twists(searching, np.random.default_rng(SEED))
     steps, threshold = refuted_by_one(searching, len(nodes[0]), searched, twists)
     # where the faces hold nothing a twist may refute less; a larger threshold it refutes as well
     threshold = max(threshold, LEAST_THRESHOLD)
-    bounds = asked.bounds(threshold + proved.raised)
+    bounds = _bounds(threshold + proved.raised, known, gap)
     done, last, stride = -1, len(bounds), 1  # those up to `done` are refuted, `last` is not
     while last - done > 1 and not stop():
         place = min(done + stride, (done + last) // 2)
@@ -168,28 +168,17 @@ def _lowered(grounds: Grounds, owners: Indices, friction: float, asked: "_Asked"
             last = place
         else:
             done, stride, steps, threshold = place, 2 * stride, tree, bound - proved.raised
-    return CutTree(
-        grounds, friction, alone, threshold, steps.deeds, steps.asked, steps.twists, steps.lines,
-        owners=owners,
-    )  # fmt: skip
+    return CutTree(grounds, friction, alone, threshold, *steps, owners=owners)
 
 
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """How near a bound should come to what is attained, and for how many cases."""
+def _bounds(first: float, known: float, gap: float) -> list[float]:
+    """Return the bounds below a first one to try, falling, each by the gap.
 
-    known: float
-    gap: float
-    parts: int
-
-    def bounds(self, first: float) -> list[float]:
-        """Return the bounds below a first one to try, falling, each by the gap.
-
-        They are multiples of what is known, or of the smallest bound where next to nothing is:
-        nothing that is found on the way moves them.
-        """
-        least, share = max(self.known, SMALLEST), 1.0 - AIMED * self.gap
-        rising = [least / share if self.known >= SMALLEST else least]
-        while rising[-1] < first * share:  # each is larger by `AIMED` of `SMALLEST_GAP` at least
-            rising.append(rising[-1] / share)
-        return [few_digits(bound, self.gap / FINER) for bound in rising[::-1] if bound < first]
+    They are multiples of what is known, or of the smallest bound where next to nothing is:
+    nothing that is found on the way moves them.
+    """
+    least, share = max(known, SMALLEST), 1.0 - AIMED * gap
+    rising = [least / share if known >= SMALLEST else least]
+    while rising[-1] < first * share:  # each is larger by `AIMED` of `SMALLEST_GAP` at least
+        rising.append(rising[-1] / share)
+    return [few_digits(bound, gap / FINER) for bound in rising[::-1] if bound < first]

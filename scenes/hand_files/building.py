@@ -17,7 +17,7 @@ from grasp_core.hands.collisions import overlapping_pairs
 from grasp_core.hands.couplings import Coupling
 from grasp_core.hands.hand import PALM, Fingertip, Hand, HandFinger, Joint, Link, LinkShape
 from grasp_core.hands.kinematics import rotation_about
-from scenes.hand_files.couplings import Followers, followers
+from scenes.hand_files.couplings import followers
 from scenes.hand_files.fingers import Chains, TipBall, chains, frames, tip_ball
 from scenes.hand_files.model import HandModel, compiled_hand
 from scenes.hand_files.model_text import model_text
@@ -42,7 +42,11 @@ def hand_from_file(path: Path, fingertips: tuple[str, ...]) -> Hand:
         HandFinger(tip.name, _links(model, found, placed, shapes, chain, coupled.ranges), ball)
         for tip, chain, (ball, _) in zip(found.tips, found.joints, balls, strict=True)
     ]
-    own = own_chains(fingers, _couplings(model, coupled))
+    rules = tuple(
+        Coupling(_joint_name(model, joint), _joint_name(model, line.root), line.ratio, line.offset)
+        for joint, line in sorted(coupled.lines.items())
+    )
+    own = own_chains(fingers, rules)
     palm = tuple(shapes.get(-1, ()))
     hand = Hand(
         path.stem, palm, own.fingers, (f"{path.name}; {AS_BOXES}",),
@@ -58,7 +62,6 @@ def hand_from_file(path: Path, fingertips: tuple[str, ...]) -> Hand:
 
 
 def _tips_elsewhere(model: HandModel, found: Chains) -> tuple[str, ...]:
-    """Say which fingertips are bodies without shapes of their own."""
     names = [
         tip.name for tip in found.tips
         if tip.name not in (model.body_names[tip.body], *model.geom_names, *model.site_names)
@@ -68,19 +71,8 @@ def _tips_elsewhere(model: HandModel, found: Chains) -> tuple[str, ...]:
     return (f"fingertips without shapes are the nearest shape of their link: {', '.join(names)}",)
 
 
-def _couplings(model: HandModel, coupled: Followers) -> tuple[Coupling, ...]:
-    return tuple(
-        Coupling(_joint_name(model, joint), _joint_name(model, line.root), line.ratio, line.offset)
-        for joint, line in sorted(coupled.lines.items())
-    )
-
-
 def _close_by(hand: Hand, originals: dict[str, str]) -> set[tuple[str, str]]:
-    """Return the names of links that overlap where they are built into each other.
-
-    They are two joints apart at most, in one finger or from the palm. Links of different fingers
-    that meet in the middle of their ranges are not: fingers that close meet there.
-    """
+    """Return names of links at most two joints apart in a finger, or from the palm."""
     pairs = set[tuple[str, str]]()
     for finger in hand.fingers:
         chain = [PALM, *(originals.get(link.name, link.name) for link in finger.links)]
@@ -92,7 +84,6 @@ def _close_by(hand: Hand, originals: dict[str, str]) -> set[tuple[str, str]]:
 def _balls(
     model: HandModel, found: Chains, frames: dict[int, tuple[Array, Array]], name: str
 ) -> list[tuple[Fingertip, TipBall]]:
-    """Find the fingertips' balls, in the frames of the last links."""
     balls = list[tuple[Fingertip, TipBall]]()
     for tip, chain in zip(found.tips, found.joints, strict=True):
         R, p = model.rotations[tip.body], model.positions[tip.body]
@@ -143,7 +134,6 @@ def _squared(R: Array) -> Array:
 
 
 def _shape(model: HandModel, g: int) -> LinkShape:
-    """Return a geom's shape in the frame of its body."""
     kind, size, R = model.geom_kinds[g], model.raw.geom_size[g], _squared(model.geom_rotations[g])
     if kind in {"sphere", "capsule"}:
         half = np.array([0.0, 0.0, size[1] if kind == "capsule" else 0.0])
@@ -157,7 +147,6 @@ def _links(
     shapes: dict[int, list[LinkShape]], chain: tuple[int, ...],
     ranges: dict[int, tuple[float, float]],
 ) -> tuple[Link, ...]:  # fmt: skip
-    """Make the links of a finger."""
     links, before = list[Link](), -1
     for joint in chain:
         turned, origin = frames[joint]
@@ -237,7 +226,6 @@ def _excluded(model: HandModel, found: Chains) -> set[tuple[str, str]]:
 
 
 def _may_meet(model: HandModel, found: Chains, one: int, other: int) -> bool:
-    """Return whether the bits of any two geoms of two links let them collide."""
     bits = [
         model.geom_bits[[found.owners[b] == joint for b in model.raw.geom_bodyid.tolist()]]
         for joint in (one, other)
@@ -251,10 +239,8 @@ class OwnChains:
     """Fingers with chains of their own."""
 
     fingers: tuple[HandFinger, ...]
-    couplings: tuple[Coupling, ...]
-    """Couplings that were given, and those of the copies."""
-    originals: dict[str, str]
-    """For the name of each copy, the name of the link that it moves with."""
+    couplings: tuple[Coupling, ...]  # those that were given, and of the copies
+    originals: dict[str, str]  # for each copy, the link that it moves with
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -20,8 +20,7 @@ from scenes.hand_files.model_text import listed
 class Line:
     """A joint's angle as a linear function: `offset + ratio * angle of the root`."""
 
-    root: int
-    """The joint that moves freely; -1 for a constant angle."""
+    root: int  # the joint that moves freely; -1 for a constant angle
     ratio: float
     offset: float
 
@@ -30,10 +29,8 @@ class Line:
 class Followers:
     """How joints of a hand move together."""
 
-    lines: dict[int, Line]
-    """For each joint on the way to a fingertip that follows another, how."""
-    ranges: dict[int, tuple[float, float]]
-    """For each joint with another range than the file states, that range [rad]."""
+    lines: dict[int, Line]  # of joints on the way to fingertips that follow others
+    ranges: dict[int, tuple[float, float]]  # where they are not the file's [rad]
     notes: tuple[str, ...]
 
 
@@ -51,8 +48,13 @@ def followers(model: HandModel, found: Chains, name: str) -> Followers:
     for root in sorted(roots):
         own = {root: Line(root, 1.0, 0.0)}
         own |= {joint: line for joint, line in sorted(lines.items()) if line.root == root}
-        free = _free(model, [joint for joint in own if joint in used])
-        turned = {joint: _from(own[free], line, free) for joint, line in own.items()}
+        members = [joint for joint in own if joint in used]
+        driven = (joint for joint in members if not np.isnan(model.torques[joint]))
+        free = next(driven, members[0])  # the first is the one that others follow
+        turned = dict[int, Line]()
+        for joint, line in own.items():  # by the angle of the free joint
+            ratio = line.ratio / own[free].ratio
+            turned[joint] = Line(free, ratio, line.offset - ratio * own[free].offset)
         kept |= {joint: turned[joint] for joint in turned if joint in used and joint != free}
         others = {joint: turned[joint] for joint in turned if joint not in used}
         aside += [model.joint_names[joint] for joint in others]
@@ -87,17 +89,6 @@ def _lines(model: HandModel, used: set[int], name: str) -> dict[int, Line]:
     return lines
 
 
-def _free(model: HandModel, own: list[int]) -> int:
-    """Choose the free joint of joints that move together; the first is the one they follow."""
-    return next((joint for joint in own if not np.isnan(model.torques[joint])), own[0])
-
-
-def _from(free: Line, line: Line, joint: int) -> Line:
-    """Express a joint's line by the angle of another joint with the same root."""
-    ratio = line.ratio / free.ratio
-    return Line(joint, ratio, line.offset - ratio * free.offset)
-
-
 def _narrowed(model: HandModel, free: int, others: dict[int, Line]) -> tuple[float, float]:
     """Return the range of a free joint at which joints that are not the hand's are in theirs."""
     low, high = model.joint_ranges[free].tolist()
@@ -109,9 +100,9 @@ def _narrowed(model: HandModel, free: int, others: dict[int, Line]) -> tuple[flo
 
 def _refuse_loops(model: HandModel, used: set[int], name: str) -> None:
     """Refuse what holds bodies or tendons together, where joints of the hand move them."""
-    for loop in model.loops:
-        one, other = (_moving(model, body) for body in loop.bodies)
-        _refuse(model, (one ^ other) & used, name, f"are in a loop that a {loop.kind} closes")
+    for kind, *bodies in model.loops:
+        one, other = (_moving(model, body) for body in bodies)
+        _refuse(model, (one ^ other) & used, name, f"are in a loop that a {kind} closes")
     for tendon in model.tendons:
         if tendon.is_held and (used & set(tendon.joints) or not tendon.joints):
             joints = set(tendon.joints) or used
@@ -119,13 +110,11 @@ def _refuse_loops(model: HandModel, used: set[int], name: str) -> None:
 
 
 def _moving(model: HandModel, body: int) -> set[int]:
-    """Return the joints that move a body."""
     path = path_of_body(model, body)
     return {j for j, own in enumerate(model.raw.jnt_bodyid.tolist()) if own in path}
 
 
 def _refuse(model: HandModel, joints: set[int], name: str, why: str) -> None:
-    """Refuse joints, if there are any."""
     if joints:
         named = [model.joint_names[j] or f"joint{j}" for j in sorted(joints - {-1})]
         raise InputError(
@@ -135,7 +124,6 @@ def _refuse(model: HandModel, joints: set[int], name: str, why: str) -> None:
 
 
 def _notes(model: HandModel, used: set[int], aside: list[str]) -> tuple[str, ...]:
-    """Say what moves otherwise than in the file."""
     notes = list[str]()
     if aside:
         notes.append(

@@ -40,8 +40,7 @@ class Tip:
 
     name: str
     body: int
-    geom: int | None
-    """Its geom; None for a site."""
+    geom: int | None  # its geom; None for a site
     site: int | None
 
 
@@ -49,12 +48,10 @@ class Tip:
 class Chains:
     """Joints of fingers, and to which link each body is fixed."""
 
-    palm: int
-    """The palm's body."""
+    palm: int  # the palm's body
     tips: tuple[Tip, ...]
     joints: tuple[tuple[int, ...], ...]
-    """For each finger its joints, from the palm outwards; fingers may have the first ones in
-    common."""
+    """For each finger its joints, from the palm outwards; the first may be common."""
     owners: tuple[int, ...]
     """For each body, the joint that moves it, -1 for the palm's, -2 where it is no part of it."""
 
@@ -131,7 +128,6 @@ def _nearest(model: HandModel, body: int, name: str, file: str) -> int:
 
 
 def _solid(model: HandModel) -> list[int]:
-    """Return the geoms that collide with anything."""
     return [
         g for g, bits in enumerate(model.geom_bits)
         if bits.any() and model.geom_kinds[g] not in {"plane", "hfield"}
@@ -151,7 +147,6 @@ def _joints_of(model: HandModel, body: int) -> tuple[int, ...]:
 
 
 def _owners(model: HandModel, palm: int, used: set[int]) -> tuple[int, ...]:
-    """Find which joint of a finger moves each body."""
     found = list[int]()
     for body in range(len(model.raw.body_parentid)):
         moving = [j for b in path_of_body(model, body) for j in _joints_of(model, b) if j in used]
@@ -161,11 +156,7 @@ def _owners(model: HandModel, palm: int, used: set[int]) -> tuple[int, ...]:
 
 
 def frames(model: HandModel, found: Chains) -> dict[int, tuple[Array, Array]]:
-    """Return rotation and position of each link's frame in the world at the reference angles.
-
-    A link's frame stands on its joint's axis, turned like the joint's body; that of -1 is the
-    palm's body.
-    """
+    """Return axes and origin of each joint's link, as its body's; -1 is the palm's body."""
     placed = {-1: (model.rotations[found.palm], model.positions[found.palm])}
     for joint in (joint for chain in found.joints for joint in chain):
         body = int(model.raw.jnt_bodyid[joint])
@@ -180,11 +171,9 @@ class TipBall:
 
     center: Array
     radius: float
-    corners: Array | None = None
-    """Corners of the block, (m, 3) [m]; None for a ball."""
+    corners: Array | None = None  # of the block, (m, 3) [m]; None for a ball
     rounding: float = 0.0
-    cover: LinkShape | None = None
-    """Box that covers the block, in place of its geom; None to keep the geom."""
+    cover: LinkShape | None = None  # box that covers the block, in place of its geom
 
 
 def tip_ball(model: HandModel, tip: Tip, joint: Array, name: str) -> TipBall:

@@ -28,64 +28,41 @@ class JointRule(NamedTuple):
     """A joint that is held at the angle `offset + ratio * angle of the leader`."""
 
     joint: int
-    leader: int
-    """The other joint; -1 for a constant angle."""
+    leader: int  # the other joint; -1 for a constant angle
     offset: float
     ratio: float
-    is_linear: bool
-    """False where the rule has further powers of the leader's angle."""
-
-
-class Loop(NamedTuple):
-    """Two bodies that are held together, which closes a loop of links."""
-
-    kind: str
-    bodies: tuple[int, int]
+    is_linear: bool  # False where the rule has further powers of the leader's angle
 
 
 class Tendon(NamedTuple):
     """A tendon: a sum of joint angles, or a cable."""
 
     name: str
-    joints: tuple[int, ...]
-    """Joints of the sum; none for a cable."""
-    is_held: bool
-    """Whether the model holds its length at a constant or a function of another's."""
+    joints: tuple[int, ...]  # joints of the sum; none for a cable
+    is_held: bool  # whether its length is a constant, or a function of another's
 
 
 class HandModel(NamedTuple):
     """What a compiled model says: n bodies, j joints, g geoms."""
 
-    raw: Any
-    """MuJoCo's own model, whose arrays are read where they are used."""
+    raw: Any  # MuJoCo's own model, whose arrays are read where they are used
     body_names: tuple[str, ...]
     geom_names: tuple[str, ...]
     site_names: tuple[str, ...]
     joint_names: tuple[str, ...]
-    positions: Array
-    """Origins of the bodies' frames in the world at the reference joint angles, (n, 3) [m]."""
-    rotations: Array
-    """Their axes, (n, 3, 3)."""
-    joint_kinds: tuple[str, ...]
-    """`hinge`, `slide`, `ball` or `free`."""
-    joint_ranges: Array
-    """Lowest and highest angles; NaN without limits, (j, 2) [rad]."""
-    references: Array
-    """Angles at which the model is drawn, (j,) [rad]; NaN for joints that are no hinges."""
-    torques: Array
-    """Largest torques, NaN where none is stated, (j,) [N m]."""
+    positions: Array  # of bodies in the world at the reference angles, (n, 3) [m]
+    rotations: Array  # their axes, (n, 3, 3)
+    joint_kinds: tuple[str, ...]  # `hinge`, `slide`, `ball` or `free`
+    joint_ranges: Array  # lowest and highest angles, NaN for none, (j, 2) [rad]
+    references: Array  # angles of hinges as drawn, NaN for others, (j,) [rad]
+    torques: Array  # largest torques, NaN where none is stated, (j,) [N m]
     geom_kinds: tuple[str, ...]
-    geom_rotations: Array
-    """Their axes, (g, 3, 3)."""
-    geom_bits: Indices
-    """Bits that say with what a geom collides: its type and its affinity, (g, 2)."""
-    joint_rules: tuple[JointRule, ...]
-    """What holds joints at functions of others."""
-    loops: tuple[Loop, ...]
-    """What holds bodies together besides joints."""
+    geom_rotations: Array  # their axes, (g, 3, 3)
+    geom_bits: Indices  # what a geom collides with: its type and affinity, (g, 2)
+    joint_rules: tuple[JointRule, ...]  # what holds joints at functions of others
+    loops: tuple[tuple[str, int, int], ...]  # how two bodies are held together, and which
     tendons: tuple[Tendon, ...]
-    notes: tuple[str, ...]
-    """What was compiled otherwise than it is written, a sentence each."""
+    notes: tuple[str, ...]  # sentences about what was compiled otherwise
 
 
 def compiled_hand(text: ModelText, name: str) -> HandModel:
@@ -164,7 +141,6 @@ def _impossible(spec: mujoco.MjSpec) -> list[str]:
 
 
 def _joint_rules(model: mujoco.MjModel) -> tuple[JointRule, ...]:
-    """Return the active rules that hold joints at polynomials of others."""
     rules, start = list[JointRule](), model.qpos0[model.jnt_qposadr]
     for i in _active(model, mujoco.mjtEq.mjEQ_JOINT):
         joint, leader = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
@@ -176,16 +152,15 @@ def _joint_rules(model: mujoco.MjModel) -> tuple[JointRule, ...]:
     return tuple(rules)
 
 
-def _loops(model: mujoco.MjModel) -> tuple[Loop, ...]:
-    """Return the active rules that hold bodies together."""
-    found = list[Loop]()
+def _loops(model: mujoco.MjModel) -> tuple[tuple[str, int, int], ...]:
+    found = list[tuple[str, int, int]]()
     kinds = {"connect": mujoco.mjtEq.mjEQ_CONNECT, "weld": mujoco.mjtEq.mjEQ_WELD}
     for name, kind in kinds.items():
         for i in _active(model, kind):
             ends = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
             if model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE:
                 ends = int(model.site_bodyid[ends[0]]), int(model.site_bodyid[ends[1]])
-            found.append(Loop(name, ends))
+            found.append((name, *ends))
     return tuple(found)
 
 
@@ -203,7 +178,6 @@ def _tendons(model: mujoco.MjModel) -> tuple[Tendon, ...]:
 
 
 def _active(model: mujoco.MjModel, kind: mujoco.mjtEq) -> list[int]:
-    """Return the numbers of the active rules of a kind."""
     return np.flatnonzero((model.eq_type == kind) & model.eq_active0.astype(bool)).tolist()
 
 
@@ -222,7 +196,6 @@ def mesh_points(model: HandModel, geom: int) -> Array:
 
 
 def _turns(quaternions: Array) -> Array:
-    """Return the rotation matrices of unit quaternions, (n, 3, 3)."""
     found = np.empty((len(quaternions), 9))
     for quaternion, matrix in zip(quaternions, found, strict=True):
         mujoco.mju_quat2Mat(matrix, quaternion)

@@ -18,16 +18,8 @@ LARGEST_TEXT, LARGEST_FILES = 4 * 2**20, 64 * 2**20
 """Largest size of the text, and of all files that it names together [bytes]."""
 LARGEST_MANIFEST = 2**16
 MOST_FILES, MOST_ELEMENTS = 500, 20_000
-REFUSED = (
-    "include",
-    "model",
-    "plugin",
-    "extension",
-    "replicate",
-    "composite",
-    "flexcomp",
-    "attach",
-)
+REFUSED = ("include", "model", "plugin", "extension", "replicate", "composite", "flexcomp",
+           "attach")  # fmt: skip
 """Elements that read other models, run code or make copies in any number."""
 MOST_PIXELS = 4096
 """Largest value of the attributes that say how large pictures and fields of heights are."""
@@ -58,10 +50,8 @@ class ModelText:
     """The text of a model that names no file on disk."""
 
     xml: str
-    files: dict[str, bytes]
-    """The files that it names, by the names in it."""
-    notes: tuple[str, ...] = ()
-    """What was read otherwise than it is written, a sentence each."""
+    files: dict[str, bytes]  # the files that it names, by the names in it
+    notes: tuple[str, ...] = ()  # sentences about what was read otherwise
 
 
 def model_text(path: Path) -> ModelText:
@@ -78,7 +68,14 @@ def model_text(path: Path) -> ModelText:
         ) from error
     for other in [each for each in root if each.tag in OTHERS and root.tag == "robot"]:
         root.remove(other)
-    _check_followed(path, root)
+    kinds = {joint.get("name"): joint.get("type") for joint in root.findall("joint")}
+    for joint in root.findall("joint"):  # MuJoCo would take those that follow a fixed one as free
+        mimic = joint.find("mimic")
+        if mimic is not None and not {kinds.get(mimic.get("joint")), joint.get("type")} <= TURNING:
+            raise InputError(
+                f"{path}: joint {joint.get('name')} must follow a joint that moves, got <mimic> "
+                f"of {mimic.get('joint')}; name another joint there, or remove it"
+            )
     notes = _with_shapes(root)
     elements = list(root.iter())
     if root.tag not in {"mujoco", "robot"} or len(elements) > MOST_ELEMENTS:
@@ -91,23 +88,8 @@ def model_text(path: Path) -> ModelText:
     return ModelText(*_with_files(path, root, elements, etree), notes)
 
 
-def _check_followed(path: Path, root: Any) -> None:
-    """Refuse URDF joints that follow one which does not move: MuJoCo would take them as free."""
-    kinds = {joint.get("name"): joint.get("type") for joint in root.findall("joint")}
-    for joint in root.findall("joint"):
-        mimic = joint.find("mimic")
-        if mimic is not None and not {kinds.get(mimic.get("joint")), joint.get("type")} <= TURNING:
-            raise InputError(
-                f"{path}: joint {joint.get('name')} must follow a joint that moves, got <mimic> "
-                f"of {mimic.get('joint')}; name another joint there, or remove it"
-            )
-
-
 def _with_shapes(root: Any) -> tuple[str, ...]:
-    """Let the visual shapes of a URDF link collide where it has no others, and drop all others.
-
-    Gives notes about the links whose visual shapes collide, and those that have none to be read.
-    """
+    """Let visual shapes of URDF links collide where there are no others; return notes."""
     lent, bare = list[str](), list[str]()
     for link in root.findall("link"):
         visuals, known = link.findall("visual"), link.find("collision") is not None
@@ -214,10 +196,10 @@ def _found(path: Path, given: str, places: list[Path]) -> Path:
 
 
 def _roots(home: Path, package: str) -> list[Path]:
-    """Return the folders of a package in which a model is, or that is beside those it is in.
+    """Return the folders of a package in which a model is, or beside those that it is in.
 
-    A folder above the model's is a package if it is called so, or if its manifest says so; another
-    folder only if it is called so and has a manifest that says so.
+    Folders beside must be called like the package and have a manifest that says so; for those in
+    which the model is, one of both is enough.
     """
     if not PLAIN.fullmatch(package) or package.startswith("."):
         return []
@@ -231,7 +213,6 @@ def _roots(home: Path, package: str) -> list[Path]:
 
 
 def _is_called(folder: Path, package: str) -> bool:
-    """Return whether the manifest in a folder gives the name of a package."""
     try:
         with (folder / MANIFEST).open("rb") as file:
             said = re.search(rb"<name>\s*([\w.-]+)\s*</name>", file.read(LARGEST_MANIFEST))
@@ -241,7 +222,6 @@ def _is_called(folder: Path, package: str) -> bool:
 
 
 def _bytes(path: Path, most: int, model: Path) -> bytes:
-    """Read a file of a size up to `most`."""
     try:
         with path.open("rb") as file:
             content = file.read(most + 1)

@@ -45,7 +45,6 @@ def hand_inertials(hand: Hand) -> dict[str, dict[str, object]]:
 
 
 def _inertial(shapes: Sequence[LinkShape], link: Link | None) -> dict[str, object]:
-    """Return the inertial of shapes, with the mass and centre that are known of their link."""
     shapes = shapes or (BALL,)
     known = None if link is None else link.mass_kg
     center = None if link is None else link.center_of_mass
@@ -77,35 +76,25 @@ class Chains:
     """A hand in a pose, with what its joints, shapes and fingertips are to be in a scene."""
 
     hand: Hand
-    joints: Array
-    """Joint angles of the pose, (j,) [rad]."""
-    armature_kg_m2: float
-    """Inertia that each joint has besides that of its links."""
-    tips: tuple[Mapping[str, object], ...]
-    """Attributes of each finger's fingertip: what it touches, and how."""
-    light_kg: float = NOMINAL_KG
-    """Mass of a link whose own is not known, or does not count [kg]."""
-    weighs: bool = False
-    """Whether gravity pulls at links whose masses are known."""
+    joints: Array  # joint angles of the pose, (j,) [rad]
+    armature_kg_m2: float  # inertia that each joint has besides that of its links
+    tips: tuple[Mapping[str, object], ...]  # attributes of each finger's fingertip
+    light_kg: float = NOMINAL_KG  # of links whose masses do not count
+    weighs: bool = False  # whether gravity pulls at links whose masses are known
     touches: int = 0
     """Bits of what palm and links touch besides each other; last links touch none of it, as their
     fingertips do."""
-    contact: Mapping[str, object] | None = None
-    """Attributes of these contacts."""
+    contact: Mapping[str, object] | None = None  # attributes of these contacts
     inertials: Mapping[str, Mapping[str, object]] = field(default_factory=dict[str, Any])
-    """Mass and inertia of links by name, in place of those above."""
-    stops: bool = False
-    """Whether joints stop at the ends of their ranges."""
+    """Inertials of links by name, in place of those above."""
+    stops: bool = False  # whether joints stop at the ends of their ranges
 
 
 def add_hand(
     root: Element, parent: Element, pose: Array, chains: Chains, limits: Iterable[float],
     stiffness: float, damping: float,
 ) -> None:  # fmt: skip
-    """Add a hand to a body at a pose of the palm, with a servo for each joint.
-
-    Takes `limits` [N m]; `stiffness` [N m/rad]; `damping` [N m s/rad].
-    """
+    """Add a hand to a body at a pose of the palm, with a servo for each joint."""
     palm = add_element(parent, "body", {"name": PALM, **placed(pose[:3, 3], pose[:3, :3])})
     add_fingers(palm, chains)
     add_exclusions(add_element(root, "contact", {}), chains.hand)
@@ -201,10 +190,7 @@ def add_servo(
     actuators: Element, joint: str, stiffness: float, damping: float, limit: float | None,
     span: tuple[float, float] | None = None,
 ) -> None:  # fmt: skip
-    """Add the servo of a joint.
-
-    Takes `stiffness` [N m/rad]; `damping` [N m s/rad]; `limit` [N m]; `span` [rad].
-    """
+    """Add a servo with kp [N m/rad], kv [N m s/rad], a torque limit [N m] and a span [rad]."""
     servo = {
         "name": joint, "joint": joint, "kp": stiffness, "kv": damping,
         "ctrllimited": "false" if span is None else "true", "ctrlrange": span or (0.0, 0.0),

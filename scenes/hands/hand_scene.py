@@ -38,9 +38,9 @@ from grasp_core.checked import instance, path_of
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_motors import direction, hand_motors
+from grasp_core.hands.hand_motors import hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians
-from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
+from grasp_core.hands.reach import HandReach, Stance, direction, stance_of, uncoupled
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
@@ -70,26 +70,17 @@ percent."""
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
 class HandLayout(Layout):
-    """Positions, masses and drives of everything in a scene with a hand, in the world frame.
-
-    `drive` holds what fingertips on slides would be driven with; its radius is that of the largest.
-    """
+    """Positions, masses and drives of a scene with a hand, in the world frame."""
 
     hand: Hand
-    joints: Array
-    """Joint angles of the pose, (j,) [rad]."""
-    palm_pose: Array
-    """Pose of the palm in the world frame, (4, 4)."""
-    used_fingers: tuple[int, ...]
-    """The hand's finger at each contact."""
+    joints: Array  # joint angles of the pose, (j,) [rad]
+    palm_pose: Array  # pose of the palm in the world frame, (4, 4)
+    used_fingers: tuple[int, ...]  # the hand's finger at each contact
     motors: Motors
-    gravity: Array
-    """Acceleration of gravity that pulls at the links, (3,) [m/s^2]; zero for none."""
-    servo_n_m_per_rad: float
-    """Stiffness of the joints' servos."""
+    gravity: Array  # acceleration that pulls at the links, (3,) [m/s^2]
+    servo_n_m_per_rad: float  # stiffness of the joints' servos
     damping_n_m_s_per_rad: float
-    armature_kg_m2: float
-    """Inertia that each joint has besides that of its links."""
+    armature_kg_m2: float  # inertia that each joint has besides that of its links
 
     @property
     def tip_radii(self) -> Array:
@@ -107,18 +98,12 @@ class HandLayout(Layout):
         return False
 
     def tips(self, joints: Array) -> Array:
-        """Compute where the centres of the fingertips are, (n, k, 3) [m].
-
-        Takes `joints` (n, j) [rad].
-        """
+        """Compute the centres of the fingertips, (n, k, 3) [m], at joints (n, j) [rad]."""
         found = places(self.hand, self.joints + joints, self.palm_pose)
         return found.tips[:, list(self.used_fingers)]
 
     def commands(self, forces: Array) -> Array:
-        """Compute what servos are told to make fingertips push with forces: (1), (n, j) [rad].
-
-        Takes `forces` (n, k, 3) [N].
-        """
+        """Compute what servos are told, (n, j) [rad], to push with forces (n, k, 3) [N], by (1)."""
         torques = forces.reshape(len(forces), -1) @ self.motors.levers.T + self.motors.gravity
         return to_digits(torques) / self.servo_n_m_per_rad
 
@@ -127,10 +112,7 @@ def hand_layout(
     hand: Hand, body: Polyhedron, reach: HandReach, friction: float,
     down: tuple[float, float, float] | None = None,
 ) -> HandLayout:  # fmt: skip
-    """Place an object and a hand that stands in a grasp of it.
-
-    Gives the layout, with the joints turned by as much as fingertips were off their faces.
-    """
+    """Place an object and a hand, whose joints are turned until fingertips are on faces."""
     check_body(body)
     stance = stance_of(uncoupled(hand, SIMULATION), reach)
     motors = hand_motors(hand, reach, down=down)
@@ -145,7 +127,7 @@ def hand_layout(
     armature = float(to_digits(np.array(drive.mass_kg * lever**2)))
     own = {each.name: getattr(base, each.name) for each in fields(base)}
     own["squeeze"] = to_digits(SQUEEZE * np.einsum("kij,ki->kj", base.frames, squeeze))
-    gravity = np.zeros(3) if down is None else GRAVITY_M_PER_S2 * direction(down)
+    gravity = np.zeros(3) if down is None else GRAVITY_M_PER_S2 * direction(down, "down")
     centers = base.contacts - (radii - drive.indentation_m)[:, None] * base.frames[:, :, 0]
     joints = touching(replace(stance, palm_pose=pose), centers)
     return HandLayout(
@@ -221,10 +203,7 @@ def build_hand_scene(
 
 
 def limited(scene: HandScene, limits: Array, friction: float) -> HandScene:
-    """Return a scene with other torque limits, (joints,) [N m], and another friction.
-
-    All else stays as it is, stiffness and commands too.
-    """
+    """Return a scene with other torque limits and friction, but the same stiffness and commands."""
     motors = replace(scene.layout.motors, limits=limits)
     layout = replace(scene.layout, motors=motors, friction=friction)
     return HandScene(hand_text(layout, scene.physics), layout, scene.physics, "pads")

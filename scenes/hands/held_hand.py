@@ -65,25 +65,17 @@ through them."""
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class HeldHandLayout(HeldLayout):
-    """A scene of execution whose fingertips stand on the chains of a hand.
-
-    Springs, dampers and masses of the fingertips are those of (1).
-    """
+    """A scene of execution whose fingertips stand on the chains of a hand, by (1)."""
 
     hand: Hand
-    angles: Array
-    """Joint angles of the pose, (j,) [rad]."""
-    palm_pose: Array
-    """Pose of the palm in the world frame at rest, (4, 4)."""
-    used_fingers: tuple[int, ...]
-    """The hand's finger at each contact."""
+    angles: Array  # joint angles of the pose, (j,) [rad]
+    palm_pose: Array  # pose of the palm in the world frame at rest, (4, 4)
+    used_fingers: tuple[int, ...]  # the hand's finger at each contact
     motors: Motors
     servo_n_m_per_rad: float
     damping_n_m_s_per_rad: float
-    armature_kg_m2: float
-    """Inertia that each joint has besides that of its links."""
-    inertias: Array
-    """Inertia of each fingertip along its springs by (1), (k, 3) [kg]."""
+    armature_kg_m2: float  # inertia that each joint has besides that of its links
+    inertias: Array  # of fingertips along their springs by (1), (k, 3) [kg]
 
     @property
     def tip_names(self) -> tuple[str, ...]:
@@ -102,10 +94,7 @@ class HeldHandLayout(HeldLayout):
 
     @property
     def stiffest(self) -> float:
-        """Return the stiffness K that the servos amount to at the levers' root mean square [N/m].
-
-        A fingertip is stiffer where its levers are short, and its inertia is larger by as much.
-        """
+        """Return the stiffness K of the servos at the levers' root mean square [N/m]."""
         return self.servo_n_m_per_rad / self.armature_kg_m2 * self.tip_mass_kg
 
     @property
@@ -124,10 +113,7 @@ class HeldHandLayout(HeldLayout):
 
     @property
     def above_table(self) -> tuple[Array, Array]:
-        """Return balls that a table must not meet: middles (n, 3) and radii (n,) [m].
-
-        They are the fingertips, and the corners of the shapes of links and palm.
-        """
+        """Return tips and corners of shapes as balls: middles (n, 3) and radii (n,) [m]."""
         found = self._places(np.zeros((1, len(self.angles))))
         hand, pose = self.hand, self.palm_pose
         parts = [(shape, pose[:3, :3], pose[:3, 3]) for shape in hand.palm]
@@ -144,10 +130,7 @@ class HeldHandLayout(HeldLayout):
         return np.vstack([*corners, found.tips[0]]), np.concatenate([*radii, every])
 
     def joints(self, reached: Array) -> Array:
-        """Find how far joints turn to move the fingertips by displacements (k, 3) [m], (j,) [rad].
-
-        The displacements are along the fingertips' springs.
-        """
+        """Find the turns of joints, (j,) [rad], that move tips along their springs, (k, 3) [m]."""
         rest = self._places(np.zeros((1, len(self.angles)))).tips[0, list(self.used_fingers)]
         goals = rest + np.einsum("kij,kj->ki", self.axes, reached)
         return touching(self._stance, goals) - self.angles
@@ -197,7 +180,6 @@ class HeldHandLayout(HeldLayout):
         return np.asarray(np.linalg.solve(square, asked[..., None]), dtype=np.float64)[..., 0]
 
     def _chain(self, finger: int) -> slice:
-        """Return the numbers of a finger's joints."""
         first = sum(len(each.links) for each in self.hand.fingers[:finger])
         return slice(first, first + len(self.hand.fingers[finger].links))
 

@@ -1,6 +1,7 @@
 """Runs the command `transfer`, which carries grasps over to a part that has changed."""
 
 import math
+from dataclasses import replace
 
 from grasp_core.by_value import counted
 from grasp_core.errors import InputError
@@ -72,15 +73,15 @@ def transfer_file(command: command_flags.Transfer, reporter: Reporter) -> int:
 
 
 def _changed_part(command: command_flags.Transfer, old: Polyhedron) -> Polyhedron:
-    center = command.center_of_mass_m
-    if center is None and (kept := given_center(old)) is not None:
-        x, y, z = kept.tolist()
-        center = x, y, z
-    mesh = flag_groups.Mesh(
-        command.lengths, faces="planar", center_of_mass_m=center,
-        largest_part=old.surface.dropped > SMALL, limits=command.limits,
-    )  # fmt: skip
-    return load_object(command.part, mesh)
+    center, part = command.center_of_mass_m, Path(command.part)
+    asked = flag_groups.Mesh(command.lengths, center_of_mass_m=center, limits=command.limits)
+    if part.suffix or part.is_file():  # a built-in object is as it is
+        if center is None and (kept := given_center(old)) is not None:
+            x, y, z = kept.tolist()
+            center = x, y, z
+        largest = old.surface.dropped > SMALL
+        asked = replace(asked, faces="planar", center_of_mass_m=center, largest_part=largest)
+    return load_object(command.part, asked)
 
 
 def _show(found: Transfer, reporter: Reporter) -> None:

@@ -98,10 +98,7 @@ def hand_squeeze(
     hand: Hand, body: Polyhedron, reach: HandReach, friction: float, settings: ExecutionSettings,
     loads: LoadSet | None = None,
 ) -> BestSqueeze:  # fmt: skip
-    """Choose the squeeze within the motors' torques that carries most of the weight.
-
-    With loads it is the one of the least push within these torques that survives them.
-    """
+    """Choose the squeeze that carries most, or needs least push for loads, within the torques."""
     check_body(body)
     stance = stance_of(hand, reach)
     if not force_closure(stance.contacts, friction=friction).closed:
@@ -132,8 +129,7 @@ class HandJob:
     body: Polyhedron
     reach: HandReach
     friction: float
-    settings: ExecutionSettings | None = None
-    """How to execute the grasp; None where it is only to hold test wrenches."""
+    settings: ExecutionSettings | None = None  # None where it only holds wrenches
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,12 +137,9 @@ class ExecutedHand:
     """What came of executing one grasp with a hand."""
 
     grasp: str
-    execution: Execution | None
-    """The trials; None where the grasp cannot be executed."""
-    refused: str = ""
-    """Why the grasp cannot be executed; empty if it was."""
-    enough: Enough | None = None
-    """The push, and stiffness, that would be enough for the trials, as in `Execution.enough`."""
+    execution: Execution | None  # None where the grasp cannot be executed
+    refused: str = ""  # why the grasp cannot be executed; empty if it was
+    enough: Enough | None = None  # what would be enough, as in `Execution.enough`
 
     @property
     def survived(self) -> bool:
@@ -155,10 +148,7 @@ class ExecutedHand:
 
     @property
     def least_predicted_loss(self) -> float:
-        """Return the least multiple of a trial's load at which the object is predicted to be lost.
-
-        It is zero where the grasp cannot be executed.
-        """
+        """Return the least multiple of a trial's load at which the object is lost."""
         return 0.0 if self.execution is None else self.execution.least_predicted_loss
 
     @property

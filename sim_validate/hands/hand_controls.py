@@ -37,18 +37,12 @@ FRICTIONS = (0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1)
 class HandControl(ByValue):
     """A load that a hand provably cannot hold, after one thing has been changed."""
 
-    name: str
-    """Kind of the control: `overloaded`, `weak_motors`, `dead_motor` or `low_friction`."""
-    explanation: str
-    """What was changed, as a sentence."""
-    friction: float
-    """Coulomb coefficient at every contact."""
-    limits: Array
-    """Largest torque of each joint, (joints,) [N m]."""
-    share: float
-    """What is applied, over the limit that was predicted before the change."""
-    proof: WrenchLimit
-    """Limit of the applied wrench after the change: its `upper` is below one."""
+    name: str  # `overloaded`, `weak_motors`, `dead_motor` or `low_friction`
+    explanation: str  # what was changed, as a sentence
+    friction: float  # Coulomb coefficient at every contact
+    limits: Array  # largest torque of each joint, (joints,) [N m]
+    share: float  # what is applied, over the limit before the change
+    proof: WrenchLimit  # of what is applied after the change: `upper` is below one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,26 +66,14 @@ def hand_controls(
 ) -> tuple[HandControl, ...]:
     """Make the negative controls that exist for a hand, at most one of each kind."""
     at_limit = weakest.limit.wrench
-    kinds = (
-        _overloaded(case, at_limit),
-        _weak_motors(case, at_limit),
-        _dead_motor(case, at_limit, names),
-        _low_friction(case, at_limit),
-    )
-    return tuple(found for kind in kinds for found in kind)
-
-
-def _overloaded(case: HandCase, at_limit: Array) -> Iterator[HandControl]:
     told = f"the load is {OVERLOAD:g} times the predicted limit"
-    yield from _proved("overloaded", told, case, at_limit, OVERLOAD)
-
-
-def _weak_motors(case: HandCase, at_limit: Array) -> Iterator[HandControl]:
+    found = list(_proved("overloaded", told, case, at_limit, OVERLOAD))
     weak = WEAK_MOTORS * case.motors.limits
     if (np.abs(case.motors.gravity) < weak).all():
         motors = replace(case.motors, limits=weak)
         told = f"every motor has {WEAK_MOTORS:g} of the torque that the load needs"
-        yield from _proved("weak_motors", told, replace(case, motors=motors), at_limit, 1.0)
+        found += _proved("weak_motors", told, replace(case, motors=motors), at_limit, 1.0)
+    return (*found, *_dead_motor(case, at_limit, names), *_low_friction(case, at_limit))
 
 
 def _dead_motor(case: HandCase, at_limit: Array, names: tuple[str, ...]) -> Iterator[HandControl]:

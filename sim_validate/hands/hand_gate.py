@@ -21,7 +21,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from grasp_core.arrays import Array
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import UnfaithfulError
 from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link
@@ -52,6 +51,8 @@ SETTLE_S = 0.5
 """Time in which the slippery cube comes to rest: five times what others are given [s]."""
 GENTLE = 0.1
 """Load of the slippery cube, over what one finger presses with."""
+OUTWARD = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, -0.0, -0.0], [-0.0, -1.0, -0.0]])
+"""Outward normals at the contacts, (4, 3)."""
 
 
 def require_faithful_hands(setup: Setup, friction: float) -> tuple[Check, ...]:
@@ -84,34 +85,21 @@ def cube() -> Polyhedron:
     )
 
 
-def _outward() -> Array:
-    """Return the outward normals at the contacts, (4, 3)."""
-    x, y = np.eye(3)[:2]
-    return np.array([x, y, -x, -y])
-
-
 def hinged_hand() -> Hand:
     """Return the hand with one hinge a finger."""
-    fingers = tuple(
-        HandFinger(
-            f"finger{number}",
-            (Link(f"link{number}", _joint(number, out), (), None, None),),
-            Fingertip(TIP * out + np.array([0.0, 0.0, -HEIGHT]), TIP),
-        )
-        for number, out in enumerate(_outward())
-    )
-    return Hand("known hand", (), fingers)
-
-
-def _joint(number: int, out: Array) -> Joint:
-    axis = np.cross(np.array([0.0, 0.0, 1.0]), out)
-    place = HALF * out + np.array([0.0, 0.0, HEIGHT])
-    return Joint(f"hinge{number}", place, np.eye(3), axis, -1.0, 1.0, TORQUE)
+    fingers = list[HandFinger]()
+    for number, out in enumerate(OUTWARD):
+        axis, place = np.cross(np.eye(3)[2], out), HALF * out + np.array([0.0, 0.0, HEIGHT])
+        hinge = Joint(f"hinge{number}", place, np.eye(3), axis, -1.0, 1.0, TORQUE)
+        tip = Fingertip(TIP * out + np.array([0.0, 0.0, -HEIGHT]), TIP)
+        link = Link(f"link{number}", hinge, (), None, None)
+        fingers.append(HandFinger(f"finger{number}", (link,), tip))
+    return Hand("known hand", (), tuple(fingers))
 
 
 def stance(friction: float) -> HandReach:
     """Return the pose in which it holds the cube, with its proof at a friction."""
-    contacts = tuple(Contact(HALF * out, -out) for out in _outward())
+    contacts = tuple(Contact(HALF * out, -out) for out in OUTWARD)
     proof = force_closure([c.position for c in contacts], [c.normal for c in contacts], friction)
     return HandReach(
         "known hand", "cube", "", "", 1, 0.0, np.arange(4), np.zeros(4), np.eye(4), contacts, proof
@@ -121,7 +109,6 @@ def stance(friction: float) -> HandReach:
 def _limits(
     scene: HandScene, body: Polyhedron, reach: HandReach, setup: Setup
 ) -> tuple[Check, ...]:
-    """Measure (1)."""
     friction, press = scene.layout.friction, TORQUE / HEIGHT
     exact = {
         "across the contacts": (np.eye(6)[2], 4.0 * friction * press),
@@ -143,7 +130,6 @@ def _limits(
 
 
 def _displaced(scene: HandScene, setup: Setup) -> Check:
-    """Measure (2)."""
     smooth = limited(scene, scene.layout.motors.limits, SLIPPERY)
     layout = smooth.layout
     # without the grasp's own friction forces, which slippery contacts do not carry

@@ -162,8 +162,6 @@ def validate_hand(
 
 
 class _Bout:
-    """A hand on the bench, with the trials of an agenda."""
-
     def __init__(
         self, body: Polyhedron, contacts: tuple[Contact, ...], scene: HandScene, agenda: Agenda,
         setup: Setup,
@@ -172,14 +170,9 @@ class _Bout:
         self.case = HandCase(body, contacts, self.layout.friction, self.layout.motors, setup)
         self.rig = self._rig(scene)
         self.loads = planned_loads(
-            body,
-            contacts,
-            self.layout.friction,
-            self.rig.idle,
-            agenda,
-            setup,
+            body, contacts, self.layout.friction, self.rig.idle, agenda, setup,
             motors=self.layout.motors,
-        )
+        )  # fmt: skip
 
     def _rig(self, scene: HandScene) -> Rig:
         bench = Bench(scene, threads=self.setup.threads, timeout_s=self.setup.timeout_s)

@@ -24,8 +24,6 @@ from grasp_core.arrays import Array
 from grasp_core.checked import BOUNDS, coefficient, function, number, seed_of, whole
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
-from grasp_core.families.constructions import point_region, regions_of
-from grasp_core.families.free import closed_at, of_general_type
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.grounds import SEARCH_DIGITS, exact_maps, first_nodes, grounds_of
@@ -33,11 +31,11 @@ from grasp_core.optimizing.best.incumbents import begin, climbed, piece_at
 from grasp_core.optimizing.best.result import BestGrasp, Ended, GapAt, measured
 from grasp_core.optimizing.best.search import CUTS, TWISTS, Found, Searching, Steps, Stop, stopping
 from grasp_core.optimizing.best.support_cuts import SEARCHED_BELOW, CutTree, Slack
-from grasp_core.optimizing.better_contacts import FINGER_RADIUS
-from grasp_core.planning.certify import Candidate, certify, named, to_grasp
+from grasp_core.optimizing.better_contacts import FINGER_RADIUS, certified
+from grasp_core.planning.certify import named
 from grasp_core.quality.measures import Measure, MeasureName
 from grasp_core.solvers.ties import few_digits, first_best, on_grid, surpassing
-from grasp_core.values import ForceCone, Grasp
+from grasp_core.values import Grasp
 
 COUNT = 384
 """Random twists to begin with, as many as a wave hands on; a quarter of them is moved to where the
@@ -59,10 +57,7 @@ MOST_JOBS = 256
 
 
 def lowered_twists(searching: Searching, rng: np.random.Generator) -> Array:
-    """Return twists in which all polygons together resist little, and let the search know them.
-
-    Gives unit twists, (n, 6).
-    """
+    """Return unit twists, (n, 6), that polygons resist little, and let the search know them."""
     grounds, loads = searching.grounds, searching.measure.loads
     points = [grounds.places(p, at) for p, at in enumerate(grounds.polygons())]
     on = np.repeat(np.arange(len(points)), [len(each) for each in points])
@@ -195,9 +190,8 @@ class Levels:
     def result(self, ended: Ended) -> BestGrasp:
         """Return the best contacts as a grasp, with the proof."""
         proof = CutTree(
-            self.grounds, self.friction, self.maps, self.threshold, self.steps.deeds,
-            self.steps.asked, self.steps.twists, self.steps.lines, self.measure,
-        )  # fmt: skip
+            self.grounds, self.friction, self.maps, self.threshold, *self.steps, self.measure
+        )
         grasp = self._grasp(self.best)
         quality = measured(self.body, grasp, self.friction, self.measure)
         return BestGrasp(grasp, quality, self.clearance, proof, ended, tuple(self.history))
@@ -205,19 +199,11 @@ class Levels:
     def _grasp(self, best: Found) -> Grasp:
         pieces = tuple(piece_at(self.grounds, p) for p in best.pieces)
         points = np.array([piece.point(y) for piece, y in zip(pieces, best.at, strict=True)])
-        plain = closed_at(pieces, points, self.friction, 0.0)
-        placement = plain and of_general_type(pieces, plain, self.friction, self.rng)
-        if placement is not None:
-            a, b, c, d = (piece.face for piece in pieces)
-            faces = (a, b, c, d)
-            cones = tuple(ForceCone(piece.normal, math.atan(self.friction)) for piece in pieces)
-            regions = regions_of(point_region, pieces, cones, placement)
-            candidate = Candidate(
-                named("b", faces), faces, "regulus", pieces, cones, placement, regions
-            )
-            found = certify(candidate, self.friction)
-            if found is not None:
-                return to_grasp(self.body, self.friction, found)
+        a, b, c, d = (piece.face for piece in pieces)
+        name = named("b", (a, b, c, d))
+        found = certified(self.body, name, pieces, points, self.friction, self.rng)
+        if found is not None:
+            return found
         raise InputError(
             f"best_grasp: expected that the best contacts found, on faces "
             f"{[piece.face for piece in pieces]}, can be certified, and they cannot; try another "

@@ -22,12 +22,9 @@ CROSSING_STEPS = 4
 class Pieces(NamedTuple):
     """The convex pieces of faces on which contacts lie, at unit size."""
 
-    normals: Array
-    """Inward unit normals, (p, 3)."""
-    origins: Array
-    """Points whose plane coordinates are zero, (p, 3)."""
-    frames: Array
-    """Orthonormal columns spanning the planes, (p, 3, 2)."""
+    normals: Array  # inward unit normals, (p, 3)
+    origins: Array  # points whose plane coordinates are zero, (p, 3)
+    frames: Array  # orthonormal columns spanning the planes, (p, 3, 2)
     friction: float
 
 
@@ -63,10 +60,7 @@ def support(at: Array, a: float, b: float, friction: float) -> float:
 
 @loop("numpy")
 def cut(corners: Array, count: int, at: Array, friction: float, t: float, out: Array) -> int:
-    """Fill in the corners of what is left of a polygon where the support reaches t.
-
-    Takes `at` (6,). Gives how many corners the rest has: zero if no point answers.
-    """
+    """Fill in what is left of a polygon where the support reaches t; return how many corners."""
     heights = np.empty(MOST_CORNERS)
     reached, runs = 0, 0
     for k in range(count):

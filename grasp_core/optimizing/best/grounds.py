@@ -63,30 +63,25 @@ MOST_MAPS = 128
 ASIDE = (0.37, 0.11)
 """Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
 KERNEL = "grasp_core.optimizing.best.cuts_kernel"
+SHAPES = {"normals": (3,), "origins": (3,), "frames": (3, 2), "corners": (ROOM, 2)}
+"""Shapes of the arrays of a polygon in `Grounds`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Grounds(ByValue):
     """Convex polygons on which contacts may be, at unit size about the centre of mass."""
 
-    faces: Indices
-    """The face of each polygon, (p,)."""
-    normals: Array
-    """Inward unit normals, (p, 3)."""
-    origins: Array
-    """Points whose plane coordinates are zero, (p, 3)."""
-    frames: Array
-    """Orthonormal columns that span the planes, (p, 3, 2)."""
+    faces: Indices  # the face of each polygon, (p,)
+    normals: Array  # inward unit normals, (p, 3)
+    origins: Array  # points whose plane coordinates are zero, (p, 3)
+    frames: Array  # orthonormal columns that span the planes, (p, 3, 2)
     corners: Array
     """Corners in plane coordinates, in order, zero where there are fewer, (p, 24, 2)."""
-    counts: Indices
-    """How many corners each has, (p,)."""
+    counts: Indices  # how many corners each has, (p,)
 
     def __post_init__(self) -> None:
-        shapes = {"normals": (None, 3), "origins": (None, 3), "frames": (None, 3, 2),
-                  "corners": (None, ROOM, 2)}  # fmt: skip
-        for name, shape in shapes.items():
-            object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
+        for name, shape in SHAPES.items():
+            object.__setattr__(self, name, frozen(getattr(self, name), (None, *shape), name))
         for name in ("faces", "counts"):
             object.__setattr__(self, name, frozen_indices(getattr(self, name), (None,), name))
 
@@ -96,10 +91,7 @@ class Grounds(ByValue):
         if not (
             0 < n <= MOST_PIECES
             and is_indices(self.faces, n)
-            and is_array(self.normals, n, 3)
-            and is_array(self.origins, n, 3)
-            and is_array(self.frames, n, 3, 2)
-            and is_array(self.corners, n, ROOM, 2)
+            and all(is_array(getattr(self, name), n, *shape) for name, shape in SHAPES.items())
             and bool((self.counts >= 3).all() and (self.counts <= ROOM).all())  # noqa: PLR2004
         ):
             return False
@@ -165,7 +157,6 @@ def _small(corners: Array) -> list[Array]:
 
 
 def _is_convex(corners: Array) -> bool:
-    """Return whether a polygon turns one way at all corners, and once around in all."""
     edges = np.roll(corners, -1, axis=0) - corners
     following = np.roll(edges, -1, axis=0)
     turns = edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0]
@@ -176,10 +167,7 @@ def _is_convex(corners: Array) -> bool:
 
 
 def exact_maps(body: Polyhedron, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> Array:
-    """Return the symmetries of an object that map pieces and loads exactly enough, (g, 3, 3).
-
-    Only the identity is returned if they do not form a group.
-    """
+    """Return symmetries that map pieces and loads exactly enough, (g, 3, 3); only 1 if no group."""
     alone = np.eye(3)[None]
     found = symmetries(body)
     every = np.concatenate([alone, found.rotations[1:], found.reflections])

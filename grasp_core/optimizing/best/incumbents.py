@@ -130,7 +130,6 @@ def piece_at(grounds: Grounds, place: int) -> FacePiece:
 
 
 def _supports(grounds: Grounds, friction: float, on: Indices, at: Array, twists: Array) -> Array:
-    """Return the support of each contact's cone in each twist, (m, n)."""
     points = grounds.origins[on] + np.einsum("kij,kj->ki", grounds.frames[on], at)
     normals = grounds.normals[on]
     u = twists[None, :, :3] + np.cross(twists[None, :, 3:], points[:, None])

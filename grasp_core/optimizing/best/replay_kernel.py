@@ -4,7 +4,7 @@ Solved: the check that `support_cuts` derives. Supports are computed in space, f
 and edges are followed by halving. From which support on a contact answers a twist is given.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,12 +22,9 @@ DEEPEST = 4096
 class Planes(NamedTuple):
     """The planes of the pieces."""
 
-    normals: Array
-    """Inward unit normals, (p, 3)."""
-    origins: Array
-    """Points whose plane coordinates are zero, (p, 3)."""
-    frames: Array
-    """Orthonormal columns, (p, 3, 2)."""
+    normals: Array  # inward unit normals, (p, 3)
+    origins: Array  # points whose plane coordinates are zero, (p, 3)
+    frames: Array  # orthonormal columns, (p, 3, 2)
     friction: float
 
 
@@ -58,8 +55,8 @@ def replay(  # noqa: PLR0913, PLR0917 - the arrays of a tree
             if top + FINGERS >= deep:
                 if deep >= DEEPEST:
                     return False
-                corners, counts = _more(corners), _more_counts(counts)
-                fresh, cuts, deep = _more_rows(fresh), _more_numbers(cuts), 2 * deep
+                corners, counts = _doubled(corners), _doubled(counts)
+                fresh, cuts, deep = _doubled(fresh), _doubled(cuts), 2 * deep
             cuts[top - 1] += 1
             if cuts[top - 1] > most_cuts:
                 return False
@@ -81,29 +78,8 @@ def replay(  # noqa: PLR0913, PLR0917 - the arrays of a tree
 
 
 @loop("numpy")
-def _more(old: Array) -> Array:
-    new = np.zeros((2 * old.shape[0], old.shape[1], old.shape[2], old.shape[3], old.shape[4]))
-    new[: len(old)] = old
-    return new
-
-
-@loop("numpy")
-def _more_counts(old: Indices) -> Indices:
-    new = np.zeros((2 * old.shape[0], old.shape[1], old.shape[2]), np.int64)
-    new[: len(old)] = old
-    return new
-
-
-@loop("numpy")
-def _more_rows(old: Indices) -> Indices:
-    new = np.zeros((2 * old.shape[0], old.shape[1]), np.int64)
-    new[: len(old)] = old
-    return new
-
-
-@loop("numpy")
-def _more_numbers(old: Indices) -> Indices:
-    new = np.zeros(2 * len(old), np.int64)
+def _doubled(old: Any) -> Any:
+    new = np.zeros((2 * len(old), *old.shape[1:]), old.dtype)
     new[: len(old)] = old
     return new
 

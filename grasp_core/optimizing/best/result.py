@@ -23,15 +23,15 @@ small, or too many, to be divided further."""
 
 
 def are_contacts_of(grasp: Grasp, wrenches: WrenchSet, proof: CutTree) -> bool:
-    """Return whether a grasp has the contacts of a wrench set, and these lie on a proof's polygons.
-
-    The grasp is in the object's frame and size, the others about its centre of mass in radii.
-    """
+    """Return whether a grasp has a wrench set's contacts, in radii, on polygons of a proof."""
     if not (is_a(grasp, Grasp) and wrenches.norm == "l1" and len(wrenches.friction) == FINGERS):
         return False
     if (wrenches.friction != proof.friction).any() or wrenches.width != 3:  # noqa: PLR2004
         return False
-    normals, arms = _contacts(wrenches)
+    each = wrenches.G.reshape(2, 3, FINGERS, 3).transpose(0, 2, 1, 3)
+    turns = each[1] @ each[0].transpose(0, 2, 1)
+    normals = each[0, :, :, 0]
+    arms = np.stack([turns[:, 2, 1], turns[:, 0, 2], turns[:, 1, 0]], axis=1)
     away, levers = grasp.positions - grasp.positions.mean(axis=0), arms - arms.mean(axis=0)
     size = float((away * levers).sum() / (levers * levers).sum())
     return bool(
@@ -39,13 +39,6 @@ def are_contacts_of(grasp: Grasp, wrenches: WrenchSet, proof: CutTree) -> bool:
         and np.abs(away - size * levers).max() <= SAME * size
         and np.abs(grasp.normals - normals).max() <= SAME
     ) and all(_is_on(proof, *contact) for contact in zip(arms, normals, strict=True))
-
-
-def _contacts(wrenches: WrenchSet) -> tuple[Array, Array]:
-    """Return the normals and the points, (4, 3) each, of hard contacts."""
-    each = wrenches.G.reshape(2, 3, FINGERS, 3).transpose(0, 2, 1, 3)
-    turns = each[1] @ each[0].transpose(0, 2, 1)
-    return each[0, :, :, 0], np.stack([turns[:, 2, 1], turns[:, 0, 2], turns[:, 1, 0]], axis=1)
 
 
 def _is_on(proof: CutTree, point: Array, normal: Array) -> bool:
@@ -136,7 +129,6 @@ class BestGrasp(ByValue):
         )
 
     def _has_its_measure(self) -> bool:
-        """Return whether the quality is about the loads of the proof."""
         if isinstance(self.quality, ResistedLoads):
             return self.quality.measure == self.proof.measure
         usual = is_a(self.proof.measure, Measure) and self.proof.measure.is_usual

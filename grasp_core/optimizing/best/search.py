@@ -19,7 +19,7 @@ from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -35,7 +35,6 @@ from grasp_core.values import FINGERS
 Nodes: TypeAlias = tuple[Array, Indices, Indices]
 """Where fingers may be at each of some nodes, as `first_nodes` returns them: corners (n, 4, p,
 any, 2), how many count (n, 4, p), and which fingers are fresh (n, 4)."""
-NODES = "grasp_core.optimizing.best.search_kernel"
 POOL = 512
 """Twists that a search keeps: asking is most of its work, and takes as long as there are twists."""
 DEEP, FIRST_ROOM = 24, 256
@@ -125,10 +124,8 @@ def stopping(seconds: float | None) -> Generator[Stop]:
 class Found:
     """Contacts whose quality, or multiple of a task's loads, is known."""
 
-    pieces: tuple[int, ...]
-    """The piece of each contact, (4,)."""
-    at: Array
-    """Plane coordinates, (4, 2)."""
+    pieces: tuple[int, ...]  # the piece of each contact, (4,)
+    at: Array  # plane coordinates, (4, 2)
     quality: FerrariCanny | ResistedLoads
 
     def __post_init__(self) -> None:
@@ -147,11 +144,10 @@ class Part:
     left: list[Nodes] = field(default_factory=list[Nodes])
     """Nodes that are left to parts of their own, in the order of the tree."""
     parts: list["Part"] = field(default_factory=list["Part"])
-    """These parts, in the same order."""
+    """These parts."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Steps:
+class Steps(NamedTuple):
     """The nodes of a tree as `CutTree` lists them."""
 
     deeds: Indices
@@ -171,7 +167,7 @@ def leave(part: Part) -> None:
 
 def part_from(first: Nodes, pool: Any) -> Part:
     """Return a part that begins with nodes and the twists of a pool."""
-    nodes = compiled(NODES)
+    nodes = compiled(KERNEL)
     corners, counts, fresh = first
     deep, pieces = max(DEEP, len(corners) + FINGERS + 1), counts.shape[2]
     stack = nodes.Stack(
@@ -188,15 +184,11 @@ def part_from(first: Nodes, pool: Any) -> Part:
         np.zeros(FIRST_ROOM, np.int64), np.zeros(FIRST_ROOM, np.int64),
         np.zeros((FIRST_ROOM, 6)), np.zeros((FIRST_ROOM, 3)), np.zeros(3, np.int64),
     )  # fmt: skip
-    return Part(stack, tree, _copied(pool))
-
-
-def _copied(pool: Any) -> Any:
-    """Return a pool with the same twists, all used before a tree begins, which has named none."""
-    copies = type(pool)(*(array.copy() for array in pool))
-    copies.names[:] = -1
-    copies.used[:] -= copies.used.max() + 1
-    return copies
+    # the same twists, all used before the tree begins, which has named none
+    own = type(pool)(*(array.copy() for array in pool))
+    own.names[:] = -1
+    own.used[:] -= own.used.max() + 1
+    return Part(stack, tree, own)
 
 
 def enlarge(part: Part) -> None:
@@ -216,18 +208,9 @@ def _doubled(array: Any) -> Any:
     return np.concatenate([array, np.zeros_like(array)])
 
 
-def room() -> Any:
-    """Return the memory in which a node is looked at."""
-    return compiled(NODES).Work(
-        np.zeros((FINGERS, POOL)), np.zeros((FINGERS, POOL)), np.zeros(POOL), np.zeros(POOL),
-        np.zeros(FINGERS), np.zeros((FINGERS, 2)), np.zeros(FINGERS, np.int64),
-        np.full(1, -1),
-    )  # fmt: skip
-
-
 def joined(trunk: Part, parts: Sequence[Part]) -> Steps:
     """Put the trees of parts into their places in the trunk's tree, and in each other's."""
-    nodes = compiled(NODES)
+    nodes = compiled(KERNEL)
     every = [trunk, *parts]
     sizes = np.array([part.tree.sizes for part in every], dtype=np.int64)
     starts = np.cumsum(sizes, axis=0) - sizes
@@ -274,8 +257,7 @@ class Searching:
     spare: float = 0.0
     """How far below threshold times demand a support still counts as an answer."""
     pool: Any = None
-    nodes: int = 0
-    """How many nodes were visited in all levels."""
+    nodes: int = 0  # how many nodes were visited in all levels
 
     def __post_init__(self) -> None:
         self.pool = self.empty_pool()
@@ -320,11 +302,7 @@ class Searching:
     def refute(
         self, nodes: Nodes, threshold: float, known: float
     ) -> tuple[Steps | None, list[Found]]:
-        """Try to refute that contacts of the first nodes reach a threshold.
-
-        Gives the tree, or None if it was stopped or contacts reach the threshold; contacts found
-        that surpass what is known.
-        """
+        """Try to refute a threshold: return the tree or None, and contacts above what is known."""
         corners, counts, fresh = nodes
         trunk = part_from((on_grid(corners, SEARCH_DIGITS), counts, fresh), self.pool)
         self._search(trunk, threshold, known, PART_DEPTH)
@@ -343,7 +321,11 @@ class Searching:
                     part.left, part.pool = [], None
                 if not waiting:
                     return joined(trunk, parts), better
-                wave = [_next(waiting) for _ in range(min(WAVE, len(waiting)))]
+                wave = list[Part]()
+                for _ in range(min(WAVE, len(waiting))):
+                    above, node, pool = waiting.popleft()
+                    above.parts.append(part_from(node, pool))
+                    wave.append(above.parts[-1])
                 self._together(threads, wave, threshold, known)
                 self._hand_on(wave)
                 parts += wave
@@ -351,7 +333,6 @@ class Searching:
     def _together(
         self, threads: ThreadPoolExecutor, wave: Sequence[Part], threshold: float, known: float
     ) -> None:
-        """Search the parts of a wave; an interrupt stops all of them."""
         try:
             for ended in [
                 threads.submit(self._search, part, threshold, known, MOST_DEPTH) for part in wave
@@ -370,10 +351,13 @@ class Searching:
 
     def _runs(self, part: Part, threshold: float, known: float, depth: int) -> Iterator[int]:
         """Run the kernel until a part is done, and yield why it pauses for the caller."""
-        kernel, nodes, pieces = compiled(KERNEL), compiled(NODES), self.pieces
-        work, demand, found_at = room(), self.demand, -1
+        kernel, pieces, demand, found_at = compiled(KERNEL), self.pieces, self.demand, -1
+        work = kernel.Work(
+            np.zeros((FINGERS, POOL)), np.zeros((FINGERS, POOL)), np.zeros(POOL), np.zeros(POOL),
+            np.zeros(FINGERS), np.zeros((FINGERS, 2)), np.zeros(FINGERS, np.int64), np.full(1, -1),
+        )  # fmt: skip
         while not self.stop():
-            search = nodes.Search(
+            search = kernel.Search(
                 pieces, part.stack, part.pool, part.tree, work, threshold, demand, self.spare
             )
             before = int(part.tree.sizes[0])
@@ -391,13 +375,12 @@ class Searching:
                     return
                 size = int(part.tree.sizes[0])
                 # found again: the twist refutes the contacts by less than rounding
-                if size == found_at and not nodes.divide(search, int(part.stack.top[0]) - 1):
+                if size == found_at and not kernel.divide(search, int(part.stack.top[0]) - 1):
                     return
                 found_at = size
             yield why
 
     def _is_refuted(self, part: Part, work: Any, threshold: float, known: float) -> bool:
-        """Return whether contacts found are below the threshold; learn the twist that shows it."""
         found = self.measured(work.on, work.middle)
         if found.quality.lower > known:
             part.found.append(found)
@@ -429,10 +412,3 @@ class Searching:
             old = {y.tobytes() for y in self.pool.twists}
             fresh = [y for y in part.pool.twists[newest] if y.tobytes() not in old]
             self.learn(np.array(fresh).reshape(-1, 6), now=part.tree.sizes[0])
-
-
-def _next(waiting: deque[_Waiting]) -> Part:
-    """Make a part of the node that has waited longest, below the part that left it."""
-    above, node, pool = waiting.popleft()
-    above.parts.append(part_from(node, pool))
-    return above.parts[-1]

@@ -50,48 +50,35 @@ class Stack(NamedTuple):
     corners: Array
     """Corners of what is left of each piece, for each node and finger, (d, 4, p, MOST_CORNERS,
     2)."""
-    counts: Indices
-    """How many corners each has, (d, 4, p)."""
+    counts: Indices  # how many corners each has, (d, 4, p)
     fresh: Indices
     """Whether a finger may still be exchanged with the other fresh ones, (d, 4)."""
-    depths: Indices
-    """How many nodes above each have several children, (d,)."""
-    top: Indices
-    """How many nodes wait, (1,)."""
+    depths: Indices  # how many nodes above each have several children, (d,)
+    top: Indices  # how many nodes wait, (1,)
 
 
 class Tree(NamedTuple):
     """What was done at each node, children after their parents."""
 
-    deeds: Indices
-    """What was done, (n,)."""
+    deeds: Indices  # what was done, (n,)
     asked: Indices
     """Place of the twist among `twists`, or of the line among `lines`, (n,)."""
-    twists: Array
-    """Twists that are named, (m, 6)."""
+    twists: Array  # twists that are named, (m, 6)
     lines: Array
     """Lines that divide polygons, or the first piece of the second half, (l, 3)."""
-    sizes: Indices
-    """How many nodes, twists and lines there are, (3,)."""
+    sizes: Indices  # how many nodes, twists and lines there are, (3,)
 
 
 class Work(NamedTuple):
     """Room for what is known about the node at work."""
 
-    reach: Array
-    """Largest support of each finger under each twist, (4, c)."""
-    left: Array
-    """Estimated share of each finger's polygons that answers, (4, c)."""
-    low: Array
-    """Least support on a piece, (c,)."""
-    high: Array
-    """Largest support on a piece, (c,)."""
-    whole: Array
-    """Weight of each finger's polygons, (4,)."""
-    middle: Array
-    """Contacts in the middle of a node that is not refuted, (4, 2)."""
-    on: Indices
-    """Their pieces, (4,)."""
+    reach: Array  # largest support of each finger under each twist, (4, c)
+    left: Array  # estimated share of each finger's polygons that answers, (4, c)
+    low: Array  # least support on a piece, (c,)
+    high: Array  # largest support on a piece, (c,)
+    whole: Array  # weight of each finger's polygons, (4,)
+    middle: Array  # contacts in the middle of a node that is not refuted, (4, 2)
+    on: Indices  # their pieces, (4,)
     changed: Indices
     """The finger whose polygons have changed since the other fields were filled in, (1,)."""
 
@@ -104,8 +91,7 @@ class Search(NamedTuple):
     pool: Pool
     tree: Tree
     work: Work
-    t: float
-    """The multiple of the loads that no contacts are to resist."""
+    t: float  # the multiple of the loads that no contacts are to resist
     demand: Demand
     spare: float
     """How far below t times a twist's demand a support still counts as an answer."""
@@ -430,10 +416,7 @@ def run(search: Search, budget: int, part_depth: int) -> int:
 
 @loop("numpy")
 def _visit(search: Search, node: int, now: int) -> bool:
-    """Replace a node by its children; False if its middle may reach the threshold, or it is tiny.
-
-    Where it is tiny, the first of `work.on` is negative.
-    """
+    """Replace a node by children; False if its middle may reach t, or it is tiny (on[0] < 0)."""
     look_again(search, node)
     best, cost = choose(search, node)
     if cost > 0.0 and _is_single(search, node):
@@ -467,10 +450,7 @@ def _is_single(search: Search, node: int) -> bool:
 
 @loop("numpy")
 def _lowered(search: Search, node: int, now: int) -> tuple[int, bool]:
-    """Lower what all corners of a node resist; return the new twist or -1, and if that refutes.
-
-    Supports count with what is spared of an answer, as in `answer_to`.
-    """
+    """Lower what all corners of a node resist; return the new twist or -1, and if that refutes."""
     work, stack, pieces = search.work, search.stack, search.pieces
     least, first = np.inf, 0
     for k in range(search.pool.size[0]):

@@ -197,16 +197,11 @@ class CutTree(ByValue):
         longest = LONGEST_TWIST if self.measure.is_usual else 1.0 + TWIST_SLACK
         fits = fits and lengths.max(initial=1.0) <= longest
         alone = len(self.maps) == 1
-        if self.owners is not None:
-            return bool(fits) and alone and self._has_owners()
+        if self.owners is not None:  # each piece has one, and each finger a piece
+            owned = is_indices(self.owners, len(self.grounds.counts))
+            owned = owned and set(self.owners.tolist()) == set(range(FINGERS))
+            return bool(fits) and alone and owned
         return bool(fits) and (alone or fitting(self.maps, self.grounds, self.measure))
-
-    def _has_owners(self) -> bool:
-        """Return whether each piece has an owner, and each of four fingers has a piece."""
-        owners = self.owners
-        if owners is None or not is_indices(owners, len(self.grounds.counts)):
-            return False
-        return set(owners.tolist()) == set(range(FINGERS))
 
     def _has_fitting_threshold(self) -> bool:
         if self.measure.is_usual:
@@ -216,13 +211,12 @@ class CutTree(ByValue):
         return is_number(self.threshold, least=LEAST_THRESHOLD / size, most=most)
 
     def _replayed(self) -> bool:
-        kernel = compiled(KERNEL)
-        corners, counts, fresh = first_nodes(self.grounds, self.maps, self.owners)
-        grounds = self.grounds
+        kernel, grounds = compiled(KERNEL), self.grounds
+        nodes = first_nodes(grounds, self.maps, self.owners)
         # (4), or the threshold itself
         answers = self.threshold * self.measure.demands(self.twists) - self._slack.lowered
         return kernel.replay(
             kernel.Planes(grounds.normals, grounds.origins, grounds.frames, self.friction),
-            corners, counts, fresh, self.deeds.astype(np.int64), self.asked.astype(np.int64),
+            *nodes, self.deeds.astype(np.int64), self.asked.astype(np.int64),
             np.array(self.twists), answers, np.array(self.lines), MOST_CUTS,
         )  # fmt: skip

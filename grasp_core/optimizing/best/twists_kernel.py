@@ -31,8 +31,7 @@ class Demand(NamedTuple):
 
     kind: int
     """Whose length is at most one (`USUAL` for wrenches, `WEIGHT` for forces), or of a `TASK`."""
-    loads: Array
-    """Loads of a task, (m, 6)."""
+    loads: Array  # loads of a task, (m, 6)
 
 
 class Pool(NamedTuple):
@@ -40,16 +39,12 @@ class Pool(NamedTuple):
 
     twists: Array
     """Twists at least one long, with torques over the object's radius, (c, 6)."""
-    demands: Array
-    """How much of the loads each asks for, (c,)."""
-    asked: Array
-    """The `slopes` of each piece under each twist, (p, 6, c)."""
-    used: Indices
-    """When each was used last, (c,)."""
+    demands: Array  # how much of the loads each asks for, (c,)
+    asked: Array  # the `slopes` of each piece under each twist, (p, 6, c)
+    used: Indices  # when each was used last, (c,)
     names: Indices
     """Their places among the twists that a tree names, -1 for none, (c,)."""
-    size: Indices
-    """How many there are, (1,)."""
+    size: Indices  # how many there are, (1,)
 
 
 @loop("numpy")
@@ -214,10 +209,7 @@ def _steepest(
     pieces: Pieces, demand: Demand, points: Array, on: Indices, m: int, y: Array, slope: Array,
     hardest: Array,
 ) -> float:  # fmt: skip
-    """Return the multiple that a twist allows, as if it asked for a little at least, and its slope.
-
-    The slope, (6,), is that of the support over the demand: (w - multiple * load) / demand.
-    """
+    """Return the multiple that a twist allows, asked for a little at least; fill in its slope."""
     found = highest(pieces, points, on, m, y, slope)
     if demand.kind == USUAL:
         return found

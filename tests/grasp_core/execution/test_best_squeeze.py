@@ -1,5 +1,4 @@
 import dataclasses
-from functools import partial
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from tests.grasp_core.execution.held import (
     opposed,
     planned,
 )
-from tests.marks import more
 
 G = 9.80665
 ANY = gc.any_direction(1.0)
@@ -97,44 +95,27 @@ def test_the_worst_load_is_a_first_slip():
     assert tested == 24
 
 
-def less(grip, N, x):
-    local = (N @ x).reshape(4, 3)
-    return -survived(grip.squeezed(np.einsum("kij,kj->ki", grip.frames, local)), ANY, 10.0)
-
-
-def against_brute_force(name, limit, count):
+def test_no_random_or_searched_squeeze_survives_more():
     """Balanced squeezes at random, and the best by a direct search from some, each with its own
     response: at stiff fingertips, where that is nearly the same, none is better by 1 %, and the
-    search comes within 1 %. Returns how many squeezes were tried.
+    search comes within 1 %.
     """
-    rng, tested = np.random.default_rng(1), 0
-    body, grasps = planned(name, limit)
-    for grasp in grasps:
-        found = gc.best_squeeze(body, grasp, 0.5, ANY, max_push_n=10.0, stiffness=20_000.0)
-        grip = found.grip
-        N = null_space(in_frames(grasp_map(grip.arms), grip.frames))
-        away = partial(less, grip, N)
-        known = N.T @ grip.local_squeeze.ravel()
-        starts = known + 2.0 * rng.normal(size=(count, N.shape[1]))
-        values = [away(x) for x in starts]
-        assert min(values) >= -found.upper * 1.01
-        near = [known, *starts[np.argsort(values)[: count // 70]]]
-        best = min(
-            minimize(away, x, method="Nelder-Mead", options={"maxiter": count}).fun for x in near
-        )
-        assert -1.01 * found.scale <= best <= -0.99 * found.scale
-        tested += len(starts)
-    return tested
+    rng, (body, (grasp, *_)) = np.random.default_rng(1), planned("wedge", 1)
+    found = gc.best_squeeze(body, grasp, 0.5, ANY, max_push_n=10.0, stiffness=20_000.0)
+    grip = found.grip
+    N = null_space(in_frames(grasp_map(grip.arms), grip.frames))
 
+    def less(x):
+        local = (N @ x).reshape(4, 3)
+        return -survived(grip.squeezed(np.einsum("kij,kj->ki", grip.frames, local)), ANY, 10.0)
 
-def test_no_random_or_searched_squeeze_survives_more():
-    assert against_brute_force("wedge", 1, 140) == 140
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", more("box", "dodecahedron", "wedge"))
-def test_no_squeeze_of_many_survives_more(name):
-    assert against_brute_force(name, 3, 300) == 900
+    known = N.T @ grip.local_squeeze.ravel()
+    starts = known + 2.0 * rng.normal(size=(140, N.shape[1]))
+    values = [less(x) for x in starts]
+    assert min(values) >= -found.upper * 1.01
+    near = [known, *starts[np.argsort(values)[:2]]]
+    best = min(minimize(less, x, method="Nelder-Mead", options={"maxiter": 140}).fun for x in near)
+    assert -1.01 * found.scale <= best <= -0.99 * found.scale
 
 
 def test_least_push_and_most_scale_are_inverse():
@@ -195,22 +176,12 @@ def test_without_friction_nothing_is_survived():
 def test_unstable_grips_are_reported():
     assert HALF > ASIDE
     soft = {"stiffness": 100.0, "tip_radius_m": 0.0}
-    with pytest.raises(gc.NoForcesError, match="unstable under the best squeeze") as failed:
+    with pytest.raises(gc.NoForcesError, match=r"unstable under .* a smaller limit of pushes"):
         gc.best_squeeze(box(), opposed(), 0.5, ANY, max_push_n=100.0, **soft)
-    # under the names of functions, of the settings of executions, and of flags
-    said = (
-        "a smaller limit of pushes, with which it may be stable (max_push_n; of executions push_n"
-    )
-    assert str(failed.value).endswith(f"or {said}, or --push-n)")
+    heavy = gc.any_direction(5.0)
+    with pytest.raises(gc.NoForcesError, match=r"unstable under .* smaller loads"):
+        gc.best_squeeze(box(), opposed(), 0.5, heavy, **soft)
     assert gc.best_squeeze(box(), opposed(), 0.5, ANY, max_push_n=0.5, **soft).grip.stable
-
-
-def test_an_unstable_grip_without_a_limit_of_pushes_needs_smaller_loads():
-    heavy, light = gc.any_direction(5.0), gc.any_direction(0.01)
-    with pytest.raises(gc.NoForcesError, match="or smaller loads, whose smaller pushes may leave"):
-        gc.best_squeeze(box(), opposed(), 0.5, heavy, stiffness=100.0, tip_radius_m=0.0)
-    found = gc.best_squeeze(box(), opposed(), 0.5, light, stiffness=100.0, tip_radius_m=0.0)
-    assert found.grip.stable
 
 
 def test_two_fingers_cannot_be_a_grip():

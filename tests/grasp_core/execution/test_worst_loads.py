@@ -46,17 +46,6 @@ def test_no_sampled_load_slips_before_the_worst_and_the_worst_does():
     assert tested == 180_000
 
 
-def test_the_minimum_over_angles_is_that_of_a_fine_grid():
-    tested = 0
-    for _, _, reactions in cases():
-        grid = np.tile(np.linspace(0.0, 2.0 * np.pi, 20_001), (4, 1))
-        _, scales = reactions.worst_angles()
-        assert (scales <= reactions.scales(grid).min(axis=1) * (1.0 + 1e-12)).all()
-        assert scales == pytest.approx(reactions.scales(grid).min(axis=1), rel=1e-6)
-        tested += 4
-    assert tested == 72
-
-
 def test_any_reactions_have_their_worst_angle_found():
     """Random rows, also of few or no changes, against a fine grid."""
     rng = np.random.default_rng(3)

@@ -186,29 +186,6 @@ def test_an_object_that_is_too_large_is_not_reached_and_nothing_says_impossible(
     assert found.contacts is None
 
 
-def test_a_hand_with_locked_joints_ends_at_its_limits():
-    hand = gc.load_hand("allegro")
-    locked = replace(
-        hand,
-        fingers=tuple(
-            HandFinger(
-                f.name,
-                tuple(
-                    replace(link, joint=replace(link.joint, lowest=middle, highest=middle))
-                    for link in f.links
-                    for middle in [0.5 * (link.joint.lowest + link.joint.highest)]
-                ),
-                f.tip,
-            )
-            for f in hand.fingers
-        ),
-    )
-    body, grasp = scaled("dodecahedron", 0.035), grasps("dodecahedron", 0.035)[0]
-    found = gc.reach_with(locked, body, grasp, FRICTION, starts=10)
-    assert not found.reached
-    assert found.reason in {"limit", "not found"}
-
-
 def test_a_hand_with_five_fingers_uses_four():
     body, grasp = scaled("dodecahedron", 0.035), grasps("dodecahedron", 0.035)[0]
     hand = gc.load_hand("allegro")

@@ -78,27 +78,3 @@ def test_a_grasp_that_is_not_closed_or_not_there_is_refused():
         gc.optimize_contacts(example_object("tetrahedron"), grasp, 0.5)
     with pytest.raises(gc.InputError, match="finger_radius must be a number from 1e-09"):
         gc.optimize_contacts(body, grasp, 0.5, finger_radius=0.0)
-
-
-@pytest.mark.slow
-@pytest.mark.more
-def test_nearly_all_grasps_of_all_objects_get_better_and_none_worse(capsys):
-    """The best eight grasps of each object; prints how the gains are distributed."""
-    gains = {}
-    for name in NAMES:
-        body = example_object(name)
-        grasps = gc.plan(body, 0.5, limit=8).grasps
-        grasps = grasps or gc.plan(body, 0.5, families="free", limit=8).grasps
-        gains[name] = [
-            checked(grasp, gc.optimize_contacts(body, grasp, 0.5), 0.5) for grasp in grasps
-        ]
-    every = np.array([gain for found in gains.values() for gain in found])
-    with capsys.disabled():
-        for name, found in gains.items():
-            low, middle, high = np.percentile(found, [0, 50, 100])
-            print(f"\n{name}: {len(found)} grasps, gain {low:.3f} {middle:.3f} {high:.3f}", end="")
-        shares = np.percentile(every, [0, 5, 25, 50, 75, 95, 100])
-        print("\nall", len(every), "gains at 0 5 25 50 75 95 100 %:", np.round(shares, 3))
-    assert len(every) >= 80
-    assert every.min() >= 1.0
-    assert (every > 1.0).mean() >= 0.95

@@ -132,23 +132,6 @@ def test_where_no_three_contacts_close_each_choice_has_a_proof(hand):
         assert proof.verify()
 
 
-def test_contacts_stay_the_planned_three_without_regions(hand):
-    body, seen = scaled("dodecahedron", RADIUS), 0
-    for grasp in grasps("dodecahedron", RADIUS):
-        found = gc.reach_with(hand, body, grasp, FRICTION, regions=False)
-        if found.reached:
-            seen += 1
-            points = np.array([contact.position for contact in found.contacts])
-            assert points == pytest.approx(grasp.positions[found.used], abs=1e-8)
-            assert all(found.within_regions)
-    assert seen >= 2
-
-
-def test_the_same_seed_gives_the_same_three_contacts(hand, reached):
-    body, grasp, found = reached[0]
-    assert gc.reach_with(hand, body, grasp, FRICTION) == found
-
-
 def test_fingers_that_meet_in_the_middle_of_their_ranges_may_not_overlap(tmp_path):
     """Closed there, all three tips are in one place; the thumb and its base are built together."""
     text = Path(three_fingers_file(tmp_path)).read_text()

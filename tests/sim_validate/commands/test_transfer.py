@@ -48,6 +48,14 @@ def test_a_scale_is_that_of_the_changed_part(folder, tmp_path, capsys):
     assert "6 of 6 grasps were carried over" in capsys.readouterr().out
 
 
+def test_the_changed_part_may_be_a_built_in_object(folder, capsys):
+    command = ["transfer", str(folder / "plan" / "grasps.json"), "box"]
+    assert main(command) == Exit.GOOD
+    assert "6 of 6 grasps were carried over" in capsys.readouterr().out
+    assert main([*command, "--unit", "mm"]) == Exit.INPUT
+    assert "leave out --unit" in capsys.readouterr().err
+
+
 def test_it_writes_grasps_and_what_became_of_them(folder, tmp_path, capsys):
     assert transfer(folder, "moved.obj", "--out", str(tmp_path / "new")) == Exit.GOOD
     said = capsys.readouterr().out

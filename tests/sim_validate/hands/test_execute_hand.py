@@ -10,7 +10,7 @@ import sim_validate as sv
 from grasp_core.errors import InputError, NoForcesError
 from sim_validate.hands.execute_hand import hand_execution_settings, hand_squeeze
 from tests.grasp_core.hands.gripping import FRICTION, scaled
-from tests.sim_validate.hands.executing import MASS, OBJECT, RADIUS, TORQUE, stood
+from tests.sim_validate.hands.executing import MASS, OBJECT, RADIUS, stood
 
 HANDS = ("allegro", "leap")
 NEAR = 0.02
@@ -58,18 +58,6 @@ def test_an_object_ten_times_as_heavy_as_motors_carry_is_lost():
     )
     assert not found.survived
     assert found.least_predicted_loss < 1.0
-
-
-def test_what_a_hand_carries_grows_with_its_motors():
-    """Without weight of links, forces and loads scale with torque limits: the same cones."""
-    reach, hand = stood("allegro")
-    body, settings = scaled(OBJECT, RADIUS), replace(hand_execution_settings(MASS), push_n=1e4)
-    stiff = replace(settings, stiffness_n_per_m=1e6)  # squeezes change no stiffness then
-    some = hand_squeeze(hand, body, reach, FRICTION, stiff).scale
-    twice = hand.with_torque_limits(2.0 * TORQUE, "a test")
-    assert hand_squeeze(twice, body, reach, FRICTION, stiff).scale == pytest.approx(
-        2.0 * some, rel=1e-2
-    )
 
 
 def test_what_cannot_be_executed_is_refused():

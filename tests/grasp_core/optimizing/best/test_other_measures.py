@@ -14,8 +14,8 @@ from grasp_core.optimizing.ascent import _weakest
 from grasp_core.optimizing.best import best_grasp as searching
 from grasp_core.optimizing.best.grounds import exact_maps, grounds_of
 from grasp_core.optimizing.best.proof_file import read_proof, write_proof
-from grasp_core.optimizing.best.search import DEEP, Searching, Stop
-from grasp_core.optimizing.best.support_cuts import ROUNDING, CutTree
+from grasp_core.optimizing.best.search import Searching, Stop
+from grasp_core.optimizing.best.support_cuts import ROUNDING
 from grasp_core.quality.measures import Measure, ResistedLoads, resisted_loads
 from scenes.example_objects import example_object
 from tests.grasp_core.optimizing.best.independent_replay import replays
@@ -202,13 +202,6 @@ def test_a_file_holds_the_proof_and_the_loads(searched, tmp_path):
     assert again.verify()
 
 
-def test_a_file_of_the_usual_quality_is_as_before(tmp_path):
-    found = gc.best_grasp(example_object("tetrahedron"), FRICTION, gap=0.4)
-    with np.load(write_proof(tmp_path / "proof.npz", found.proof)) as archive:
-        assert archive["schema"] == 1
-        assert not {"measure", "loads"} & set(archive)
-
-
 @pytest.mark.parametrize(
     "changed", [{"measure": "volume"}, {"measure": "ferrari-canny"}, {"measure": "task"},
                 {"loads": np.ones((1, 6))}, {"loads": np.ones(6)}, {"schema": 3}],
@@ -286,15 +279,6 @@ def test_compiled_demands_are_those_of_the_definition(measure):
 
 
 TWISTS = "grasp_core.optimizing.best.twists_kernel"
-
-
-@pytest.mark.slow
-def test_the_proof_is_the_same_on_any_number_of_threads():
-    one, two = (best("tetrahedron", "weight", gap=0.05, jobs=jobs) for jobs in (1, 3))
-    assert isinstance(one.proof, CutTree)
-    assert one.proof == two.proof
-    assert one.grasp == two.grasp
-    assert len(one.proof.deeds) > DEEP
 
 
 @pytest.mark.parametrize(
