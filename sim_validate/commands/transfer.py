@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 from grasp_core.by_value import counted
 from grasp_core.errors import InputError
