@@ -12,10 +12,10 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 80_597,
-    "modules of packages": 637,
-    "lines of tests": 58_050,
-    "lines of docs": 6_622,
+    "lines of packages": 67_341,
+    "modules of packages": 372,
+    "lines of tests": 52_843,
+    "lines of docs": 6_561,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
 only with a line below that says why."""
