@@ -1,4 +1,5 @@
 from dataclasses import asdict
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -139,6 +140,14 @@ def after(model, key, steps):
     return data, forces[:, 0].max(initial=0.0)
 
 
+def test_before_the_grasp_fingers_stay_where_they_come_from(held):
+    _, _, scene, model = held
+    (start, _), (later, _) = after(model, "pregrasp", 0), after(model, "pregrasp", 1500)
+    np.testing.assert_array_equal(start.qpos, model.key("approach").qpos)
+    assert start.ncon == later.ncon == 0
+    np.testing.assert_allclose(later.qpos, start.qpos, atol=1e-9 * scene.layout.radius_m)
+
+
 def test_fingers_push_as_hard_as_their_keyframe_says(held):
     """A servo loses its stiffness times what its finger moves until the contact carries it; and as
     the object turns, a share of the tangential force, at most `friction` of the push, is normal."""
@@ -156,6 +165,10 @@ def test_fingers_push_as_hard_as_their_keyframe_says(held):
         assert lost < 0.05 * most
         assert push == pytest.approx(share * most, abs=lost)
         assert np.linalg.norm(data.qpos[:3]) < 1e-3 * scene.layout.radius_m
+
+
+def test_the_text_is_xml_for_readers_other_than_mujoco(held):
+    assert ElementTree.fromstring(held[2].xml).tag == "mujoco"  # noqa: S314 - our own text
 
 
 def test_numbers_are_written_in_full(held):
