@@ -6,10 +6,8 @@ import pytest
 import grasp_core as gc
 from grasp_core.optimizing.better_contacts import pieces_under
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
-from scenes.example_objects import example_names, example_object
+from scenes.example_objects import example_object
 from tests.marks import MORE
-
-NAMES = tuple(name for name in example_names() if "FACES" not in name)
 
 
 def checked(grasp, found, friction):
