@@ -23,11 +23,11 @@ SETTINGS = {
     "reportMissingModuleSource": "error",
 }
 
-BROUGHT_ALONG = ("torch",)
+BROUGHT_ALONG = ("torch", "pxr")
 """Packages that readers have, and that are too large to be installed for a check: what comes from
 them has no type here."""
-UNTYPED = 'is not a known attribute of module "mujoco"'
-"""End of what is said of MuJoCo, whose compiled part has no types."""
+UNTYPED = re.compile(r'is not a known attribute of module "(mujoco|pxr\.\w+)"$')
+"""What is said of MuJoCo and of pxr, whose compiled parts have no types."""
 EXCUSED = {f'Import "{name}" could not be resolved' for name in BROUGHT_ALONG}
 
 
@@ -60,7 +60,7 @@ def complaints(found: dict[str, str]) -> list[str]:
         for each in answer["generalDiagnostics"]
         if each["severity"] == "error"
         and each["message"] not in EXCUSED
-        and not each["message"].endswith(UNTYPED)
+        and not UNTYPED.search(each["message"])
     ]
 
 
