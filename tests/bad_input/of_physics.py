@@ -41,7 +41,7 @@ FLAGS = {
     "plan box --finger-radius-m": (*NUMBERS, "0"),
     "plan box --approach-m": (*NUMBERS, "0"),
     "plan box --limit": ("0", "-1", "1.5", "many", "99999999999"),
-    "plan box --seed": ("-1", f"{MOST_SEED + 1}", "18446744073709551616", "0.5"),
+    "plan box --seed": ("-1", f"{MOST_SEED + 1}", "0.5"),
     "plan box --patch-depth": (*NUMBERS, "0", "2"),
     "run box --fingertip-radius-m": (*NUMBERS, "0", "1e-12"),
     "run box --fingertip-mass-kg": (*NUMBERS, "0", "1e-12", "1e12"),

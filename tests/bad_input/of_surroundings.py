@@ -26,7 +26,7 @@ ON_GRASPS = {
     "report taken": "taken",
     "report nowhere": "nowhere",
     "view grasps.json --grasp nobody --picture a.png": "nobody",
-    "replay grasps.json --grasp nobody --out made": "nobody",
+    "replay grasps.json --grasp nobody --out made": "verdicts.json",
     "replay full --out made": "full",
     "dataset verify full": "full",
     "dataset verify nowhere": "nowhere",
