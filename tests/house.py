@@ -14,7 +14,7 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 67_341,
     "modules of packages": 372,
-    "lines of tests": 52_868,
+    "lines of tests": 52_869,
     "lines of docs": 6_561,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
