@@ -49,7 +49,7 @@ Settled: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement, tuple[Contac
 Planned: TypeAlias = tuple[
     tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...] | None
 ]
-"""The same; None for regions that are left to the construction."""
+"""A settled placement whose regions may be None: the construction then chooses them."""
 
 
 class Known(NamedTuple):

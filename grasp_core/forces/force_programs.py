@@ -56,8 +56,9 @@ FRICTIONLESS = 1e-6
 ROUNDS, IMPROVEMENT = 20, 1e-2
 """Most rounds in pyramids, and the share by which the coefficient must fall in each."""
 CONE_ROUNDS, CONE_IMPROVEMENT = 12, 1e-4
-"""The same in cones. The excess falls by half or more in each round, and faster unless a finger
-idles; the search ends some 1e-4 above the least."""
+"""Most rounds in exact cones, and the share by which the coefficient must fall in each. The excess
+falls by half or more in a round, faster unless a finger idles; the search ends some 1e-4 above the
+least."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.hands.hand import PALM, SAME, Hand, LinkShape
+from grasp_core.hands.hand import PALM, SAME, Hand, HandFinger, LinkShape
 
 Value = TypeVar("Value")
 Result = TypeVar("Result")
@@ -173,12 +173,7 @@ def hand_arrays(hand: Hand) -> HandArrays:
     lengths = [len(finger.links) for finger in hand.fingers]
     starts = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
     ends = starts[1:] - 1
-    # what stands for a fingertip: its ball, or what covers its corners
-    tips = [
-        LinkShape(each.tip.center, np.eye(3), np.zeros(3), each.tip.radius)
-        if each.tip.corners is None else each.links[-1].shapes[-1]
-        for each in hand.fingers
-    ]  # fmt: skip
+    tips = [_tip_shape(finger) for finger in hand.fingers]
     parts += [
         (int(end), tip)
         for end, tip, finger in zip(ends, tips, hand.fingers, strict=True)
@@ -225,6 +220,13 @@ def hand_arrays(hand: Hand) -> HandArrays:
         ball_centers=np.array([center for _, center, _ in balls]).reshape(-1, 3),
         ball_radii=np.array([radius for _, _, radius in balls]),
     )  # fmt: skip
+
+
+def _tip_shape(finger: HandFinger) -> LinkShape:
+    """Return what stands for a fingertip: its ball, or what covers its corners."""
+    if finger.tip.corners is not None:
+        return finger.links[-1].shapes[-1]
+    return LinkShape(finger.tip.center, np.eye(3), np.zeros(3), finger.tip.radius)
 
 
 def _reach(shape: LinkShape) -> float:

@@ -79,8 +79,8 @@ shrinks."""
 WORTHWHILE = 1e-6
 """Predicted relative gain below which the climb ends."""
 TASK_WORTHWHILE = 1e-4
-"""The same for a task: the smallest gap that may be asked for, as each
-step takes a program for every load."""
+"""Predicted relative gain below which a climb for a task ends: the smallest gap that may be asked
+for, as each step takes a program for every load."""
 SPREAD, ROUNDS = 48, 4
 """Directions of the weight for which contacts climb first, and how often they climb. Every
 direction is within 23 degrees of one of these, so that it is held at most 8 % less than they are;

@@ -18,7 +18,7 @@ from tests.patience import HANGING_S
 
 COMMAND = [sys.executable, "-P", "-c", "from sim_validate.main import run_and_exit as r; r()"]
 LINES, LETTERS = 24, 2000
-"""Of one screen."""
+"""Most lines and letters of a message: it must fit on one screen."""
 USAGE = 2
 
 
@@ -32,7 +32,7 @@ class Tried:
     left: tuple[str, ...]
     """Files that were not there before."""
     seconds: float
-    """Of a processor."""
+    """Processor time that the command took."""
     megabytes: float
     """By which the largest memory of this process grew."""
 

@@ -60,7 +60,7 @@ class Answer:
     walks: list = field(default_factory=list)
     """How far contacts walked until they were not closed, and not held, in borders' distances."""
     sizes: dict = field(default_factory=dict)
-    """Of the paper's regions and ours: disc, least inscribed radius, total area, seconds."""
+    """Sizes of the paper's regions and ours: disc, inscribed radius, total area, seconds."""
 
 
 def main():
