@@ -3,6 +3,8 @@
 import numpy as np
 
 import grasp_core as gc
+import scenes
+from tests.bad_input.mesh_texts import obj
 
 
 def sphere_mesh(levels):
@@ -28,3 +30,10 @@ def dented_ball():
     points, triangles = sphere_mesh(3)
     points = 0.05 * points * (1.0 - 0.6 * np.clip(points[:, 2:] - 0.3, 0.0, None))
     return gc.Polyhedron.from_mesh(points, triangles, name="dented ball", faces="patches")
+
+
+def box_obj(*half_sizes):
+    """The text of an OBJ file of a box around the origin."""
+    box = scenes.example_object("box")
+    corners = np.sign(box.vertices - box.center_of_mass) * half_sizes
+    return obj(corners.tolist(), box.triangles.tolist())

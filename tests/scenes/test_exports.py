@@ -11,7 +11,7 @@ import yaml
 
 import grasp_core as gc
 import scenes
-from scenes.exports import ENDINGS, ROD_LENGTH
+from scenes.exports import ROD_LENGTH
 
 SAME = {"rtol": 0.0, "atol": 1e-12}
 """For numbers of 64 bits about objects of a tenth of a metre, whose rounding is 1e-17."""
@@ -223,18 +223,6 @@ def test_without_planned_fingers_they_come_along_the_normals(tmp_path):
     np.testing.assert_allclose(rod[:3, 2], plan[0].normals[2], **SAME)
     length = np.ptp(read.geometry[bar].vertices[:, 2])
     assert length == pytest.approx(ROD_LENGTH * plan.body.radius, rel=SINGLE)
-
-
-@pytest.mark.parametrize("to", ENDINGS)
-def test_another_ending_is_refused_before_anything_is_written(plan, tmp_path, to):
-    with pytest.raises(gc.InputError, match=f"must end in .* for the format {to}"):
-        scenes.export_grasps(plan, tmp_path / "grasps.json", to)
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_plan_without_grasps_is_refused(plan, tmp_path):
-    with pytest.raises(gc.InputError, match="at least one grasp to export"):
-        scenes.export_grasps(plan[:0], tmp_path / "a.glb", "gltf")
 
 
 def test_a_missing_library_is_named_with_its_extra(plan, tmp_path, monkeypatch):

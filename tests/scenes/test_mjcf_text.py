@@ -42,12 +42,6 @@ def test_numbers_are_written_in_full():
     assert as_text([[1, 2], [3, 4]]) == "1 2 3 4"
 
 
-def test_elements_have_their_attributes():
-    root = element("a", {})
-    add_element(root, "b", {"pos": np.zeros(2), "name": "n"})
-    assert document(root) == '<a>\n  <b pos="0.0 0.0" name="n" />\n</a>\n'
-
-
 def test_the_text_is_that_of_xml_etree():
     root, judge = element("a", {"name": 'x&y<z>"'}), ElementTree.Element("a", name='x&y<z>"')
     for parent, other in (

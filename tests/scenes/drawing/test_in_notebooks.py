@@ -1,10 +1,8 @@
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
 import grasp_core as gc
@@ -12,7 +10,6 @@ import scenes
 import sim_validate as sv
 from scenes.drawing import in_notebooks
 from scenes.drawing.colours import FINGERS
-from tests.grasp_core.curved import curved_body
 
 SVG = "{http://www.w3.org/2000/svg}"
 EVIL = "<script>alert('&')</script>"
@@ -60,15 +57,6 @@ def test_every_family_is_drawn():
         assert set(FINGERS) <= fills
 
 
-def test_points_are_where_the_view_shows_them(plan):
-    """The picture of a finger's number lies in the square, and the four are apart."""
-    found, _ = read(plan)
-    at = np.array([[float(text.get(axis)) for axis in "xy"] for text in found.iter(f"{SVG}text")])
-    assert ((at > 0.0) & (at < in_notebooks.SIDE)).all()
-    gaps = np.linalg.norm(at[:, None] - at[None], axis=-1)[np.triu_indices(4, 1)]
-    assert gaps.min() > 20.0
-
-
 def test_a_plan_without_grasps_says_why():
     plan = gc.plan(scenes.example_object("box"), 0.5, families=("concurrent",), cones="normal")
     assert read(plan)[1] == [plan.absence]
@@ -99,22 +87,6 @@ def test_what_cannot_be_drawn_is_shown_as_text_and_never_raises(plan, monkeypatc
     found, cells = read(plan.body)
     assert found.find(f".//{SVG}path") is None
     assert "67.74 mm" in cells
-
-
-def test_the_time_to_draw_grows_no_faster_than_the_triangles():
-    coarse, fine = (curved_body(subdivisions=number) for number in (3, 5))
-    times = len(fine.triangles) / len(coarse.triangles)
-    assert times == 16
-    before = min(seconds(coarse) for _ in range(3))
-    assert any(seconds(fine) < times * before for _ in range(3))
-
-
-def seconds(body):
-    """The processor time of one drawing."""
-    begun = time.process_time()
-    found, _ = read(body)
-    assert found.find(f".//{SVG}path") is not None
-    return time.process_time() - begun
 
 
 def test_pictures_come_with_scenes_alone():

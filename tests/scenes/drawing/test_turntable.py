@@ -37,11 +37,3 @@ def test_the_page_holds_the_contacts(plan):
     (contacts,) = (shape["points"] for shape in shapes if shape["role"] == "contact")
     points = body.center_of_mass + np.array(contacts) * body.radius / UNITS
     np.testing.assert_allclose(points, grasp.positions, atol=body.radius / UNITS)
-
-
-def test_what_is_shown_has_a_short_text_and_is_a_value(plan):
-    shown = scenes.show(plan.body, plan[0])
-    assert repr(shown).startswith("Turntable(object='wedge', grasp='c-0-1-2-7', page=")
-    assert len(repr(shown)) <= 300
-    assert shown == scenes.show(plan.body, plan[0], 0.5)
-    assert shown != scenes.show(plan.body, plan[0], 0.6)

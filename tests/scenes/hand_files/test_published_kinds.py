@@ -5,9 +5,10 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-import scenes
 from grasp_core.errors import InputError
 from grasp_core.hands.kinematics import places
+from tests.scenes.hand_files.grippers import gripper, loaded
+from tests.scenes.meshes import box_obj
 
 INERTIA = '<inertia ixx="{0}" iyy="1e-6" izz="1e-6" ixy="0" ixz="0" iyz="0"/>'
 SPHERE = '<geometry><sphere radius="0.008"/></geometry>'
@@ -50,13 +51,6 @@ def robot(tip=f"<collision>{SPHERE}</collision>", middle=None, follows="", odd=F
     return f'<robot name="r">{"".join(parts)}</robot>'
 
 
-def loaded(folder, text, tips=TIPS, name="hand.urdf"):
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / name
-    path.write_text(text)
-    return scenes.load_hand(path, tips)
-
-
 def turned(axis, angle):
     x, y, z = axis
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -97,25 +91,18 @@ def check_places(hand, text, tips=TIPS, local=(0.0, 0.0, 0.0)):
 
 def test_links_on_fixed_joints_keep_their_names(tmp_path):
     text = robot()
-    hand = loaded(tmp_path, text)
+    hand = loaded(tmp_path, text, TIPS)
     assert [finger.name for finger in hand.fingers] == list(TIPS)
     assert [finger.tip.radius for finger in hand.fingers] == pytest.approx([0.008] * 3)
     assert hand.notes == ()
+    assert {each.torque_limit_n_m for each in hand.joints} == {0.5}
     check_places(hand, text)
 
 
 def test_inertias_that_no_body_can_have_are_said_and_masses_stay(tmp_path):
-    hand = loaded(tmp_path, robot(odd=True))
+    hand = loaded(tmp_path, robot(odd=True), TIPS)
     assert any("masses alone: b0, b1, b2" in note for note in hand.notes)
     assert [each.mass_kg for each in hand.links] == pytest.approx([0.02, 0.02 + BALL_KG] * 3)
-
-
-def obj(half=0.005):
-    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-    faces = ("1 2 4", "1 4 3", "5 7 8", "5 8 6", "1 5 6", "1 6 2", "3 4 8", "3 8 7", "1 3 7",
-             "1 7 5", "2 6 8", "2 8 4")  # fmt: skip
-    lines = [" ".join(["v", *(f"{half * c}" for c in corner)]) for corner in corners]
-    return "\n".join([*lines, *(f"f {face}" for face in faces)])
 
 
 def meshed(name, tag="collision"):
@@ -125,23 +112,23 @@ def meshed(name, tag="collision"):
 def test_a_package_is_looked_for_above_the_file(tmp_path):
     root = tmp_path / "my_hand"
     (root / "meshes").mkdir(parents=True)
-    (root / "meshes" / "middle.obj").write_text(obj())
+    (root / "meshes" / "middle.obj").write_text(box_obj(0.005, 0.005, 0.005))
     text = robot(middle=meshed("package://my_hand/meshes/middle.obj"))
-    hand = loaded(root / "models" / "urdf", text)
+    hand = loaded(root / "models" / "urdf", text, TIPS)
     assert hand.links[1].shapes[0].half_sizes == pytest.approx([0.005] * 3)
-    beside = loaded(root, text)
+    beside = loaded(root, text, TIPS)
     assert beside.links[1] == hand.links[1]
 
 
 def test_a_package_may_be_called_otherwise_than_its_folder(tmp_path):
     root = tmp_path / "checkout"
     (root / "meshes").mkdir(parents=True)
-    (root / "meshes" / "middle.obj").write_text(obj())
+    (root / "meshes" / "middle.obj").write_text(box_obj(0.005, 0.005, 0.005))
     text = robot(middle=meshed("package://my_hand/meshes/middle.obj"))
     with pytest.raises(InputError, match="package my_hand around it"):
-        loaded(root / "urdf", text)
+        loaded(root / "urdf", text, TIPS)
     (root / "package.xml").write_text("<package><name>my_hand</name></package>")
-    assert loaded(root / "urdf", text).links[1].shapes
+    assert loaded(root / "urdf", text, TIPS).links[1].shapes
 
 
 OUTSIDE = {
@@ -158,27 +145,27 @@ def test_nothing_is_read_outside_the_package(case, tmp_path):
     for name in ("my_hand", "other"):
         (tmp_path / name / "meshes").mkdir(parents=True)
     secret = tmp_path / "other" / "meshes" / "secret.obj"
-    secret.write_text(obj())
+    secret.write_text(box_obj(0.005, 0.005, 0.005))
     (tmp_path / "my_hand" / "meshes" / "link.obj").symlink_to(secret)
     with pytest.raises(InputError, match="not in the folder of the model"):
-        loaded(tmp_path / "my_hand" / "urdf", robot(middle=meshed(OUTSIDE[case])))
+        loaded(tmp_path / "my_hand" / "urdf", robot(middle=meshed(OUTSIDE[case])), TIPS)
 
 
 def test_visual_shapes_are_taken_where_a_link_has_no_others(tmp_path):
-    hand = loaded(tmp_path, robot(middle=box("visual"), tip=f"<visual>{SPHERE}</visual>"))
+    hand = loaded(tmp_path, robot(middle=box("visual"), tip=f"<visual>{SPHERE}</visual>"), TIPS)
     assert any("collide with their visual ones: b0, t0, b1, t1, b2, t2" in n for n in hand.notes)
     assert [len(each.shapes) for each in hand.links] == [1, 2] * 3
     assert [finger.tip.radius for finger in hand.fingers] == pytest.approx([0.008] * 3)
 
 
 def test_visual_shapes_of_links_that_have_others_are_not_read(tmp_path):
-    hand = loaded(tmp_path, robot(middle=box() + meshed("missing.glb", "visual")))
+    hand = loaded(tmp_path, robot(middle=box() + meshed("missing.glb", "visual")), TIPS)
     assert hand.notes == ()
     assert [len(each.shapes) for each in hand.links] == [1, 2] * 3
 
 
 def test_links_with_pictures_alone_touch_nothing_and_are_named(tmp_path):
-    hand = loaded(tmp_path, robot(middle=meshed("missing.dae", "visual")))
+    hand = loaded(tmp_path, robot(middle=meshed("missing.dae", "visual")), TIPS)
     assert any("touch nothing: b0, b1, b2" in note for note in hand.notes)
 
 
@@ -198,7 +185,7 @@ def test_bodies_of_mjcf_without_shapes_that_collide_take_all_they_have(tmp_path)
 def test_a_fingertip_without_shape_is_the_nearest_of_its_link(tmp_path):
     ball = '<collision><origin xyz="0 0 0.055"/><geometry><sphere radius="0.006"/></geometry>'
     text = robot(tip="", middle=f"{ball}</collision>{box(length=0.04)}")
-    hand = loaded(tmp_path, text)
+    hand = loaded(tmp_path, text, TIPS)
     assert [finger.tip.radius for finger in hand.fingers] == pytest.approx([0.006] * 3)
     assert any("nearest shape of their link: t0, t1, t2" in note for note in hand.notes)
     check_places(hand, text, ("b0", "b1", "b2"), (0.0, 0.0, 0.055))
@@ -206,17 +193,17 @@ def test_a_fingertip_without_shape_is_the_nearest_of_its_link(tmp_path):
 
 def test_a_finger_without_any_shape_says_what_to_do(tmp_path):
     with pytest.raises(InputError, match="a sphere of the fingertip's radius"):
-        loaded(tmp_path, robot(tip="", middle=""))
+        loaded(tmp_path, robot(tip="", middle=""), TIPS)
 
 
 def test_what_simulators_add_to_urdf_is_left_out(tmp_path):
     more = '<gazebo><plugin filename="libx.so" name="x"/></gazebo><transmission name="t"/>'
-    assert loaded(tmp_path, robot(more=more)) == loaded(tmp_path, robot())
+    assert loaded(tmp_path, robot(more=more), TIPS) == loaded(tmp_path, robot(), TIPS)
 
 
 def test_joints_of_urdf_follow_others(tmp_path):
     text = robot(follows='<mimic joint="ja{n}" multiplier="1.5" offset="0.1"/>')
-    hand = loaded(tmp_path, text)
+    hand = loaded(tmp_path, text, TIPS)
     assert [(c.joint, c.driver) for c in hand.couplings] == [(f"jb{n}", f"ja{n}") for n in range(3)]
     assert [(c.ratio, c.offset) for c in hand.couplings] == [pytest.approx((1.5, 0.1))] * 3
     # -1.2 <= 1.5 q + 0.1 <= 0.9
@@ -226,27 +213,13 @@ def test_joints_of_urdf_follow_others(tmp_path):
 
 def test_a_joint_that_follows_one_that_does_not_move_is_refused(tmp_path):
     with pytest.raises(InputError, match="jb0 must follow a joint that moves, got <mimic> of jt0"):
-        loaded(tmp_path, robot(follows='<mimic joint="jt{n}"/>'))
+        loaded(tmp_path, robot(follows='<mimic joint="jt{n}"/>'), TIPS)
 
 
-def gripper(equality="", tendon=""):
-    """Three fingers of three joints in degrees, drawn bent by ten, beside a crank on the palm."""
-    fingers = "".join(
-        f'<body name="a{n}" pos="{0.04 * np.cos(a)} {0.04 * np.sin(a)} 0" euler="0 0 {120 * n}">'
-        f'<joint name="a{n}" axis="0 0 1" range="-30 30"/>'
-        f'<joint name="b{n}" axis="0 1 0" range="-60 60" ref="10"/>'
-        '<geom type="capsule" fromto="0 0 0 0 0 0.04" size="0.006"/>'
-        f'<body name="c{n}" pos="0 0 0.04"><joint name="c{n}" axis="0 1 0" range="-80 20"/>'
-        '<geom type="capsule" fromto="0 0 0 0 0 0.03" size="0.006"/></body></body>'
-        for n, a in enumerate(2.0 * np.pi * np.arange(3) / 3.0)
-    )
-    crank = ('<body name="crank" pos="0 0 -0.03"><joint name="crank" axis="1 0 0" range="-10 10"/>'
-             '<geom type="box" size="0.01 0.01 0.01"/></body>')  # fmt: skip
-    return (
-        f'<mujoco><worldbody><body name="palm"><geom type="box" size="0.03 0.03 0.01"/>{fingers}'
-        f"{crank}</body></worldbody><tendon>{tendon}</tendon><equality>{equality}</equality>"
-        "</mujoco>"
-    )
+CRANK = (
+    '<body name="crank" pos="0 0 -0.03"><joint name="crank" axis="1 0 0" range="-10 10"/>'
+    '<geom type="box" size="0.01 0.01 0.01"/></body>'
+)
 
 
 def rule(one, other, coefficients="0 1 0 0 0"):
@@ -254,7 +227,11 @@ def rule(one, other, coefficients="0 1 0 0 0"):
 
 
 def coupled(tmp_path, equality, tendon=""):
-    return loaded(tmp_path, gripper(equality, tendon), ("c0", "c1", "c2"), "hand.xml")
+    """A gripper of three fingers, drawn bent by ten degrees, beside a crank on the palm."""
+    extra = f"<tendon>{tendon}</tendon><equality>{equality}</equality>"
+    text = gripper(extra=extra, fingers=3, on_palm=CRANK)
+    motors = ' actuatorfrcrange="-0.4 0.4"'  # joints that have them would drive the others
+    return loaded(tmp_path, text.replace(motors, ""), ("d0", "d1", "d2"), "hand.xml")
 
 
 def test_equalities_are_about_the_angles_in_which_a_file_is_drawn(tmp_path):
@@ -306,9 +283,9 @@ REFUSED = {
     "curve": (rule("c0", "b0", "0 1 0.5 0 0"), "joints b0, c0 are on a curve"),
     "circle": (rule("c0", "b0") + rule("b0", "c0"), "joints b0, c0 follow each other in a circle"),
     "two": (rule("c0", "b0") + rule("c0", "a0"), "joints c0 follow two others"),
-    "loop": ('<connect body1="c0" body2="crank" anchor="0 0 0"/>',
+    "loop": ('<connect body1="d0" body2="crank" anchor="0 0 0"/>',
              "joints a0, b0, c0 are in a loop that a connect closes"),
-    "weld": ('<weld body1="c0" body2="c1"/>', "joints a0, b0, c0, a1, b1, c1 are in a loop"),
+    "weld": ('<weld body1="d0" body2="d1"/>', "joints a0, b0, c0, a1, b1, c1 are in a loop"),
     "tendon": ('<tendon tendon1="pull"/>', "joints b0, c0 are coupled by the length of tendon"),
 }  # fmt: skip
 
@@ -322,10 +299,10 @@ def test_other_rules_are_refused_with_their_joints(case, tmp_path):
 
 
 def test_a_weld_that_holds_the_palm_is_no_loop(tmp_path):
-    text = gripper('<weld body1="palm"/>').replace(
-        '<body name="palm">', '<body name="palm"><freejoint/>'
-    )
-    assert len(loaded(tmp_path, text, ("c0", "c1", "c2"), "hand.xml").joints) == 9
+    base = '<body name="base" pos="0 0 0.3">'
+    text = gripper(extra='<equality><weld body1="base"/></equality>', fingers=3)
+    text = text.replace(base, f"{base}<freejoint/>")
+    assert len(loaded(tmp_path, text, ("d0", "d1", "d2"), "hand.xml").joints) == 9
 
 
 def test_fingers_with_joints_in_common_move_as_one(tmp_path):
@@ -333,7 +310,7 @@ def test_fingers_with_joints_in_common_move_as_one(tmp_path):
     text = robot(more=link("arch", box(length=0.02)) + joint("arch", ("palm", "arch"), "0 0 0.01"))
     for n in (1, 2):
         text = text.replace(f'"palm"/><child link="a{n}"', f'"arch"/><child link="a{n}"')
-    hand = loaded(tmp_path, text)
+    hand = loaded(tmp_path, text, TIPS)
     assert [j.name for j in hand.fingers[1].links[0:1]] == ["arch"]
     (coupling,) = hand.couplings
     assert (coupling.joint, coupling.driver, coupling.ratio) == ("arch of t2", "arch", 1.0)

@@ -1,24 +1,22 @@
 """Commands leave nothing in the working folder, whatever MuJoCo warns of."""
 
+import re
+
 import pytest
 
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.simulation.bench import compiled
+from tests.scenes.meshes import box_obj
 from tests.three_fingers import THREE_TIPS, three_fingers_mjcf
-
-BOX = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-FACES = ("1 2 4", "1 4 3", "5 7 8", "5 8 6", "1 5 6", "1 6 2", "3 4 8", "3 8 7", "1 3 7", "1 7 5",
-         "2 6 8", "2 8 4")  # fmt: skip
 
 
 @pytest.fixture
 def noisy(tmp_path):
     """A box with a texture coordinate that is missing, of which MuJoCo warns."""
     path = tmp_path / "noisy.obj"
-    lines = [" ".join(["v", *(f"{0.01 * c}" for c in corner)]) for corner in BOX]
-    faces = [" ".join(f"{corner}/9" for corner in face.split()) for face in FACES]
-    path.write_text("\n".join([*lines, "vt 0 0", *(f"f {face}" for face in faces)]))
+    text = re.sub(r" (\d+)(?= |$)", r" \1/9", box_obj(0.01, 0.01, 0.01), flags=re.MULTILINE)
+    path.write_text(f"vt 0 0\n{text}")
     return path
 
 

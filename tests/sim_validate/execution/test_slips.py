@@ -10,22 +10,11 @@ from sim_validate.execution.bench import HeldMotion
 from sim_validate.execution.paths import Table, idle
 from sim_validate.execution.slips import SLID, TOUCHED, outcome, seen, slides
 from tests.judges import random_rotation
+from tests.scenes.execution.test_turns import quaternions, turn_about
 from tests.sim_validate.execution.held_rigs import box_scene
 
 COUNT = 400
 FRICTION = np.full(4, 0.5)
-
-
-def turn_about(axis, angle):
-    axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
-    c = np.cross(np.eye(3), axis)
-    return np.eye(3) + np.sin(angle) * c + (1 - np.cos(angle)) * c @ c
-
-
-def quaternions(axis, angles):
-    axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
-    half = 0.5 * np.asarray(angles)
-    return np.column_stack([np.cos(half), np.sin(half)[:, None] * axis])
 
 
 def motion_of(moved=None, turned=None, palm=None, centers=None, forces=None):
