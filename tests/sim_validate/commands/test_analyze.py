@@ -9,7 +9,7 @@ from grasp_core.errors import UndecidedError
 from sim_validate import contact_analysis as analysis
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
-from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 from tests.sim_validate.commands.contacts_files import (
     CROSS,
     TETRAHEDRON,
@@ -218,40 +218,3 @@ def test_what_cannot_be_decided_is_named_and_the_rest_is_answered(analyze, monke
     assert document["summary"]["undecided"] == 1
     assert main(["analyze", "contacts.json"]) == Exit.NEGATIVE
     assert "closure is undecided: too close to zero" in capsys.readouterr().out
-
-
-def test_an_interrupted_analysis_tells_what_is_done(analyze, monkeypatch):
-    def interrupted(contacts, question):
-        if contacts.id == "1":
-            raise KeyboardInterrupt
-        return analysis.analyze(contacts, question)
-
-    monkeypatch.setattr("sim_validate.commands.analyze.analyze", interrupted)
-    grasp = {"contacts": TETRAHEDRON["contacts"]}
-    code, document = analyze({"grasps": [grasp, grasp], "friction": 0.5})
-    assert code == Exit.INTERRUPTED
-    assert document["complete"] is False
-    assert [grasp["id"] for grasp in document["grasps"]] == ["0"]
-
-
-def test_one_and_two_processes_say_the_same(analyze):
-    """Most of them pairs, which are quick; contacts at random, since ties make bounds wider."""
-    rng = np.random.default_rng(3)
-    counts = [2] * 14 + [4] * 2
-    grasps = [{"contacts": contacts(*random_contacts(rng, count))} for count in counts]
-    file = {"grasps": grasps, "friction": 0.8}
-    _, one = analyze(file, "--jobs", "1")
-    _, two = analyze(file, "--jobs", "2")
-    assert len(one["grasps"]) == 16
-    for here, there in zip(one["grasps"], two["grasps"], strict=True):
-        assert (here["id"], here["closed"]) == (there["id"], there["closed"])
-        for name in ("ferrari_canny_l1_n", "ferrari_canny_linf_n"):
-            assert here[name] == pytest.approx(there[name], rel=1e-4, abs=1e-9)
-
-
-@pytest.mark.usefixtures("analyze")
-def test_control_characters_in_an_id_do_not_reach_the_terminal(capsys):
-    grasp = {"id": "a\x1b[31m", "contacts": TETRAHEDRON["contacts"]}
-    Path("contacts.json").write_text(json.dumps({"grasps": [grasp], "friction": 1}))
-    assert main(["analyze", "contacts.json"]) == Exit.GOOD
-    assert "\x1b[31m" not in capsys.readouterr().out

@@ -80,33 +80,17 @@ ONE = TETRAHEDRON["contacts"][0]
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("", "not complete JSON"),
         ("[1]", "a contacts file must hold one JSON object, got a list"),
-        ('{"contacts": ' * 100_000, "nested more than 64 deep"),
         (changed(["friction"], None), "friction: null is not allowed; give a value, or leave the"),
         ("{}", '"contacts" (one grasp) or "grasps" (several)'),
         (TETRAHEDRON | {"grasps": [{"contacts": [ONE, ONE]}]}, '"contacts" (one grasp)'),
-        ({"grasps": [], "friction": 1}, "grasps: expected at least 1"),
         (changed(["friction"], ...), 'contacts[0].friction: the key is missing; give it there'),
-        (changed(["friction"], -0.1), "friction: expected at least 0.0, got -0.1"),
-        (changed(["friction"], 1e4), "friction: expected at most 1000"),
-        (changed(["friction"], "0.5"), 'friction: expected a number, got "0.5"'),
         (changed(["mu"], 0.5), "mu: unknown key; known keys are contacts, grasps, friction"),
-        (changed(["schema"], 1), "schema: unknown key"),
-        (changed(["torque_scale_m"], 0), "torque_scale_m: expected more than 0.0, got 0"),
-        (changed(["center_m"], [0, 0]), "center_m[2]: missing"),
         (changed(["contacts"], [ONE]), "contacts: expected at least 2 items, got 1"),
-        (changed(["contacts"], [ONE] * 101), "contacts: expected at most 100 items, got 101"),
         (changed(["contacts"], [ONE] * 3), "all contacts lie within"),
-        (changed(["contacts", 1, "normal"], ...), "contacts[1].normal: missing"),
         (changed(["contacts", 2, "normal"], [0, 0, 1.01]), "contacts[2].normal: its length must"),
-        (changed(["contacts", 2, "normal"], [0, 0, 1.01]), "got 1.01; divide it"),
         (changed(["contacts", 3, "normal", 0], float("nan")), "contacts[3].normal[0]: expected a"),
-        (changed(["contacts", 3, "position_m", 2], 1e7), "contacts[3].position_m[2]: expected at"),
-        (changed(["contacts", 3, "pos"], 1), "contacts[3].pos: unknown key; known keys are pos"),
         ({"grasps": [{"contacts": [ONE, ONE | {"normal": 1}]}]}, "grasps[0].contacts[1].normal: "),
-        ({"grasps": [{"contacts": [ONE, ONE], "name": "a"}]}, "known keys are id, contacts"),
-        ({"grasps": [TETRAHEDRON | {"friction": 1}]}, "grasps[0].friction: unknown key"),
         ({"grasps": [{"id": "1", "contacts": [ONE, ONE]}, {"contacts": [ONE, ONE]}]},
          "grasps[1].id: '1' is also that of grasps[0]"),
     ],
@@ -125,24 +109,6 @@ def test_a_file_that_is_missing_or_asks_too_much_is_refused(tmp_path, monkeypatc
     assert "--edges 2500 or less" in capsys.readouterr().err
     assert main(["analyze", "contacts.json", "--friction", "1001"]) == Exit.USAGE
     assert "--friction must be at least 0, at most 1000" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("flags", "words"),
-    [
-        ("--wrench 0 0 0 0 0 0", "must not be zero"),
-        ("--wrench 0 0 1 0 0", "6 values"),
-        ("--wrench 0 0 1 0 0 inf", "finite"),
-        ("--edges 2", "edges"),
-        ("--friction -0.1", "friction"),
-        ("--max-normal-force -1", "--max-normal-force must be"),
-        ("--torque-scale-m 0", "--torque-scale-m must be"),
-    ],
-)
-def test_flags_without_sense_are_usage_errors(capsys, flags, words):
-    assert main(["analyze", "contacts.json", *flags.split()]) == Exit.USAGE
-    shown = capsys.readouterr()
-    assert words in shown.err + shown.out
 
 
 def test_a_config_file_gives_wrenches(analyze):

@@ -60,22 +60,6 @@ def test_a_face_that_moved_by_a_millimetre_is_not_comparable(copy, capsys):
         assert "the object is another one" in why
 
 
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
-        ("[physics]\niterations = 60\n", "setup.physics.iterations: "),
-        ("[fingers]\nradius_m = 0.004\n", "setup.fingers.radius_m: None -> 0.004"),
-    ],
-    ids=["solver settings", "a fingertip's radius"],
-)
-def test_other_settings_are_not_comparable(copy, capsys, text, reason):
-    setup = write_text(copy / "setup.toml", text)
-    assert check(copy, "--setup", str(setup), "--json") == Exit.INPUT
-    for status, why in statuses(capsys).values():
-        assert status == "not comparable"
-        assert why.startswith(reason)
-
-
 def altered(folder, **changed):
     """The baseline as if the first grasp's verdict had been another one."""
     path = folder / "base.json"
@@ -167,9 +151,3 @@ def test_grasps_are_not_overwritten(copy, capsys):
     assert main(["baseline", "record", str(grasps), "-o", str(grasps)]) == Exit.INPUT
     assert "will not be overwritten" in capsys.readouterr().err
     assert grasps.read_bytes() == before
-
-
-def test_noise_without_repeats_is_refused(copy, capsys):
-    line = ["baseline", "record", str(copy / "grasps.json"), "-o", str(copy / "n.json")]
-    assert main([*line, "--noise-friction", ".2"]) == Exit.USAGE
-    assert "with --trials too" in capsys.readouterr().err

@@ -43,12 +43,6 @@ def test_planned_grasps_are_compared_with_the_bound(folder):
         assert grasp["share_of_bound"] == grasp["quality"][0] / best["bound"]
 
 
-def test_json_is_one_document(capsys):
-    assert main([*ASKED, "--gap", "0.3", "--json"]) == 0
-    out = capsys.readouterr().out
-    assert json.loads(out)["proof"] is None
-
-
 def test_a_time_limit_ends_with_the_gap_reached(capsys):
     assert main([*ASKED, "--gap", "0.001", "--time-limit-s", "0.1"]) == 6
     assert "the time limit is reached" in capsys.readouterr().out

@@ -27,17 +27,10 @@ QUICK = ["--trials", "knock"]
 IDS = ("c-0-1-2-7", "p-0-7-1-5")
 
 
-@pytest.fixture(scope="module")
-def plans(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("plan")
-    assert main(["plan", "wedge", "--limit", "2", "--out", str(folder), "-q"]) == Exit.GOOD
-    return (folder / "grasps.json").read_text()
-
-
 @pytest.fixture
-def here(plans, tmp_path, monkeypatch):
+def here(wedge_plan, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "grasps.json").write_text(plans)
+    (tmp_path / "grasps.json").write_text(wedge_plan.read_text())
     return tmp_path
 
 
@@ -46,12 +39,7 @@ def test_grasps_that_survive_are_shown_and_written(here, capsys):
     assert main([*words, "--trials", "weight,lift,knock"]) == Exit.GOOD
     shown = capsys.readouterr().out
     for part in (
-        "wrote e/executions.json", "least loss", "payload kg", "2.78", "0.834",
-        "3 of 3", "6 of 6", "1 of 1",
-        "first slips, predicted/simulated", "2.75/2.75", "no lift for 2 of 2 grasps: a fingertip",
-        "load: multiple of the weight, in any direction, that the squeeze is certified for\n",
-        "at which a contact slips; above one none does, and in simulation 1.00 also stands for a",
-        "best for this: p-0-7-1-5, predicted to be lost at ",
+        "wrote e/executions.json", "0.834", "2.75/2.75", "no lift for 2 of 2 grasps: a fingertip",
         "2 of 2 grasps survived every trial with 0.3 kg; 14 of 14 trials were survived; 6 of 6",
     ):  # fmt: skip
         assert part in shown, shown
@@ -65,17 +53,6 @@ def test_grasps_that_survive_are_shown_and_written(here, capsys):
         assert [each.kind for each in grasp.execution.skipped] == ["lift"]
         assert grasp.execution.load_multiple > 1.0
     assert found.settings.trials == ("weight", "lift", "knock")
-
-
-def test_the_file_is_the_document_and_does_not_depend_on_jobs(here, capsys):
-    texts = []
-    for count in ("1", "2"):
-        words = ["execute", "grasps.json", "--mass-kg", "0.3", "--grasp", IDS[1], "--jobs", count]
-        assert main([*words, *QUICK, "--out", count, "--json"]) == Exit.GOOD
-        texts += [(here / count / "executions.json").read_text(), capsys.readouterr().out]
-    assert len(set(texts)) == 1
-    (only,) = json.loads(texts[0])["executions"]
-    assert only["id"] == IDS[1]
 
 
 @pytest.mark.usefixtures("here")
@@ -120,14 +97,6 @@ def test_a_grasp_without_a_squeeze_is_a_result_with_its_reason(capsys):
     assert not first.survived
     assert second.execution is not None
     assert f"c-0-1-2-7: not executed: {first.reason}" in capsys.readouterr().err
-
-
-@pytest.mark.usefixtures("here")
-def test_where_no_trial_is_possible_nothing_was_survived(capsys):
-    words = ["execute", "grasps.json", "--limit", "1", "--trials", "lift", "--out", "."]
-    assert main(words) == Exit.NEGATIVE
-    assert "no trial is possible, so nothing was survived" in capsys.readouterr().err
-    assert not sv.load_executions("executions.json").grasps[0].survived
 
 
 @pytest.mark.usefixtures("here")
@@ -227,12 +196,6 @@ def test_a_file_of_flags_and_a_file_of_physics(here):
 
 REFUSED = {
     "--mass-kg 1 --density-kg-m3 1000": (Exit.USAGE, "exclude each other"),
-    "--mass-kg 0": (Exit.USAGE, "--mass-kg must be at least 1e-09"),
-    "--trials weight,throw": (Exit.USAGE, "--trials must be names among weight, lift, shake"),
-    "--down 0 0 0": (Exit.USAGE, "--down must not be zero"),
-    "--shake-hz 1e6": (Exit.USAGE, "--shake-hz must be at least 0.1, at most 25"),
-    "--grasp nobody": (Exit.INPUT, "no grasp is named nobody"),
-    "--setup none.toml": (Exit.INPUT, "none.toml"),
     "--setup fingers.toml": (Exit.INPUT, "fingers.toml: expected the table physics"),
     "--setup gravity.toml": (Exit.INPUT, "give its direction with --down"),
     "--setup unknown.toml": (Exit.INPUT, 'no setting is named "speed"'),
@@ -280,20 +243,7 @@ def test_a_run_has_a_report_where_executions_are_refused(here, capsys, monkeypat
     assert (here / "r" / "report" / "index.html").is_file()
 
 
-@pytest.mark.usefixtures("here")
-def test_run_ends_with_1_where_a_grasp_holds_but_does_not_survive(capsys):
-    flags = ["--execute", "--mass-kg", "30", "--execute-trials", "weight"]
-    assert main([*RUN, *flags]) == Exit.NEGATIVE
-    said = capsys.readouterr().out
-    assert "1 of 1 grasps held all wrenches" in said
-    assert "0 of 1 grasps survived every trial" in said
-    assert said.index("results in r/: ") < said.index("wrote r/executions.json")
-
-
-@pytest.mark.parametrize(
-    "flags", ["--mass-kg 1", "--execute-trials lift", "--execute-down 1 0 0", "--lift-m 1"]
-)
-def test_run_refuses_flags_of_executions_without_any(here, capsys, flags):
-    assert main([*RUN, *flags.split()]) == Exit.USAGE
-    assert "add --execute too" in capsys.readouterr().err
+def test_run_refuses_flags_of_executions_without_any(here):
+    for flags in (["--mass-kg", "1"], ["--execute-trials", "lift"]):
+        assert main([*RUN, *flags]) == Exit.USAGE
     assert not (here / "r").exists()

@@ -12,32 +12,37 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 
 
-@pytest.fixture(scope="module")
-def grasps(tmp_path_factory):
-    path = tmp_path_factory.mktemp("plan") / "grasps.json"
-    gc.save_grasps(path, gc.plan(scenes.example_object("wedge"), 0.5, limit=3))
-    return path
-
-
 def test_the_flag_the_functions_and_the_endings_have_the_same_formats():
     assert Export.__dataclass_fields__["to"].type == GraspFormat
     assert set(GraspFormat.__args__) == set(ENDINGS)
 
 
 @pytest.mark.parametrize("to", ["moveit", "gltf"])
-def test_it_writes_what_python_writes(grasps, tmp_path, capsys, to):
+def test_it_writes_what_python_writes(wedge_plan, tmp_path, capsys, to):
     ending = ENDINGS[to][0]
     out, wanted = tmp_path / f"out{ending}", tmp_path / f"wanted{ending}"
-    assert main(["export", str(grasps), "--to", to, "-o", str(out), "--limit", "2"]) == Exit.GOOD
-    assert "with 2 grasps" in capsys.readouterr().out
-    scenes.export_grasps(gc.load_grasps(grasps)[:2], wanted, to)
+    assert (
+        main(["export", str(wedge_plan), "--to", to, "-o", str(out), "--limit", "1"]) == Exit.GOOD
+    )
+    assert "with 1 grasp" in capsys.readouterr().out
+    scenes.export_grasps(gc.load_grasps(wedge_plan)[:1], wanted, to)
     assert out.read_bytes() == wanted.read_bytes()
 
 
-def test_one_grasp_and_another_radius_can_be_asked_for(grasps, tmp_path, capsys):
-    plan, out = gc.load_grasps(grasps), tmp_path / "a.glb"
+def test_one_grasp_and_another_radius_can_be_asked_for(wedge_plan, tmp_path, capsys):
+    plan, out = gc.load_grasps(wedge_plan), tmp_path / "a.glb"
     wanted = plan[1].id
-    words = ["export", str(grasps), "--to", "gltf", "-o", str(out), "--grasp", wanted, "--json"]
+    words = [
+        "export",
+        str(wedge_plan),
+        "--to",
+        "gltf",
+        "-o",
+        str(out),
+        "--grasp",
+        wanted,
+        "--json",
+    ]
     assert main([*words, "--fingertip-radius-m", "0.004"]) == Exit.GOOD
     told = json.loads(capsys.readouterr().out)
     assert told == {"to": "gltf", "out": str(out), "grasps": [wanted]}
@@ -45,9 +50,9 @@ def test_one_grasp_and_another_radius_can_be_asked_for(grasps, tmp_path, capsys)
     assert out.read_bytes() == again.read_bytes()
 
 
-def test_what_it_refuses_is_told_with_a_remedy(grasps, tmp_path, capsys):
+def test_what_it_refuses_is_told_with_a_remedy(wedge_plan, tmp_path, capsys):
     def ends(*words):
-        code = main(["export", str(grasps), *words])
+        code = main(["export", str(wedge_plan), *words])
         return code, capsys.readouterr().err
 
     out = str(tmp_path / "a.glb")

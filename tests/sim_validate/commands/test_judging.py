@@ -10,27 +10,12 @@ from sim_validate.dexgraspbench import load_dex_record
 from sim_validate.main import main
 
 
-@pytest.fixture(scope="module")
-def grasps(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("judged")
-    assert main(["plan", "wedge", "--limit", "2", "--out", str(folder), "-q"]) == Exit.GOOD
-    return folder / "grasps.json"
-
-
-@pytest.fixture(scope="module")
-def graspable(tmp_path_factory):
-    """The grasps of a built-in object that fits the hands as it is."""
-    folder = tmp_path_factory.mktemp("reached")
-    assert main(["plan", "l-bracket", "--limit", "2", "--out", str(folder), "-q"]) == Exit.GOOD
-    return folder / "grasps.json"
-
-
 def finite(document):
     return json.loads(document, parse_constant=lambda text: pytest.fail(f"{text} is no JSON"))
 
 
-def test_grasps_are_judged_by_each_test(grasps, tmp_path, capsys):
-    words = ["validate", str(grasps), "--protocol", "dexgraspbench", "--protocol", "dexonomy"]
+def test_grasps_are_judged_by_each_test(wedge_plan, tmp_path, capsys):
+    words = ["validate", str(wedge_plan), "--protocol", "dexgraspbench", "--protocol", "dexonomy"]
     assert main([*words, "--out", str(tmp_path)]) == Exit.GOOD
     assert capsys.readouterr().out.count("dexonomy") == 3
     document = finite((tmp_path / "judgements.json").read_text())
@@ -49,8 +34,10 @@ def test_grasps_are_judged_by_each_test(grasps, tmp_path, capsys):
     assert document["protocols"]["dexgraspbench"]["sources"][0]["commit"].startswith("1e7a5a6f")
 
 
-def test_a_test_without_loads_has_a_margin_of_null(grasps, capsys):
-    code = main(["validate", str(grasps), "--limit", "1", "--protocol", "mj-grasp-sim", "--json"])
+def test_a_test_without_loads_has_a_margin_of_null(wedge_plan, capsys):
+    code = main(
+        ["validate", str(wedge_plan), "--limit", "1", "--protocol", "mj-grasp-sim", "--json"]
+    )
     document = finite(capsys.readouterr().out)
     (judgement,) = document["judgements"]
     assert judgement["predicted"]["margin"] is None
@@ -58,20 +45,20 @@ def test_a_test_without_loads_has_a_margin_of_null(grasps, capsys):
     assert code == Exit.GOOD
 
 
-def test_fingers_that_hardly_push_fail_and_the_command_says_why(grasps, capsys):
+def test_fingers_that_hardly_push_fail_and_the_command_says_why(wedge_plan, capsys):
     """The weight of a decagram of push is nothing beside one newton."""
     words = ["--protocol", "dexgraspbench", "--max-normal-force", "0.01", "--limit", "1"]
-    assert main(["validate", str(grasps), *words]) == Exit.NEGATIVE
+    assert main(["validate", str(wedge_plan), *words]) == Exit.NEGATIVE
     found = capsys.readouterr()
     assert "failed" in found.out
     assert "moved by" in found.err
     assert "ours:" in found.err
 
 
-def test_a_report_shows_what_each_test_says_and_new_judgements_remove_it(grasps, tmp_path):
+def test_a_report_shows_what_each_test_says_and_new_judgements_remove_it(wedge_plan, tmp_path):
     run = tmp_path / "run"
     run.mkdir()
-    shutil.copy(grasps, run)
+    shutil.copy(wedge_plan, run)
     words = ["validate", str(run / "grasps.json"), "--limit", "1", "--out", str(run), "-q"]
     main([*words, "--protocol", "dexgraspbench"])
     main(["report", str(run), "--limit", "1", "-q"])
@@ -89,8 +76,8 @@ def test_a_report_shows_what_each_test_says_and_new_judgements_remove_it(grasps,
      (lambda record: record["summary"]["dexonomy"].update(more=1), "more")],
     ids=["field", "object", "unknown"],
 )  # fmt: skip
-def test_a_report_refuses_judgements_that_do_not_fit(change, said, grasps, tmp_path, capsys):
-    shutil.copy(grasps, tmp_path)
+def test_a_report_refuses_judgements_that_do_not_fit(change, said, wedge_plan, tmp_path, capsys):
+    shutil.copy(wedge_plan, tmp_path)
     own = str(tmp_path / "grasps.json")
     main(["validate", own, "--limit", "1", "--out", str(tmp_path), "-q", "--protocol", "dexonomy"])
     path = tmp_path / "judgements.json"
@@ -103,18 +90,17 @@ def test_a_report_refuses_judgements_that_do_not_fit(change, said, grasps, tmp_p
     assert said in found
 
 
-def test_results_do_not_depend_on_jobs(grasps, tmp_path):
-    texts = []
-    for jobs in ("1", "2"):
-        out = tmp_path / jobs
-        words = ["--protocol", "dexonomy", "--jobs", jobs, "--out", str(out), "-q"]
-        main(["validate", str(grasps), *words])
-        texts.append((out / "judgements.json").read_bytes())
-    assert texts[0] == texts[1]
-
-
-def test_a_hand_is_judged_and_its_records_are_written(graspable, tmp_path, capsys):
-    words = ["reach", str(graspable), "--hand", "allegro", "--torque-limit-n-m", "0.7"]
+def test_a_hand_is_judged_and_its_records_are_written(bracket_plan, tmp_path, capsys):
+    words = [
+        "reach",
+        str(bracket_plan),
+        "--limit",
+        "2",
+        "--hand",
+        "allegro",
+        "--torque-limit-n-m",
+        "0.7",
+    ]
     more = ["--simulate", "--protocol", "dexgraspbench", "--out", str(tmp_path / "out")]
     code = main([*words, *more, "--dexgraspbench", str(tmp_path / "records")])
     found = capsys.readouterr()
@@ -134,6 +120,6 @@ def test_a_hand_is_judged_and_its_records_are_written(graspable, tmp_path, capsy
     assert len(load_dex_record(tmp_path / "records" / "graspdata" / names[0]).grasp) == 7 + 16
 
 
-def test_a_hand_is_judged_in_simulation_only(graspable, capsys):
-    assert main(["reach", str(graspable), "--protocol", "dexgraspbench"]) == Exit.USAGE
+def test_a_hand_is_judged_in_simulation_only(bracket_plan, capsys):
+    assert main(["reach", str(bracket_plan), "--protocol", "dexgraspbench"]) == Exit.USAGE
     assert "--simulate" in capsys.readouterr().err

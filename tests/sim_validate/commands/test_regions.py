@@ -6,7 +6,6 @@ import json
 import numpy as np
 import pytest
 
-import grasp_core as gc
 import sim_validate as sv
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.on_faces import within
@@ -55,15 +54,6 @@ def test_the_proofs_can_be_checked_from_their_files(folder):
         assert not cover.verify([1.3 * region for region in regions], proof["normals"], friction)
         checked += 1
     assert checked == 3
-
-
-def test_processes_and_runs_agree(folder, tmp_path):
-    grasps = str(folder / "grasps.json")
-    for jobs in ("1", "2"):
-        out = tmp_path / jobs
-        asked = ["regions", grasps, "--max-cones", "1000", "--jobs", jobs, "--out", str(out), "-q"]
-        assert main(asked) == Exit.GOOD
-        assert (out / "regions.json").read_bytes() == (folder / "regions.json").read_bytes()
 
 
 def test_one_grasp_with_a_reserve(folder, capsys):
@@ -134,14 +124,6 @@ def test_files_give_back_the_regions_and_their_proof(folder):
             assert region.inscribed_radius == pytest.approx(told["inscribed_radius_m"])
 
 
-@pytest.mark.parametrize("text", [b"", b"not a proof", b"PK\x03\x04"])
-def test_files_that_are_no_proofs_are_refused(tmp_path, text):
-    path = tmp_path / "proof.npz"
-    path.write_bytes(text)
-    with pytest.raises(gc.InputError, match="expected a proof file"):
-        sv.load_regions(path)
-
-
 def test_plans_may_come_with_certified_regions(tmp_path, folder):
     asked = ["plan", "wedge", "--limit", "3", "--regions", "--out", str(tmp_path), "-q"]
     assert main(asked) == Exit.GOOD
@@ -179,13 +161,6 @@ def test_a_run_keeps_regions_and_proofs_and_the_next_removes_them(tmp_path):
     assert not list((tmp_path / "proofs").iterdir())
 
 
-def test_regions_of_plans_stay_clear_of_edges(tmp_path):
-    asked = ["plan", "octahedron", "--limit", "1", "--family", "regulus", "--regions"]
-    assert main([*asked, "--edge-clearance-m", "0.002", "--out", str(tmp_path), "-q"]) == Exit.GOOD
-    saved = grasps_from_json((tmp_path / "grasps.json").read_text())
-    assert clearance_of(saved.body, saved.grasps[0], saved.grasps[0].regions) > 0.002 - 1e-9
-
-
 def test_regions_stay_clear_of_edges_that_contacts_are_near_to(folder, tmp_path):
     saved = grasps_from_json((folder / "grasps.json").read_text())
     asked = ["regions", str(folder / "grasps.json"), "--max-cones", "1000", "--out", str(tmp_path)]
@@ -209,9 +184,3 @@ def clearance_of(body, grasp, regions):
         inside = np.einsum("ki,cki->ck", inward, region.polygon[:, None] - face.polygon)
         least = min(least, inside.min())
     return least
-
-
-def test_fingers_on_one_face_and_certified_regions_do_not_go_together(capsys):
-    asked = ["plan", "wedge", "--regions", "--share-faces-m", "0.01"]
-    assert main(asked) == Exit.INPUT
-    assert "leave one of the two flags out" in capsys.readouterr().err

@@ -72,15 +72,6 @@ def test_flags_of_the_hand_are_in_the_scene(wedge, tmp_path):
     assert model.opt.gravity.tolist() == [9.80665, 0.0, 0.0]
 
 
-def test_the_text_says_whether_masses_are_true(wedge, capsys):
-    assert main(["scene", wedge]) == Exit.GOOD
-    scaled = capsys.readouterr().out
-    assert "Masses and servos are scaled to suit the grasp" in scaled
-    assert mujoco.MjModel.from_xml_string(scaled).opt.gravity.tolist() == [0.0, 0.0, 0.0]
-    assert main(["scene", wedge, "--mass-kg", "0.3"]) == Exit.GOOD
-    assert "The object has its true mass" in capsys.readouterr().out
-
-
 def test_a_mass_that_is_too_large_is_warned_of(wedge, tmp_path, capsys):
     words = ["scene", wedge, "--mass-kg", "3", "--out", str(tmp_path)]
     assert main(words) == Exit.GOOD
@@ -99,11 +90,8 @@ def test_a_grasp_that_no_squeeze_holds_has_no_scene(wedge, tmp_path, capsys):
 
 
 REFUSED = {
-    "--mass-kg 1 --density-kg-m3 1000": "exclude each other",
     "--mass-kg 1 --surface mesh": "for scenes with scaled masses",
-    "--mass-kg 1 --stiffness-n-per-m 1000": "for scenes with scaled masses",
     "--tip-stiffness-n-per-m 1000": "give --mass-kg or --density-kg-m3 too",
-    "--down 1 0 0": "give --mass-kg or --density-kg-m3 too",
 }
 
 

@@ -139,16 +139,6 @@ def test_lost_grasps_end_with_1_and_no_grasp_at_all_with_5(folder, tmp_path, cap
     assert record["absence"] == "none of the 6 grasps could be carried over to the changed part"
 
 
-def test_another_friction_is_judged_on_both_parts(folder, capsys):
-    assert transfer(folder, "moved.obj", "--friction", "0.01", "--json") in (
-        Exit.NEGATIVE, Exit.NONE,
-    )  # fmt: skip
-    record = json.loads(capsys.readouterr().out)
-    assert record["friction"] == 0.01
-    assert any("not in force closure at friction 0.01" in each["reason"]
-               for each in record["grasps"])  # fmt: skip
-
-
 def test_the_old_grasps_are_not_overwritten(folder, capsys):
     before = (folder / "plan" / "grasps.json").read_text()
     assert transfer(folder, "moved.obj", "--out", str(folder / "plan")) == Exit.INPUT
@@ -168,10 +158,3 @@ def test_a_given_centre_of_mass_stays(folder, tmp_path):
     main([*asked, "--out", str(tmp_path / "other"), "--center-of-mass-m", "0", "0", "0.004"])
     other = read_grasps(tmp_path / "other" / "grasps.json").body.center_of_mass
     np.testing.assert_array_equal(other, [0.0, 0.0, 0.004])
-
-
-def test_equal_transfers_write_equal_files(folder, tmp_path):
-    for name in ("one", "two"):
-        transfer(folder, "hole.obj", "--out", str(tmp_path / name), "-q")
-    for file in ("grasps.json", "transfer.json"):
-        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()

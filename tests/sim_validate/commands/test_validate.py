@@ -90,9 +90,6 @@ def test_settings_of_a_file_are_in_force_and_in_the_record(planned, verdict):
     [
         (["--down", "0", "0", "-1"], Exit.USAGE, "give the weight with --weight-n too"),
         (["--traces"], Exit.USAGE, "with --out DIR too"),
-        (["--wrenches", "none.json"], Exit.INPUT, "none.json"),
-        (["--setup", "none.toml"], Exit.INPUT, "none.toml"),
-        (["--limits", "guess"], Exit.USAGE, "bisection"),
         (["--weight-n", "1", "--down", "0", "0", "0"], Exit.USAGE, "zero"),
     ],
 )
