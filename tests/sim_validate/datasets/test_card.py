@@ -3,13 +3,10 @@ import re
 
 import pytest
 
-from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.card import CARD, card_text
 from sim_validate.datasets.manifest import read_manifest
-from sim_validate.datasets.parquet import read_rows
 from sim_validate.datasets.tables import TABLES
 from sim_validate.datasets.verify import verify
-from sim_validate.main import main
 from tests.sim_validate.datasets.small import SMALL
 
 pytest.importorskip("pyarrow")
@@ -82,24 +79,6 @@ def test_every_column_is_documented_with_its_unit(folder):
     assert count == sum(map(len, TABLES.values()))
 
 
-def test_every_label_is_explained(folder):
-    _, body = split_card((folder / CARD).read_text())
-    rows = [
-        row for path in folder.glob("data/grasps/*.parquet") for row in read_rows(path, "grasps")
-    ]
-    labels = {row["label"] for row in rows}
-    said = dict(re.findall(r"^\| `(\w+)` \| ([^|]+) \|$", body.partition("| `label` |")[2], re.M))
-    assert {"grasp"} < labels <= set(said)
-
-
-def test_counts_are_those_of_the_tables(folder, manifest):
-    _, body = split_card((folder / CARD).read_text())
-    rows = re.findall(r"^\| `(\w+)` \| .* \| (\w+) \| (\d+) \|$", body, re.MULTILINE)
-    assert len(rows) == 9
-    for name in TABLES:
-        assert sum(int(n) for table, _, n in rows if table == name) == manifest.rows()[name]
-
-
 @pytest.mark.parametrize("text", HOSTILE)
 def test_words_of_the_user_stay_words(manifest, text):
     config = dataclasses.replace(SMALL, title=text, creator=text, url=text, license=text)
@@ -128,42 +107,8 @@ def test_only_addresses_become_links(manifest):
         assert f"<{url}>" not in said(url).split("## How")[0]
 
 
-def test_what_is_not_given_is_not_said(manifest):
-    bare = dataclasses.replace(SMALL, license="", creator="", url="", published="")
-    header, body = split_card(card_text(bare, manifest))
-    assert "license" not in header
-    assert not re.search(r"^- (By|At|Published|Licence):", body, re.MULTILINE)
-
-
 def test_a_dataset_without_rows_has_a_card(manifest):
     empty = dataclasses.replace(manifest, units=3, quarantined=3, files=())
     header, body = split_card(card_text(SMALL, empty))
     assert "configs" not in header
     assert "Of 3 units of work, 3 were left out" in body
-
-
-@pytest.mark.parametrize(
-    ("given", "hub", "said"),
-    [
-        ("CC0-1.0", 'license: "cc0-1.0"', "Licence: CC0-1.0"),
-        ("https://example.org/terms", 'license: "other"', "Licence: <https://example.org/terms>"),
-    ],
-)
-def test_licences_have_their_usual_names_where_they_are_known(manifest, given, hub, said):
-    lines = card_text(dataclasses.replace(SMALL, license=given), manifest).splitlines()
-    assert hub in lines
-    assert f"- {said}" in lines
-
-
-@pytest.mark.usefixtures("built_here")
-def test_a_build_says_once_which_flags_are_missing(tmp_path, capsys):
-    names = ["dataset", "build", "tetrahedron", "--family", "concurrent", "--limit", "1"]
-    flags = ["--license", "MIT", "--creator", "A", "--url", "https://a.b", "--published"]
-    assert main([*names, "--out", str(tmp_path / "a")]) == Exit.GOOD
-    said = capsys.readouterr().err
-    assert said.count(f"{CARD} will lack") == 1
-    assert all(flag in said for flag in flags if flag.startswith("--"))
-    assert main([*names, "--out", str(tmp_path / "b"), *flags, "2026-11-22"]) == Exit.GOOD
-    assert CARD not in capsys.readouterr().err
-    assert main([*names, "--out", str(tmp_path / "c"), *flags, "soon"]) == Exit.INPUT
-    assert "2026-11-22" in capsys.readouterr().err

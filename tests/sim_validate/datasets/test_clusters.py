@@ -15,13 +15,11 @@ from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.units import WorkerError, units_of
 from sim_validate.datasets.workers import do_unit, drive
 from sim_validate.parallel.clusters import dask_workers, ray_workers
-from tests.sim_validate.datasets.engines import Here, contents, silent
+from tests.sim_validate.datasets.engines import contents, silent
+from tests.sim_validate.datasets.pair import CONFIG
 
 pytest.importorskip("pyarrow")
 pytestmark = pytest.mark.slow
-CONFIG = DatasetConfig(
-    objects=("tetrahedron", "wedge"), frictions=(0.4, 0.5), families=("concurrent",), limit=2
-)
 TIMEOUT_S = 100.0
 PACKAGES = {"ray": "ray", "dask": "distributed"}
 
@@ -38,13 +36,6 @@ def engine(request):
         yield started
 
 
-@pytest.fixture(scope="module")
-def alone(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("alone") / "ds"
-    build(CONFIG, folder, Here(), silent)
-    return contents(folder)
-
-
 def faulty(unit, staging):
     """Ends, hangs or does its work, as the object's name says."""
     if unit.object == "wedge":
@@ -54,11 +45,11 @@ def faulty(unit, staging):
     do_unit(unit, staging)
 
 
-def test_every_engine_makes_the_same_bytes(engine, alone, tmp_path):
+def test_every_engine_makes_the_same_bytes(engine, dataset, tmp_path):
     assert engine.workers == 2
     built = build(CONFIG, tmp_path / "ds", engine, silent, TIMEOUT_S)
     assert built.made == 4
-    assert contents(tmp_path / "ds") == alone
+    assert contents(tmp_path / "ds") == contents(dataset)
 
 
 def test_what_ends_or_hangs_is_given_up_and_the_others_are_done(engine, tmp_path):
@@ -84,14 +75,14 @@ def test_a_worker_with_other_packages_ends_the_run(engine, tmp_path, monkeypatch
         build(CONFIG, tmp_path / "ds", engine, silent, TIMEOUT_S)
 
 
-def test_a_running_dask_cluster_is_used_and_several_threads_are_refused(alone, tmp_path):
+def test_a_running_dask_cluster_is_used_and_several_threads_are_refused(dataset, tmp_path):
     distributed = pytest.importorskip("distributed")
     settings = {"dashboard_address": "127.0.0.1:0", "silence_logs": 50, "n_workers": 1}
     with distributed.LocalCluster(threads_per_worker=1, **settings) as cluster:
         with dask_workers(9, cluster.scheduler_address) as started:
             assert started.workers == 1
             build(CONFIG, tmp_path / "ds", started, silent, TIMEOUT_S)
-        assert contents(tmp_path / "ds") == alone
+        assert contents(tmp_path / "ds") == contents(dataset)
     with (
         distributed.LocalCluster(threads_per_worker=2, **settings) as cluster,
         pytest.raises(gc.InputError, match="--nthreads 1"),

@@ -13,11 +13,8 @@ import grasp_core as gc
 import sim_validate as sv
 from scenes.example_objects import example_object
 from sim_validate.datasets.build import build
-from sim_validate.datasets.card import CARD
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.figures import execution_cells, execution_rows
-from sim_validate.datasets.manifest import MANIFEST
-from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.tables import EXECUTED, EXECUTIONS, TABLES
 from sim_validate.datasets.verify import Sample, loose_difference, verify
 from sim_validate.execution.settings import AskedExecution
@@ -93,12 +90,6 @@ def test_tables_have_the_columns(executed):
     assert list(loaded["grasps"])[-len(own) :] == own
     assert loaded["grasps"]["squeeze_n"].shape[1:] == (4, 3)
     assert list(loaded["executions"]) == [column.name for column in EXECUTIONS]
-
-
-def test_a_dataset_without_executions_does_not_mention_them(small_dataset):
-    assert "executed" not in (small_dataset / MANIFEST).read_text(encoding="utf-8")
-    assert "execut" not in (small_dataset / CARD).read_text(encoding="utf-8")
-    assert list(select(small_dataset).tables) == list(TABLES)
 
 
 def test_a_whole_dataset_has_no_fault(executed):

@@ -100,17 +100,6 @@ def test_files_do_not_depend_on_the_order_of_rows_nor_on_when_they_are_made(unit
         )
 
 
-def test_columns_say_their_units(written):
-    from pyarrow import parquet
-
-    schema = parquet.read_schema(written["grasps"])
-    assert schema.metadata == {b"made by": b"a test"}
-    for column in TABLES["grasps"]:
-        said = schema.field(column.name).metadata
-        assert said[b"meaning"].decode() == column.meaning
-        assert said.get(b"unit", b"").decode() == column.unit
-
-
 def test_no_flipped_bit_in_a_page_changes_rows_in_silence(written):
     path = written["trials"]
     whole, rows = path.read_bytes(), read_rows(path, "trials")

@@ -2,8 +2,6 @@ import dataclasses
 import errno
 import itertools
 import os
-import shutil
-import subprocess
 import time
 
 import pytest
@@ -43,7 +41,7 @@ def burn(*_):
     sum(itertools.repeat(1))  # one call that never gives the interpreter back
 
 
-@pytest.mark.parametrize("name", ["mujoco", "numpy", "code_sha256", "python"])
+@pytest.mark.parametrize("name", ["mujoco", "code_sha256"])
 def test_a_worker_with_another_version_refuses_and_the_run_ends(tmp_path, monkeypatch, name):
     other = dict(provenance()) | {name: "0.0.1"}
     asked_first = iter([other])
@@ -68,10 +66,7 @@ def test_rows_that_do_not_arrive_end_the_run(staging):
         drive(units_of(CONFIG), staging, Elsewhere(), silent)
 
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO)
-
-
-@pytest.mark.parametrize("code", FULL)
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EIO])
 def test_a_full_disk_ends_the_run_and_later_it_goes_on(tmp_path, code):
     config = dataclasses.replace(CONFIG, frictions=(0.4, 0.5))
 
@@ -141,25 +136,3 @@ def test_a_process_that_never_ends_is_ended(staging):
         given = task(staging, do_unit)
         engine.submit(do_task, given).result()
     assert staging.finished(given.unit)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(os.getuid() != 0, reason="only root can mount a small file system")
-def test_on_a_small_file_system_nothing_is_lost(tmp_path):
-    small = tmp_path / "small"
-    small.mkdir()
-    mount, unmount = shutil.which("mount"), shutil.which("umount")
-    options = ["-t", "tmpfs", "-o", "size=48k", "tmpfs", str(small)]
-    if mount is None or unmount is None:
-        pytest.skip("nothing to mount with")
-    if subprocess.run([mount, *options], capture_output=True, check=False).returncode:
-        pytest.skip("mounting is not allowed here")
-    try:
-        with pytest.raises(OSError, match="No space") as raised:
-            build(CONFIG, small / "ds", Here(), silent)
-        assert raised.value.errno == errno.ENOSPC
-        assert not (small / "ds" / "manifest.json").exists()
-        subprocess.run([mount, "-o", "remount,size=8m", str(small)], check=True)
-        assert build(CONFIG, small / "ds", Here(), silent).quarantined == 0
-    finally:
-        subprocess.run([unmount, str(small)], check=True)
