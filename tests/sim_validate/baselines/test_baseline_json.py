@@ -46,16 +46,9 @@ def with_entry(**changed):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "not complete JSON"),
-        ("[]", "a baseline must hold one JSON object, got a list"),
         ("{}", "expected a baseline, as"),
-        (spoiled(lambda r: r.update(schema=2)), "schema: .* a newer graspproof wrote"),
-        (spoiled(lambda r: r.pop("friction")), "friction: missing"),
         (spoiled(lambda r: r.update(friction="x")), "friction: expected a number, got"),
         (spoiled(lambda r: r.update(taste=1)), "taste: unknown key; known keys are "),
-        (spoiled(lambda r: r.update(grasps=[])), "grasps: expected a list, got null"),
-        (with_entry(limit_n="3"), "grasps\\[0\\].limit_n: expected a number"),
-        (with_entry(limit_n=-1.0), "grasps\\[0\\].limit_n: expected at least 0"),
         (with_entry(limit_n=float("nan")), "grasps\\[0\\].limit_n"),
         (
             with_entry(outcome="slipped"),
@@ -78,10 +71,7 @@ def test_what_is_no_baseline_is_refused_with_the_field(text, message):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"trials": 2.5}, "settings.trials"),
         ({"surface": "foo"}, "settings.surface"),
-        ({"noise": {"mass": "x"}}, "settings.noise.mass"),
-        ({"noise": {"taste": 0.1}}, "taste"),
         ({"noise": {"mass": -0.1}}, "mass"),
         ({"taste": 1}, "settings.taste"),
     ],

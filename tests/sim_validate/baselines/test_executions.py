@@ -16,11 +16,9 @@ from sim_validate.baselines.baseline import (
 )
 from sim_validate.baselines.check import Checked, Measured, demanded
 from sim_validate.baselines.compare import Status, compare
-from sim_validate.baselines.explain import not_survived
 from sim_validate.baselines.settings import How, of_settings, settings_of
 from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.execution.settings import asked_execution
-from sim_validate.execution.trials import Skipped
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     Execution,
@@ -133,29 +131,13 @@ def test_what_must_survive_fails_although_the_baseline_did_not_survive_either():
     assert demanded(kept).findings == kept.findings
 
 
-def test_a_loss_names_trial_numbers_and_prediction():
-    lost = dataclasses.replace(
-        TRIAL, survived=False, fate="slipped", displacement_m=7e-3, predicted_first_slip=0.83
-    )
-    found = dataclasses.replace(
-        EXECUTION, trials=(TRIAL, lost), controls=(ExecutionControl("idle", False, 1.2),)
-    )
-    said = not_survived(ExecutedGrasp("c-1", "", "1f", found))
-    assert said.startswith("c-1 with 0.3 kg: 1 of 2 trials lost; its squeeze is certified for 2.7")
-    assert "weight: moved or turned too far after a slip, moved 7 mm" in said
-    assert "first slip predicted at 0.83 of the load, simulated at 2.49" in said
-    assert "control idle did not slip" in said
-    assert not_survived(ExecutedGrasp("c", "", "1f", EXECUTION)) == ""
-    assert "no squeeze" in not_survived(ExecutedGrasp("c", "", "1f", None, "no squeeze"))
-    nothing = dataclasses.replace(EXECUTION, trials=(), skipped=(Skipped("lift", "no room"),))
-    assert "no trial is possible" in not_survived(ExecutedGrasp("c", "", "1f", nothing))
-
-
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
         ({"survives": "yes"}, "survives: expected true or false"),
-        ({"execution": "hard"}, "execution: expected a table"),
+        ({"strict": 1}, "strict: expected true or false"),
+        ({"taste": 1}, "no setting is named"),
+        ({"changed_part": {"refuse": 1}}, "changed_part.refuse: expected true or false"),
         ({"execution": {"mass_kg": -1.0}}, "execution: mass_kg must be"),
     ],
 )

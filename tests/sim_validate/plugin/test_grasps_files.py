@@ -27,13 +27,6 @@ def test_grasps_that_stay_as_they_were_pass(blessed, tmp_path):
         assert kept["outcome"] == "held"
 
 
-@pytest.mark.slow
-def test_they_pass_on_several_workers_too(blessed):
-    code, said = run_pytest_alone(blessed, "-n", "2")
-    assert code == 0, said
-    assert "2 passed" in said
-
-
 def test_a_regression_says_what_was_and_what_is(blessed, tmp_path):
     copied(blessed, tmp_path)
     baseline = tmp_path / "wedge.baseline.json"
@@ -95,19 +88,11 @@ def test_the_file_of_results_has_the_status_and_figures_of_each_grasp(blessed, t
     assert "graspproof replay" in said
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "grasps: expected the path"),
-        ("grasp = 1", "no setting is named"),
-        ('grasps = "g.json"\nstrict = 1', "strict: expected true or false"),
-    ],
-)
-def test_a_bad_file_is_named(tmp_path, text, message):
-    write_text(tmp_path / "x.grasps.toml", text)
+def test_a_bad_file_is_named(tmp_path):
+    write_text(tmp_path / "x.grasps.toml", "")
     code, said = run_pytest(tmp_path)
     assert code != 0
-    assert message in said
+    assert "grasps: expected the path" in said
 
 
 def test_it_is_silent_where_it_is_not_used(tmp_path):

@@ -16,15 +16,6 @@ def test_grasps_stand_below_the_part_that_they_were_tested_on():
     ]
 
 
-def test_better_grasps_on_an_unchanged_part_and_baselines_have_sections_of_their_own():
-    lines = [line("a better"), line(wrote="wrote x: 2 of 2 grasps held"),
-             line(wrote="wrote x: 2 of 2 grasps held")]  # fmt: skip
-    assert sections(lines) == [
-        ("grasps that are better", ["a better"]),
-        ("baselines of grasps", ["wrote x: 2 of 2 grasps held"]),
-    ]
-
-
 def test_a_long_list_is_cut():
     lines = [line(f"{number:03d} same", note=NOTE) for number in range(MOST_TOLD + 3)]
     ((_, texts),) = sections(lines)
