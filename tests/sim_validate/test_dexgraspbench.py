@@ -209,7 +209,7 @@ def test_records_of_any_pickle_protocol_are_read(protocol, tmp_path):
     assert len(read.grasp) == 8
 
 
-@pytest.mark.parametrize("kind", [list, tuple, np.asfortranarray, np.float32, np.dtype(">f8").type])
+@pytest.mark.parametrize("kind", [list, np.float32, np.dtype(">f8").type])
 def test_numbers_may_be_an_array_of_any_kind_or_a_list(kind, tmp_path):
     turned = kind(FIELDS["squeeze_qpos"].tolist())
     read = load_dex_record(saved(FIELDS | {"squeeze_qpos": turned}, tmp_path / "0.npy"))

@@ -124,8 +124,7 @@ def test_json_output_is_one_document_and_the_rest_goes_elsewhere(capsys):
         json.loads(capsys.readouterr().out)
 
 
-@pytest.mark.parametrize("name", ["box", "prism"])
-@pytest.mark.parametrize("command", ["run", "plan"])
+@pytest.mark.parametrize(("command", "name"), [("run", "box"), ("plan", "prism")])
 @pytest.mark.usefixtures("here")
 def test_an_object_without_grasps_says_so_in_one_sentence(capsys, command, name):
     paper = [part for family in FAMILIES for part in ("--family", family)]
@@ -159,15 +158,11 @@ def test_a_scale_multiplies_what_a_mesh_file_says(here, capsys):
     ("arguments", "code", "words"),
     [
         (["plan", "tetrahedon"], Exit.INPUT, "did you mean tetrahedron"),
-        (["plan", "none.stl"], Exit.INPUT, "none.stl"),
         (["plan", "wedge", "--theta-deg", "40"], Exit.INPUT, "theta_deg must be a number from"),
         (["plan", "wedge", "--friction", "0"], Exit.USAGE, "friction"),
-        (["plan", "wedge", "--family", "spiral"], Exit.USAGE, "concurrent"),
         (["plan", "wedge", "--fricton", "0.3"], Exit.USAGE, "--friction"),
         (["plan"], Exit.USAGE, "Required options"),
-        (["bake"], Exit.USAGE, "inspect"),
         (["plan", "wedge", "--config"], Exit.USAGE, "--config"),
-        (["plan", "wedge", "--config", "none.toml"], Exit.INPUT, "none.toml"),
     ],
 )  # fmt: skip
 def test_errors_have_their_exit_code_and_name_the_cause(here, capsys, arguments, code, words):
@@ -205,12 +200,6 @@ def test_a_run_without_controls_says_so(monkeypatch, capsys):
     assert "no negative controls" in capsys.readouterr().err
 
 
-def test_a_folder_named_like_an_object_does_not_hide_it(here, capsys):
-    (here / "wedge").mkdir()
-    assert main(["plan", "wedge", "--limit", "1", "-q"]) == Exit.GOOD
-    assert "error" not in capsys.readouterr().err
-
-
 def test_an_unexpected_error_is_internal_and_shows_its_place_when_asked(monkeypatch, capsys):
     def broken(*_, **__):
         raise RuntimeError("boom")
@@ -232,29 +221,15 @@ def test_control_characters_in_a_name_do_not_reach_the_terminal(here, capsys):
     assert "\x1b[31m" not in shown.out + shown.err
 
 
-@pytest.mark.parametrize("graphics", ["nonsense", "osmesa"])
-def test_graphics_that_are_not_here_are_named(graphics):
-    """Where OSMesa is, the second one is not wrong."""
+def test_graphics_that_are_not_here_are_named():
     code = "from sim_validate.main import run_and_exit; run_and_exit()"
     done = subprocess.run(
-        [sys.executable, "-c", code, "doctor"], env=os.environ | {"MUJOCO_GL": graphics}, cwd=ROOT,
-        capture_output=True, text=True, check=False,
+        [sys.executable, "-c", code, "doctor"], env=os.environ | {"MUJOCO_GL": "nonsense"},
+        cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip
-    assert done.returncode == Exit.INPUT or (graphics, done.returncode) == ("osmesa", Exit.GOOD)
-    assert done.returncode == Exit.GOOD or "MUJOCO_GL" in done.stderr
+    assert done.returncode == Exit.INPUT
+    assert "MUJOCO_GL" in done.stderr
     assert "internal error" not in done.stderr
-
-
-def test_objects_whose_names_look_alike_have_folders_of_their_own(here):
-    import trimesh
-
-    for name, shape in (("a b", "box"), ("a'b", "prism")):
-        body = scenes.example_object(shape)
-        trimesh.Trimesh(body.vertices, body.triangles).export(here / f"{name}.stl")
-        assert main(["run", f"{name}.stl", "--limit", "1", "--no-report", "-q"]) == Exit.GOOD
-    folders = sorted(path.name for path in (here / "graspproof-out").iterdir())
-    assert len(folders) == 2
-    assert all(re.fullmatch(r"a_b-[0-9a-f]{8}", folder) for folder in folders)
 
 
 def test_an_interrupted_run_keeps_what_is_done(here):
@@ -349,8 +324,6 @@ def test_an_object_is_drawn(here, capsys):
         if (view.camera - face.centroid) @ -face.normal > 0.0
     ]
     assert 3 <= len(numbers) < len(wedge.faces)
-    assert main(["inspect", "wedge", "--picture", "wedge.doc"]) == Exit.USAGE
-    assert "--picture must end in" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("here")
@@ -379,16 +352,13 @@ def test_plans_ordered_by_what_grasps_carry_show_it(capsys):
     body = scenes.example_object("tetrahedron")
     over = [mass / (1000.0 * body.volume) for mass in masses]
     assert columns["first slip"] == pytest.approx(over, rel=2e-3)
-    assert main(["plan", "tetrahedron", "--limit", "1"]) == Exit.GOOD
-    assert "theta* deg  margin  quality N" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("flags", "said"),
     [
+        (["--ceiling", "10"], "--ceiling needs --optimize"),
         (["--approach-m", "0.1"], "--approach-m also needs --finger-radius-m"),
-        (["--finger-radius-m", "0.01"], "--finger-radius-m also needs --approach-m"),
-        (["--edge-clearance-m", "5"], "clearance must be a number from 0"),
         (["--complete", "--family", "pencil"], "needs the free method"),
         (["--optimize", "--share-faces-m", "0.01"], "leave out --optimize or these"),
         (["--scale", "2"], "leave out --unit, --scale"),

@@ -1,6 +1,9 @@
-"""What every drawing must be: its texts are on it, and none is on another."""
+"""What drawings must be: texts are on a sheet, none on another; and what clips show."""
 
 import itertools
+
+import numpy as np
+from PIL import Image
 
 from scenes.drawing.panels import width_of
 
@@ -29,3 +32,13 @@ def assert_whole(sheet):
         assert bottom <= sheet.height, words
     for one, two in itertools.combinations(texts, 2):
         assert not overlap(box(one), box(two)), (one.text, two.text)
+
+
+def frames_of(path, *places):
+    """The number of frames of a clip, and the pixels of some of them as whole numbers."""
+    with Image.open(path) as clip:
+        found = []
+        for place in places:
+            clip.seek(place % clip.n_frames)
+            found.append(np.asarray(clip.convert("RGB")).astype(int))
+        return clip.n_frames, *found

@@ -98,11 +98,9 @@ def test_a_squeeze_goes_as_far_as_motors_do():
 
 
 def test_what_makes_no_scene_is_refused():
-    held, body, reach, *_ = stood("allegro")
+    _, body, reach, *_ = stood("allegro")
     with pytest.raises(InputError, match="must have a torque limit"):
         scenes.build_hand_scene(gc.load_hand("allegro"), body, reach, FRICTION)
-    with pytest.raises(InputError, match="friction"):
-        scenes.build_hand_scene(held, body, reach, -1.0)
     other = gc.load_hand("leap").with_torque_limits(0.35, "a test")
     with pytest.raises(InputError, match="hand must be the one of the pose"):
         scenes.build_hand_scene(other, body, reach, FRICTION)

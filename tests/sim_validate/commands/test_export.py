@@ -60,9 +60,6 @@ def test_what_it_refuses_is_told_with_a_remedy(wedge_plan, tmp_path, capsys):
         Exit.USAGE,
         f"graspproof: --out must end in .yaml or .yml with --to moveit, got {out}\n",
     )
-    code, said = ends("--to", "gltf", "-o", out, "--grasp", "c-9-9-9-9")
-    assert code == Exit.INPUT
-    assert "no grasp is named c-9-9-9-9; the file has c-0-1-2-7" in said
     code, said = ends("--to", "gltf", "-o", out, "--fingertip-radius-m", "3")
     assert code == Exit.INPUT
     assert "fingertip_radius_m must be a number from 1e-09 up to" in said

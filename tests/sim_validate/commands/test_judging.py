@@ -8,6 +8,7 @@ import pytest
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.dexgraspbench import load_dex_record
 from sim_validate.main import main
+from tests.sim_validate.changing import changed
 
 
 def finite(document):
@@ -80,10 +81,7 @@ def test_a_report_refuses_judgements_that_do_not_fit(change, said, wedge_plan, t
     shutil.copy(wedge_plan, tmp_path)
     own = str(tmp_path / "grasps.json")
     main(["validate", own, "--limit", "1", "--out", str(tmp_path), "-q", "--protocol", "dexonomy"])
-    path = tmp_path / "judgements.json"
-    record = json.loads(path.read_text())
-    change(record)
-    path.write_text(json.dumps(record))
+    changed(tmp_path / "judgements.json", change)
     assert main(["report", str(tmp_path), "-q"]) == Exit.INPUT
     found = capsys.readouterr().err
     assert "judgements.json" in found

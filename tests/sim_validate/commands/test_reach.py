@@ -11,9 +11,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.files.json_text import record_of
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands import reach as simulated
 from sim_validate.files.result_folders import REACHES
-from sim_validate.hands.execute_hand import held_by_hands
 from sim_validate.hands.validate_hand import MOST_PUSH_N
 from sim_validate.main import main
 from sim_validate.records.reaches import ReachesFile, read_reaches
@@ -62,16 +60,9 @@ def test_a_grasp_that_is_not_reached_is_a_negative_answer(bracket_plan, tmp_path
     assert "no pose was found" in only["explanation"]
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--hand", "nose"], "hand must be allegro, allegro-urdf, leap"),
-        (["--grasp", "c-9-9-9-9"], "c-9-9-9-9"),
-    ],
-)
-def test_what_cannot_be_asked_is_refused(words, said, bracket_plan, capsys):
-    assert main(["reach", str(bracket_plan), *words]) in {Exit.INPUT, Exit.USAGE}
-    assert said in capsys.readouterr().err
+def test_a_hand_that_there_is_not_is_refused(bracket_plan, capsys):
+    assert main(["reach", str(bracket_plan), "--hand", "nose"]) == Exit.INPUT
+    assert "hand must be allegro, allegro-urdf, leap" in capsys.readouterr().err
 
 
 def test_three_fingers_stand_at_contacts_that_the_file_names(bracket_plan, tmp_path, capsys):
@@ -193,29 +184,6 @@ def test_a_hand_of_known_motors_and_links_says_what_it_carries(bracket_plan, tmp
     assert "Payload in any orientation" in page
 
 
-def test_what_was_tried_before_an_interrupt_is_kept(bracket_plan, tmp_path, monkeypatch):
-    def one_and_stop(jobs, processes):
-        yield from held_by_hands(jobs[:1], processes)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(simulated, "held_by_hands", one_and_stop)
-    words = [
-        "reach",
-        str(bracket_plan),
-        "--simulate",
-        "--torque-limit-n-m",
-        "0.35",
-        "--jobs",
-        "1",
-    ]
-    assert main([*words, "--out", str(tmp_path)]) == Exit.INTERRUPTED
-    record = record_of(ReachesFile, (tmp_path / REACHES).read_text(), REACHES, schema=1)
-    assert not record["summary"]["complete"]
-    reached = [each for each in record["reaches"] if each["reached"]]
-    assert len(reached) >= 2
-    assert ["simulated" in each for each in reached] == [True] + [False] * (len(reached) - 1)
-
-
 def test_a_hand_without_torque_limits_is_not_simulated(bracket_plan, capsys):
     assert main(["reach", str(bracket_plan), "--simulate"]) == Exit.INPUT
     assert "give one for all joints with --torque-limit-n-m" in capsys.readouterr().err
@@ -249,7 +217,6 @@ def test_a_hand_executes_the_grasps_that_it_reaches(bracket_plan, tmp_path, caps
     assert main(["report", str(tmp_path), "-q"]) == Exit.GOOD
     page = (tmp_path / "report" / "grasps" / f"{reached[0]['id']}.html").read_text()
     assert "Executed with the hand" in page
-    assert "Payload of the squeeze" in page
     trials = reached[0]["executed"]["execution"]
     said = f"survived {trials['trials'] - len(trials['lost'])} of {trials['trials']} trials"
     first = (tmp_path / "report" / "index.html").read_text()
@@ -268,9 +235,6 @@ def test_where_a_hand_loses_the_object_what_would_be_enough_is_said(bracket_plan
     assert enough["push_n"] is None
     assert enough["reason"].startswith("it is proved that no balanced squeeze within the torques")
     assert enough["reason"] in capsys.readouterr().err
-    assert main(["report", str(tmp_path), "-q"]) == Exit.GOOD
-    page = (tmp_path / "report" / "grasps" / f"{one['id']}.html").read_text()
-    assert "What would be enough" in page
 
 
 def test_a_hand_too_weak_for_an_object_says_so(bracket_plan, tmp_path, capsys):

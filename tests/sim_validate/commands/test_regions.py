@@ -79,13 +79,6 @@ def test_where_nothing_can_be_proved_it_is_said(folder, capsys):
     assert "no regions for 1 of 1 grasps: " in capsys.readouterr().out
 
 
-def test_what_is_wrong_is_refused(folder, capsys):
-    grasps = str(folder / "grasps.json")
-    assert main(["regions", grasps, "--grasp", "none"]) == Exit.INPUT
-    assert "expected a grasp none to certify" in capsys.readouterr().err
-    assert main(["regions", grasps, "--max-cones", "1"]) == Exit.USAGE
-
-
 def test_grasps_that_are_not_closed_do_not_stop_the_others(folder, tmp_path, capsys):
     grasps = json.loads((folder / "grasps.json").read_text())["grasps"]
     frictions = sorted(grasp["critical_friction"] for grasp in grasps)

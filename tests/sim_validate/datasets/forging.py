@@ -3,7 +3,7 @@
 import dataclasses
 import hashlib
 
-from sim_validate.datasets.manifest import read_manifest, write_manifest
+from sim_validate.datasets.manifest import listed, read_manifest, write_manifest
 from sim_validate.datasets.parquet import parquet_bytes, read_rows
 
 
@@ -30,3 +30,11 @@ def forged(folder, name, change):
         entry, bytes=len(data), sha256=hashlib.sha256(data).hexdigest(), rows=len(rows)
     )
     write_manifest(folder, dataclasses.replace(manifest, files=(*others, changed)))
+
+
+def relisted(folder, path, **changes):
+    """Write the manifest with the hash that a file has now, and with other changes."""
+    manifest = read_manifest(folder)
+    kept = [each for each in manifest.files if each.path != path.relative_to(folder).as_posix()]
+    files = (*kept, listed(folder, path))
+    write_manifest(folder, dataclasses.replace(manifest, files=files, **changes))

@@ -21,7 +21,7 @@ from sim_validate.datasets.verify import Sample, verify
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, WorkerEndedError, contents, silent
 from tests.sim_validate.datasets.learned import rows_of
-from tests.sim_validate.datasets.pair import CONFIG, all_rows
+from tests.sim_validate.datasets.pair import CONFIG
 
 pytest.importorskip("pyarrow")
 ROOT = Path(__file__).parents[3]
@@ -33,8 +33,8 @@ class KilledError(BaseException):
 
 def test_a_dataset_holds_every_object_at_every_friction(dataset):
     assert verify(dataset) == []
-    grasps = [row for row in all_rows(dataset, "grasps") if row["label"] == "grasp"]
-    names = {row["object_id"]: row["source_name"] for row in all_rows(dataset, "objects")}
+    grasps = [row for row in rows_of(dataset, "grasps") if row["label"] == "grasp"]
+    names = {row["object_id"]: row["source_name"] for row in rows_of(dataset, "objects")}
     assert sorted(names.values()) == ["tetrahedron", "wedge"]
     assert {(names[row["object_id"]], row["friction"]) for row in grasps} == {
         (name, friction) for name in CONFIG.objects for friction in CONFIG.frictions
@@ -310,7 +310,7 @@ def test_scenes_are_written_on_request(dataset, tmp_path):
     config = dataclasses.replace(CONFIG, scenes=True, objects=("tetrahedron",), frictions=(0.5,))
     build(config, tmp_path / "ds", Here(), silent)
     assert verify(tmp_path / "ds", Sample(1.0)) == []
-    rows = [row for row in all_rows(tmp_path / "ds", "grasps") if row["label"] == "grasp"]
+    rows = [row for row in rows_of(tmp_path / "ds", "grasps") if row["label"] == "grasp"]
     scenes = {path.stem: path for path in (tmp_path / "ds" / "scenes").iterdir()}
     assert rows
     assert sorted(scenes) == sorted(row["grasp_id"] for row in rows)
@@ -327,4 +327,4 @@ def test_many_rows_take_several_files(dataset, tmp_path, monkeypatch):
     files = sorted((tmp_path / "ds" / "data" / "trials").glob("*.parquet"))
     assert len(files) > len(list((dataset / "data" / "trials").glob("*.parquet")))
     for name in ("objects", "grasps", "trials"):
-        assert all_rows(tmp_path / "ds", name) == all_rows(dataset, name)
+        assert rows_of(tmp_path / "ds", name) == rows_of(dataset, name)

@@ -21,7 +21,7 @@ from sim_validate.execution.settings import AskedExecution
 from sim_validate.execution.verdict import ExecutedGrasp
 from tests.sim_validate.datasets.engines import Here, silent
 from tests.sim_validate.datasets.forging import forged
-from tests.sim_validate.datasets.pair import all_rows
+from tests.sim_validate.datasets.learned import rows_of
 
 pytest.importorskip("pyarrow")
 SETTINGS = sv.ExecutionSettings(mass_kg=1.2, trials=("weight",))
@@ -46,8 +46,8 @@ def copied(executed, tmp_path):
 
 def grasps_of(folder):
     """Rows of planned grasps by the name of their object."""
-    names = {row["object_id"]: row["source_name"] for row in all_rows(folder, "objects")}
-    rows = [row for row in all_rows(folder, "grasps") if row["control_of"] is None]
+    names = {row["object_id"]: row["source_name"] for row in rows_of(folder, "objects")}
+    rows = [row for row in rows_of(folder, "grasps") if row["control_of"] is None]
     return {names[row["object_id"]]: row for row in rows}
 
 
@@ -60,7 +60,7 @@ def test_a_grasp_that_loses_its_object_is_a_natural_negative(executed):
     assert not lost["survived"]
     assert lost["predicted_first_slip"] < 1.0
     assert lost["load_multiple"] < 1.0
-    controls = [row for row in all_rows(executed, "grasps") if row["control_of"] is not None]
+    controls = [row for row in rows_of(executed, "grasps") if row["control_of"] is not None]
     assert controls
     assert all(row["executed"] is False and row["survived"] is None for row in controls)
 
@@ -76,7 +76,7 @@ def test_the_rows_say_what_an_execution_says(executed):
     assert row["execution_mismatches"] == sum(not each.let_go for each in found.controls)
     (trial,) = found.trials
     (stored,) = [
-        each for each in all_rows(executed, "executions") if each["grasp_id"] == row["grasp_id"]
+        each for each in rows_of(executed, "executions") if each["grasp_id"] == row["grasp_id"]
     ]
     for name in ("kind", "name", "survived", "fate", "slip_m", "displacement_m", "turn_rad",
                  "predicted_first_slip", "simulated_first_slip"):  # fmt: skip

@@ -4,7 +4,6 @@ import shutil
 import pytest
 import trimesh
 
-import grasp_core as gc
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.units import body_of, units_of
 
@@ -53,12 +52,3 @@ def test_more_objects_and_frictions_leave_the_units_that_were_there():
         CONFIG, objects=(*CONFIG.objects, "prism"), frictions=(0.3, 0.5, 1.0)
     )
     assert {unit.id for unit in units_of(CONFIG)} < {unit.id for unit in units_of(more)}
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [("wegde", "did you mean wedge"), ("nowhere/part.stl", r"part\.stl: the mesh file cannot")],
-)
-def test_objects_that_are_nowhere_are_refused_before_anything_runs(name, message):
-    with pytest.raises(gc.InputError, match=message):
-        units_of(DatasetConfig(objects=(name,)))

@@ -1,7 +1,6 @@
 """What is wrong with a dataset is named: files, rows, and what comes out otherwise."""
 
 import dataclasses
-import hashlib
 import json
 import shutil
 
@@ -12,13 +11,15 @@ import trimesh
 import grasp_core as gc
 from scenes.example_objects import example_object
 from sim_validate.datasets.build import build
-from sim_validate.datasets.manifest import listed, read_manifest, write_manifest
+from sim_validate.datasets.manifest import read_manifest, write_manifest
 from sim_validate.datasets.meshes import mesh_text
 from sim_validate.datasets.open_dataset import load_dataset
 from sim_validate.datasets.verify import Sample, drawn, verify
+from tests.sim_validate.changing import changed
 from tests.sim_validate.datasets.engines import Here, contents, silent
-from tests.sim_validate.datasets.forging import forged
-from tests.sim_validate.datasets.pair import CONFIG, all_rows
+from tests.sim_validate.datasets.forging import forged, relisted
+from tests.sim_validate.datasets.learned import rows_of
+from tests.sim_validate.datasets.pair import CONFIG
 
 pytest.importorskip("pyarrow")
 
@@ -145,7 +146,7 @@ def test_with_other_rounding_verdicts_and_critical_frictions_count(copy, change)
 
 
 def test_a_grasp_that_was_left_out_is_named(copy):
-    (first, *_) = all_rows(copy, "grasps")
+    (first, *_) = rows_of(copy, "grasps")
     gone = first["grasp_id"]
 
     def kept(row):
@@ -175,25 +176,19 @@ def test_objects_of_the_same_file_name_are_told_apart(tmp_path):
 
 
 def test_what_is_quarantined_has_no_rows(copy):
-    (row, *_) = all_rows(copy, "objects")
+    (row, *_) = rows_of(copy, "objects")
     line = {"object": "x", "source_sha256": row["source_sha256"], "given": [], "reason": "no"}
     lines = [json.dumps(line | {"friction": friction}) for friction in CONFIG.frictions]
     path = copy / "quarantine.jsonl"
     path.write_text("\n".join(lines) + "\n")
-    manifest = read_manifest(copy)
-    kept = [each for each in manifest.files if each.path != path.name]
-    files = (*kept, listed(copy, path))
-    write_manifest(copy, dataclasses.replace(manifest, files=files, quarantined=2))
+    relisted(copy, path, quarantined=2)
     assert sum("left out, but it has rows" in fault for fault in verify(copy, Sample(1.0))) == 2
 
 
 def test_settings_that_are_not_the_manifests_are_named(copy):
     path = copy / "config.toml"
     path.write_text(path.read_text().replace("limit = 2", "limit = 3"))
-    manifest = read_manifest(copy)
-    kept = [each for each in manifest.files if each.path != path.name]
-    files = (*kept, listed(copy, path))
-    write_manifest(copy, dataclasses.replace(manifest, files=files))
+    relisted(copy, path)
     assert any("not the configuration" in fault for fault in verify(copy))
 
 
@@ -204,14 +199,6 @@ def test_a_larger_sample_holds_a_smaller_one():
     assert more[:10] == some
     assert drawn(units, Sample(0.1, seed=4)) != some
     assert len(drawn(units, Sample(0.001))) == 1
-
-
-def rewritten(folder, change):
-    """The manifest's text with a change."""
-    path = folder / "manifest.json"
-    record = json.loads(path.read_text())
-    change(record)
-    path.write_text(json.dumps(record))
 
 
 @pytest.mark.parametrize(
@@ -225,7 +212,7 @@ def rewritten(folder, change):
     ],
 )
 def test_a_manifest_that_is_none_is_refused_by_field(copy, change, words):
-    rewritten(copy, change)
+    changed(copy / "manifest.json", change)
     with pytest.raises(gc.InputError, match=rf"manifest\.json: .*{words}"):
         verify(copy)
     with pytest.raises(gc.InputError, match=words):
@@ -259,9 +246,7 @@ def test_nothing_is_loaded_where_any_byte_is_another(copy):
 def test_a_line_of_the_quarantine_that_is_none_is_named(copy):
     path = copy / "quarantine.jsonl"
     path.write_text('{"object": 3}\n')
-    data = path.read_bytes()
-    rewritten(copy, lambda r: next(each for each in r["files"] if each["path"] == path.name).update(
-        bytes=len(data), sha256=hashlib.sha256(data).hexdigest()))  # fmt: skip
+    relisted(copy, path)
     (fault,) = verify(copy)
     assert "quarantine.jsonl: line 1: object: expected text, got 3" in fault
 

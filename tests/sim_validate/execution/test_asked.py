@@ -51,14 +51,8 @@ def test_a_configuration_without_executions_does_not_mention_them():
         ("soft", 'execution: expected a table of settings, got "soft"'),
         ({}, "execution: expected one of mass_kg and density_kg_m3, got neither"),
         ({"mass_kg": 1.0, "density_kg_m3": 1.0}, "got both"),
-        ({"mass_kg": 1.0, "colour": "red"}, 'no setting is named "colour"; choose from mass_kg'),
         ({"mass_kg": 1.0, "hand": {"left": 1}}, 'execution.hand: no setting is named "left"'),
-        ({"mass_kg": 1.0, "hand": 3}, "execution.hand: expected an object"),
-        ({"mass_kg": "heavy"}, 'execution.mass_kg: expected a number, got "heavy"'),
         ({"density_kg_m3": True}, "execution: density_kg_m3 must be a number"),
-        ({"density_kg_m3": -1.0}, "execution: density_kg_m3 must be"),
-        ({"mass_kg": 1.0, "trials": ["juggle"]}, "execution.trials"),
-        ({"mass_kg": 1.0, "lift_s": 1e9}, "execution: lift_s must be"),
     ],
 )
 def test_what_is_refused_names_the_setting(table, message):

@@ -70,3 +70,19 @@ def test_an_object_that_slides_while_fingers_close_is_let_go():
         assert found.controls_let_go
         sliding += found.controls[2].first_slip == 0.0
     assert sliding > 0
+
+
+def test_the_slipping_load_slips_also_where_a_push_reaches_its_limit_first():
+    """Some of these squeezes end at a limit of 10 N, which simulated springs do not have."""
+    body = example_object("l-bracket")
+    grasps = gc.plan(body, FRICTION, families=("pencil",), limit=8).grasps
+    limited = 0
+    for grasp in grasps:
+        best = chosen_squeeze(body, grasp, FRICTION, SETTINGS)
+        load = slipping_load(best)
+        slip = gc.first_slip(best.grip, load, model="linear")
+        assert slip.event == "slip"
+        assert slip.multiple == pytest.approx(1.0, rel=1e-6)
+        assert np.linalg.norm(load) >= np.linalg.norm(best.load) * (1.0 - 1e-6)
+        limited += gc.first_slip(best.grip, best.load, model="linear").multiple > 1.01
+    assert 0 < limited < len(grasps)

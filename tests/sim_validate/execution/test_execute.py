@@ -16,7 +16,6 @@ from tests.sim_validate.execution.held_rigs import G, opposed, planned
 
 LIGHT = sv.ExecutionSettings(0.1)
 FAMILIES = ("concurrent", "pencil", "regulus", "free")
-NUMBERS = ("slip_m", "displacement_m", "turn_rad", "predicted_first_slip", "simulated_first_slip")
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ import trimesh
 from grasp_core.execution.grips import unsqueezed
 from scenes.execution.held import TOUCH, held_layout
 from scenes.fingertips import fitting_radius
+from sim_validate.execution import trials
 from sim_validate.execution.trials import ROOM, met, misplacements
 from tests.sim_validate.execution.held_rigs import planned
 
@@ -110,3 +111,13 @@ def test_an_object_in_its_place_is_met_in_the_planned_places():
     assert met(layout, poses, OFF_M, OFF_RAD) == pytest.approx(
         np.zeros((3, 4, 3)), abs=1e-6 * layout.radius_m
     )
+
+
+def test_fingertips_meet_the_same_points_of_triangles_nearby_as_of_all(monkeypatch):
+    layout = layout_of("l-bracket")
+    near = trials._near(layout, layout.tip_centers[:1], 1e-3)
+    assert 0 < len(near) < len(layout.triangles)
+    poses = misplacements(layout, 2e-3, 0.03, 20, seed=1)
+    few = met(layout, poses, 2e-3, 0.03)
+    monkeypatch.setattr(trials, "_near", lambda layout, *_: layout.triangles)
+    np.testing.assert_array_equal(few, met(layout, poses, 2e-3, 0.03))

@@ -8,7 +8,15 @@ import pytest
 from scenes.execution.held import hinged, rotations
 from sim_validate.execution.bench import HeldMotion
 from sim_validate.execution.paths import Table, idle
-from sim_validate.execution.slips import SLID, TOUCHED, outcome, seen, slides
+from sim_validate.execution.slips import (
+    SLID,
+    TOUCHED,
+    Seen,
+    _first_slip,
+    outcome,
+    seen,
+    slides,
+)
 from tests.judges import random_rotation
 from tests.scenes.execution.test_turns import quaternions, turn_about
 from tests.sim_validate.execution.held_rigs import box_scene
@@ -237,3 +245,12 @@ def test_a_contact_that_is_on_its_cone_when_the_full_load_has_come_has_slipped()
 def test_only_a_take_off_may_touch_a_cone():
     motion, drive = taken_off([40], 0.5 * TOUCHED)
     assert judged(motion, replace(drive, table=None)).slipped
+
+
+def test_a_slip_in_the_first_sample_of_a_load_has_a_multiple():
+    """Before it nothing has changed and no load is there: nothing can be extrapolated from that."""
+    forces = np.array([[[1.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]], [[1.0, 0.6, 0.0]]])
+    still, unmoved = np.zeros((3, 1, 3)), np.tile(np.eye(3), (3, 1, 1))
+    found = Seen(still[:, 0], unmoved, unmoved[:, None], still, forces)
+    shares = np.array([0.0, 0.0, 0.3])
+    assert _first_slip(found, shares, FRICTION[:1], 0) == 0.3

@@ -12,7 +12,6 @@ from tests.grasp_core.execution.held import box
 from tests.sim_validate.execution.held_rigs import G, box_scene
 
 SETTINGS = sv.ExecutionSettings(0.3)
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def listed(**changes):

@@ -15,8 +15,6 @@ from sim_validate.execution.verdict import (
     ExecutionTrial,
     best_executed,
     ended,
-    losses_in_words,
-    trial_in_words,
 )
 
 
@@ -34,28 +32,6 @@ def execution(*trials, controls=()):
 )
 def test_an_object_survives_if_it_survives_every_trial_of_at_least_one(survived, expected):
     assert execution(*(trial("knock", each) for each in survived)).survived is expected
-
-
-def test_survival_is_counted_by_kind():
-    found = execution(
-        trial("knock", True), trial("stop", False), trial("knock", False), trial("knock", True)
-    )
-    assert found.survival("knock") == (2, 3)
-    assert found.survival("stop") == (0, 1)
-    assert found.survival("lift") == (0, 0)
-    assert [one.kind for one in found.of_kind("knock")] == ["knock"] * 3
-
-
-def test_losses_are_told_in_millimetres_and_degrees_as_limits_are_given():
-    turn = math.radians(107.5)
-    lost = ExecutionTrial(
-        "knock", "knock -y", False, "slipped", 2e-3, 0.123, turn, 0.8, 0.9, 0.75, 1e-3
-    )
-    assert losses_in_words(execution(trial("weight", True), lost)) == [trial_in_words(lost)]
-    assert trial_in_words(lost) == (
-        "knock -y: moved or turned too far after a slip, moved 123 mm and turned 108 degrees; "
-        "first slip predicted at 0.8 of the load, simulated at 0.75; loss predicted at 0.9"
-    )
 
 
 @pytest.mark.parametrize(

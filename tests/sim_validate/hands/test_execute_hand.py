@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from grasp_core.errors import InputError, NoForcesError
+from grasp_core.errors import InputError
 from sim_validate.hands.execute_hand import hand_execution_settings, hand_squeeze
 from tests.grasp_core.hands.gripping import FRICTION, scaled
 from tests.sim_validate.hands.executing import MASS, OBJECT, RADIUS, stood
@@ -69,14 +69,3 @@ def test_what_cannot_be_executed_is_refused():
         sv.execute_hand(gc.load_hand("allegro"), body, reach, FRICTION, mass_kg=MASS)
     with pytest.raises(InputError, match="not in force closure"):
         sv.execute_hand(hand, body, reach, 0.001, mass_kg=MASS)
-    with pytest.raises((InputError, NoForcesError)):
-        sv.execute_hand(hand, body, reach, FRICTION, mass_kg=-1.0)
-
-
-def test_threads_and_repetitions_change_nothing():
-    reach, hand = stood("leap")
-    body = scaled(OBJECT, RADIUS)
-    settings = replace(hand_execution_settings(MASS), trials=("stop",))
-    one = sv.execute_hand(hand, body, reach, FRICTION, settings)
-    two = sv.execute_hand(hand, body, reach, FRICTION, settings, threads=2)
-    assert one == two

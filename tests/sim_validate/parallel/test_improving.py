@@ -1,7 +1,6 @@
 import json
 
 import numpy as np
-import pytest
 
 from grasp_core.records.grasps_json import grasps_from_json
 from sim_validate.cli.exit_codes import Exit
@@ -43,27 +42,9 @@ def test_grasps_that_end_at_the_same_contacts_are_kept_once(tmp_path):
             assert np.abs(places[0] - places[1]).max() > 0.01 * saved.body.radius
 
 
-def test_without_optimisation_the_list_is_empty(tmp_path):
-    document, saved = planned(tmp_path, "tetrahedron", "--limit", "1")
-    assert document["optimization"] == []
-    assert saved.grasps[0].id == "c-0-1-2-3"
-
-
 def test_optimised_grasps_hold_in_simulation(tmp_path):
     flags = ["tetrahedron", "--limit", "1", "--optimize", "--out", str(tmp_path)]
     assert main(["run", *flags, "--no-report"]) == Exit.GOOD
     verdicts = json.loads((tmp_path / "verdicts.json").read_text())
     assert all(grasp["held"] for grasp in verdicts["verdicts"])
     assert (tmp_path / "scenes" / "o-c-0-1-2-3.xml").exists()
-
-
-@pytest.mark.parametrize(
-    ("flags", "code", "message"),
-    [
-        (["--ceiling", "10"], Exit.INPUT, "--ceiling needs --optimize"),
-        (["--optimize", "--finger-radius-m", "-1"], Exit.USAGE, "--finger-radius-m must be"),
-    ],
-)
-def test_settings_that_make_no_sense_are_refused(flags, code, message, capsys):
-    assert main(["plan", "tetrahedron", *flags]) == code
-    assert message in capsys.readouterr().err

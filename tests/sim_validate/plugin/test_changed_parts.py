@@ -19,6 +19,7 @@ from sim_validate.baselines.suite import suite_from_toml
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from tests.bad_input.mesh_texts import obj
+from tests.sim_validate.changing import changed, first_grasp
 from tests.sim_validate.plugin.project import copied, properties_in, run_pytest
 
 TOP = 3
@@ -116,10 +117,8 @@ def test_a_grasp_that_the_changed_part_does_not_have_fails_and_is_gone(project):
 def test_a_grasp_that_is_better_fails_only_where_that_is_strict(project):
     """The baseline says that the grasp needed more friction than it does on the changed part."""
     edited(project)
-    path = project / "part.baseline.json"
-    record = json.loads(path.read_text())
-    record["grasps"][0].update(critical_friction=0.2, simulated_critical_friction=0.2)
-    write_text(path, json.dumps(record))
+    needed = first_grasp(critical_friction=0.2, simulated_critical_friction=0.2)
+    record = changed(project / "part.baseline.json", needed)
     code, said = run_pytest(project, "--junitxml", "j.xml")
     assert code == 0, said
     kept = kept_in(project)
@@ -135,10 +134,7 @@ def test_a_grasp_that_is_better_fails_only_where_that_is_strict(project):
 
 def test_a_grasp_that_is_worse_fails_and_the_face_that_moved_is_named(project):
     edited(project)
-    path = project / "part.baseline.json"
-    record = json.loads(path.read_text())
-    record["grasps"][0].update(limit_n=1e3)
-    write_text(path, json.dumps(record))
+    changed(project / "part.baseline.json", first_grasp(limit_n=1e3))
     code, said = run_pytest(project)
     assert code == 1
     assert ": regressed" in said
@@ -188,9 +184,7 @@ def test_the_planned_part_put_back_after_a_blessed_change_is_judged_like_any_oth
     said = " ".join(capsys.readouterr().out.split())
     assert "1 within bands" in said
     assert moved in said
-    record = json.loads((project / "part.baseline.json").read_text())
-    record["grasps"][0].update(limit_n=1e3)
-    write_text(project / "part.baseline.json", json.dumps(record))
+    changed(project / "part.baseline.json", first_grasp(limit_n=1e3))
     code, said = run_pytest(project)
     assert code == 1
     assert "worse on the changed part: " in said
@@ -215,11 +209,9 @@ def test_a_part_in_a_baseline_that_is_not_the_recorded_one_is_refused(project):
     edited(project)
     suite_from_toml(project / "part.grasps.toml").bless()
     edited(project)
-    path = project / "part.baseline.json"
-    record = json.loads(path.read_text())
-    for vertex in record["part"]["vertices_m"]:
-        vertex[0] += 0.001
-    write_text(path, json.dumps(record))
+    part = json.loads((project / "part.baseline.json").read_text())["part"]
+    part["vertices_m"] = [[x + 0.001, y, z] for x, y, z in part["vertices_m"]]
+    changed(project / "part.baseline.json", lambda record: record.update(part=part))
     with pytest.raises(gc.InputError, match="not the one that its content_sha256 says"):
         _ = suite_from_toml(project / "part.grasps.toml").compared
 

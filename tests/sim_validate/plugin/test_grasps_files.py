@@ -9,6 +9,7 @@ from sim_validate.baselines.compare import Status
 from sim_validate.baselines.suite import suite_from_toml
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
+from tests.sim_validate.changing import changed, first_grasp
 from tests.sim_validate.plugin.project import (
     CODE,
     copied,
@@ -53,9 +54,8 @@ def test_a_grasp_that_slips_says_at_which_wrench(blessed, tmp_path):
     """A wrench in the baseline's settings that no finger can hold."""
     copied(blessed, tmp_path)
     baseline = tmp_path / "wedge.baseline.json"
-    record = json.loads(baseline.read_text())
-    record["settings"]["wrenches"] = {"far too much": [0.0, 0.0, 90.0, 0.0, 0.0, 0.0]}
-    baseline.write_text(json.dumps(record))
+    push = {"far too much": [0.0, 0.0, 90.0, 0.0, 0.0, 0.0]}
+    changed(baseline, lambda record: record["settings"].update(wrenches=push))
     code, said = run_pytest(tmp_path)
     assert code == 1
     assert "held -> slipped at far too much" in said
@@ -71,10 +71,7 @@ def test_a_grasp_that_slips_says_at_which_wrench(blessed, tmp_path):
 )
 def test_the_file_of_results_has_the_status_and_figures_of_each_grasp(blessed, tmp_path, workers):
     copied(blessed, tmp_path)
-    baseline = tmp_path / "wedge.baseline.json"
-    record = json.loads(baseline.read_text())
-    record["grasps"][0].update(limit_n=1e3)
-    baseline.write_text(json.dumps(record))
+    changed(tmp_path / "wedge.baseline.json", first_grasp(limit_n=1e3))
     write_text(tmp_path / "test_mine.py", CODE)
     code, said = (run_pytest_alone if workers else run_pytest)(
         tmp_path, "--junitxml", "j.xml", *workers

@@ -8,7 +8,6 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.errors import InputError
 from grasp_core.values import Contact
 from sim_validate.protocols.judging import judge_by, judge_hand_by
 from sim_validate.protocols.published import protocol, protocol_names
@@ -75,12 +74,6 @@ def test_a_hand_passes_tests_as_well(name):
     assert found.ours.held, found.ours.reason
     assert found.hand == "allegro"
     assert found.predicted
-
-
-def test_contacts_that_are_too_few_or_no_contacts_are_refused():
-    for wrong in ([GRASP.contacts[0]], ["contact"] * 3):
-        with pytest.raises(InputError, match="grasp"):
-            judge_by("dexgraspbench", BODY, wrong)
 
 
 def test_the_object_has_the_mass_of_the_test():

@@ -104,45 +104,24 @@ def of_first(**changes):
 
 BAD = {
     "kind": (of_trial(kind="throw"), r"executions\[0\]\.trials\[0\]\.kind: expected 'weight'"),
-    "fate": (of_trial(fate="flew"), r"trials\[0\]\.fate: expected 'stuck'"),
     "slip": (
         of_trial(slip_m=None),
         r"trial lift: slip_m, displacement_m and turn_rad are infinite",
     ),
     "fell": (of_trial(survived=True), r"trial lift: survived is false where the fate is dropped"),
-    "word": (of_trial(survived="no"), r"trials\[0\]\.survived: expected true or false"),
-    "survival": (
-        of_trial(survived=True, fate="stuck"),
-        r"executions\[0\]\.survived: expected true",
-    ),
     "opposite": (of_first(survived=True), r"executions\[0\]\.survived: expected false"),
-    "squeeze": (of_first(squeeze_n=[[1, 2, 3]]), r"squeeze_n: expected at least 2 items, got 1"),
     "no squeeze": (of_first(squeeze_n=None), r"executions\[0\]\.squeeze_n: null is not allowed"),
-    "no load": (of_first(load_multiple=None), r"\.load_multiple: null is not allowed where"),
-    "mass": (lambda d: d["settings"].update(mass_kg=-1), "settings: mass_kg must be a number"),
-    "lost": (lambda d: d["settings"].pop("mass_kg"), r"settings\.mass_kg: missing"),
-    "default": (lambda d: d["settings"].pop("shake_g"), r"settings\.shake_g: missing; add it"),
-    "nested": (
-        lambda d: d["settings"]["hand"].pop("down"),
-        r"settings\.hand\.down: missing; add it",
-    ),
     "tolerance": (
         lambda d: d["executions"][0]["physics"].pop("tolerance"),
         r"executions\[0\]\.physics\.tolerance: missing; add it",
     ),
-    "extra": (lambda d: d["settings"].update(speed=1), r"settings\.speed: unknown key"),
     "hand": (
         lambda d: d["settings"]["hand"].update(down=[0, 0, 0]),
         "settings: down must be a direction",
     ),
-    "schema": (lambda d: d.update(schema=2), "schema: expected 1, got 2: a newer graspproof"),
-    "friction": (lambda d: d.update(friction=0), "friction: expected more than 0.0, got 0"),
-    "object": (lambda d: d.pop("object"), "object: missing"),
     "physics": (of_first(physics={"timestep": 1}), r"executions\[0\]\.physics: timestep must be"),
-    "unknown": (of_first(physics={"speed": 1}), r"executions\[0\]\.physics\.speed: unknown key"),
     "reason": (of_first(reason="heavy"), r"executions\[0\]\.load_multiple: expected nothing"),
     "radii": (of_first(tip_radius_m=[0.004] * 3), r"executions\[0\]\.tip_radius_m must have"),
-    "radius": (of_first(tip_radius_m=[0, 1, 1, 1]), r"tip_radius_m\[0\]: expected more than 0"),
     "half": (
         of_first(
             enough={
@@ -172,15 +151,3 @@ def test_a_file_that_is_wrong_is_refused_with_the_field(name, tmp_path):
     path.write_text(json.dumps(document))
     with pytest.raises(gc.InputError, match=rf"x\.json: .*{said}"):
         sv.load_executions(path)
-
-
-def test_another_file_is_called_by_its_name(tmp_path):
-    path = tmp_path / "grasps.json"
-    path.write_text('{"schema": 1, "verdicts": []}')
-    with pytest.raises(gc.InputError, match=r"this is a verdicts\.json, not an executions\.json"):
-        sv.load_executions(path)
-    path.write_text("{")
-    with pytest.raises(gc.InputError, match="not complete JSON"):
-        sv.load_executions(path)
-    with pytest.raises(gc.InputError, match="cannot be read"):
-        sv.load_executions(tmp_path / "none.json")

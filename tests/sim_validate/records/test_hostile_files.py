@@ -54,16 +54,6 @@ def test_no_more_is_read_than_the_limit(tmp_path):
         read_bytes(path, 4)
 
 
-@pytest.mark.parametrize("command", [["analyze"], ["view"], ["replay"], ["validate"]])
-def test_commands_end_with_code_4_at_a_pipe(tmp_path, capsys, command):
-    os.mkfifo(tmp_path / "pipe")
-    assert main([*command, str(tmp_path / "pipe")]) == Exit.INPUT
-    assert (
-        "pipe: the file cannot be read (the path is a folder, a pipe or a device"
-        in capsys.readouterr().err
-    )
-
-
 def test_a_configuration_of_flags_is_a_file_of_values(tmp_path, capsys):
     path = tmp_path / "c.toml"
     for text, words in (

@@ -30,13 +30,8 @@ def test_a_file_changes_what_it_names_and_nothing_else(tmp_path):
     ("text", "words"),
     [
         ("[physics]\ntimestp = 0.001\n", r"physics: no setting is named .timestp.*timestep"),
-        ("[physic]\ntimestep = 0.001\n", "expected tables physics.* got .physic."),
         ("timestep = 0.001\n", "expected tables physics.* got .timestep."),
-        ('[physics]\ntimestep = "slow"\n', r"physics.timestep: .*number"),
-        ("[physics]\ntimestep = -0.001\n", "timestep must be a number from 1e-05"),
-        ("[physics]\ntolerance = nan\n", "physics.tolerance: expected a finite"),
         ("[hold]\nload_share = 2.0\n", "load_share must be a number from 0.1 up to 0.999"),
-        ("[hold]\ncontrol_load = 1e-6\n", "control_load must be a number from 0.05 up to 2"),
         ("[physics]\ngravity = [0.0, 0.0, -9.81]\n", r"gravity must be zero.*--weight-n"),
         ("[physics]\ncondim = 4\n", r"setup.toml: physics: physics.condim must be 3"),
         ("[physics\n", "not TOML"),
@@ -71,14 +66,9 @@ def test_wrenches_of_a_task_are_read_as_they_are(tmp_path):
             "wrench .a.: its largest component must be from 1e-09",
         ),
         (
-            '{"wrenches": [{"name": "a", "force_n": [1, 0, 0], "mass": 1}]}',
-            "mass: unknown key",
-        ),
-        (
             '{"wrenches": [{"name": "a", "force_n": [1, 0, 1e999]}]}',
             "force_n\\[2\\]: expected",
         ),
-        ("[", "not complete JSON"),
     ],
 )
 def test_what_is_wrong_with_wrenches_is_said(tmp_path, text, words):

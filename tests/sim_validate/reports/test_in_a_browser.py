@@ -19,7 +19,8 @@ from tests.browser import (
     requests_of,
 )
 from tests.scenes.drawing.standing import GRASP, run_with_hand
-from tests.sim_validate.reports.test_report import EVIL, changed
+from tests.sim_validate.changing import changed
+from tests.sim_validate.reports.test_report import EVIL
 
 pytestmark = [pytest.mark.slow, needs_browser]
 
@@ -234,15 +235,6 @@ def test_text_can_be_read_by_day_and_by_night(browser, shown, kind, width, dark)
     assert [text for contrast, text in found if contrast < READABLE] == []
     light = browser.execute_script("return getComputedStyle(document.body).backgroundColor")
     assert (light == "rgb(255, 255, 255)") != dark
-
-
-def test_the_drawing_that_turns_fits_its_window(browser, shown):
-    opened(browser, shown["turntable"], width=1280)
-    tall = browser.execute_script("return document.documentElement.scrollHeight")
-    assert tall <= browser.execute_script("return window.innerHeight")
-    said = browser.execute_script("return document.body.innerText")
-    for part in ("friction cone", "force cone", "critical friction", "margin of closure"):
-        assert part in said
 
 
 def test_tables_sort_by_a_heading_and_with_keys(browser, shown):

@@ -22,7 +22,8 @@ from tests.scenes.drawing.standing import (
     small_plan,
     standing,
 )
-from tests.sim_validate.reports.test_report import Page, changed
+from tests.sim_validate.changing import changed
+from tests.sim_validate.reports.test_report import Page
 
 (OTHER,) = (each.id for each in small_plan() if each.id != GRASP)
 
@@ -143,30 +144,15 @@ def test_a_hand_that_cannot_be_drawn_is_said_plainly(change, said, tmp_path, cap
     assert said in " ".join(capsys.readouterr().err.split())
 
 
-def twice(record):
-    record["reaches"] *= 2
-
-
-def of_other_contacts(record):
-    record["reaches"][0]["contacts_sha256"] = "0" * 64
-
-
-def contradiction(record):
-    record["reaches"][0]["reached"] = False
-
-
-def other_object(record):
-    record["object"]["content_sha256"] = "0" * 64
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (twice, "two records of one grasp"), (of_other_contacts, "contacts of .* differ"),
-        (contradiction, "exactly where `reached` is true"), (other_object, "another object"),
+        (lambda each: each.update(reaches=2 * each["reaches"]), "two records of one grasp"),
+        (lambda each: each["reaches"][0].update(contacts_sha256="0" * 64), "contacts of .* differ"),
+        (lambda each: each["reaches"][0].update(reached=False), "exactly where `reached` is true"),
+        (lambda each: each["object"].update(content_sha256="0" * 64), "another object"),
     ],
-    ids=lambda value: getattr(value, "__name__", ""),
-)  # fmt: skip
+)
 def test_a_file_that_contradicts_itself_or_its_grasps_is_refused(change, said, tmp_path):
     folder = changed_run(tmp_path, change)
     with pytest.raises(InputError, match=rf"reaches\.json: .*{said}"):

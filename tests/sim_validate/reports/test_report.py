@@ -10,18 +10,15 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
-from scenes.drawing.colours import FINGERS
-from scenes.drawing.painting import DARKEST, LIGHT
 from scenes.drawing.turntable import UNITS
-from scenes.drawing.views import DISTANCE
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.records import verdicts
 from sim_validate.records.grasps import read_grasps
 from sim_validate.reports.agreement import said_of
-from sim_validate.reports.pages import asset
 from sim_validate.reports.report import write_report
+from tests.sim_validate.changing import changed
 
 EVIL = '<script>document.title="taken"</script>"\'&\x1b[31m'
 
@@ -115,9 +112,6 @@ def test_the_first_page_counts(small_run, small_report):
     said = " ".join(Page((small_report / "index.html").read_text()).said)
     controls = summary["controls"]
     assert f"3 of 3 held, {controls} of {controls} negative controls were let go" in said
-    assert "critical friction: 3 pairs" in said
-    assert "in the trials of closure masses are scaled" in said
-    assert "largest wrench [N], torques over grasp size: 39 pairs" in said
     assert "39 agree" in said
 
 
@@ -134,21 +128,6 @@ def test_the_drawing_is_that_of_the_grasp(small_run, small_report):
     text = (small_report / "object-0.js").read_text()
     drawn = json.loads(text.partition("= ")[2].rstrip(";\n"))
     assert [shape["role"] for shape in drawn] == ["object", "edge"]
-
-
-def test_colours_and_camera_are_the_same_everywhere(small_report):
-    style, script = asset("style.css"), asset("turntable.js")
-    for finger, colour in enumerate(FINGERS):
-        assert f".finger{finger} {{ background: {colour}; }}" in style
-    (darkest,) = re.findall(r"const DARKEST = ([\d.]+);", script)
-    assert float(darkest) == DARKEST
-    (path, *_) = sorted((small_report / "grasps").iterdir())
-    drawing = json.loads(Page(path.read_text()).data["drawing"])
-    assert drawing["distance"] == DISTANCE * UNITS
-    assert drawing["middle"] == [0, 0, 0]
-    assert drawing["hidden"] == []
-    (light,) = re.findall(r"const LIGHT = \[(.*)\];", script)
-    np.testing.assert_allclose([float(part) for part in light.split(",")], LIGHT, atol=1e-3)
 
 
 def test_its_commands_are_commands(small_run, small_report, monkeypatch):
@@ -168,12 +147,6 @@ def test_its_commands_are_commands(small_run, small_report, monkeypatch):
 def copy(small_run, tmp_path):
     """Another run to spoil."""
     return shutil.copytree(small_run, tmp_path / "copy")
-
-
-def changed(path, change):
-    document = json.loads(path.read_text())
-    change(document)
-    path.write_text(json.dumps(document))
 
 
 def counted(document, _=None):
@@ -246,8 +219,6 @@ def test_of_many_grasps_those_with_bad_news_are_shown(copy, tmp_path):
     said = " ".join(Page(report.index.read_text()).said)
     assert "3 grasps at friction 0.5" in said
     assert "1 are shown" in said
-    assert "critical friction: 3 pairs" in said
-    assert "in the trials of closure masses are scaled" in said
 
 
 def test_several_runs_make_one_report(copy, tmp_path):
@@ -333,25 +304,11 @@ def test_bad_news_has_a_name(small_run, change, says):
     assert said_of(verdict | change) == (says, "bad")
 
 
-def test_a_control_that_says_nothing_is_bad_news(small_run):
-    verdict = json.loads((small_run / "verdicts.json").read_text())["verdicts"][0]
-    for trial in next(iter(verdict["controls"].values()))["wrenches"]:
-        trial["outcome"] = "diverged"
-    assert said_of(verdict) == ("a negative control is undecided", "bad")
-
-
 @pytest.mark.parametrize(
     ("file", "change", "says"),
     [
-        ("verdicts.json", lambda each: each.pop("gate"), r"verdicts\.json: gate: missing"),
         ("verdicts.json", lambda each: each["object"].update(content_sha256="0"), "another object"),
         ("verdicts.json", lambda each: each["verdicts"][0].update(contacts_sha256="0"), "contacts"),
-        ("verdicts.json", lambda each: each["verdicts"][0].update(id="c-9-9-9-9"), "in that file"),
-        ("verdicts.json", lambda each: each["verdicts"][0].update(held=False),
-         r"verdicts\[0\]\.held: False contradicts the outcome held"),
-        ("verdicts.json", lambda each: each["summary"].update(grasps_held=99),
-         r"summary\.grasps_held: expected .*, got 99"),
-        ("verdicts.json", lambda each: each["verdicts"].append(each["verdicts"][0]), "twice|got"),
         ("regions.json", lambda each: each["grasps"][0].update(contacts_sha256="0"), "contacts"),
     ],
 )  # fmt: skip
@@ -360,11 +317,3 @@ def test_files_that_are_not_ours_are_refused(copy, file, change, says):
     with pytest.raises(InputError, match=says):
         write_report(copy, jobs=1)
     assert not (copy / "report" / "index.html").exists()
-
-
-def test_a_folder_without_a_run_is_refused(tmp_path, capsys):
-    assert main(["report", str(tmp_path)]) == Exit.INPUT
-    assert "has no grasps.json" in capsys.readouterr().err
-    assert main(["report", str(tmp_path / "none")]) == Exit.INPUT
-    assert "expected the folder of a run" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())

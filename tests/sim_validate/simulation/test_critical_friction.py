@@ -41,15 +41,6 @@ def test_the_simulator_finds_the_critical_friction_of_the_analysis():
     assert np.abs(np.array(ratios) - 1.0).max() < 0.005
 
 
-def test_the_number_alone_is_one_call():
-    body, found = grasps("random-12-1", 0.5, 2, ("regulus",))
-    assert len(found) == 2
-    for grasp in found:
-        assert sv.simulated_critical_friction(body, grasp) == pytest.approx(
-            grasp.critical_friction, rel=0.005
-        )
-
-
 def test_a_finger_that_hardly_needs_to_push_does_not_let_the_object_turn():
     """Two fingers need the friction; with the others idle the object turned 8 % above it."""
     body = scenes.example_object("box")

@@ -16,11 +16,11 @@ from sim_validate.simulation.schedules import (
     release,
 )
 from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.traces import Outcome, displaced, judge, traces
+from sim_validate.simulation.traces import Outcome, judge
 from sim_validate.validation.controls import control_case, negative_controls
 from tests.marks import more
 from tests.sim_validate.rigs import grasps, limiting_loads, rig_of
-from tests.sim_validate.simulation.test_traces import motion, pose
+from tests.sim_validate.simulation.test_traces import pose
 from tests.sim_validate.simulation.whole_and_early import compared
 
 SAMPLE_S = 0.01
@@ -243,18 +243,6 @@ def test_rigid_fingertips_end_only_by_loss(held):
         assert not settled[0]
         assert answered[0] == (sample >= 30)
     assert trial.watched == 10
-
-
-def test_displacements_are_those_that_trials_are_judged_by(held):
-    layout, rng = held[2].bench.scene.layout, np.random.default_rng(0)
-    rows = [pose(1e-3 * rng.normal(size=3)) for _ in range(9)]
-    for row in rows:
-        row[3:7] += 0.1 * rng.normal(size=4)
-        row[3:7] /= np.linalg.norm(row[3:7])
-    (found,) = traces([motion(rows)], layout, [1])
-    poses = np.array(rows)[1:, :7]
-    starts = np.tile(rows[0][:7], (8, 1))
-    np.testing.assert_allclose(displaced(poses, starts, layout), found.displacements_m, rtol=1e-12)
 
 
 def test_a_bench_forgets_earlier_trials(held):

@@ -57,21 +57,6 @@ def test_settling_and_a_settled_release_are_a_release():
         np.testing.assert_array_equal(np.concatenate(parts), getattr(whole, name))
 
 
-def test_a_squeeze_applies_no_wrench_and_ends_with_the_planned_forces():
-    schedule = schedules.squeeze(LOAD.forces, 1.5, SAMPLE_S, HoldProtocol())
-    assert not schedule.wrenches.any()
-    np.testing.assert_array_equal(schedule.forces[-1], LOAD.forces)
-    assert schedule.watched == len(schedule.friction) == 16
-
-
-def test_a_release_changes_nothing_but_the_friction():
-    schedule = schedules.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol())
-    assert not schedule.wrenches.any()
-    assert (schedule.forces == STILL.forces).all()
-    assert schedule.friction[schedule.watched - 1] == 2.0
-    assert schedule.friction[schedule.watched] == 0.3
-
-
 def test_a_ramp_watches_while_the_load_rises_between_the_shares():
     protocols = HoldProtocol(), LimitProtocol()
     schedule, shares = schedules.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, SAMPLE_S, protocols)

@@ -51,16 +51,3 @@ def test_many_validations_are_those_of_single_ones_and_say_how_far_they_are():
     assert [verdict.id for verdict in found] == [grasp.id for grasp in plan]
     assert list(found) == [sv.validate(body, grasp, FRICTION, agenda=SHORT) for grasp in plan]
     assert told == [(1, 3, found[0]), (2, 3, found[1]), (3, 3, found[2])]
-
-
-def test_several_processors_give_the_same_verdicts():
-    """From sixteen grasps on these are two processes."""
-    body = example_object("wedge")
-    plan, told = gc.plan(body, FRICTION, limit=16), []
-    assert len(plan) == 16
-    one = sv.validate_all(body, plan, FRICTION, agenda=SHORT)
-    two = sv.validate_all(
-        body, plan, FRICTION, agenda=SHORT, jobs=2, progress=lambda *step: told.append(step[:2])
-    )
-    assert [verdict.wrenches for verdict in one] == [verdict.wrenches for verdict in two]
-    assert told == [(done, 16) for done in range(1, 17)]
