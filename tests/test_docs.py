@@ -27,7 +27,7 @@ from sim_validate.records.wrenches import wrenches_from_file
 from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.traces import Outcome
 from tests import api_reference
-from tests.sim_validate.datasets.small import build_small
+from tests.sim_validate.datasets.configs import build_small
 
 ROOT = Path(__file__).parent.parent
 SITE = ROOT / "docs" / "index.md"

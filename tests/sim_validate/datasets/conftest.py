@@ -5,15 +5,13 @@ import shutil
 import pytest
 
 from sim_validate.datasets.build import build
+from tests.sim_validate.datasets.configs import CONFIG, LEARNED, build_small
 from tests.sim_validate.datasets.engines import Here, silent
-from tests.sim_validate.datasets.learned import LEARNED
-from tests.sim_validate.datasets.pair import CONFIG
-from tests.sim_validate.datasets.small import build_small
 
 
 @pytest.fixture(scope="session")
 def small_dataset(tmp_path_factory):
-    """The dataset of `small.py`, only to be read."""
+    """The dataset of `SMALL`, only to be read."""
     return build_small(tmp_path_factory.mktemp("small") / "ds")
 
 
@@ -32,7 +30,7 @@ def copy(dataset, tmp_path):
 
 @pytest.fixture(scope="session")
 def learned(tmp_path_factory):
-    """The dataset of `learned.py`, only to be read."""
+    """The dataset of `LEARNED`, only to be read."""
     pytest.importorskip("pyarrow")
     folder = tmp_path_factory.mktemp("learned") / "ds"
     built = build(LEARNED, folder, Here(), silent)

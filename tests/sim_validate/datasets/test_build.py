@@ -19,9 +19,8 @@ from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
 from sim_validate.datasets.verify import Sample, verify
 from sim_validate.main import main
+from tests.sim_validate.datasets.configs import CONFIG, rows_of
 from tests.sim_validate.datasets.engines import Here, WorkerEndedError, contents, silent
-from tests.sim_validate.datasets.learned import rows_of
-from tests.sim_validate.datasets.pair import CONFIG
 
 pytest.importorskip("pyarrow")
 ROOT = Path(__file__).parents[3]
@@ -255,7 +254,7 @@ STRUCK = """
 import os, pathlib, shutil, sys
 from sim_validate.datasets.build import build
 from tests.sim_validate.datasets.engines import Here, silent
-from tests.sim_validate.datasets.pair import CONFIG
+from tests.sim_validate.datasets.configs import CONFIG
 
 def counted(plain):
     def call(*args, **kwargs):

@@ -7,7 +7,7 @@ from sim_validate.datasets.card import CARD, card_text
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.tables import TABLES
 from sim_validate.datasets.verify import verify
-from tests.sim_validate.datasets.small import SMALL
+from tests.sim_validate.datasets.configs import SMALL
 
 pytest.importorskip("pyarrow")
 yaml = pytest.importorskip("yaml")

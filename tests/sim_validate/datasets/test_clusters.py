@@ -15,8 +15,8 @@ from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.units import WorkerError, units_of
 from sim_validate.datasets.workers import do_unit, drive
 from sim_validate.parallel.clusters import dask_workers, ray_workers
+from tests.sim_validate.datasets.configs import CONFIG
 from tests.sim_validate.datasets.engines import contents, silent
-from tests.sim_validate.datasets.pair import CONFIG
 
 pytest.importorskip("pyarrow")
 pytestmark = pytest.mark.slow

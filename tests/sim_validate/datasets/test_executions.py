@@ -19,9 +19,9 @@ from sim_validate.datasets.tables import EXECUTED, EXECUTIONS, TABLES
 from sim_validate.datasets.verify import Sample, loose_difference, verify
 from sim_validate.execution.settings import AskedExecution
 from sim_validate.execution.verdict import ExecutedGrasp
+from tests.sim_validate.datasets.configs import rows_of
 from tests.sim_validate.datasets.engines import Here, silent
 from tests.sim_validate.datasets.forging import forged
-from tests.sim_validate.datasets.learned import rows_of
 
 pytest.importorskip("pyarrow")
 SETTINGS = sv.ExecutionSettings(mass_kg=1.2, trials=("weight",))

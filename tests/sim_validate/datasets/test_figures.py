@@ -8,8 +8,8 @@ from grasp_core.closure.contacts import stacked
 from grasp_core.geometry.nearest_points import nearest_on_triangles
 from grasp_core.hands.kinematics import places
 from sim_validate.datasets.verify import verify
+from tests.sim_validate.datasets.configs import BODIES, rows_of
 from tests.sim_validate.datasets.forging import forged
-from tests.sim_validate.datasets.learned import BODIES, rows_of
 
 
 @pytest.fixture(scope="module")

@@ -19,8 +19,8 @@ from sim_validate.datasets.varied import RATIOS, Varying, region_exit, variants
 from sim_validate.datasets.verify import Sample, verify
 from sim_validate.simulation.setup import Agenda
 from sim_validate.validation.validation import validate
+from tests.sim_validate.datasets.configs import BODIES, LEARNED, rows_of
 from tests.sim_validate.datasets.forging import forged
-from tests.sim_validate.datasets.learned import BODIES, LEARNED, rows_of
 
 WEDGE = example_object("wedge")
 KINDS = {*RATIOS, "moved_out"}

@@ -16,10 +16,9 @@ from sim_validate.datasets.meshes import mesh_text
 from sim_validate.datasets.open_dataset import load_dataset
 from sim_validate.datasets.verify import Sample, drawn, verify
 from tests.sim_validate.changing import changed
+from tests.sim_validate.datasets.configs import CONFIG, rows_of
 from tests.sim_validate.datasets.engines import Here, contents, silent
 from tests.sim_validate.datasets.forging import forged, relisted
-from tests.sim_validate.datasets.learned import rows_of
-from tests.sim_validate.datasets.pair import CONFIG
 
 pytest.importorskip("pyarrow")
 

@@ -1,0 +1,44 @@
+"""Settings of small datasets, which `conftest.py` builds once, and what is read of them."""
+
+import sim_validate as sv
+from scenes.example_objects import example_object
+from sim_validate.datasets.build import build
+from sim_validate.datasets.config import DatasetConfig, Learning
+from sim_validate.datasets.open_dataset import select
+from sim_validate.execution.settings import AskedExecution
+from tests.sim_validate.datasets.engines import Here, silent
+
+CONFIG = DatasetConfig(
+    objects=("tetrahedron", "wedge"), frictions=(0.4, 0.5), families=("concurrent",), limit=2
+)
+"""Two objects at two frictions."""
+SMALL = DatasetConfig(
+    objects=("tetrahedron", "wedge", "prism"), families=("concurrent",), limit=1, seed=6,
+    license="CC-BY-4.0", creator="A. Maker", url="https://example.org/grasps",
+    published="2026-11-22",
+)  # fmt: skip
+"""Three objects, each of which is in another split with this seed."""
+LEARNED = DatasetConfig(
+    objects=("tetrahedron", "wedge"), families=("concurrent",), limit=1,
+    execution=AskedExecution(
+        sv.ExecutionSettings(mass_kg=1.0, trials=("weight", "misplaced"), misplacements=2)
+    ),
+    learning=Learning(
+        friction_below=1, friction_near=2, friction_above=1, moved_out=2, mass_near=1, synthetic=1,
+        figures=("closure", "least_squeeze"), seeds=(7,), hand="leap",
+    ),
+)  # fmt: skip
+"""Two objects with rows of every kind."""
+BODIES = {body.content_sha256: body for body in map(example_object, LEARNED.objects)}
+
+
+def rows_of(folder, name):
+    return list(select(folder).rows(name))
+
+
+def build_small(folder, config=SMALL):
+    """Build it, and check that it is what tests rely on."""
+    built = build(config, folder, Here(), silent)
+    assert built.rows["objects"] == len(config.objects)
+    assert len(list(folder.glob("data/grasps/*.parquet"))) == 3
+    return folder
