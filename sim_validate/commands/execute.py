@@ -4,12 +4,12 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli import command_flags
-from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.objects import chosen_grasps, saved_grasps
 from sim_validate.commands.asked.trials import check_mass, execution_settings
@@ -79,21 +79,13 @@ def execute_grasps(
     """
     if folder:
         remove_executions(folder)
-    changed = physics or {}
+    changed, count = physics or {}, len(saved.grasps)
     tasks = [ExecutionJob(saved.body, g, saved.friction, settings, changed) for g in saved.grasps]
-    found: list[ExecutedGrasp] = []
-    try:
-        with reporter.progress("executing") as steps:
-            for each in executed(tasks, jobs):
-                found.append(each)
-                survived = sum(one.survived for one in found)
-                steps.update(len(found), len(tasks), f"({survived} survived)")
-    finally:
-        complete = len(found) == len(tasks)
-        text = executions_to_json(saved.body, saved.friction, settings, found, complete=complete)
-        if folder and found:
-            path = write_text(folder / EXECUTIONS, text)
-            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+    results = reporter.counted(
+        "executing", executed(tasks, jobs), count, "survived", lambda each: each.survived
+    )
+    text_of = partial(executions_to_json, saved.body, saved.friction, settings)
+    found, text = finished(results, count, text_of, folder and folder / EXECUTIONS, reporter)
     _show(found, settings, reporter)
     if not all(each.controls_let_go for each in found):
         return Exit.INTERNAL, text

@@ -1,15 +1,15 @@
 """Runs the command `validate`, which simulates grasps and writes verdicts on them."""
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
 from sim_validate.cli import command_flags
-from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.objects import chosen_grasps, saved_grasps
 from sim_validate.commands.asked.trials import prepared
@@ -59,21 +59,16 @@ def simulate_grasps(
     if folder:
         remove_verdicts(folder)
     tasks = [Job(saved.body, g, saved.friction, agenda, setup) for g in saved.grasps]
-    verdicts: list[Verdict] = []
-    try:
-        with reporter.progress("simulating") as steps:
-            for verdict in validated(tasks, jobs):
-                verdicts.append(verdict)
-                if folder and agenda.keep_traces:
-                    write_arrays(folder / "traces" / f"{verdict.id}.npz", trace_arrays(verdict))
-                held = sum(verdict.held for verdict in verdicts)
-                steps.update(len(verdicts), len(tasks), f"({held} held)")
-    finally:
-        complete = len(verdicts) == len(tasks)
-        text = verdicts_to_json(saved.body, saved.friction, verdicts, gate, complete=complete)
-        if folder and verdicts:
-            path = write_text(folder / "verdicts.json", text)
-            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+
+    def kept(verdict: Verdict) -> bool:
+        if folder and agenda.keep_traces:
+            write_arrays(folder / "traces" / f"{verdict.id}.npz", trace_arrays(verdict))
+        return verdict.held
+
+    results = reporter.counted("simulating", validated(tasks, jobs), len(tasks), "held", kept)
+    text_of = partial(verdicts_to_json, saved.body, saved.friction, gate=gate)
+    path = folder and folder / "verdicts.json"
+    verdicts, text = finished(results, len(tasks), text_of, path, reporter)
     _show(saved.grasps, verdicts, setup, reporter)
     good = all(verdict.good for verdict in verdicts)
     return (Exit.GOOD if good else Exit.NEGATIVE), text

@@ -13,7 +13,7 @@ is confirmed then, whatever comes later.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -162,15 +162,7 @@ def execute(
         NoForcesError: No squeeze carries the weight, or the grip is unstable under the best one.
         UnfaithfulError: The simulator fails on a case with a known answer.
     """
-    if settings is not None:
-        instance(settings, ExecutionSettings, "settings")
-        settings = settings if mass_kg is None else replace(settings, mass_kg=mass_kg)
-    elif mass_kg is not None:
-        settings = ExecutionSettings(mass_kg=mass_kg)
-    else:
-        raise InputError("execute: expected mass_kg or settings, got neither; give mass_kg=0.3")
-    whole(threads, "threads", least=1, most=MOST_THREADS)
-    switch(enough, "enough")
+    settings = asked_settings("execute", settings, mass_kg, ExecutionSettings)
     contacts = given_contacts(body, grasp)
     return executed(
         body, settings,
@@ -180,11 +172,26 @@ def execute(
     )  # fmt: skip
 
 
+def asked_settings(
+    by: str, settings: ExecutionSettings | None, mass_kg: float | None,
+    usual: Callable[[float], ExecutionSettings],
+) -> ExecutionSettings:  # fmt: skip
+    """Return settings with a mass, if one is given, or the usual ones for the mass."""
+    if settings is not None:
+        instance(settings, ExecutionSettings, "settings")
+        return settings if mass_kg is None else replace(settings, mass_kg=mass_kg)
+    if mass_kg is None:
+        raise InputError(f"{by}: expected mass_kg or settings, got neither; give mass_kg=0.3")
+    return usual(mass_kg)
+
+
 def executed(
     body: Polyhedron, settings: ExecutionSettings, choose: Choose, scene_of: SceneOf, *,
     threads: int, enough: bool,
 ) -> Execution:  # fmt: skip
     """Choose the squeeze, simulate its trials, and find what would be enough if they are lost."""
+    whole(threads, "threads", least=1, most=MOST_THREADS)
+    switch(enough, "enough")
     try:
         best = choose(settings, None)
     except NoForcesError as error:

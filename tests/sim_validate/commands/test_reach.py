@@ -13,12 +13,11 @@ from grasp_core.files.json_text import record_of
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.hand_flags import Reach
-from sim_validate.commands import reach as simulated
 from sim_validate.commands.reach import say_where_to_look
 from sim_validate.files.result_folders import REACHES
-from sim_validate.hands.execute_hand import held_by_hands
-from sim_validate.hands.validate_hand import MOST_PUSH_N
+from sim_validate.hands.validate_hand import MOST_PUSH_N, validate_hand
 from sim_validate.main import main
+from sim_validate.parallel import processes
 from sim_validate.records.reaches import ReachesFile, read_reaches
 from tests.grasp_core.hands.gripping import plain_hand
 from tests.hand_models import hand_mjcf
@@ -243,11 +242,15 @@ def test_a_hand_whose_links_have_no_masses_or_are_too_heavy_says_nothing_of_it(
 
 
 def test_what_was_tried_before_an_interrupt_is_kept(grasps, tmp_path, monkeypatch):
-    def one_and_stop(jobs, processes):
-        yield from held_by_hands(jobs[:1], processes)
-        raise KeyboardInterrupt
+    run = processes.each
 
-    monkeypatch.setattr(simulated, "held_by_hands", one_and_stop)
+    def one_and_stop(function, units, **more):
+        held = units[0].func is validate_hand
+        yield from run(function, units[:1] if held else units, **more)
+        if held:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(processes, "each", one_and_stop)
     words = ["reach", str(grasps), "--simulate", "--torque-limit-n-m", "0.35", "--jobs", "1"]
     assert main([*words, "--out", str(tmp_path)]) == Exit.INTERRUPTED
     record = record_of(ReachesFile, (tmp_path / REACHES).read_text(), REACHES, schema=1)
