@@ -51,11 +51,9 @@ def planned_loads(
     motors: Motors | None = None,
 ) -> tuple[PlannedLoad, ...]:
     """Plan all wrenches to test, in order: along axes, weakest, random, the user's own."""
-    resisted = resisted_by(body, contacts, friction, setup, motors)
+    resisted, share = resisted_by(body, contacts, friction, setup, motors), setup.hold.load_share
     relative = [
-        _load(
-            name, found, setup.hold.load_share * found.limit, idle, body, contacts, setup.torsion_m
-        )
+        _load(name, found, share * found.limit, idle, body, contacts, setup.torsion_m)
         for name, found in _relative(resisted, body.radius, agenda)
     ]
     named = [(each.name, each.wrench) for each in agenda.wrenches]

@@ -144,14 +144,10 @@ def robustness(
     agenda: Agenda, setup: Setup,
 ) -> Robustness:  # fmt: skip
     """Repeat the holds of a grasp with noise."""
-    numbers = range(agenda.trials)
-    cases = (
-        disturbed(body, grasp, friction, agenda.noise, agenda.seed, number) for number in numbers
-    )
-    trials = [
-        noisy_trial(body, case, loads, number, setup)
-        for number, case in zip(numbers, cases, strict=True)
-    ]
+    trials = list[NoisyTrial]()
+    for number in range(agenda.trials):
+        case = disturbed(body, grasp, friction, agenda.noise, agenda.seed, number)
+        trials.append(noisy_trial(body, case, loads, number, setup))
     return Robustness(agenda.noise, tuple(trials))
 
 
