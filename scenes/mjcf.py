@@ -19,7 +19,6 @@ from typing import Literal, get_args
 import numpy as np
 
 from grasp_core.arrays import to_digits
-from grasp_core.by_value import ByValue
 from grasp_core.checked import instance, one_of, path_of, several
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_parts
@@ -29,7 +28,7 @@ from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
-from scenes.mjcf_text import Element, add_element, as_texts, document, quaternion
+from scenes.mjcf_text import Element, SceneText, add_element, as_texts, document, quaternion
 from scenes.physics import PhysicsSettings, add_free_body, add_light, begin_scene
 
 Surface = Literal["pads", "mesh"]
@@ -43,10 +42,9 @@ AXES = ("normal", "tangent1", "tangent2")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Scene(ByValue, InNotebooks):
+class Scene(SceneText, InNotebooks):
     """A grasp as the text of a MuJoCo model, with the settings and numbers it was made from."""
 
-    xml: str
     layout: Layout
     physics: PhysicsSettings
     surface: Surface
@@ -100,13 +98,13 @@ def _listed(contacts: Iterable[Contact]) -> tuple[Contact, ...]:
     return listed
 
 
-def write_scene(scene: Scene, path: str | Path) -> Path:
-    """Write the scene's text to a file and return its path.
+def write_scene(scene: SceneText, path: str | Path) -> Path:
+    """Write the text of a scene of any kind to a file and return its path.
 
     Raises:
         InputError: `scene` is not a scene, or `path` is not a path.
     """
-    instance(scene, Scene, "scene", "build_scene makes one")
+    instance(scene, SceneText, "scene", "build_scene makes one")
     return write_parts(path_of(path, "path"), [scene.xml.encode()])
 
 
@@ -116,11 +114,11 @@ def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads")
     contact = as_texts(physics.contact())
     add_object(world, layout, contact, surface)
     for finger in range(len(layout.contacts)):
-        _finger(world, layout, contact, finger)
+        add_finger(world, layout, contact, finger)
     if not layout.drive.rigid:
         actuators = add_element(root, "actuator", {})
         for finger in range(len(layout.contacts)):
-            _servos(actuators, layout, finger)
+            add_servos(actuators, layout, finger, (0.0, layout.drive.max_normal_force_n))
         _keyframes(root, layout)
     return document(root)
 
@@ -167,10 +165,14 @@ def add_object(
         add_element(body, "geom", pad | contact)
 
 
-def _finger(world: Element, layout: Layout, contact: dict[str, str], finger: int) -> None:
+def add_finger(
+    world: Element, layout: Layout, contact: dict[str, str], finger: int, *, lifted: bool = True
+) -> None:
+    """Add a fingertip on its slides."""
     drive = layout.drive
     pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.frames[finger])}
-    body = add_element(world, "body", {"name": f"finger{finger}", "gravcomp": 1.0} | pose)
+    weight = {"gravcomp": 1.0} if lifted else {}
+    body = add_element(world, "body", {"name": f"finger{finger}"} | weight | pose)
     slides = () if drive.rigid else tuple(zip(AXES, np.eye(3), strict=True))
     for axis, direction in slides:
         add_element(
@@ -200,7 +202,10 @@ def _finger(world: Element, layout: Layout, contact: dict[str, str], finger: int
     add_element(body, "geom", tip | contact)
 
 
-def _servos(actuators: Element, layout: Layout, finger: int) -> None:
+def add_servos(
+    actuators: Element, layout: Layout, finger: int, pushes: tuple[float, float] | None = None
+) -> None:
+    """Add the servos of a fingertip's slides; pushes along the normal may have limits [N]."""
     drive = layout.drive
     for axis in AXES:
         name = f"finger{finger}_{axis}"
@@ -212,8 +217,8 @@ def _servos(actuators: Element, layout: Layout, finger: int) -> None:
             "ctrllimited": "false",
             "forcelimited": "false",
         }
-        if axis == "normal":
-            servo |= {"forcelimited": "true", "forcerange": (0.0, drive.max_normal_force_n)}
+        if axis == "normal" and pushes is not None:
+            servo |= {"forcelimited": "true", "forcerange": pushes}
         add_element(actuators, "position", servo)
 
 

@@ -42,8 +42,8 @@ from scenes.hands.chains_mjcf import (
     placed,
 )
 from scenes.hands.hand_scene import hand_layout
-from scenes.layout import SQUEEZE, Layout, arrange
-from scenes.mjcf import AXES
+from scenes.layout import SQUEEZE, arrange
+from scenes.mjcf import add_finger, add_servos
 from scenes.mjcf_text import Element, add_element, as_texts, document, quaternion
 from scenes.physics import PhysicsSettings, add_free_body, begin_scene
 
@@ -141,12 +141,15 @@ def fingertip_scene(
     """Make the scene of a grasp, or of contacts of any origin."""
     base = arrange(body, grasp, friction, fingers, physics.torsion_m)
     mass, inertia = mass_properties(body, mass_kg)
-    layout = replace(base, center=np.zeros(3), mass_kg=mass, inertia_kg_m2=inertia)
+    stiffness, share = base.drive.stiffness_n_per_m, TIP_MASS_KG + mass / len(base.contacts)
+    damping = 2.0 * math.sqrt(stiffness * share)
+    drive = replace(base.drive, mass_kg=TIP_MASS_KG, damping_n_s_per_m=damping, rigid=False)
+    layout = replace(base, drive=drive)
     root, world = begun(body, friction, (mass, inertia), physics)
-    actuators = add_element(root, "actuator", {})
+    contact, actuators = as_texts(physics.contact()), add_element(root, "actuator", {})
     for finger in range(len(layout.contacts)):
-        _fingertip(world, layout, physics, finger)
-        _tip_servos(actuators, layout, finger)
+        add_finger(world, layout, contact, finger, lifted=False)
+        add_servos(actuators, layout, finger)
     away = min(OPEN_M, OPEN_SIZES * layout.grasp_size_m)
     opened = np.tile([-away, 0.0, 0.0], len(layout.contacts))
     squeeze = layout.squeeze / SQUEEZE
@@ -156,35 +159,6 @@ def fingertip_scene(
         ended(root, opened), physics, friction, mass, inertia, squeeze[:, 0], opened,
         np.zeros_like(opened), commands, names,
     )  # fmt: skip
-
-
-def _fingertip(world: Element, layout: Layout, physics: PhysicsSettings, finger: int) -> None:
-    name, radius = f"finger{finger}", layout.drive.radius_m
-    pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.frames[finger])}
-    body = add_element(world, "body", {"name": name} | pose)
-    for axis, way in zip(AXES, np.eye(3), strict=True):
-        slide = {"name": f"{name}_{axis}", "type": "slide", "axis": way, "pos": (0.0, 0.0, 0.0),
-                 "limited": "false", "damping": 0.0, "stiffness": 0.0, "armature": 0.0,
-                 "frictionloss": 0.0}  # fmt: skip
-        add_element(body, "joint", slide)
-    inertia = (0.4 * TIP_MASS_KG * radius**2,) * 3
-    own = {"pos": (0.0, 0.0, 0.0), "mass": TIP_MASS_KG, "diaginertia": inertia}
-    add_element(body, "inertial", own)
-    tip = {"name": name, "type": "sphere", "size": radius, "contype": 0,
-           "conaffinity": 1 << finger, "friction": (layout.friction, layout.torsion_m, 0.0),
-           "mass": 0.0, "group": 0, "rgba": (0.8, 0.25, 0.2, 1.0)}  # fmt: skip
-    add_element(body, "geom", tip | physics.contact())
-
-
-def _tip_servos(actuators: Element, layout: Layout, finger: int) -> None:
-    stiffness = layout.drive.stiffness_n_per_m
-    share = TIP_MASS_KG + layout.mass_kg / len(layout.contacts)
-    damping = 2.0 * math.sqrt(stiffness * share)
-    for axis in AXES:
-        name = f"finger{finger}_{axis}"
-        servo = {"name": name, "joint": name, "kp": stiffness, "kv": damping,
-                 "ctrllimited": "false", "forcelimited": "false"}  # fmt: skip
-        add_element(actuators, "position", servo)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,19 +13,16 @@ the larger.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.by_value import ByValue
-from grasp_core.checked import instance, path_of
+from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
-from grasp_core.files.text_files import write_parts
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.execution.held import HeldLayout, HeldSettings, held_layout
-from scenes.mjcf_text import Element, add_element, document, quaternion
+from scenes.mjcf_text import Element, SceneText, add_element, document, quaternion
 from scenes.physics import PhysicsSettings, add_free_body, add_light, begin_scene
 
 PALM_ARMATURE = 1e7
@@ -100,10 +97,9 @@ def held_physics(layout: HeldLayout) -> PhysicsSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class HeldScene(ByValue):
+class HeldScene(SceneText):
     """A held object as the text of a MuJoCo model, with the numbers it was made from."""
 
-    xml: str
     layout: HeldLayout
     physics: PhysicsSettings
 
@@ -145,16 +141,6 @@ def build_held_scene(
             "predicted for hard fingertips; leave it out, or simulate the grasp with validate"
         )
     return HeldScene(held_text(layout, physics), layout, physics)
-
-
-def write_held_scene(scene: HeldScene, path: str | Path) -> Path:
-    """Write the scene's text to a file and return its path.
-
-    Raises:
-        InputError: `scene` is not a scene, or `path` is not a path.
-    """
-    instance(scene, HeldScene, "scene", "build_held_scene makes one")
-    return write_parts(path_of(path, "path"), [scene.xml.encode()])
 
 
 def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
