@@ -12,14 +12,14 @@ Fingers are spheres on three slides along (normal, tangent, tangent), each with 
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
 
 from grasp_core.arrays import to_digits
-from grasp_core.checked import instance, one_of, path_of, several
+from grasp_core.checked import instance, one_of, path_of
+from grasp_core.closure.contacts import listed_contacts
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_parts
 from grasp_core.notebooks import InNotebooks
@@ -33,7 +33,6 @@ from scenes.physics import PhysicsSettings, add_free_body, add_light, begin_scen
 
 Surface = Literal["pads", "mesh"]
 """What fingertips touch: one pad (a small box) each, or the convex hull of the object's mesh."""
-FEWEST_CONTACTS = 2
 SCALED = (
     "Masses and servos are scaled to suit the grasp: this scene is for tests of force closure. "
     "The command `graspproof scene` with a mass writes the true one, under gravity."
@@ -84,18 +83,10 @@ def build_scene(
             f"surface must be 'pads' for an object that is not convex: {body.name} is not convex, "
             "and MuJoCo would fill its hollows"
         )
-    contacts = grasp if isinstance(grasp, Grasp) else _listed(grasp)
+    contacts = grasp if isinstance(grasp, Grasp) else listed_contacts(grasp, "grasp")
     physics = physics or PhysicsSettings()
     layout = arrange(body, contacts, friction, fingers, physics.torsion_m)
     return Scene(to_text(layout, physics, surface), layout, physics, surface)
-
-
-def _listed(contacts: Iterable[Contact]) -> tuple[Contact, ...]:
-    each = partial(instance, kind=Contact, name="grasp", remedy="give a Grasp, or Contact values")
-    listed = several(contacts, each, "grasp", "Contact values or a Grasp")
-    if len(listed) < FEWEST_CONTACTS:
-        raise InputError(f"grasp must have at least {FEWEST_CONTACTS} contacts, got {len(listed)}")
-    return listed
 
 
 def write_scene(scene: SceneText, path: str | Path) -> Path:

@@ -32,7 +32,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from grasp_core.arrays import Array, to_digits
+from grasp_core.arrays import Array, rounded, to_digits
 from grasp_core.checked import instance
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
@@ -121,8 +121,8 @@ def hand_layout(
     lever = mean_lever(motors)
     drive, pose = base.drive, stance.palm_pose.copy()
     pose[:3, 3] -= body.center_of_mass
-    servo = float(to_digits(np.array(drive.stiffness_n_per_m * lever**2)))
-    armature = float(to_digits(np.array(drive.mass_kg * lever**2)))
+    servo = rounded(drive.stiffness_n_per_m * lever**2)
+    armature = rounded(drive.mass_kg * lever**2)
     own = {each.name: getattr(base, each.name) for each in fields(base)}
     own["squeeze"] = to_digits(SQUEEZE * np.einsum("kij,ki->kj", base.frames, squeeze))
     gravity = np.zeros(3) if down is None else GRAVITY_M_PER_S2 * direction(down, "down")

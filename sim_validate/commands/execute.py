@@ -3,7 +3,6 @@
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked.objects import chosen_grasps, saved_grasps
+from sim_validate.commands.asked.objects import asked_grasps
 from sim_validate.commands.asked.trials import check_mass, execution_settings
 from sim_validate.execution.jobs import ExecutionJob, executed
 from sim_validate.execution.settings import ExecutionSettings
@@ -28,7 +27,6 @@ from sim_validate.records.executions import (
     executions_summary,
     executions_to_json,
 )
-from sim_validate.records.grasps import grasp_with_id
 from sim_validate.records.setup_toml import physics_from_file
 
 ABSENT = "-"
@@ -52,12 +50,12 @@ SLIPS_MEAN = (
 def execute_file(command: command_flags.Execute, reporter: Reporter) -> int:
     """Execute the grasps of a file in simulation and report which of them survive."""
     check_mass(command.executing.mass)
-    saved = saved_grasps(command.grasps, reporter)
-    if saved is None:
+    chosen = asked_grasps(
+        command.grasps, reporter, grasp=command.grasp, friction=command.friction,
+        seed=command.seed, limit=command.limit,
+    )  # fmt: skip
+    if chosen is None:
         return Exit.NONE
-    if command.grasp is not None:
-        saved = replace(saved, grasps=(grasp_with_id(command.grasps, saved, command.grasp),))
-    chosen = chosen_grasps(saved, friction=command.friction, seed=command.seed, limit=command.limit)
     settings = execution_settings(chosen, command.executing, command.trials, command.down)
     physics = {} if command.setup is None else physics_from_file(command.setup)
     with alone_in(command.out):

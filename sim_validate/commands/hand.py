@@ -1,7 +1,6 @@
 """Runs the command `hand`, which shows what a hand was read as."""
 
 import math
-from typing import Any
 
 from grasp_core.by_value import counted
 from grasp_core.hands.couplings import Coupling
@@ -11,7 +10,7 @@ from scenes.hand_files.loading import load_hand
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.records.hand_model import couplings_record
+from sim_validate.records.hand_model import model_record
 
 MM = 1e3
 SMALL_RANGE = math.radians(10.0)
@@ -28,7 +27,8 @@ def asked_hand(command: hand_flags.Hand | hand_flags.Reach) -> Hand:
 def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
     """Show fingers, joints and fingertips of a hand."""
     hand = asked_hand(command)
-    reporter.document(hand_facts(hand))
+    told = {"torque_source": hand.torque_source, "sources": list(hand.sources)}
+    reporter.document({"name": hand.name, **model_record(hand), **told})
     fingers = [
         (
             f.name, str(len(f.links)), f"{MM * f.tip.radius:.1f}",
@@ -88,37 +88,3 @@ def _follows(coupling: Coupling) -> str:
     said = f"{coupling.joint} = {coupling.ratio:g} {coupling.driver}"
     offset = math.degrees(coupling.offset)
     return f"{said} {'-' if offset < 0.0 else '+'} {abs(offset):.4g} deg" if offset else said
-
-
-def hand_facts(hand: Hand) -> dict[str, Any]:
-    """Return what a hand was read as, for JSON, with units in the keys."""
-    return {
-        "name": hand.name,
-        "fingers": [
-            {
-                "fingertip": finger.name,
-                "tip_radius_m": finger.tip.radius,
-                "tip_center_m": finger.tip.center.tolist(),
-                "tip_corners": 0 if finger.tip.corners is None else len(finger.tip.corners),
-                "joints": [
-                    {
-                        "name": link.joint.name,
-                        "link": link.name,
-                        "lowest_rad": link.joint.lowest,
-                        "highest_rad": link.joint.highest,
-                        "torque_limit_n_m": link.joint.torque_limit_n_m,
-                        "mass_kg": link.mass_kg,
-                        "shapes": len(link.shapes),
-                    }
-                    for link in finger.links
-                ],
-            }
-            for finger in hand.fingers
-        ],
-        "palm_shapes": len(hand.palm),
-        "may_overlap": [list(pair) for pair in hand.ignored_pairs],
-        "couplings": couplings_record(hand),
-        "notes": list(hand.notes),
-        "torque_source": hand.torque_source,
-        "sources": list(hand.sources),
-    }

@@ -7,7 +7,7 @@ poses are written as records of DexGraspBench.
 import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import partial
 from operator import call
 from pathlib import Path
@@ -25,7 +25,7 @@ from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.flag_bounds import FlagsError
-from sim_validate.commands.asked.objects import chosen_grasps, saved_grasps
+from sim_validate.commands.asked.objects import asked_grasps
 from sim_validate.commands.hand import asked_hand
 from sim_validate.commands.judging import judge_hands
 from sim_validate.dexgraspbench import dex_record, write_dex_object, write_dex_record
@@ -40,7 +40,6 @@ from sim_validate.hands.execute_hand import executed_by_hand, hand_execution_set
 from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict, validate_hand
 from sim_validate.parallel import processes
 from sim_validate.parallel.compiling import REACHING, compile_loops, must_compile
-from sim_validate.records.grasps import grasp_with_id
 from sim_validate.records.reaches import AskedRecord, HandTrials, reaches_summary, reaches_to_json
 from sim_validate.reports.run_folder import GRASPS
 from sim_validate.simulation.setup import Agenda
@@ -56,12 +55,12 @@ EXECUTED_COLUMNS = ("grasp", "survived", "least predicted loss", PAYLOAD, "contr
 def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
     """Look for a pose of a hand in each grasp of a file, and write what was found."""
     hand = with_motors(asked_hand(command), command)
-    saved = saved_grasps(command.grasps, reporter)
-    if saved is None:
+    chosen = asked_grasps(
+        command.grasps, reporter, grasp=command.grasp, friction=command.friction,
+        limit=command.limit,
+    )  # fmt: skip
+    if chosen is None:
         return Exit.NONE
-    if command.grasp is not None:
-        saved = replace(saved, grasps=(grasp_with_id(command.grasps, saved, command.grasp),))
-    chosen = chosen_grasps(saved, friction=command.friction, seed=None, limit=command.limit)
     with alone_in(command.out):
         found, tried, text = _reach(command, hand, chosen, reporter)
         _show(hand, found, tried.payloads, reporter)

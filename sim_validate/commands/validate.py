@@ -11,7 +11,7 @@ from grasp_core.values import Grasp
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked.objects import chosen_grasps, saved_grasps
+from sim_validate.commands.asked.objects import asked_grasps
 from sim_validate.commands.asked.trials import prepared
 from sim_validate.commands.judging import judge_grasps
 from sim_validate.files.result_folders import alone_in, remove_verdicts
@@ -26,11 +26,12 @@ from sim_validate.validation.verdict import Verdict
 
 def validate_file(command: command_flags.Validate, reporter: Reporter) -> int:
     """Simulate the grasps of a file and report which of them hold."""
-    saved = saved_grasps(command.grasps, reporter)
-    if saved is None:
+    chosen = asked_grasps(
+        command.grasps, reporter, friction=command.friction, seed=command.seed, limit=command.limit
+    )
+    if chosen is None:
         return Exit.NONE
-    chosen = chosen_grasps(saved, friction=command.friction, seed=command.seed, limit=command.limit)
-    setup, agenda = prepared(command.testing, saved.finger, chosen.seed, command.out)
+    setup, agenda = prepared(command.testing, chosen.finger, chosen.seed, command.out)
     jobs, folder = command.testing.jobs, command.out
     with alone_in(folder):
         if command.protocol:

@@ -15,13 +15,12 @@ is confirmed then, whatever comes later.
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.checked import instance, several, switch, whole
-from grasp_core.closure.contacts import FEWEST, contact_arrays, stacked
+from grasp_core.checked import instance, switch, whole
+from grasp_core.closure.contacts import contact_arrays, listed_contacts, stacked
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.grips import Grip
@@ -256,14 +255,10 @@ def chosen_squeeze(
 def given_contacts(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> tuple[Contact, ...]:
     """Return the contacts of a grasp, or those that are given, checked."""
     check_body(body)
-    if isinstance(grasp, Grasp):
-        check_on_faces(body, grasp)
-    listed = grasp.contacts if isinstance(grasp, Grasp) else grasp
-    each = partial(instance, kind=Contact, name="grasp", remedy="or give a Grasp")
-    contacts = several(listed, each, "grasp", "Contact values")
-    if len(contacts) < FEWEST:
-        raise InputError(f"grasp: at least two contacts are needed, got {len(contacts)}")
-    return contacts
+    if not isinstance(grasp, Grasp):
+        return listed_contacts(grasp, "grasp")
+    check_on_faces(body, grasp)
+    return grasp.contacts
 
 
 def tip_radius(body: Polyhedron, contacts: Sequence[Contact], settings: ExecutionSettings) -> float:
