@@ -166,8 +166,6 @@ def arrange(
     which turns differences in the last digits of a number, such as those between machines, into
     visible motions. Everything after the rounding is plain arithmetic with the same result on every
     machine.
-
-    Takes `torsion_m` [m].
     """
     coefficient(friction)
     fingers = fingers or FingerSettings()
@@ -256,10 +254,7 @@ def _inertia(mass: float, positions: Array, size: float) -> Array:
 
 
 def _pushes(positions: Array, normals: Array, friction: float, torsion_m: float) -> Array:
-    """Compute balanced forces in the contact frames, (k, 3), or normal ones without closure.
-
-    The largest normal part is one.
-    """
+    """Compute balanced forces, (k, 3), or normal ones without closure; the largest push is one."""
     arms, _, _ = unit_size(positions)
     _, _, margins = deepest_forces(arms[None], normals[None], np.array([friction]))
     try:

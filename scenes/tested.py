@@ -113,7 +113,6 @@ def begun(
 def _object(
     world: Element, mass: tuple[float, Array], rubbing: dict[str, str], solids: int
 ) -> None:
-    """Add the object with its mass, and the solids that are its surface."""
     body = add_free_body(world, *mass)
     seen = {"name": "object", "type": "mesh", "mesh": "object", "contype": 0, "conaffinity": 0,
             "mass": 0.0, "group": 1, "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip

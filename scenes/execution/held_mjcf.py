@@ -190,7 +190,6 @@ def _object(world: Element, layout: HeldLayout, physics: PhysicsSettings) -> Non
 
 
 def _smooth(physics: PhysicsSettings) -> Mapping[str, object]:
-    """Return what geoms of the object have in common."""
     return {"conaffinity": 0, "friction": (0.0, 0.0, 0.0), "mass": 0.0, **physics.contact()}
 
 

@@ -93,7 +93,6 @@ def _say_measures(contacts: ContactSet, reporter: Reporter) -> None:
 
 
 def _facts(found: Analysis) -> list[tuple[str, str]]:
-    """List all facts about one grasp, as rows of a table."""
     certificate = found.certificate
     rows = [("contacts", str(len(found.contacts.positions))), ("closed", _closed(found))]
     if certificate is not None:

@@ -71,10 +71,7 @@ def execute_grasps(
     saved: SavedGrasps, settings: ExecutionSettings, *, jobs: int, folder: Path | None,
     reporter: Reporter, physics: Mapping[str, object] | None = None,
 ) -> tuple[Exit, str]:  # fmt: skip
-    """Execute grasps, show the results, and write them even if the run is interrupted.
-
-    Gives the exit code, and the text of executions.json.
-    """
+    """Execute grasps; return the exit code and the text of executions.json."""
     if folder:
         remove_executions(folder)
     changed, count = physics or {}, len(saved.grasps)
@@ -161,7 +158,6 @@ def _survived(found: Execution | None, kind: str) -> str:
 
 
 def _slips(found: Execution | None, kind: str) -> str:
-    """Write the least first slip of the trials of a kind, predicted and simulated."""
     trials = () if found is None else found.of_kind(kind)
     if not trials:
         return ABSENT
@@ -178,7 +174,6 @@ def multiple_in_words(multiple: float) -> str:
 
 
 def _losses(found: Sequence[ExecutedGrasp], settings: ExecutionSettings) -> Iterator[str]:
-    """Yield a line about each control that held, grasp without a squeeze, and failed trial."""
     for each in found:
         if each.execution is not None:
             yield from (f"{each.id}: {line}" for line in held_controls_in_words(each.execution))

@@ -63,7 +63,6 @@ def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
 
 
 def _weight(hand: Hand) -> str:
-    """Say what the links weigh and where their masses come from."""
     masses = [link.mass_kg for link in hand.links]
     stated = [mass for mass in masses if mass is not None]
     if len(stated) < len(masses):

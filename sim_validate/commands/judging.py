@@ -25,10 +25,7 @@ def judge_grasps(
     saved: SavedGrasps, names: Sequence[str], setup: Setup, *, jobs: int, folder: Path | None,
     reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
-    """Judge the grasps of a file by tests with four fingertips.
-
-    Gives the exit code, and the text of judgements.json.
-    """
+    """Judge grasps by tests with four fingertips; return exit code and text of judgements.json."""
     cases = [
         partial(judge_by, name, saved.body, grasp, saved.friction, setup=setup)
         for name in names
@@ -41,10 +38,7 @@ def judge_hands(
     saved: SavedGrasps, hand: Hand, found: Sequence[HandReach], names: Sequence[str], *,
     jobs: int, folder: Path | None, reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
-    """Judge the poses of a hand in the grasps of a file by tests.
-
-    Gives the exit code, and the text of judgements.json.
-    """
+    """Judge the poses of a hand by tests; return the exit code and the text of judgements.json."""
     cases = [
         partial(judge_hand_by, name, hand, saved.body, reach, saved.friction)
         for name in names
@@ -58,7 +52,6 @@ def _judged(
     saved: SavedGrasps, cases: Sequence[Callable[[], Judgement]], jobs: int, folder: Path | None,
     reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
-    """Judge all cases, and write what is done even if the run is interrupted."""
     if folder:
         remove_judgements(folder)
     found = processes.each(call, cases, jobs=jobs)
@@ -71,7 +64,6 @@ def _judged(
 
 
 def _show(judgements: Sequence[Judgement], reporter: Reporter) -> None:
-    """Show their verdicts, ours and the predicted margins, and how often they agree."""
     rows = [_row(each) for each in judgements[:TABLE_ROWS]]
     reporter.table("judged by published tests", COLUMNS, rows)
     say_cut(len(judgements), reporter)

@@ -85,7 +85,6 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
 def _reach(
     command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, reporter: Reporter
 ) -> tuple[list[HandReach], HandTrials, str]:
-    """Look for poses, try them, and write what is done even if the run is interrupted."""
     if command.out is not None:
         remove_reaches(command.out)
     asked: AskedRecord = {

@@ -50,10 +50,7 @@ def simulate_grasps(
     saved: SavedGrasps, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None,
     reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
-    """Simulate grasps, show the verdicts, and write them even if the run is interrupted.
-
-    Gives the exit code, and the text of verdicts.json.
-    """
+    """Simulate grasps; return the exit code and the text of verdicts.json."""
     gate = require_faithful(setup, saved.friction, saved.body.radius)
     for check in gate.checks:
         reporter.detail(str(check))
@@ -132,7 +129,6 @@ def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
 
 
 def _surprises(verdicts: Sequence[Verdict]) -> Iterable[str]:
-    """Yield a line about each trial that did not end as it should."""
     lines = list[str]()
     for verdict in verdicts:
         for trial in verdict.failures:

@@ -105,7 +105,6 @@ class HeldBench:
         self, scene: HeldScene, *, threads: int = 1, sample_s: float = SAMPLE_S,
         lost_m: float = math.inf, step_s: float | None = None,
     ) -> None:  # fmt: skip
-        """Compile a scene."""
         self.scene, self.threads, self.lost_m = scene, threads, lost_m
         self.model = compiled(scene.xml)
         if step_s is None:
@@ -146,7 +145,6 @@ class HeldBench:
     def _begun(
         self, drives: Sequence[Drive], start: Array | None, friction: Array | None
     ) -> batch.Batch:
-        """Put every trial into its state at the start."""
         trials = batch.Batch(self.model, len(drives), self.threads)
         trials.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         if start is not None:

@@ -280,10 +280,7 @@ def held_scene(
 
 
 def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> float | None:
-    """Return how far from the contacts a curved surface must be there [m]; None for all of it.
-
-    It is as far as fingertips come before the object counts as lost.
-    """
+    """Return how far fingertips come from contacts on a curved surface [m]; None for flat ones."""
     if body.patches is None:
         return None
     turn = settings.most_rad + math.radians(settings.off_deg)
@@ -343,7 +340,6 @@ def _judged(
     trial: Trial, motion: HeldMotion, predicted: tuple[float, float], bench: HeldBench,
     settings: ExecutionSettings,
 ) -> ExecutionTrial:  # fmt: skip
-    """Judge a trial beside its predicted multiples of first slip and of loss."""
     if motion.faults:
         found = DIVERGED
     else:

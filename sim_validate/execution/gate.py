@@ -80,10 +80,8 @@ def require_faithful_execution(
 def cases_of(
     layout: HeldLayout, physics: PhysicsSettings, hand: HeldSettings, push_n: float
 ) -> tuple[HeldCase, ...]:
-    """Return the case to check for each friction of a scene, with numbers of two digits.
-
-    Gravity points down the box's free axis, whatever its direction in the scene.
-    """
+    """Return the case to check for each friction of a scene, with numbers of two digits."""
+    # gravity points down the box's free axis, whatever its direction in the scene
     upright = replace(physics, gravity=tuple(WEIGHT.tolist()))
     numbers = {
         "mass_kg": layout.mass_kg, "stiffness_n_per_m": layout.stiffest, "push_n": push_n,
@@ -196,7 +194,6 @@ def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> Drive:
 
 
 def _held_load(case: HeldCase) -> Drive:
-    """Return the drive in which a light load along each axis grows, and stays."""
     lag = SETTLED * 2.0 * case.damping_ratio / case.frequency
     share = np.concatenate([case.rise(), np.ones(paths.samples(lag) + _period(case))])
     wrenches = case.light_n * share[:, None] * np.repeat([1.0, 0.0], 3)
@@ -215,7 +212,6 @@ def _creep(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
 
 
 def _sudden_load(case: HeldCase) -> Drive:
-    """Return the drive in which a load along x is there at once, and suddenly gone."""
     wrenches = np.zeros((2 * JUMP, 6))
     wrenches[:JUMP, 0] = JUMP_SHARE * case.light_n
     return replace(idle(2 * JUMP), wrenches=wrenches)
@@ -294,8 +290,6 @@ def ring_frequency(points: Array, about: float, sample_s: float) -> float:
     """Return the frequency of a decaying ring about an unknown middle [rad/s].
 
     Points at equal times t obey x_2 = p x_1 - q x_0 + r with p = 2 sqrt(q) cos(w t).
-
-    Takes `points` (n,); `about` [rad/s]; `sample_s` [s].
     """
     stride = max(1, int(RADIANS / (about * sample_s)))
     first, second, third = points[: -2 * stride], points[stride:-stride], points[2 * stride :]
@@ -440,7 +434,6 @@ def on_faces(case: HeldCase, name: str) -> tuple[Check, ...]:
 
 
 def _centroid(corners: Array) -> tuple[Array, float]:
-    """Return the centroid and the area of a convex polygon."""
     triangles = np.array(
         [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]
     )

@@ -154,11 +154,7 @@ ANY_MASS_KG = 1.0
 
 @dataclass(frozen=True, slots=True)
 class AskedExecution:
-    """How the grasps of all objects of a file are executed.
-
-    Raises:
-        InputError: The density is out of range.
-    """
+    """How the grasps of all objects of a file are executed."""
 
     settings: ExecutionSettings
     density_kg_m3: float | None = None
