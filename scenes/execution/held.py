@@ -100,7 +100,6 @@ class HeldLayout:
     solids: tuple[Array, ...]
     """Corners of each convex solid that fingertips can touch, (n, 3) each [m]."""
     radius_m: float
-    """Largest distance of the object's surface from its centre of mass [m]."""
     mass_kg: float
     inertia_kg_m2: Array
     """Inertia about the centre of mass, along the world axes, (3, 3) [kg m^2]."""

@@ -205,6 +205,15 @@ def finished(
     return done, text
 
 
+def warn_of(lines: Sequence[str], file: str, reporter: Reporter) -> None:
+    """Print the first lines of warnings, and say which file has all of them."""
+    for line in lines[:TABLE_ROWS]:
+        reporter.warn(line)
+    if len(lines) > TABLE_ROWS:
+        left = len(lines) - TABLE_ROWS
+        reporter.warn(f"and {left} more: {file} (--out DIR) has all of them")
+
+
 def say_cut(count: int, reporter: Reporter) -> None:
     """Say how many rows a table left out."""
     if count > TABLE_ROWS:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli import command_flags
-from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut
+from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut, warn_of
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.objects import asked_grasps
 from sim_validate.commands.asked.trials import check_mass, execution_settings
@@ -99,13 +99,7 @@ def _show(found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter:
     reporter.say(SLIPS_MEAN)
     say_cut(len(found), reporter)
     _say_totals(found, settings, reporter)
-    lines = list(_losses(found, settings))
-    for line in lines[:TABLE_ROWS]:
-        reporter.warn(line)
-    if len(lines) > TABLE_ROWS:
-        reporter.warn(
-            f"and {len(lines) - TABLE_ROWS} more: {EXECUTIONS} (--out DIR) has all of them"
-        )
+    warn_of(list(_losses(found, settings)), EXECUTIONS, reporter)
     if any(each.enough for each in found):
         reporter.say(ENOUGH_MEANS)
     if any(not trial.survived for each in found for trial in each.trials if trial.kind == "knock"):

@@ -41,7 +41,15 @@ def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
         f"fingers of {hand.name}", ("fingertip", "joints", "radius mm", "kind", "shapes"), fingers
     )
     columns = ("joint", "fingertip", "range deg", "torque limit N m")
-    reporter.table("joints, from the palm outwards", columns, _joints(hand))
+    links = [(finger, link.joint) for finger in hand.fingers for link in finger.links]
+    joints = [
+        (
+            joint.name, finger.name, f"{math.degrees(low):.1f} to {math.degrees(high):.1f}",
+            "none stated" if joint.torque_limit_n_m is None else f"{joint.torque_limit_n_m:g}",
+        )
+        for (finger, joint), (low, high) in zip(links, hand.ranges.tolist(), strict=True)
+    ]  # fmt: skip
+    reporter.table("joints, from the palm outwards", columns, joints)
     reporter.say(f"The palm has {counted(len(hand.palm), 'shape')} that must touch nothing.")
     if hand.ignored_pairs:
         listed = ", ".join(" and ".join(pair) for pair in hand.ignored_pairs)
@@ -69,17 +77,6 @@ def _weight(hand: Hand) -> str:
         return "Masses of links: unknown; without them gravity does not load the motors."
     said = f"The links of the fingers weigh {1e3 * sum(stated):.3g} g together"
     return said + ("." if hand.name in HANDS else f"; {SHAPES_WEIGH}.")
-
-
-def _joints(hand: Hand) -> list[tuple[str, ...]]:
-    links = [(finger, link.joint) for finger in hand.fingers for link in finger.links]
-    return [
-        (
-            joint.name, finger.name, f"{math.degrees(low):.1f} to {math.degrees(high):.1f}",
-            "none stated" if joint.torque_limit_n_m is None else f"{joint.torque_limit_n_m:g}",
-        )
-        for (finger, joint), (low, high) in zip(links, hand.ranges.tolist(), strict=True)
-    ]  # fmt: skip
 
 
 def _follows(coupling: Coupling) -> str:

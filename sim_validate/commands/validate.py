@@ -1,6 +1,6 @@
 """Runs the command `validate`, which simulates grasps and writes verdicts on them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -9,7 +9,7 @@ import numpy as np
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
 from sim_validate.cli import command_flags
-from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut
+from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut, warn_of
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.objects import asked_grasps
 from sim_validate.commands.asked.trials import prepared
@@ -75,6 +75,7 @@ def simulate_grasps(
 def _show(
     grasps: Sequence[Grasp], verdicts: Sequence[Verdict], setup: Setup, reporter: Reporter
 ) -> None:
+    limited = bool(verdicts) and verdicts[0].agenda.limits != "none"
     rows: list[tuple[str, ...]] = []
     for grasp, verdict in zip(grasps[:TABLE_ROWS], verdicts, strict=False):
         # the maximum is NaN if one is
@@ -84,12 +85,11 @@ def _show(
         rows.append(
             (grasp.id, grasp.family, f"{friction.predicted:.4f}",
              "-" if friction.simulated is None else f"{friction.simulated:.4f}",
-             *([_limit_range(verdict)] if verdict.agenda.limits != "none" else []),
+             *([_limit_range(verdict)] if limited else []),
              verdict.outcome.value, f"{1e6 * worst:.2g}", f"{let_go} of {len(verdict.controls)}")
         )  # fmt: skip
-    limits = ("limits",) if verdicts and verdicts[0].agenda.limits != "none" else ()
     ends = ("outcome", "um moved", "controls let go")
-    columns = ("grasp", "family", "mu*", "in sim", *limits, *ends)
+    columns = ("grasp", "family", "mu*", "in sim", *(["limits"] if limited else []), *ends)
     reporter.table("verdicts", columns, rows)
     say_cut(len(verdicts), reporter)
     _show_robustness(verdicts, reporter)
@@ -100,8 +100,7 @@ def _show(
         f"{totals['controls']} negative controls were let go (all should), "
         f"{totals['controls_held']} held"
     )
-    for line in _surprises(verdicts):
-        reporter.warn(line)
+    warn_of(_surprises(verdicts), "verdicts.json", reporter)
     if not totals["controls"]:
         reporter.warn("there were no negative controls: nothing shows that this test can fail")
 
@@ -128,7 +127,7 @@ def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
     reporter.table("repeats with noise", columns, rows)
 
 
-def _surprises(verdicts: Sequence[Verdict]) -> Iterable[str]:
+def _surprises(verdicts: Sequence[Verdict]) -> list[str]:
     lines = list[str]()
     for verdict in verdicts:
         for trial in verdict.failures:
@@ -143,6 +142,4 @@ def _surprises(verdicts: Sequence[Verdict]) -> Iterable[str]:
         for trial in control.tried
         if not control.let_go
     ]
-    left = len(lines) - TABLE_ROWS
-    more = [f"and {left} more: verdicts.json (--out DIR) has all of them"] if left > 0 else []
-    return lines[:TABLE_ROWS] + more
+    return lines

@@ -141,9 +141,14 @@ def held_box(case: HeldCase) -> tuple[Check, ...]:
     bench = HeldBench(case.held_box())
     _, start = bench.settled(paths.closing(SETTLE_S))
     ramps = [_ramp(case, 0.0), _ramp(case, RISING)]
-    still = _held_load(case)
+    lag = SETTLED * 2.0 * case.damping_ratio / case.frequency
+    share = np.concatenate([case.rise(), np.ones(paths.samples(lag) + _period(case))])
+    wrenches = case.light_n * share[:, None] * np.repeat([1.0, 0.0], 3)
+    still = replace(idle(len(share)), wrenches=wrenches, shares=share)
     moving = replace(still, velocity=SPEED_M_PER_S * np.array([0.6, 0.8, 0.0]))
-    sudden = _sudden_load(case)
+    jump = np.zeros((2 * JUMP, 6))  # there at once, and suddenly gone
+    jump[:JUMP, 0] = JUMP_SHARE * case.light_n
+    sudden = replace(idle(2 * JUMP), wrenches=jump)
     motions = bench.run([*ramps, still, moving, sudden], start)
     layout, friction = bench.scene.layout, bench.scene.layout.friction
     slips = [
@@ -193,13 +198,6 @@ def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> Drive:
     return replace(drive, accelerations=accelerations)
 
 
-def _held_load(case: HeldCase) -> Drive:
-    lag = SETTLED * 2.0 * case.damping_ratio / case.frequency
-    share = np.concatenate([case.rise(), np.ones(paths.samples(lag) + _period(case))])
-    wrenches = case.light_n * share[:, None] * np.repeat([1.0, 0.0], 3)
-    return replace(idle(len(share)), wrenches=wrenches, shares=share)
-
-
 def _creep(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
     """Check how far contacts that stick creep in the time of the longest trial."""
     last = _period(case)
@@ -209,12 +207,6 @@ def _creep(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
     far = speed * longest / (SLID * case.radius_m)
     name = "creep of contacts that stick in a whole trial, over what counts as slipped"
     return little(name, motion, far, CREEP)
-
-
-def _sudden_load(case: HeldCase) -> Drive:
-    wrenches = np.zeros((2 * JUMP, 6))
-    wrenches[:JUMP, 0] = JUMP_SHARE * case.light_n
-    return replace(idle(2 * JUMP), wrenches=wrenches)
 
 
 def _jumps(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:

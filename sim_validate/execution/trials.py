@@ -113,7 +113,6 @@ class Rest:
     down: Array
     """Unit normal out of the object."""
     height: float
-    """Distance of the centre of mass from the table [m]."""
     likelihood: float
     """Share of the sphere that the face takes, as the centre of mass sees it."""
 

@@ -28,7 +28,6 @@ class Source:
     """Files of a public repository in which a test is stated."""
 
     repository: str
-    """Owner and name on GitHub."""
     commit: str
     paths: tuple[str, ...]
 

@@ -20,7 +20,6 @@ class Watched:
     """The motion in one hold, from the closed fingers to the end."""
 
     joints: Array
-    """Joint positions as in `Motion.joints`, (n, 7 + 3k)."""
     trace: Trace
     times_s: Array
     """Times of the samples, zero at the moment friction was lowered, (n,) [s]."""

@@ -159,12 +159,10 @@ class Load:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Schedule:
-    """The wrench, the finger forces and the friction in each of the n samples of a trial."""
+    """Wrench (n, 6), finger forces (n, k, 3) and friction in each of the n samples of a trial."""
 
     wrenches: Array
-    """External wrench in each sample, (n, 6) [N, N m]."""
     forces: Array
-    """Planned finger forces in each sample, (n, k, 3) [N]."""
     friction: Array
     watched: int
     """Index of the first sample from which the object must stay where it is."""

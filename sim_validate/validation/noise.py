@@ -47,13 +47,12 @@ seed."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Disturbed:
-    """A grasp after one draw of noise."""
+    """A grasp after one draw of noise: `contacts` are `landed` with normals that lean."""
 
     landed: tuple[Contact, ...]
     """Where fingers meet the surface, with the model's normals; fewer than k contacts if some
     miss."""
     contacts: tuple[Contact, ...]
-    """The contacts in `landed`, with surface normals tilted by the noise."""
     missed: tuple[int, ...]
     friction: float
     mass: float
