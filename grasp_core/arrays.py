@@ -140,6 +140,11 @@ def to_digits(values: Array, size: float = 0.0) -> Array:
     return np.floor(values * scale + SHIFT) / scale
 
 
+def rounded(value: float) -> float:
+    """Round a number as `to_digits` rounds an array of it alone."""
+    return float(to_digits(np.array(value, dtype=np.float64)))
+
+
 def is_a(value: Any, kind: type) -> bool:
     """Return whether a value is an instance of a class, whatever type is declared for it."""
     return isinstance(value, kind)

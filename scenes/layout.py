@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, to_digits
+from grasp_core.arrays import Array, Indices, rounded, to_digits
 from grasp_core.by_value import ByValue
 from grasp_core.checked import coefficient, number
 from grasp_core.closure.contacts import contact_frames, unit_size
@@ -166,8 +166,6 @@ def arrange(
     which turns differences in the last digits of a number, such as those between machines, into
     visible motions. Everything after the rounding is plain arithmetic with the same result on every
     machine.
-
-    Takes `torsion_m` [m].
     """
     coefficient(friction)
     fingers = fingers or FingerSettings()
@@ -184,7 +182,7 @@ def arrange(
         name=body.name,
         vertices=to_digits(body.vertices - body.center_of_mass),
         triangles=body.triangles,
-        radius_m=_to_digits(body.radius),
+        radius_m=rounded(body.radius),
         center=to_digits(arms.mean(axis=0), body.radius),
         grasp_size_m=size,
         mass_kg=mass,
@@ -211,7 +209,7 @@ def _drive(
     if fingers.radius_m is not None:
         where = ", the object's radius in m, or None"
         number(fingers.radius_m, "fingers.radius_m", most=body.radius, where=where)
-    radius = fingers.radius_m or _to_digits(fitting_radius(body, positions, normals))
+    radius = fingers.radius_m or rounded(fitting_radius(body, positions, normals))
     return FingerDrive(
         radius_m=radius,
         mass_kg=mass,
@@ -236,11 +234,7 @@ def grasp_size(positions: Array) -> float:
     """Compute the root mean square distance [m] of contacts from the axis they are closest to."""
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     lever = np.linalg.norm(spread[1:]) / math.sqrt(len(positions))
-    return _to_digits(float(lever))
-
-
-def _to_digits(value: float) -> float:
-    return float(to_digits(np.array(value, dtype=np.float64)))
+    return rounded(float(lever))
 
 
 def _inertia(mass: float, positions: Array, size: float) -> Array:
@@ -260,10 +254,7 @@ def _inertia(mass: float, positions: Array, size: float) -> Array:
 
 
 def _pushes(positions: Array, normals: Array, friction: float, torsion_m: float) -> Array:
-    """Compute balanced forces in the contact frames, (k, 3), or normal ones without closure.
-
-    The largest normal part is one.
-    """
+    """Compute balanced forces, (k, 3), or normal ones without closure; the largest push is one."""
     arms, _, _ = unit_size(positions)
     _, _, margins = deepest_forces(arms[None], normals[None], np.array([friction]))
     try:

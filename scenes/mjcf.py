@@ -12,15 +12,14 @@ Fingers are spheres on three slides along (normal, tangent, tangent), each with 
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
 
 from grasp_core.arrays import to_digits
-from grasp_core.by_value import ByValue
-from grasp_core.checked import instance, one_of, path_of, several
+from grasp_core.checked import instance, one_of, path_of
+from grasp_core.closure.contacts import listed_contacts
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_parts
 from grasp_core.notebooks import InNotebooks
@@ -29,12 +28,11 @@ from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
-from scenes.mjcf_text import Element, add_element, as_texts, document, quaternion
+from scenes.mjcf_text import Element, SceneText, add_element, as_texts, document, quaternion
 from scenes.physics import PhysicsSettings, add_free_body, add_light, begin_scene
 
 Surface = Literal["pads", "mesh"]
 """What fingertips touch: one pad (a small box) each, or the convex hull of the object's mesh."""
-FEWEST_CONTACTS = 2
 SCALED = (
     "Masses and servos are scaled to suit the grasp: this scene is for tests of force closure. "
     "The command `graspproof scene` with a mass writes the true one, under gravity."
@@ -43,10 +41,9 @@ AXES = ("normal", "tangent1", "tangent2")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Scene(ByValue, InNotebooks):
+class Scene(SceneText, InNotebooks):
     """A grasp as the text of a MuJoCo model, with the settings and numbers it was made from."""
 
-    xml: str
     layout: Layout
     physics: PhysicsSettings
     surface: Surface
@@ -86,27 +83,19 @@ def build_scene(
             f"surface must be 'pads' for an object that is not convex: {body.name} is not convex, "
             "and MuJoCo would fill its hollows"
         )
-    contacts = grasp if isinstance(grasp, Grasp) else _listed(grasp)
+    contacts = grasp if isinstance(grasp, Grasp) else listed_contacts(grasp, "grasp")
     physics = physics or PhysicsSettings()
     layout = arrange(body, contacts, friction, fingers, physics.torsion_m)
     return Scene(to_text(layout, physics, surface), layout, physics, surface)
 
 
-def _listed(contacts: Iterable[Contact]) -> tuple[Contact, ...]:
-    each = partial(instance, kind=Contact, name="grasp", remedy="give a Grasp, or Contact values")
-    listed = several(contacts, each, "grasp", "Contact values or a Grasp")
-    if len(listed) < FEWEST_CONTACTS:
-        raise InputError(f"grasp must have at least {FEWEST_CONTACTS} contacts, got {len(listed)}")
-    return listed
-
-
-def write_scene(scene: Scene, path: str | Path) -> Path:
-    """Write the scene's text to a file and return its path.
+def write_scene(scene: SceneText, path: str | Path) -> Path:
+    """Write the text of a scene of any kind to a file and return its path.
 
     Raises:
         InputError: `scene` is not a scene, or `path` is not a path.
     """
-    instance(scene, Scene, "scene", "build_scene makes one")
+    instance(scene, SceneText, "scene", "build_scene makes one")
     return write_parts(path_of(path, "path"), [scene.xml.encode()])
 
 
@@ -116,11 +105,11 @@ def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads")
     contact = as_texts(physics.contact())
     add_object(world, layout, contact, surface)
     for finger in range(len(layout.contacts)):
-        _finger(world, layout, contact, finger)
+        add_finger(world, layout, contact, finger)
     if not layout.drive.rigid:
         actuators = add_element(root, "actuator", {})
         for finger in range(len(layout.contacts)):
-            _servos(actuators, layout, finger)
+            add_servos(actuators, layout, finger, (0.0, layout.drive.max_normal_force_n))
         _keyframes(root, layout)
     return document(root)
 
@@ -167,10 +156,14 @@ def add_object(
         add_element(body, "geom", pad | contact)
 
 
-def _finger(world: Element, layout: Layout, contact: dict[str, str], finger: int) -> None:
+def add_finger(
+    world: Element, layout: Layout, contact: dict[str, str], finger: int, *, lifted: bool = True
+) -> None:
+    """Add a fingertip on its slides."""
     drive = layout.drive
     pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.frames[finger])}
-    body = add_element(world, "body", {"name": f"finger{finger}", "gravcomp": 1.0} | pose)
+    weight = {"gravcomp": 1.0} if lifted else {}
+    body = add_element(world, "body", {"name": f"finger{finger}"} | weight | pose)
     slides = () if drive.rigid else tuple(zip(AXES, np.eye(3), strict=True))
     for axis, direction in slides:
         add_element(
@@ -200,7 +193,10 @@ def _finger(world: Element, layout: Layout, contact: dict[str, str], finger: int
     add_element(body, "geom", tip | contact)
 
 
-def _servos(actuators: Element, layout: Layout, finger: int) -> None:
+def add_servos(
+    actuators: Element, layout: Layout, finger: int, pushes: tuple[float, float] | None = None
+) -> None:
+    """Add the servos of a fingertip's slides; pushes along the normal may have limits [N]."""
     drive = layout.drive
     for axis in AXES:
         name = f"finger{finger}_{axis}"
@@ -212,8 +208,8 @@ def _servos(actuators: Element, layout: Layout, finger: int) -> None:
             "ctrllimited": "false",
             "forcelimited": "false",
         }
-        if axis == "normal":
-            servo |= {"forcelimited": "true", "forcerange": (0.0, drive.max_normal_force_n)}
+        if axis == "normal" and pushes is not None:
+            servo |= {"forcelimited": "true", "forcerange": pushes}
         add_element(actuators, "position", servo)
 
 

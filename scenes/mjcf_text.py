@@ -13,6 +13,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.by_value import ByValue
 from grasp_core.solvers.ties import first_best
 
 COMPILER = {"angle": "radian", "autolimits": "false", "inertiafromgeom": "false"}
@@ -39,6 +40,13 @@ def quaternion(rotation: Array) -> Array:
     )
     row = rows[first_best(np.diag(rows))]
     return row / math.sqrt(sum(part * part for part in row.tolist()))
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SceneText(ByValue):
+    """The text of a MuJoCo model: what scenes of every kind are."""
+
+    xml: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)

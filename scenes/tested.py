@@ -42,8 +42,8 @@ from scenes.hands.chains_mjcf import (
     placed,
 )
 from scenes.hands.hand_scene import hand_layout
-from scenes.layout import SQUEEZE, Layout, arrange
-from scenes.mjcf import AXES
+from scenes.layout import SQUEEZE, arrange
+from scenes.mjcf import add_finger, add_servos
 from scenes.mjcf_text import Element, add_element, as_texts, document, quaternion
 from scenes.physics import PhysicsSettings, add_free_body, begin_scene
 
@@ -98,7 +98,7 @@ def mass_properties(body: Polyhedron, mass_kg: float) -> tuple[float, Array]:
 def begun(
     body: Polyhedron, friction: float, mass: tuple[float, Array], physics: PhysicsSettings,
 ) -> tuple[Element, Element]:  # fmt: skip
-    """Begin a scene: return its root, with the meshes of the surface, and its world."""
+    """Begin a scene of an object with its surface: return its root and its world."""
     mesh = (to_digits(body.vertices - body.center_of_mass), body.triangles)
     solids = [to_digits(each) for each in touched_solids(body, ORIGIN, 2.0 * body.radius)]
     flags = {"midphase": "disable"}
@@ -106,23 +106,16 @@ def begun(
         body.name, COMMENT, physics, body.radius, mesh, flags=flags, solids=solids
     )
     rubbing = as_texts({"friction": (friction, physics.torsion_m, 0.0), **physics.contact()})
-    _object(world, mass, rubbing, len(solids))
-    return root, world
-
-
-def _object(
-    world: Element, mass: tuple[float, Array], rubbing: dict[str, str], solids: int
-) -> None:
-    """Add the object with its mass, and the solids that are its surface."""
-    body = add_free_body(world, *mass)
+    moving = add_free_body(world, *mass)
     seen = {"name": "object", "type": "mesh", "mesh": "object", "contype": 0, "conaffinity": 0,
             "mass": 0.0, "group": 1, "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip
-    add_element(body, "geom", seen)
+    add_element(moving, "geom", seen)
     everything = {"contype": FINGERS | 1 << 20, "conaffinity": 0, "mass": 0.0, "group": 3,
                   "rgba": (0.9, 0.6, 0.2, 0.3)}  # fmt: skip
-    for place in range(solids):
+    for place in range(len(solids)):
         named = {"name": f"surface{place}", "type": "mesh", "mesh": f"surface{place}"}
-        add_element(body, "geom", named | everything | rubbing)
+        add_element(moving, "geom", named | everything | rubbing)
+    return root, world
 
 
 def ended(root: Element, opened: Array, told: int = 0) -> str:
@@ -141,12 +134,15 @@ def fingertip_scene(
     """Make the scene of a grasp, or of contacts of any origin."""
     base = arrange(body, grasp, friction, fingers, physics.torsion_m)
     mass, inertia = mass_properties(body, mass_kg)
-    layout = replace(base, center=np.zeros(3), mass_kg=mass, inertia_kg_m2=inertia)
+    stiffness, share = base.drive.stiffness_n_per_m, TIP_MASS_KG + mass / len(base.contacts)
+    damping = 2.0 * math.sqrt(stiffness * share)
+    drive = replace(base.drive, mass_kg=TIP_MASS_KG, damping_n_s_per_m=damping, rigid=False)
+    layout = replace(base, drive=drive)
     root, world = begun(body, friction, (mass, inertia), physics)
-    actuators = add_element(root, "actuator", {})
+    contact, actuators = as_texts(physics.contact()), add_element(root, "actuator", {})
     for finger in range(len(layout.contacts)):
-        _fingertip(world, layout, physics, finger)
-        _tip_servos(actuators, layout, finger)
+        add_finger(world, layout, contact, finger, lifted=False)
+        add_servos(actuators, layout, finger)
     away = min(OPEN_M, OPEN_SIZES * layout.grasp_size_m)
     opened = np.tile([-away, 0.0, 0.0], len(layout.contacts))
     squeeze = layout.squeeze / SQUEEZE
@@ -156,35 +152,6 @@ def fingertip_scene(
         ended(root, opened), physics, friction, mass, inertia, squeeze[:, 0], opened,
         np.zeros_like(opened), commands, names,
     )  # fmt: skip
-
-
-def _fingertip(world: Element, layout: Layout, physics: PhysicsSettings, finger: int) -> None:
-    name, radius = f"finger{finger}", layout.drive.radius_m
-    pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.frames[finger])}
-    body = add_element(world, "body", {"name": name} | pose)
-    for axis, way in zip(AXES, np.eye(3), strict=True):
-        slide = {"name": f"{name}_{axis}", "type": "slide", "axis": way, "pos": (0.0, 0.0, 0.0),
-                 "limited": "false", "damping": 0.0, "stiffness": 0.0, "armature": 0.0,
-                 "frictionloss": 0.0}  # fmt: skip
-        add_element(body, "joint", slide)
-    inertia = (0.4 * TIP_MASS_KG * radius**2,) * 3
-    own = {"pos": (0.0, 0.0, 0.0), "mass": TIP_MASS_KG, "diaginertia": inertia}
-    add_element(body, "inertial", own)
-    tip = {"name": name, "type": "sphere", "size": radius, "contype": 0,
-           "conaffinity": 1 << finger, "friction": (layout.friction, layout.torsion_m, 0.0),
-           "mass": 0.0, "group": 0, "rgba": (0.8, 0.25, 0.2, 1.0)}  # fmt: skip
-    add_element(body, "geom", tip | physics.contact())
-
-
-def _tip_servos(actuators: Element, layout: Layout, finger: int) -> None:
-    stiffness = layout.drive.stiffness_n_per_m
-    share = TIP_MASS_KG + layout.mass_kg / len(layout.contacts)
-    damping = 2.0 * math.sqrt(stiffness * share)
-    for axis in AXES:
-        name = f"finger{finger}_{axis}"
-        servo = {"name": name, "joint": name, "kp": stiffness, "kv": damping,
-                 "ctrllimited": "false", "forcelimited": "false"}  # fmt: skip
-        add_element(actuators, "position", servo)
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,13 +229,13 @@ def hand_scene(
     palms = postures.palms.copy()
     palms[:, :3, 3] -= body.center_of_mass
     roots = _roots(palms, servos)
+    free = servos.weld is not None
     hung = world if servos.weld is None else _welded(root, world, servos.weld)
-    at = palms[1] if servos.weld is None else servos.root
+    at = servos.root if free else palms[1]
     palm = add_element(hung, "body", {"name": PALM, **placed(at[:3, 3], at[:3, :3])})
-    if servos.weld is not None:
+    if free:
         add_element(palm, "inertial", weights[PALM])
     touching = as_texts({"friction": (friction, physics.torsion_m, 0.0)} | physics.contact())
-    free = servos.weld is not None
     tips = tuple(_tip(root, each, touching) for each in hand.fingers)
     chains = Chains(
         replace(hand, fingers=tuple(map(_without_cover, hand.fingers))), np.zeros(len(hand.joints)),
@@ -277,7 +244,13 @@ def hand_scene(
     )  # fmt: skip
     add_fingers(palm, chains)
     add_exclusions(add_element(root, "contact", {}), hand)
-    _joint_servos(root, hand, postures, servos, physics.timestep)
+    actuators, limits = add_element(root, "actuator", {}), postures.limits_n_m
+    for number, joint in enumerate(hand.joints):  # commands on a weld end where joints do
+        add_servo(
+            actuators, joint.name, servos.stiffness_n_m_per_rad, servos.damping(physics.timestep),
+            None if limits is None else float(limits[number]),
+            (joint.lowest, joint.highest) if free else None,
+        )  # fmt: skip
     opened, shut, squeezing = np.hstack([roots, to_digits(postures.joints)])
     names = tuple(tuple(link.name for link in finger.links) for finger in hand.fingers)
     return TestedScene(
@@ -341,17 +314,3 @@ def _covered(finger: HandFinger) -> bool:
         if inside > finger.tip.radius - COVERED_M:
             return True
     return False
-
-
-def _joint_servos(
-    root: Element, hand: Hand, postures: Postures, servos: HandServos, step_s: float
-) -> None:
-    """Add a servo to each joint; on a weld, commands end where joints do, as in files of hands."""
-    actuators = add_element(root, "actuator", {})
-    limits = postures.limits_n_m
-    for number, joint in enumerate(hand.joints):
-        add_servo(
-            actuators, joint.name, servos.stiffness_n_m_per_rad, servos.damping(step_s),
-            None if limits is None else float(limits[number]),
-            None if servos.weld is None else (joint.lowest, joint.highest),
-        )  # fmt: skip

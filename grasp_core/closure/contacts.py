@@ -34,6 +34,15 @@ WRENCH = 6
 """Number of components of a wrench."""
 
 
+def listed_contacts(given: Iterable[Contact], name: str) -> tuple[Contact, ...]:
+    """Return contacts of any origin, if there are enough to balance anything."""
+    each = partial(instance, kind=Contact, name=name, remedy="or give a Grasp")
+    contacts = several(given, each, name, "Contact values")
+    if len(contacts) < FEWEST:
+        raise InputError(f"{name}: at least two are needed, got {len(contacts)}")
+    return contacts
+
+
 def stacked(contacts: Iterable[Contact]) -> tuple[Array, Array]:
     """Return the positions and inward normals of contacts."""
     listed = tuple(contacts)

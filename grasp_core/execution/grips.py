@@ -41,7 +41,7 @@ compliance of a robotic hand" (1989); Howard & Kumar, "On the stability of grasp
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,7 +56,7 @@ from grasp_core.arrays import (
     real_array,
 )
 from grasp_core.by_value import ByValue
-from grasp_core.checked import LARGEST, SMALLEST, instance, several
+from grasp_core.checked import LARGEST, SMALLEST, instance
 from grasp_core.closure.contacts import (
     FEWEST,
     WRENCH,
@@ -65,6 +65,7 @@ from grasp_core.closure.contacts import (
     contact_frictions,
     cross_matrix,
     grasp_map,
+    listed_contacts,
     stacked,
 )
 from grasp_core.errors import InputError
@@ -312,11 +313,7 @@ def unsqueezed(
         check_on_faces(body, contacts)
         points, units = contact_arrays(contacts, None)
     else:
-        each = partial(instance, kind=Contact, name="contacts", remedy="or give a Grasp")
-        listed = several(contacts, each, "contacts", "Contact values")
-        if len(listed) < FEWEST:
-            raise InputError(f"contacts: at least two are needed, got {len(listed)}")
-        points, units = contact_arrays(*stacked(listed))
+        points, units = contact_arrays(*stacked(listed_contacts(contacts, "contacts")))
     count = len(points)
     arms = frozen(points - body.center_of_mass, (count, 3), "contacts", most=LARGEST)
     radii = frozen_each(tip_radius_m, count, "tip_radius_m")

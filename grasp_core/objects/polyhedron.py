@@ -16,7 +16,7 @@ from typing import Any, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices, to_digits
+from grasp_core.arrays import Array, Indices, frozen, frozen_indices, rounded
 from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import (
     LARGEST,
@@ -147,7 +147,7 @@ class Polyhedron(ByValue, InNotebooks):
                 f"{self.name}: a density gives no mass, because the surface is open and its volume "
                 "is not known; give the mass, or close the surface"
             )
-        return float(to_digits(np.array(self.volume * density)))
+        return rounded(self.volume * density)
 
     @property
     def normals(self) -> Array:

@@ -90,18 +90,6 @@ class HeldSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FingersSeen:
-    """What the fingers of a scene did in each of n samples, as the palm sees it."""
-
-    tips: Array
-    """Displacements of the fingertips along the axes of their springs, (n, k, 3) [m]."""
-    forces: Array
-    """Contact forces on the object along these axes, (n, k, 3) [N]."""
-    turns: Array | None
-    """Orientations of the fingertips, (n, k, 3, 3); None where they do not turn."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class HeldLayout:
     """Positions, masses and springs of everything in a scene of execution, in the world frame."""
 
@@ -112,7 +100,6 @@ class HeldLayout:
     solids: tuple[Array, ...]
     """Corners of each convex solid that fingertips can touch, (n, 3) each [m]."""
     radius_m: float
-    """Largest distance of the object's surface from its centre of mass [m]."""
     mass_kg: float
     inertia_kg_m2: Array
     """Inertia about the centre of mass, along the world axes, (3, 3) [kg m^2]."""
@@ -167,10 +154,17 @@ class HeldLayout:
         told = base + shares[:, :, None] * (self.pushes / self.stiffness)
         return told.reshape(len(shares), -1)
 
-    def fingers_seen(self, joints: Array, loads: Array, turned: Array) -> FingersSeen:
-        """See what fingers did."""
+    def fingers_seen(
+        self, joints: Array, loads: Array, turned: Array
+    ) -> tuple[Array, Array, Array | None]:
+        """See what fingers did in n samples, as the palm sees it.
+
+        Gives displacements of fingertips, (n, k, 3) [m], and contact forces on the object,
+        (n, k, 3) [N], along the springs, and orientations of fingertips, (n, k, 3, 3), or None
+        where they do not turn.
+        """
         shape = (len(turned), *self.stiffness.shape)
-        return FingersSeen(joints.reshape(shape), -loads.reshape(shape), None)
+        return joints.reshape(shape), -loads.reshape(shape), None
 
     @property
     def tip_centers(self) -> Array:

@@ -11,21 +11,17 @@ the larger.
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.by_value import ByValue
-from grasp_core.checked import instance, path_of
+from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
-from grasp_core.files.text_files import write_parts
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.execution.held import HeldLayout, HeldSettings, held_layout
-from scenes.mjcf_text import Element, add_element, document, quaternion
+from scenes.mjcf_text import Element, SceneText, add_element, document, quaternion
 from scenes.physics import PhysicsSettings, add_free_body, add_light, begin_scene
 
 PALM_ARMATURE = 1e7
@@ -100,10 +96,9 @@ def held_physics(layout: HeldLayout) -> PhysicsSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class HeldScene(ByValue):
+class HeldScene(SceneText):
     """A held object as the text of a MuJoCo model, with the numbers it was made from."""
 
-    xml: str
     layout: HeldLayout
     physics: PhysicsSettings
 
@@ -147,16 +142,6 @@ def build_held_scene(
     return HeldScene(held_text(layout, physics), layout, physics)
 
 
-def write_held_scene(scene: HeldScene, path: str | Path) -> Path:
-    """Write the scene's text to a file and return its path.
-
-    Raises:
-        InputError: `scene` is not a scene, or `path` is not a path.
-    """
-    instance(scene, HeldScene, "scene", "build_held_scene makes one")
-    return write_parts(path_of(path, "path"), [scene.xml.encode()])
-
-
 def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
     """Write the MJCF text of a held object; equal layouts give equal texts."""
     root, world = opened(layout, physics)
@@ -177,8 +162,22 @@ def opened(layout: HeldLayout, physics: PhysicsSettings) -> tuple[Element, Eleme
         layout.name, TRUE_MASS, physics, layout.radius_m, mesh, flags=FLAGS, solids=layout.solids
     )
     add_light(world, layout.radius_m)
-    _object(world, layout, physics)
-    _table(world, layout, physics)
+    body, contact = add_free_body(world, layout.mass_kg, layout.inertia_kg_m2), physics.contact()
+    smooth = {"conaffinity": 0, "friction": (0.0, 0.0, 0.0), "mass": 0.0, **contact}
+    hull = {"name": "object", "type": "mesh", "mesh": "object", "contype": TABLE, "group": 1,
+            "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip
+    add_element(body, "geom", {**hull, **smooth})
+    for place in range(len(layout.solids)):
+        name = f"surface{place}"
+        solid = {"name": name, "type": "mesh", "mesh": name, "contype": FINGERTIPS, "group": 3,
+                 "rgba": (0.9, 0.6, 0.2, 0.3)}  # fmt: skip
+        add_element(body, "geom", {**solid, **smooth})
+    away = AWAY * layout.radius_m * np.array([0.0, 0.0, -1.0])
+    table = add_element(world, "body", {"name": "table", "mocap": "true", "pos": away})
+    plane = {"name": "table", "type": "plane", "size": (10.0 * layout.radius_m,) * 2 + (0.01,),
+             "contype": 0, "conaffinity": TABLE, "friction": (layout.friction.max(), 0.0, 0.0),
+             "rgba": (0.8, 0.78, 0.74, 1.0)}  # fmt: skip
+    add_element(table, "geom", plane | contact)
     return root, world
 
 
@@ -189,32 +188,6 @@ def add_start(root: Element, layout: HeldLayout) -> None:
     rest = np.concatenate([home, np.zeros(len(told))])
     keys = add_element(root, "keyframe", {})
     add_element(keys, "key", {"name": "squeeze", "qpos": rest, "ctrl": told})
-
-
-def _object(world: Element, layout: HeldLayout, physics: PhysicsSettings) -> None:
-    body = add_free_body(world, layout.mass_kg, layout.inertia_kg_m2)
-    hull = {"name": "object", "type": "mesh", "mesh": "object", "contype": TABLE, "group": 1,
-            "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip
-    add_element(body, "geom", {**hull, **_smooth(physics)})
-    for place in range(len(layout.solids)):
-        name = f"surface{place}"
-        solid = {"name": name, "type": "mesh", "mesh": name, "contype": FINGERTIPS, "group": 3,
-                 "rgba": (0.9, 0.6, 0.2, 0.3)}  # fmt: skip
-        add_element(body, "geom", {**solid, **_smooth(physics)})
-
-
-def _smooth(physics: PhysicsSettings) -> Mapping[str, object]:
-    """Return what geoms of the object have in common."""
-    return {"conaffinity": 0, "friction": (0.0, 0.0, 0.0), "mass": 0.0, **physics.contact()}
-
-
-def _table(world: Element, layout: HeldLayout, physics: PhysicsSettings) -> None:
-    away = AWAY * layout.radius_m * np.array([0.0, 0.0, -1.0])
-    body = add_element(world, "body", {"name": "table", "mocap": "true", "pos": away})
-    plane = {"name": "table", "type": "plane", "size": (10.0 * layout.radius_m,) * 2 + (0.01,),
-             "contype": 0, "conaffinity": TABLE, "friction": (layout.friction.max(), 0.0, 0.0),
-             "rgba": (0.8, 0.78, 0.74, 1.0)}  # fmt: skip
-    add_element(body, "geom", plane | physics.contact())
 
 
 def palm_armature(layout: HeldLayout) -> Array:

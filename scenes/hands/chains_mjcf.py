@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
-from grasp_core.hands.hand import PALM, Hand, HandFinger, Link, LinkShape
+from grasp_core.hands.hand import PALM, Hand, Link, LinkShape
 from grasp_core.hands.kinematics import rotation_about
 from scenes.mjcf_text import Element, add_element, quaternion
 
@@ -111,20 +111,16 @@ def add_fingers(palm: Element, chains: Chains) -> None:
     for finger, tip in zip(chains.hand.fingers, chains.tips, strict=True):
         parent = palm
         for link in finger.links:
-            parent = _link(parent, chains, (link, link is finger.links[-1]), next(angles))
-        _tip(parent, finger, tip)
+            is_last = link is finger.links[-1]
+            parent = _link(parent, chains, link, next(angles), is_last=is_last)
+        ball = {"name": f"tip_{finger.name}", "type": "sphere", "size": finger.tip.radius,
+                "pos": finger.tip.center, "contype": 0, "conaffinity": 0, "mass": 0.0, "group": 0,
+                "rgba": (0.8, 0.25, 0.2, 1.0)}  # fmt: skip
+        add_element(parent, "geom", ball | dict(tip))
 
 
-def _tip(last: Element, finger: HandFinger, attributes: Mapping[str, object]) -> None:
-    ball = {"name": f"tip_{finger.name}", "type": "sphere", "size": finger.tip.radius,
-            "pos": finger.tip.center, "contype": 0, "conaffinity": 0, "mass": 0.0, "group": 0,
-            "rgba": (0.8, 0.25, 0.2, 1.0)}  # fmt: skip
-    add_element(last, "geom", ball | dict(attributes))
-
-
-def _link(parent: Element, chains: Chains, numbered: tuple[Link, bool], angle: float) -> Element:
-    (link, is_last), mass, center = numbered, chains.light_kg, np.zeros(3)
-    joint = link.joint
+def _link(parent: Element, chains: Chains, link: Link, angle: float, *, is_last: bool) -> Element:
+    mass, center, joint = chains.light_kg, np.zeros(3), link.joint
     if chains.weighs and link.mass_kg is not None and link.center_of_mass is not None:
         mass, center = link.mass_kg, link.center_of_mass
     turned = joint.rotation @ rotation_about(joint.axis, angle)

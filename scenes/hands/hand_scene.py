@@ -29,14 +29,12 @@ the motors cannot, and joints move by micrometres here.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 
 import numpy as np
 
-from grasp_core.arrays import Array, to_digits
-from grasp_core.checked import instance, path_of
+from grasp_core.arrays import Array, rounded, to_digits
+from grasp_core.checked import instance
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians
@@ -123,8 +121,8 @@ def hand_layout(
     lever = mean_lever(motors)
     drive, pose = base.drive, stance.palm_pose.copy()
     pose[:3, 3] -= body.center_of_mass
-    servo = float(to_digits(np.array(drive.stiffness_n_per_m * lever**2)))
-    armature = float(to_digits(np.array(drive.mass_kg * lever**2)))
+    servo = rounded(drive.stiffness_n_per_m * lever**2)
+    armature = rounded(drive.mass_kg * lever**2)
     own = {each.name: getattr(base, each.name) for each in fields(base)}
     own["squeeze"] = to_digits(SQUEEZE * np.einsum("kij,ki->kj", base.frames, squeeze))
     gravity = np.zeros(3) if down is None else GRAVITY_M_PER_S2 * direction(down, "down")
@@ -207,16 +205,6 @@ def limited(scene: HandScene, limits: Array, friction: float) -> HandScene:
     motors = replace(scene.layout.motors, limits=limits)
     layout = replace(scene.layout, motors=motors, friction=friction)
     return HandScene(hand_text(layout, scene.physics), layout, scene.physics, "pads")
-
-
-def write_hand_scene(scene: HandScene, path: str | Path) -> Path:
-    """Write the scene's text to a file and return its path.
-
-    Raises:
-        InputError: `scene` is not a scene, or `path` is not a path.
-    """
-    instance(scene, HandScene, "scene", "build_hand_scene makes one")
-    return write_parts(path_of(path, "path"), [scene.xml.encode()])
 
 
 def hand_text(layout: HandLayout, physics: PhysicsSettings) -> str:

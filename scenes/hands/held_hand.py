@@ -28,7 +28,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from grasp_core.arrays import Array, cross, to_digits
+from grasp_core.arrays import Array, cross, rounded, to_digits
 from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
@@ -39,7 +39,7 @@ from grasp_core.hands.kinematics import HandPlaces, places
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
-from scenes.execution.held import FingersSeen, HeldLayout, HeldSettings, held_layout
+from scenes.execution.held import HeldLayout, HeldSettings, held_layout
 from scenes.execution.held_mjcf import (
     FINGERTIPS,
     HeldScene,
@@ -143,7 +143,9 @@ class HeldHandLayout(HeldLayout):
             self.servo_n_m_per_rad
         )
 
-    def fingers_seen(self, joints: Array, loads: Array, turned: Array) -> FingersSeen:
+    def fingers_seen(
+        self, joints: Array, loads: Array, turned: Array
+    ) -> tuple[Array, Array, Array | None]:
         """See what fingers did (see `HeldLayout.fingers_seen`).
 
         Contact forces are those that load the joints of their finger with its torques, at the
@@ -162,10 +164,10 @@ class HeldHandLayout(HeldLayout):
         )
         moved = tips - rest.tips[:, used]
         back: Array = rest.link_rotations[:, last].transpose(0, 1, 3, 2)
-        return FingersSeen(
-            tips=np.einsum("kij,nki->nkj", self.axes, moved),
-            forces=np.einsum("kij,nki->nkj", self.axes, forces),
-            turns=found.link_rotations[:, last] @ back,
+        return (
+            np.einsum("kij,nki->nkj", self.axes, moved),
+            np.einsum("kij,nki->nkj", self.axes, forces),
+            found.link_rotations[:, last] @ back,
         )
 
     def _force(self, found: HandPlaces, points: Array, loads: Array, finger: int) -> Array:
@@ -208,7 +210,7 @@ def finger_springs(motors: Motors, stiffness_n_per_m: float) -> Array:
 
 def servo_stiffness(motors: Motors, stiffness_n_per_m: float) -> float:
     """Return the stiffness k_q of the servos that amount to a stiffness K of fingertips."""
-    return _rounded(stiffness_n_per_m * mean_lever(motors) ** 2)
+    return rounded(stiffness_n_per_m * mean_lever(motors) ** 2)
 
 
 def strong_motors(hand: Hand, reach: HandReach) -> Motors:
@@ -240,13 +242,9 @@ def held_hand_layout(
     return HeldHandLayout(
         **own, hand=stance.hand, angles=to_digits(angles), palm_pose=to_digits(pose),
         used_fingers=stance.fingers, motors=motors, servo_n_m_per_rad=servo,
-        damping_n_m_s_per_rad=_rounded(damping), armature_kg_m2=_rounded(armature),
+        damping_n_m_s_per_rad=rounded(damping), armature_kg_m2=rounded(armature),
         inertias=armature / shares,
     )  # fmt: skip
-
-
-def _rounded(value: float) -> float:
-    return float(to_digits(np.array(value)))
 
 
 def held_hand_scene(

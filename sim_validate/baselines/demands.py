@@ -1,19 +1,19 @@
 """Reads or plans the grasps of a pytest test, and checks that they are as stable as it demands."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.errors import InputError
+from grasp_core.files.json_text import named_settings
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines.explain import not_survived, unstable
 from sim_validate.baselines.part import TABLE, Source, if_changed, present, source_of
-from sim_validate.baselines.settings import check_names
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp
@@ -66,7 +66,7 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
             f"@pytest.mark.grasp takes the path of one file of grasps, got {list(args)}"
         )
     known = ("friction", TABLE) if args else SETTINGS
-    check_names(settings, known, "@pytest.mark.grasp")
+    named_settings(settings, known, "@pytest.mark.grasp")
     friction = _number(settings.get("friction", FRICTION))
     if args:
         return _cases_of_file(folder, folder / args[0], settings)
@@ -160,8 +160,7 @@ class Demands:
 
 def demands_of(asked: Mapping[str, Any]) -> Demands:
     """Build the demands from the arguments of a test."""
-    check_names(asked, [each.name for each in fields(Demands)], "assert_stable")
-    return Demands(**asked)
+    return Demands(**named_settings(asked, Demands, "assert_stable"))
 
 
 def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:

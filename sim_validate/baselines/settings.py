@@ -1,7 +1,7 @@
 """Reads and writes the simulation settings and the choice of trials in a baseline's file."""
 
-from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +10,7 @@ from pydantic_core import to_jsonable_python
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import complaint, shown
+from grasp_core.files.json_text import complaint, named_settings
 from grasp_core.files.json_text import settings_of as read_settings
 from grasp_core.records.grasps_json import SavedGrasps
 from scenes.fingertips import FingerSettings
@@ -92,17 +92,7 @@ def of_settings(settings: Mapping[str, Any], path: str) -> How:
 
 def noise_from_table(given: Mapping[str, Any]) -> Noise:
     """Build noise settings from some of their fields."""
-    check_names(given, [each.name for each in fields(Noise)], "noise")
-    return read_settings(Noise, given, ["noise"])
-
-
-def check_names(given: Mapping[str, Any], known: Collection[str], where: str) -> None:
-    """Refuse a setting that does not exist."""
-    for name in given:
-        if name not in known:
-            raise InputError(
-                f"{where}: no setting is named {shown(name)}; choose from {', '.join(known)}"
-            )
+    return read_settings(Noise, named_settings(given, Noise, "noise"), ["noise"])
 
 
 def setup_for(saved: SavedGrasps, path: Path | None) -> Setup:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import shown
+from grasp_core.files.json_text import named_settings, shown
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.baseline import Baseline, check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import (
@@ -35,7 +35,6 @@ from sim_validate.baselines.part import (
 from sim_validate.baselines.part import TABLE as CHANGED
 from sim_validate.baselines.settings import (
     How,
-    check_names,
     noise_from_table,
     of_settings,
     setup_for,
@@ -204,8 +203,7 @@ def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
 
 
 def _check(given: Mapping[str, Any]) -> None:
-    check_names(given, KINDS, "the file")
-    for name, value in given.items():
+    for name, value in named_settings(given, KINDS, "the file").items():
         kind = KINDS[name]
         if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
             raise InputError(f"{name}: expected {WORDS[kind]}, got {shown(value)}")

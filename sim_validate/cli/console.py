@@ -1,11 +1,15 @@
-"""Writes console output: results on standard output, everything else on standard error."""
+"""Writes console output: results on standard output, everything else on standard error.
+
+It also collects what long work gives, so that an interrupt loses nothing that is done.
+"""
 
 import importlib
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -13,8 +17,10 @@ from rich.table import Table
 from rich.text import Text
 
 from grasp_core.files.json_text import text_of
+from grasp_core.files.text_files import write_text
 from sim_validate.parallel import interrupts
 
+Result = TypeVar("Result")
 PLAIN_EVERY_S = 5.0
 """Time between two lines of progress if the output is no terminal [s]."""
 EARLIEST = 0.02
@@ -98,6 +104,18 @@ class Reporter:
             table.add_row(*(Text(printable(cell)) for cell in row))
         console.print(table)
 
+    def counted(
+        self, title: str, results: Iterable[Result], total: int, word: str,
+        is_good: Callable[[Result], bool],
+    ) -> Iterator[Result]:  # fmt: skip
+        """Yield results, and show how many of all have come and how many of them are good."""
+        good = 0
+        with self.progress(title) as steps:
+            for done, result in enumerate(results, 1):
+                good += is_good(result)
+                yield result
+                steps.update(done, total, f"({good} {word})")
+
     def progress(self, title: str) -> "Steps":
         """Show progress of long work: a bar on a terminal, plain lines elsewhere."""
         return Steps(title, self.err, shown=not self.quiet)
@@ -164,6 +182,36 @@ class Steps:
             if done > EARLIEST * total:
                 line += f", {(total - done) / rate:.0f} s left"
             self.console.print(Text(line), soft_wrap=True)
+
+
+def finished(
+    results: Iterable[Result], total: int, text_of: Callable[..., str], path: Path | None,
+    reporter: Reporter,
+) -> tuple[list[Result], str]:  # fmt: skip
+    """Collect results, and write the text about them even if the work is interrupted.
+
+    Gives them and the text. A path gets it where there is a result.
+    """
+    done = list[Result]()
+    try:
+        for result in results:
+            done.append(result)
+    finally:
+        complete = len(done) == total
+        text = text_of(done, complete=complete)
+        if path and done:
+            write_text(path, text)
+            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+    return done, text
+
+
+def warn_of(lines: Sequence[str], file: str, reporter: Reporter) -> None:
+    """Print the first lines of warnings, and say which file has all of them."""
+    for line in lines[:TABLE_ROWS]:
+        reporter.warn(line)
+    if len(lines) > TABLE_ROWS:
+        left = len(lines) - TABLE_ROWS
+        reporter.warn(f"and {left} more: {file} (--out DIR) has all of them")
 
 
 def say_cut(count: int, reporter: Reporter) -> None:

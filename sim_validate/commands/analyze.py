@@ -7,11 +7,11 @@ import numpy as np
 
 from grasp_core.arrays import Array, to_digits
 from grasp_core.closure.friction_interval import FrictionInterval
-from grasp_core.errors import InputError
+from grasp_core.errors import about
 from grasp_core.files.text_files import read_text
 from grasp_core.records.contacts_json import ContactSet, Overrides, contact_sets_from_json
 from sim_validate.cli import command_flags
-from sim_validate.cli.console import TABLE_ROWS, Reporter
+from sim_validate.cli.console import TABLE_ROWS, Reporter, finished
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.contact_analysis import Analysis, Bounds, Outcome, Question, analyze, check_edges
 from sim_validate.parallel.processes import each
@@ -27,32 +27,26 @@ UNKNOWN = "?"
 
 def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
     """Analyse the grasps of a contacts file; an interrupted run still shows its results so far."""
-    sets = _read(command)
+    overrides = Overrides(command.friction, command.torque_scale_m, command.outward)
+    text = read_text(command.contacts)
+    with about(command.contacts):
+        sets = contact_sets_from_json(text, overrides)
     check_edges(sets, command.edges)
     question = Question(command.max_normal_force, command.wrench, command.edges)
-    analyses: list[Analysis] = []
-    try:
-        with reporter.progress("analysing") as steps:
-            for analysis in each(partial(analyze, question=question), sets, jobs=command.jobs):
-                analyses.append(analysis)
-                closed = sum(found.outcome is Outcome.CLOSED for found in analyses)
-                steps.update(len(analyses), len(sets), f"({closed} closed)")
-    finally:
-        complete = len(analyses) == len(sets)
+    found = each(partial(analyze, question=question), sets, jobs=command.jobs)
+    results = reporter.counted(
+        "analysing", found, len(sets), "closed", lambda one: one.outcome is Outcome.CLOSED
+    )
+
+    def told(done: Sequence[Analysis], *, complete: bool) -> str:
         source = str(command.contacts)
-        reporter.document(analyses_to_document(source, question, analyses, complete=complete))
+        reporter.document(analyses_to_document(source, question, done, complete=complete))
+        return ""
+
+    analyses, _ = finished(results, len(sets), told, None, reporter)
     _show(analyses, reporter)
     good = all(found.outcome is Outcome.CLOSED for found in analyses)
     return Exit.GOOD if good else Exit.NEGATIVE
-
-
-def _read(command: command_flags.Analyze) -> tuple[ContactSet, ...]:
-    text = read_text(command.contacts)
-    overrides = Overrides(command.friction, command.torque_scale_m, command.outward)
-    try:
-        return contact_sets_from_json(text, overrides)
-    except InputError as error:
-        raise InputError(f"{command.contacts}: {error}") from error
 
 
 def _show(analyses: Sequence[Analysis], reporter: Reporter) -> None:
@@ -99,7 +93,6 @@ def _say_measures(contacts: ContactSet, reporter: Reporter) -> None:
 
 
 def _facts(found: Analysis) -> list[tuple[str, str]]:
-    """List all facts about one grasp, as rows of a table."""
     certificate = found.certificate
     rows = [("contacts", str(len(found.contacts.positions))), ("closed", _closed(found))]
     if certificate is not None:

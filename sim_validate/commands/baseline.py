@@ -108,7 +108,10 @@ def exit_code(findings: Sequence[Finding], *, strict: bool) -> int:
 
 def _show(done: Checked, reporter: Reporter) -> None:
     told = [finding for finding in done.findings if finding.status is not Status.SAME]
-    rows = [(each.id, each.status.value, _why(each)) for each in told]
+    rows = list[tuple[str, ...]]()
+    for each in told:  # reasons, and further differences beyond their bands
+        more = [text for text in each.beyond if text not in each.reasons]
+        rows.append((each.id, each.status.value, "; ".join([*each.reasons, *more])))
     if rows:
         title = "grasps that differ from the baseline"
         reporter.table(title, ("grasp", "status", "why"), rows[:TABLE_ROWS])
@@ -118,12 +121,6 @@ def _show(done: Checked, reporter: Reporter) -> None:
     reporter.say(f"compared {done.how}")
     listed = [_record(finding) for finding in done.findings]
     reporter.document({"counts": dict(counts), "compared": done.how, "grasps": listed})
-
-
-def _why(finding: Finding) -> str:
-    """Join the reasons why a grasp changed, and further differences beyond their bands."""
-    more = [text for text in finding.beyond if text not in finding.reasons]
-    return "; ".join([*finding.reasons, *more])
 
 
 def _record(finding: Finding) -> dict[str, object]:

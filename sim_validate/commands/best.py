@@ -36,10 +36,7 @@ UNITS = {
 def search_best(
     body: Polyhedron, command: command_flags.Plan, wrenches: Array | None, reporter: Reporter
 ) -> BestGrasp:  # fmt: skip
-    """Search for the best grasp, and show how the gap closes.
-
-    Takes `wrenches` (m, 6) [N, N m].
-    """
+    """Search for the best grasp, for wrenches (m, 6) if asked, and show how the gap closes."""
     planning = command.planning
     with reporter.progress("bounding") as steps:
 
@@ -60,10 +57,7 @@ def write_best(
     body: Polyhedron, best: BestGrasp, planned: Sequence[Grasp], folder: Path | None,
     reporter: Reporter,
 ) -> list[Rated]:  # fmt: skip
-    """Write the search's result and its proof to a folder, and to standard output with --json.
-
-    Gives the planned grasps with bounds of the measure of the best one.
-    """
+    """Write result and proof, and return the planned grasps with bounds of the same measure."""
     measure, friction = best.proof.measure, best.proof.friction
     bounds = [grasp.ferrari_canny for grasp in planned]
     if not measure.is_usual:

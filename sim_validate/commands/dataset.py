@@ -112,7 +112,6 @@ def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
 
 
 def _asked(command: dataset_flags.Build) -> DatasetConfig:
-    """Read a TOML file or flags that say which objects and grasps a dataset consists of."""
     first = Path(command.objects[0]) if command.objects else Path()
     if first.suffix == ".toml":
         unsaid = (dataset_flags.Planning(), dataset_flags.Settings(), dataset_flags.Learned())
@@ -147,7 +146,6 @@ def is_mesh(path: Path) -> bool:
 
 
 def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
-    """List names of objects, with each folder replaced by the mesh files in it."""
     found: list[str] = []
     if not names:
         raise InputError(

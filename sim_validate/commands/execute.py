@@ -3,15 +3,14 @@
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli import command_flags
-from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut, warn_of
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked.objects import chosen_grasps, saved_grasps
+from sim_validate.commands.asked.objects import asked_grasps
 from sim_validate.commands.asked.trials import check_mass, execution_settings
 from sim_validate.execution.jobs import ExecutionJob, executed
 from sim_validate.execution.settings import ExecutionSettings
@@ -28,7 +27,6 @@ from sim_validate.records.executions import (
     executions_summary,
     executions_to_json,
 )
-from sim_validate.records.grasps import grasp_with_id
 from sim_validate.records.setup_toml import physics_from_file
 
 ABSENT = "-"
@@ -52,12 +50,12 @@ SLIPS_MEAN = (
 def execute_file(command: command_flags.Execute, reporter: Reporter) -> int:
     """Execute the grasps of a file in simulation and report which of them survive."""
     check_mass(command.executing.mass)
-    saved = saved_grasps(command.grasps, reporter)
-    if saved is None:
+    chosen = asked_grasps(
+        command.grasps, reporter, grasp=command.grasp, friction=command.friction,
+        seed=command.seed, limit=command.limit,
+    )  # fmt: skip
+    if chosen is None:
         return Exit.NONE
-    if command.grasp is not None:
-        saved = replace(saved, grasps=(grasp_with_id(command.grasps, saved, command.grasp),))
-    chosen = chosen_grasps(saved, friction=command.friction, seed=command.seed, limit=command.limit)
     settings = execution_settings(chosen, command.executing, command.trials, command.down)
     physics = {} if command.setup is None else physics_from_file(command.setup)
     with alone_in(command.out):
@@ -73,27 +71,16 @@ def execute_grasps(
     saved: SavedGrasps, settings: ExecutionSettings, *, jobs: int, folder: Path | None,
     reporter: Reporter, physics: Mapping[str, object] | None = None,
 ) -> tuple[Exit, str]:  # fmt: skip
-    """Execute grasps, show the results, and write them even if the run is interrupted.
-
-    Gives the exit code, and the text of executions.json.
-    """
+    """Execute grasps; return the exit code and the text of executions.json."""
     if folder:
         remove_executions(folder)
-    changed = physics or {}
+    changed, count = physics or {}, len(saved.grasps)
     tasks = [ExecutionJob(saved.body, g, saved.friction, settings, changed) for g in saved.grasps]
-    found: list[ExecutedGrasp] = []
-    try:
-        with reporter.progress("executing") as steps:
-            for each in executed(tasks, jobs):
-                found.append(each)
-                survived = sum(one.survived for one in found)
-                steps.update(len(found), len(tasks), f"({survived} survived)")
-    finally:
-        complete = len(found) == len(tasks)
-        text = executions_to_json(saved.body, saved.friction, settings, found, complete=complete)
-        if folder and found:
-            path = write_text(folder / EXECUTIONS, text)
-            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+    results = reporter.counted(
+        "executing", executed(tasks, jobs), count, "survived", lambda each: each.survived
+    )
+    text_of = partial(executions_to_json, saved.body, saved.friction, settings)
+    found, text = finished(results, count, text_of, folder and folder / EXECUTIONS, reporter)
     _show(found, settings, reporter)
     if not all(each.controls_let_go for each in found):
         return Exit.INTERNAL, text
@@ -112,13 +99,7 @@ def _show(found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter:
     reporter.say(SLIPS_MEAN)
     say_cut(len(found), reporter)
     _say_totals(found, settings, reporter)
-    lines = list(_losses(found, settings))
-    for line in lines[:TABLE_ROWS]:
-        reporter.warn(line)
-    if len(lines) > TABLE_ROWS:
-        reporter.warn(
-            f"and {len(lines) - TABLE_ROWS} more: {EXECUTIONS} (--out DIR) has all of them"
-        )
+    warn_of(list(_losses(found, settings)), EXECUTIONS, reporter)
     if any(each.enough for each in found):
         reporter.say(ENOUGH_MEANS)
     if any(not trial.survived for each in found for trial in each.trials if trial.kind == "knock"):
@@ -171,7 +152,6 @@ def _survived(found: Execution | None, kind: str) -> str:
 
 
 def _slips(found: Execution | None, kind: str) -> str:
-    """Write the least first slip of the trials of a kind, predicted and simulated."""
     trials = () if found is None else found.of_kind(kind)
     if not trials:
         return ABSENT
@@ -188,7 +168,6 @@ def multiple_in_words(multiple: float) -> str:
 
 
 def _losses(found: Sequence[ExecutedGrasp], settings: ExecutionSettings) -> Iterator[str]:
-    """Yield a line about each control that held, grasp without a squeeze, and failed trial."""
     for each in found:
         if each.execution is not None:
             yield from (f"{each.id}: {line}" for line in held_controls_in_words(each.execution))

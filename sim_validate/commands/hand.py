@@ -1,7 +1,6 @@
 """Runs the command `hand`, which shows what a hand was read as."""
 
 import math
-from typing import Any
 
 from grasp_core.by_value import counted
 from grasp_core.hands.couplings import Coupling
@@ -11,7 +10,7 @@ from scenes.hand_files.loading import load_hand
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.records.hand_model import couplings_record
+from sim_validate.records.hand_model import model_record
 
 MM = 1e3
 SMALL_RANGE = math.radians(10.0)
@@ -28,7 +27,8 @@ def asked_hand(command: hand_flags.Hand | hand_flags.Reach) -> Hand:
 def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
     """Show fingers, joints and fingertips of a hand."""
     hand = asked_hand(command)
-    reporter.document(hand_facts(hand))
+    told = {"torque_source": hand.torque_source, "sources": list(hand.sources)}
+    reporter.document({"name": hand.name, **model_record(hand), **told})
     fingers = [
         (
             f.name, str(len(f.links)), f"{MM * f.tip.radius:.1f}",
@@ -41,7 +41,15 @@ def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
         f"fingers of {hand.name}", ("fingertip", "joints", "radius mm", "kind", "shapes"), fingers
     )
     columns = ("joint", "fingertip", "range deg", "torque limit N m")
-    reporter.table("joints, from the palm outwards", columns, _joints(hand))
+    links = [(finger, link.joint) for finger in hand.fingers for link in finger.links]
+    joints = [
+        (
+            joint.name, finger.name, f"{math.degrees(low):.1f} to {math.degrees(high):.1f}",
+            "none stated" if joint.torque_limit_n_m is None else f"{joint.torque_limit_n_m:g}",
+        )
+        for (finger, joint), (low, high) in zip(links, hand.ranges.tolist(), strict=True)
+    ]  # fmt: skip
+    reporter.table("joints, from the palm outwards", columns, joints)
     reporter.say(f"The palm has {counted(len(hand.palm), 'shape')} that must touch nothing.")
     if hand.ignored_pairs:
         listed = ", ".join(" and ".join(pair) for pair in hand.ignored_pairs)
@@ -63,7 +71,6 @@ def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
 
 
 def _weight(hand: Hand) -> str:
-    """Say what the links weigh and where their masses come from."""
     masses = [link.mass_kg for link in hand.links]
     stated = [mass for mass in masses if mass is not None]
     if len(stated) < len(masses):
@@ -72,53 +79,8 @@ def _weight(hand: Hand) -> str:
     return said + ("." if hand.name in HANDS else f"; {SHAPES_WEIGH}.")
 
 
-def _joints(hand: Hand) -> list[tuple[str, ...]]:
-    links = [(finger, link.joint) for finger in hand.fingers for link in finger.links]
-    return [
-        (
-            joint.name, finger.name, f"{math.degrees(low):.1f} to {math.degrees(high):.1f}",
-            "none stated" if joint.torque_limit_n_m is None else f"{joint.torque_limit_n_m:g}",
-        )
-        for (finger, joint), (low, high) in zip(links, hand.ranges.tolist(), strict=True)
-    ]  # fmt: skip
-
-
 def _follows(coupling: Coupling) -> str:
     """Write a coupling as a formula, angles in degrees."""
     said = f"{coupling.joint} = {coupling.ratio:g} {coupling.driver}"
     offset = math.degrees(coupling.offset)
     return f"{said} {'-' if offset < 0.0 else '+'} {abs(offset):.4g} deg" if offset else said
-
-
-def hand_facts(hand: Hand) -> dict[str, Any]:
-    """Return what a hand was read as, for JSON, with units in the keys."""
-    return {
-        "name": hand.name,
-        "fingers": [
-            {
-                "fingertip": finger.name,
-                "tip_radius_m": finger.tip.radius,
-                "tip_center_m": finger.tip.center.tolist(),
-                "tip_corners": 0 if finger.tip.corners is None else len(finger.tip.corners),
-                "joints": [
-                    {
-                        "name": link.joint.name,
-                        "link": link.name,
-                        "lowest_rad": link.joint.lowest,
-                        "highest_rad": link.joint.highest,
-                        "torque_limit_n_m": link.joint.torque_limit_n_m,
-                        "mass_kg": link.mass_kg,
-                        "shapes": len(link.shapes),
-                    }
-                    for link in finger.links
-                ],
-            }
-            for finger in hand.fingers
-        ],
-        "palm_shapes": len(hand.palm),
-        "may_overlap": [list(pair) for pair in hand.ignored_pairs],
-        "couplings": couplings_record(hand),
-        "notes": list(hand.notes),
-        "torque_source": hand.torque_source,
-        "sources": list(hand.sources),
-    }

@@ -1,19 +1,20 @@
 """Judges grasps, or hands in them, by published tests, and shows and writes the judgements."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from operator import call
 from pathlib import Path
 
-from grasp_core.files.text_files import write_text
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.records.grasps_json import SavedGrasps
-from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.files.result_folders import JUDGEMENTS, remove_judgements
+from sim_validate.parallel import processes
 from sim_validate.protocols.judgements_json import judgements_summary, judgements_to_json
-from sim_validate.protocols.judging import Case, Judgement, judge_by, judge_hand_by, judged
+from sim_validate.protocols.judging import Judgement, judge_by, judge_hand_by
 from sim_validate.simulation.setup import Setup
 
 COLUMNS = ("grasp", "test", "theirs", "ours", "margin", "moved mm", "deg")
@@ -24,10 +25,7 @@ def judge_grasps(
     saved: SavedGrasps, names: Sequence[str], setup: Setup, *, jobs: int, folder: Path | None,
     reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
-    """Judge the grasps of a file by tests with four fingertips.
-
-    Gives the exit code, and the text of judgements.json.
-    """
+    """Judge grasps by tests with four fingertips; return exit code and text of judgements.json."""
     cases = [
         partial(judge_by, name, saved.body, grasp, saved.friction, setup=setup)
         for name in names
@@ -40,45 +38,32 @@ def judge_hands(
     saved: SavedGrasps, hand: Hand, found: Sequence[HandReach], names: Sequence[str], *,
     jobs: int, folder: Path | None, reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
-    """Judge the poses of a hand in the grasps of a file by tests.
-
-    Gives the exit code, and the text of judgements.json.
-    """
+    """Judge the poses of a hand by tests; return the exit code and the text of judgements.json."""
     cases = [
-        partial(judge_hand_by, name, hand, saved.body, each, saved.friction)
+        partial(judge_hand_by, name, hand, saved.body, reach, saved.friction)
         for name in names
-        for each in found
-        if each.reached
+        for reach in found
+        if reach.reached
     ]
     return _judged(saved, cases, jobs, folder, reporter)
 
 
 def _judged(
-    saved: SavedGrasps, cases: Sequence[Case], jobs: int, folder: Path | None, reporter: Reporter
+    saved: SavedGrasps, cases: Sequence[Callable[[], Judgement]], jobs: int, folder: Path | None,
+    reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
-    """Judge all cases, and write what is done even if the run is interrupted."""
     if folder:
         remove_judgements(folder)
-    done: list[Judgement] = []
-    try:
-        with reporter.progress("judging") as steps:
-            for each in judged(cases, jobs):
-                done.append(each)
-                passed = sum(one.theirs for one in done)
-                steps.update(len(done), len(cases), f"({passed} passed)")
-    finally:
-        complete = len(done) == len(cases)
-        text = judgements_to_json(saved.body, saved.friction, done, complete=complete)
-        if folder and done:
-            path = write_text(folder / JUDGEMENTS, text)
-            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+    found = processes.each(call, cases, jobs=jobs)
+    results = reporter.counted("judging", found, len(cases), "passed", lambda one: one.theirs)
+    text_of = partial(judgements_to_json, saved.body, saved.friction)
+    done, text = finished(results, len(cases), text_of, folder and folder / JUDGEMENTS, reporter)
     if done:
         _show(done, reporter)
-    return (Exit.GOOD if all(each.good for each in done) else Exit.NEGATIVE), text
+    return (Exit.GOOD if all(one.good for one in done) else Exit.NEGATIVE), text
 
 
 def _show(judgements: Sequence[Judgement], reporter: Reporter) -> None:
-    """Show their verdicts, ours and the predicted margins, and how often they agree."""
     rows = [_row(each) for each in judgements[:TABLE_ROWS]]
     reporter.table("judged by published tests", COLUMNS, rows)
     say_cut(len(judgements), reporter)

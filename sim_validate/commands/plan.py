@@ -21,7 +21,7 @@ from grasp_core.planning.request import RankBy, methods_for
 from grasp_core.planning.result import Moved, Plan
 from grasp_core.planning.selection import carried
 from grasp_core.records.grasps_json import plan_to_json
-from grasp_core.values import FaceQuadruple, Grasp
+from grasp_core.values import Grasp
 from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
@@ -210,7 +210,7 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
             f"{tally.rejected} rejected, {found.seconds[method]:.2f} s"
         )
     if found.undecided:
-        named = [f"{_listed(faces)} ({100.0 * share:.3g} % open)"
+        named = [f"{'-'.join(map(str, faces))} ({100.0 * share:.3g} % open)"
                  for faces, share in found.undecided.items()]  # fmt: skip
         reporter.say(f"undecided face quadruples: {', '.join(named[:TABLE_ROWS])}")
         say_cut(len(named), reporter)
@@ -223,10 +223,6 @@ def _whoever(why: str) -> str:
     """Remove the finger numbers from a reason, so that equal reasons can be counted together."""
     why = re.sub(r"fingertips \d+ and \d+", "two fingertips", why)
     return re.sub(r"(finger(?:tip)?) \d+", r"a \1", why)
-
-
-def _listed(faces: FaceQuadruple) -> str:
-    return "-".join(str(face) for face in faces)
 
 
 def show_gains(moves: Sequence[Moved], reporter: Reporter) -> None:

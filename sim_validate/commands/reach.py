@@ -7,7 +7,9 @@ poses are written as records of DexGraspBench.
 import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict
+from functools import partial
+from operator import call
 from pathlib import Path
 
 from grasp_core.by_value import counted
@@ -16,35 +18,35 @@ from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.files.text_files import write_text
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_payload
-from grasp_core.hands.reach import HandReach, uncoupled
+from grasp_core.hands.reach import HandReach, reach_with, uncoupled
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.flag_bounds import FlagsError
-from sim_validate.commands.asked.objects import chosen_grasps, saved_grasps
+from sim_validate.commands.asked.objects import asked_grasps
 from sim_validate.commands.hand import asked_hand
 from sim_validate.commands.judging import judge_hands
 from sim_validate.dexgraspbench import dex_record, write_dex_object, write_dex_record
-from sim_validate.execution.verdict import Execution, held_controls_in_words, loss_in_words
-from sim_validate.files.result_folders import REACHES, alone_in, remove_reaches
-from sim_validate.hands.execute_hand import (
-    ExecutedHand,
-    HandJob,
-    executed_by_hands,
-    hand_execution_settings,
-    held_by_hands,
+from sim_validate.execution.verdict import (
+    ExecutedGrasp,
+    Execution,
+    held_controls_in_words,
+    loss_in_words,
 )
-from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict
+from sim_validate.files.result_folders import REACHES, alone_in, remove_reaches
+from sim_validate.hands.execute_hand import executed_by_hand, hand_execution_settings
+from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict, validate_hand
+from sim_validate.parallel import processes
 from sim_validate.parallel.compiling import REACHING, compile_loops, must_compile
-from sim_validate.parallel.reaching import ReachJob, reached
-from sim_validate.records.grasps import grasp_with_id
 from sim_validate.records.reaches import AskedRecord, HandTrials, reaches_summary, reaches_to_json
 from sim_validate.reports.run_folder import GRASPS
+from sim_validate.simulation.setup import Agenda
 
 ABSENT = "-"
-
+HELD = Agenda(critical_friction=False)
+"""What hands hold: the usual wrenches, with controls."""
 PAYLOAD = "payload kg"
 HELD_COLUMNS = ("grasp", "weakest wrench N", "held", "controls let go")
 EXECUTED_COLUMNS = ("grasp", "survived", "least predicted loss", PAYLOAD, "controls let go")
@@ -53,12 +55,12 @@ EXECUTED_COLUMNS = ("grasp", "survived", "least predicted loss", PAYLOAD, "contr
 def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
     """Look for a pose of a hand in each grasp of a file, and write what was found."""
     hand = with_motors(asked_hand(command), command)
-    saved = saved_grasps(command.grasps, reporter)
-    if saved is None:
+    chosen = asked_grasps(
+        command.grasps, reporter, grasp=command.grasp, friction=command.friction,
+        limit=command.limit,
+    )  # fmt: skip
+    if chosen is None:
         return Exit.NONE
-    if command.grasp is not None:
-        saved = replace(saved, grasps=(grasp_with_id(command.grasps, saved, command.grasp),))
-    chosen = chosen_grasps(saved, friction=command.friction, seed=None, limit=command.limit)
     with alone_in(command.out):
         found, tried, text = _reach(command, hand, chosen, reporter)
         _show(hand, found, tried.payloads, reporter)
@@ -73,30 +75,26 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
     reporter.text(text)
     show_simulated(tried.verdicts, reporter)
     show_executed(tried.executions, reporter)
-    if any(each.reached for each in found):
+    if any(one.reached for one in found):
         say_where_to_look(command, reporter)
-    results = (*tried.verdicts.values(), *tried.executions.values())
-    good = all(each.reached for each in found) and all(each.good for each in results)
+    good = all(one.reached for one in found) and all(one.good for one in tried.verdicts.values())
+    good &= all(one.survived and one.controls_let_go for one in tried.executions.values())
     return judged if good else Exit.NEGATIVE
 
 
 def _reach(
     command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, reporter: Reporter
 ) -> tuple[list[HandReach], HandTrials, str]:
-    """Look for poses, try them, and write what is done even if the run is interrupted."""
     if command.out is not None:
         remove_reaches(command.out)
-    jobs = [
-        ReachJob(
-            hand, saved.body, grasp, saved.friction, command.seed, not command.contacts_only,
-            command.table, command.clearance_m, command.starts,
-        )
-        for grasp in saved.grasps
-    ]  # fmt: skip
     asked: AskedRecord = {
         "regions": not command.contacts_only, "table_down": command.table,
         "clearance_m": command.clearance_m, "starts": command.starts, "seed": command.seed,
     }  # fmt: skip
+    jobs = [
+        partial(reach_with, hand, saved.body, grasp, saved.friction, **asked)
+        for grasp in saved.grasps
+    ]
     if command.mass_kg is not None:
         asked["execution"] = asdict(hand_execution_settings(command.mass_kg).used)
     found, tried = list[HandReach](), HandTrials()
@@ -104,16 +102,16 @@ def _reach(
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
     try:
-        with reporter.progress("reaching") as steps:
-            for each in reached(jobs, command.jobs):
-                found.append(each)
-                good = sum(one.reached for one in found)
-                steps.update(len(found), len(jobs), f"({good} reached)")
-        tried.payloads.update(carried(hand, saved, found))
-        simulated(command, hand, saved, found, reporter, tried.verdicts)
-        executed(command, hand, saved, found, reporter, tried.executions)
+        results = processes.each(call, jobs, jobs=command.jobs)
+        for one in reporter.counted(
+            "reaching", results, len(jobs), "reached", lambda one: one.reached
+        ):
+            found.append(one)
+        stood = [one for one in found if one.reached]
+        tried.payloads.update(carried(hand, saved, stood))
+        _try(command, hand, saved, stood, tried, reporter)
     finally:
-        stands = sum(each.reached for each in found)
+        stands = sum(one.reached for one in found)
         held = len(tried.verdicts) == stands or not tries_ours(command)
         lifted = len(tried.executions) == stands or command.mass_kg is None
         complete = len(found) == len(jobs) and held and lifted
@@ -192,7 +190,7 @@ def carried(hand: Hand, saved: SavedGrasps, found: Sequence[HandReach]) -> dict[
     if unknown or any(joint.torque_limit_n_m is None for joint in hand.free_joints):
         return {}
     payloads = dict[str, HandPayload]()
-    for reach in (each for each in found if each.reached):
+    for reach in found:
         # a figure beside the poses, which are there without it
         with suppress(InputError, SolverError):
             payloads[reach.grasp] = hand_payload(
@@ -227,22 +225,30 @@ def tries_ours(command: hand_flags.Reach) -> bool:
     return command.simulate and not command.protocol
 
 
-def simulated(
+def _try(
     command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, found: Sequence[HandReach],
-    reporter: Reporter, verdicts: dict[str, HandVerdict],
+    tried: HandTrials, reporter: Reporter,
 ) -> None:  # fmt: skip
-    """Test the hand in each grasp that it reaches, and enter verdicts by the ids of the grasps.
-
-    What is entered stays there if the run is interrupted.
-    """
-    if not tries_ours(command):
-        return
-    jobs = [HandJob(hand, saved.body, each, saved.friction) for each in found if each.reached]
-    with reporter.progress("simulating") as steps:
-        for verdict in held_by_hands(jobs, command.jobs):
-            verdicts[verdict.grasp] = verdict
-            good = sum(each.good for each in verdicts.values())
-            steps.update(len(verdicts), len(jobs), f"({good} held)")
+    """Simulate and execute what the hand reaches; what is entered by then outlasts an interrupt."""
+    if tries_ours(command):
+        held = [
+            partial(validate_hand, hand, saved.body, reach, saved.friction, agenda=HELD)
+            for reach in found
+        ]
+        verdicts, count = processes.each(call, held, jobs=command.jobs), len(held)
+        for one in reporter.counted("simulating", verdicts, count, "held", lambda one: one.good):
+            tried.verdicts[one.grasp] = one
+    if command.mass_kg is not None:
+        settings = hand_execution_settings(command.mass_kg)
+        executed = [
+            partial(executed_by_hand, hand, saved.body, reach, saved.friction, settings)
+            for reach in found
+        ]
+        results, count = processes.each(call, executed, jobs=command.jobs), len(executed)
+        for one in reporter.counted(
+            "executing", results, count, "survived", lambda one: one.survived
+        ):
+            tried.executions[one.id] = one
 
 
 def show_simulated(verdicts: Mapping[str, HandVerdict], reporter: Reporter) -> None:
@@ -272,45 +278,24 @@ def show_simulated(verdicts: Mapping[str, HandVerdict], reporter: Reporter) -> N
             reporter.warn(f"{verdict.grasp}: {sentence}")
 
 
-def executed(
-    command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, found: Sequence[HandReach],
-    reporter: Reporter, results: dict[str, ExecutedHand],
-) -> None:  # fmt: skip
-    """Execute each grasp that the hand reaches, and enter what is found by the ids of the grasps.
-
-    What is entered stays there if the run is interrupted.
-    """
-    if command.mass_kg is None:
-        return
-    settings = hand_execution_settings(command.mass_kg)
-    jobs = [
-        HandJob(hand, saved.body, each, saved.friction, settings) for each in found if each.reached
-    ]
-    with reporter.progress("executing") as steps:
-        for each in executed_by_hands(jobs, command.jobs):
-            results[each.grasp] = each
-            kept = sum(one.survived for one in results.values())
-            steps.update(len(results), len(jobs), f"({kept} survived)")
-
-
-def show_executed(results: Mapping[str, ExecutedHand], reporter: Reporter) -> None:
+def show_executed(results: Mapping[str, ExecutedGrasp], reporter: Reporter) -> None:
     """Show how the executions ended, those that are farthest from a loss first."""
     if not results:
         return
     ranked = sorted(results.values(), key=lambda each: -each.least_predicted_loss)
-    rows = [_executed_row(each.grasp, each.execution) for each in ranked[:TABLE_ROWS]]
+    rows = [_executed_row(each.id, each.execution) for each in ranked[:TABLE_ROWS]]
     reporter.table("grasps executed with the hand", EXECUTED_COLUMNS, rows)
     say_cut(len(ranked), reporter)
     survived = sum(each.survived for each in ranked)
     reporter.say(f"{survived} of {len(ranked)} grasps survived every trial with the hand")
     for each in ranked:
         if each.execution is None:
-            reporter.warn(f"{each.grasp}: {each.refused}")
+            reporter.warn(f"{each.id}: {each.reason}")
             continue
         for sentence in held_controls_in_words(each.execution):
-            reporter.warn(f"{each.grasp}: {sentence}")
+            reporter.warn(f"{each.id}: {sentence}")
         if each.enough is not None:
-            reporter.warn(f"{each.grasp}: {loss_in_words(each.execution)}")
+            reporter.warn(f"{each.id}: {loss_in_words(each.execution)}")
 
 
 def _executed_row(grasp: str, found: Execution | None) -> tuple[str, ...]:

@@ -56,7 +56,6 @@ def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Repor
 
 
 def _written(found: Replayed, command: command_flags.Replay, reporter: Reporter) -> Iterator[Path]:
-    """Write the scene, the motion and a clip of a trial, and yield their paths."""
     folder = command.out or Path()
     folder.mkdir(parents=True, exist_ok=True)
     yield write_scene(found.scene, folder / "scene.xml")

@@ -91,7 +91,6 @@ def _check(command: command_flags.Scene) -> None:
 
 
 def _scaled(command: command_flags.Scene, saved: SavedGrasps, friction: float) -> TextOf:
-    """Return a function that writes scenes as `validate` simulates them, with scaled masses."""
     fingers = with_planned_radius(finger_settings(command.fingers), saved.finger)
     physics = PhysicsSettings(torsion_m=command.fingers.torsion_m)
     return lambda grasp: (
@@ -104,7 +103,6 @@ def _scaled(command: command_flags.Scene, saved: SavedGrasps, friction: float) -
 def _held(
     command: command_flags.Scene, saved: SavedGrasps, friction: float, reporter: Reporter
 ) -> TextOf:
-    """Return a function that writes scenes as `execute` simulates them, with true masses."""
     settings = holding(saved, command.mass, command.tips, command.down)
 
     def text_of(grasp: Grasp) -> str:

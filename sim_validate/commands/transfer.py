@@ -22,7 +22,7 @@ from grasp_core.transferring.transfer import (
 from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked.objects import load_object, saved_grasps
+from sim_validate.commands.asked.objects import asked_grasps, load_object
 from sim_validate.files.result_folders import alone_in, remove_results
 from sim_validate.records.transfers import TRANSFER, carried_to_json, transfer_to_json
 
@@ -37,7 +37,7 @@ BAD: tuple[Change, ...] = ("worse", "gone")
 
 def transfer_file(command: command_flags.Transfer, reporter: Reporter) -> int:
     """Carry the grasps of a file over to a changed part, write them, and say what has changed."""
-    saved = saved_grasps(command.grasps, reporter)
+    saved = asked_grasps(command.grasps, reporter, friction=command.friction)
     if saved is None:
         return Exit.NONE
     check_planar(saved.body, "the old part")
@@ -54,10 +54,9 @@ def transfer_file(command: command_flags.Transfer, reporter: Reporter) -> int:
             f"{command.part}: the changed part is {times:.4g} times as large as the old one; if "
             "that is not so, say its unit with --unit, or its scale with --scale"
         )
-    friction = saved.friction if command.friction is None else command.friction
     with alone_in(command.out), reporter.progress("carrying over"):
         found = transfer(
-            saved.body, new, saved.grasps, friction, distance=command.carrying.distance_m,
+            saved.body, new, saved.grasps, saved.friction, distance=command.carrying.distance_m,
             angle_deg=command.carrying.angle_deg, finger=saved.finger,
         )  # fmt: skip
         text = transfer_to_json(found)

@@ -1,17 +1,17 @@
 """Runs the command `validate`, which simulates grasps and writes verdicts on them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
 from sim_validate.cli import command_flags
-from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut, warn_of
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked.objects import chosen_grasps, saved_grasps
+from sim_validate.commands.asked.objects import asked_grasps
 from sim_validate.commands.asked.trials import prepared
 from sim_validate.commands.judging import judge_grasps
 from sim_validate.files.result_folders import alone_in, remove_verdicts
@@ -26,11 +26,12 @@ from sim_validate.validation.verdict import Verdict
 
 def validate_file(command: command_flags.Validate, reporter: Reporter) -> int:
     """Simulate the grasps of a file and report which of them hold."""
-    saved = saved_grasps(command.grasps, reporter)
-    if saved is None:
+    chosen = asked_grasps(
+        command.grasps, reporter, friction=command.friction, seed=command.seed, limit=command.limit
+    )
+    if chosen is None:
         return Exit.NONE
-    chosen = chosen_grasps(saved, friction=command.friction, seed=command.seed, limit=command.limit)
-    setup, agenda = prepared(command.testing, saved.finger, chosen.seed, command.out)
+    setup, agenda = prepared(command.testing, chosen.finger, chosen.seed, command.out)
     jobs, folder = command.testing.jobs, command.out
     with alone_in(folder):
         if command.protocol:
@@ -49,31 +50,23 @@ def simulate_grasps(
     saved: SavedGrasps, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None,
     reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
-    """Simulate grasps, show the verdicts, and write them even if the run is interrupted.
-
-    Gives the exit code, and the text of verdicts.json.
-    """
+    """Simulate grasps; return the exit code and the text of verdicts.json."""
     gate = require_faithful(setup, saved.friction, saved.body.radius)
     for check in gate.checks:
         reporter.detail(str(check))
     if folder:
         remove_verdicts(folder)
     tasks = [Job(saved.body, g, saved.friction, agenda, setup) for g in saved.grasps]
-    verdicts: list[Verdict] = []
-    try:
-        with reporter.progress("simulating") as steps:
-            for verdict in validated(tasks, jobs):
-                verdicts.append(verdict)
-                if folder and agenda.keep_traces:
-                    write_arrays(folder / "traces" / f"{verdict.id}.npz", trace_arrays(verdict))
-                held = sum(verdict.held for verdict in verdicts)
-                steps.update(len(verdicts), len(tasks), f"({held} held)")
-    finally:
-        complete = len(verdicts) == len(tasks)
-        text = verdicts_to_json(saved.body, saved.friction, verdicts, gate, complete=complete)
-        if folder and verdicts:
-            path = write_text(folder / "verdicts.json", text)
-            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+
+    def kept(verdict: Verdict) -> bool:
+        if folder and agenda.keep_traces:
+            write_arrays(folder / "traces" / f"{verdict.id}.npz", trace_arrays(verdict))
+        return verdict.held
+
+    results = reporter.counted("simulating", validated(tasks, jobs), len(tasks), "held", kept)
+    text_of = partial(verdicts_to_json, saved.body, saved.friction, gate=gate)
+    path = folder and folder / "verdicts.json"
+    verdicts, text = finished(results, len(tasks), text_of, path, reporter)
     _show(saved.grasps, verdicts, setup, reporter)
     good = all(verdict.good for verdict in verdicts)
     return (Exit.GOOD if good else Exit.NEGATIVE), text
@@ -82,6 +75,7 @@ def simulate_grasps(
 def _show(
     grasps: Sequence[Grasp], verdicts: Sequence[Verdict], setup: Setup, reporter: Reporter
 ) -> None:
+    limited = bool(verdicts) and verdicts[0].agenda.limits != "none"
     rows: list[tuple[str, ...]] = []
     for grasp, verdict in zip(grasps[:TABLE_ROWS], verdicts, strict=False):
         # the maximum is NaN if one is
@@ -91,12 +85,11 @@ def _show(
         rows.append(
             (grasp.id, grasp.family, f"{friction.predicted:.4f}",
              "-" if friction.simulated is None else f"{friction.simulated:.4f}",
-             *([_limit_range(verdict)] if verdict.agenda.limits != "none" else []),
+             *([_limit_range(verdict)] if limited else []),
              verdict.outcome.value, f"{1e6 * worst:.2g}", f"{let_go} of {len(verdict.controls)}")
         )  # fmt: skip
-    limits = ("limits",) if verdicts and verdicts[0].agenda.limits != "none" else ()
     ends = ("outcome", "um moved", "controls let go")
-    columns = ("grasp", "family", "mu*", "in sim", *limits, *ends)
+    columns = ("grasp", "family", "mu*", "in sim", *(["limits"] if limited else []), *ends)
     reporter.table("verdicts", columns, rows)
     say_cut(len(verdicts), reporter)
     _show_robustness(verdicts, reporter)
@@ -107,8 +100,7 @@ def _show(
         f"{totals['controls']} negative controls were let go (all should), "
         f"{totals['controls_held']} held"
     )
-    for line in _surprises(verdicts):
-        reporter.warn(line)
+    warn_of(_surprises(verdicts), "verdicts.json", reporter)
     if not totals["controls"]:
         reporter.warn("there were no negative controls: nothing shows that this test can fail")
 
@@ -135,8 +127,7 @@ def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
     reporter.table("repeats with noise", columns, rows)
 
 
-def _surprises(verdicts: Sequence[Verdict]) -> Iterable[str]:
-    """Yield a line about each trial that did not end as it should."""
+def _surprises(verdicts: Sequence[Verdict]) -> list[str]:
     lines = list[str]()
     for verdict in verdicts:
         for trial in verdict.failures:
@@ -151,6 +142,4 @@ def _surprises(verdicts: Sequence[Verdict]) -> Iterable[str]:
         for trial in control.tried
         if not control.let_go
     ]
-    left = len(lines) - TABLE_ROWS
-    more = [f"and {left} more: verdicts.json (--out DIR) has all of them"] if left > 0 else []
-    return lines[:TABLE_ROWS] + more
+    return lines

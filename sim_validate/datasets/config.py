@@ -24,7 +24,7 @@ from grasp_core.checked import (
     one_of,
 )
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import complaint, settings_of, shown
+from grasp_core.files.json_text import complaint, named_settings, settings_of, shown
 from grasp_core.hands.named_hands import hand_names, load_hand
 from grasp_core.objects.surface import FaceKind
 from grasp_core.planning.request import METHODS, ConeKind
@@ -36,7 +36,7 @@ from sim_validate.execution.settings import (
     asked_execution,
     execution_table,
 )
-from sim_validate.files.toml_tables import check_names, read_tables
+from sim_validate.files.toml_tables import read_tables
 
 LEARNING = "learning"
 """Name of the table in a settings file."""
@@ -94,18 +94,9 @@ class Learning:
         return next((name for name, value in used.items() if value), "")
 
 
-def names_of(kind: type[Any]) -> list[str]:
-    """List the names of a class's settings."""
-    return [each.name for each in fields(kind)]
-
-
 def asked_learning(table: object) -> Learning:
     """Read the table `[learning]` of a settings file."""
-    if not isinstance(table, Mapping):
-        raise InputError(f"{LEARNING}: expected a table of settings, got {shown(table)}")
-    given = cast("Mapping[str, Any]", table)
-    check_names(given, names_of(Learning), LEARNING)
-    return settings_of(Learning, given, [LEARNING])
+    return settings_of(Learning, named_settings(table, Learning, LEARNING), [LEARNING])
 
 
 def learning_table(asked: Learning) -> dict[str, Any]:
@@ -211,7 +202,7 @@ def config_from_toml(path: Path) -> DatasetConfig:
 
 def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
     """Build a configuration from named settings with the types that TOML has."""
-    check_names(given, names_of(DatasetConfig), "the settings")
+    given = named_settings(given, DatasetConfig, "the settings")
     tables = {TABLE: asked_execution, LEARNING: asked_learning}
     own = {name: value for name, value in given.items() if name not in tables}
     try:

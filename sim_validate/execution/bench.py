@@ -11,6 +11,7 @@ the fingers would not carry what they hold along.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -46,9 +47,6 @@ class HeldMotion:
     """Positions of the fingers' joints, (n, joints) [m, rad]."""
     tips: Array
     """Displacements of the fingertips along their springs, (n, k, 3) [m]."""
-    tip_turns: Array | None
-    """Orientations of the fingertips as the palm sees them, (n, k, 3, 3); None where they do not
-    turn."""
     forces: Array
     """Contact forces on the object along the axes of the springs, (n, k, 3) [N]."""
     pressed: Array
@@ -59,6 +57,9 @@ class HeldMotion:
     states: Array
     """Complete state of the simulator, from which a trial can go on, (n, size)."""
     faults: tuple[str, ...]
+    tip_turns: Array | None
+    """Orientations of the fingertips as the palm sees them, (n, k, 3, 3); None where they do not
+    turn."""
 
     @property
     def joints(self) -> Array:
@@ -66,24 +67,27 @@ class HeldMotion:
         return np.concatenate([self.moved, self.turned, self.palm, self.fingers], axis=1)
 
 
-SERIES = ("moved", "turned", "palm", "fingers", "tips", "forces", "pressed", "table", "states")
-"""Fields of a motion that have a row for each sample."""
+SERIES = (
+    "moved", "turned", "palm", "fingers", "tips", "forces", "pressed", "table", "states",
+    "tip_turns",
+)  # fmt: skip
+"""Fields of a motion that have a row for each sample, where they are known."""
 
 
 def motions_joined(first: HeldMotion, second: HeldMotion) -> HeldMotion:
     """Return one motion after another, with the faults of both."""
-    both = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in SERIES}
-    turns = None
-    if first.tip_turns is not None and second.tip_turns is not None:
-        turns = np.concatenate([first.tip_turns, second.tip_turns])
-    return HeldMotion(**both, tip_turns=turns, faults=first.faults + second.faults)
+    both: dict[str, Any] = {}
+    for name in SERIES:
+        parts = getattr(first, name), getattr(second, name)
+        both[name] = None if parts[0] is None else np.concatenate(parts)
+    return HeldMotion(**both, faults=first.faults + second.faults)
 
 
 def begun_motion(motion: HeldMotion, count: int) -> HeldMotion:
     """Return the first samples of a motion, as if nothing had gone wrong after them."""
-    first = {name: getattr(motion, name)[:count] for name in SERIES}
-    turns = None if motion.tip_turns is None else motion.tip_turns[:count]
-    return HeldMotion(**first, tip_turns=turns, faults=())
+    rows: dict[str, Any] = {name: getattr(motion, name) for name in SERIES}
+    first: dict[str, Any] = {key: None if own is None else own[:count] for key, own in rows.items()}
+    return HeldMotion(**first, faults=())
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +105,6 @@ class HeldBench:
         self, scene: HeldScene, *, threads: int = 1, sample_s: float = SAMPLE_S,
         lost_m: float = math.inf, step_s: float | None = None,
     ) -> None:  # fmt: skip
-        """Compile a scene."""
         self.scene, self.threads, self.lost_m = scene, threads, lost_m
         self.model = compiled(scene.xml)
         if step_s is None:
@@ -142,7 +145,6 @@ class HeldBench:
     def _begun(
         self, drives: Sequence[Drive], start: Array | None, friction: Array | None
     ) -> batch.Batch:
-        """Put every trial into its state at the start."""
         trials = batch.Batch(self.model, len(drives), self.threads)
         trials.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         if start is not None:
@@ -241,12 +243,13 @@ class HeldBench:
         half /= np.linalg.norm(half, axis=1)[:, None]
         palm_then = hinged(palm[:, 3:] + back[:, FREE + 3 : PALM]).transpose(0, 2, 1)
         pressed = palm_then @ object_turns @ rotations(half)
-        seen = layout.fingers_seen(fingers, forces[:, PALM:], turned)
-        contact = layout.fingers_seen(fingers + back[:, PALM:], forces[:, PALM:], pressed).forces
+        tips, _, turns = layout.fingers_seen(fingers, forces[:, PALM:], turned)
+        before = fingers + back[:, PALM:]
+        _, contact, _ = layout.fingers_seen(before, forces[:, PALM:], pressed)
         finger_forces = np.einsum("kij,nkj->ni", layout.axes, contact)
         return HeldMotion(
-            joints[:, :3], joints[:, 3:7], palm, fingers, seen.tips, seen.turns, contact, pressed,
-            table=forces[:, :3] - finger_forces, states=states, faults=faults,
+            joints[:, :3], joints[:, 3:7], palm, fingers, tips, contact, pressed,
+            forces[:, :3] - finger_forces, states, faults, turns,
         )  # fmt: skip
 
 

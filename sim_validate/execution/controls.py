@@ -62,10 +62,7 @@ class Weaker:
 def run_controls(
     bench: HeldBench, best: BestSqueeze, lowest_frequency: float
 ) -> tuple[ExecutionControl, ...]:
-    """Simulate the weaker grips under loads that must make a contact slip.
-
-    The loads grow so slowly that the held object follows them.
-    """
+    """Simulate the weaker grips under loads that grow slowly and must make a contact slip."""
     layout = bench.scene.layout
     rise_s = min(max(2.0 * paths.RISE_S, FOLLOWED / lowest_frequency), LONGEST_RISE_S)
     share = paths.smooth(paths.samples(rise_s))

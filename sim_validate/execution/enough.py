@@ -64,7 +64,6 @@ class Enough:
             )
 
     def __str__(self) -> str:
-        """Say it in words."""
         carried = f"{self.load_multiple:.3g} times the weight in any direction"
         if self.push_n is None:
             return f"no push is found to be enough for {carried}: {self.reason}"
@@ -79,7 +78,6 @@ class NoSqueezeError(NoForcesError):
     """Raised where no squeeze executes a grasp; it knows what would be enough."""
 
     def __init__(self, reason: str, enough: Enough | None = None) -> None:
-        """Say why there is no squeeze, and what would be enough, where it was sought."""
         super().__init__(reason if enough is None else f"{reason}; {enough}")
         self.enough = enough
 

@@ -13,15 +13,14 @@ is confirmed then, whatever comes later.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.checked import instance, several, switch, whole
-from grasp_core.closure.contacts import FEWEST, contact_arrays, stacked
+from grasp_core.checked import instance, switch, whole
+from grasp_core.closure.contacts import contact_arrays, listed_contacts, stacked
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.grips import Grip
@@ -162,15 +161,7 @@ def execute(
         NoForcesError: No squeeze carries the weight, or the grip is unstable under the best one.
         UnfaithfulError: The simulator fails on a case with a known answer.
     """
-    if settings is not None:
-        instance(settings, ExecutionSettings, "settings")
-        settings = settings if mass_kg is None else replace(settings, mass_kg=mass_kg)
-    elif mass_kg is not None:
-        settings = ExecutionSettings(mass_kg=mass_kg)
-    else:
-        raise InputError("execute: expected mass_kg or settings, got neither; give mass_kg=0.3")
-    whole(threads, "threads", least=1, most=MOST_THREADS)
-    switch(enough, "enough")
+    settings = asked_settings("execute", settings, mass_kg, ExecutionSettings)
     contacts = given_contacts(body, grasp)
     return executed(
         body, settings,
@@ -180,11 +171,26 @@ def execute(
     )  # fmt: skip
 
 
+def asked_settings(
+    by: str, settings: ExecutionSettings | None, mass_kg: float | None,
+    usual: Callable[[float], ExecutionSettings],
+) -> ExecutionSettings:  # fmt: skip
+    """Return settings with a mass, if one is given, or the usual ones for the mass."""
+    if settings is not None:
+        instance(settings, ExecutionSettings, "settings")
+        return settings if mass_kg is None else replace(settings, mass_kg=mass_kg)
+    if mass_kg is None:
+        raise InputError(f"{by}: expected mass_kg or settings, got neither; give mass_kg=0.3")
+    return usual(mass_kg)
+
+
 def executed(
     body: Polyhedron, settings: ExecutionSettings, choose: Choose, scene_of: SceneOf, *,
     threads: int, enough: bool,
 ) -> Execution:  # fmt: skip
     """Choose the squeeze, simulate its trials, and find what would be enough if they are lost."""
+    whole(threads, "threads", least=1, most=MOST_THREADS)
+    switch(enough, "enough")
     try:
         best = choose(settings, None)
     except NoForcesError as error:
@@ -249,14 +255,10 @@ def chosen_squeeze(
 def given_contacts(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> tuple[Contact, ...]:
     """Return the contacts of a grasp, or those that are given, checked."""
     check_body(body)
-    if isinstance(grasp, Grasp):
-        check_on_faces(body, grasp)
-    listed = grasp.contacts if isinstance(grasp, Grasp) else grasp
-    each = partial(instance, kind=Contact, name="grasp", remedy="or give a Grasp")
-    contacts = several(listed, each, "grasp", "Contact values")
-    if len(contacts) < FEWEST:
-        raise InputError(f"grasp: at least two contacts are needed, got {len(contacts)}")
-    return contacts
+    if not isinstance(grasp, Grasp):
+        return listed_contacts(grasp, "grasp")
+    check_on_faces(body, grasp)
+    return grasp.contacts
 
 
 def tip_radius(body: Polyhedron, contacts: Sequence[Contact], settings: ExecutionSettings) -> float:
@@ -278,10 +280,7 @@ def held_scene(
 
 
 def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> float | None:
-    """Return how far from the contacts a curved surface must be there [m]; None for all of it.
-
-    It is as far as fingertips come before the object counts as lost.
-    """
+    """Return how far fingertips come from contacts on a curved surface [m]; None for flat ones."""
     if body.patches is None:
         return None
     turn = settings.most_rad + math.radians(settings.off_deg)
@@ -341,7 +340,6 @@ def _judged(
     trial: Trial, motion: HeldMotion, predicted: tuple[float, float], bench: HeldBench,
     settings: ExecutionSettings,
 ) -> ExecutionTrial:  # fmt: skip
-    """Judge a trial beside its predicted multiples of first slip and of loss."""
     if motion.faults:
         found = DIVERGED
     else:

@@ -80,10 +80,8 @@ def require_faithful_execution(
 def cases_of(
     layout: HeldLayout, physics: PhysicsSettings, hand: HeldSettings, push_n: float
 ) -> tuple[HeldCase, ...]:
-    """Return the case to check for each friction of a scene, with numbers of two digits.
-
-    Gravity points down the box's free axis, whatever its direction in the scene.
-    """
+    """Return the case to check for each friction of a scene, with numbers of two digits."""
+    # gravity points down the box's free axis, whatever its direction in the scene
     upright = replace(physics, gravity=tuple(WEIGHT.tolist()))
     numbers = {
         "mass_kg": layout.mass_kg, "stiffness_n_per_m": layout.stiffest, "push_n": push_n,
@@ -143,9 +141,14 @@ def held_box(case: HeldCase) -> tuple[Check, ...]:
     bench = HeldBench(case.held_box())
     _, start = bench.settled(paths.closing(SETTLE_S))
     ramps = [_ramp(case, 0.0), _ramp(case, RISING)]
-    still = _held_load(case)
+    lag = SETTLED * 2.0 * case.damping_ratio / case.frequency
+    share = np.concatenate([case.rise(), np.ones(paths.samples(lag) + _period(case))])
+    wrenches = case.light_n * share[:, None] * np.repeat([1.0, 0.0], 3)
+    still = replace(idle(len(share)), wrenches=wrenches, shares=share)
     moving = replace(still, velocity=SPEED_M_PER_S * np.array([0.6, 0.8, 0.0]))
-    sudden = _sudden_load(case)
+    jump = np.zeros((2 * JUMP, 6))  # there at once, and suddenly gone
+    jump[:JUMP, 0] = JUMP_SHARE * case.light_n
+    sudden = replace(idle(2 * JUMP), wrenches=jump)
     motions = bench.run([*ramps, still, moving, sudden], start)
     layout, friction = bench.scene.layout, bench.scene.layout.friction
     slips = [
@@ -195,14 +198,6 @@ def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> Drive:
     return replace(drive, accelerations=accelerations)
 
 
-def _held_load(case: HeldCase) -> Drive:
-    """Return the drive in which a light load along each axis grows, and stays."""
-    lag = SETTLED * 2.0 * case.damping_ratio / case.frequency
-    share = np.concatenate([case.rise(), np.ones(paths.samples(lag) + _period(case))])
-    wrenches = case.light_n * share[:, None] * np.repeat([1.0, 0.0], 3)
-    return replace(idle(len(share)), wrenches=wrenches, shares=share)
-
-
 def _creep(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
     """Check how far contacts that stick creep in the time of the longest trial."""
     last = _period(case)
@@ -212,13 +207,6 @@ def _creep(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
     far = speed * longest / (SLID * case.radius_m)
     name = "creep of contacts that stick in a whole trial, over what counts as slipped"
     return little(name, motion, far, CREEP)
-
-
-def _sudden_load(case: HeldCase) -> Drive:
-    """Return the drive in which a load along x is there at once, and suddenly gone."""
-    wrenches = np.zeros((2 * JUMP, 6))
-    wrenches[:JUMP, 0] = JUMP_SHARE * case.light_n
-    return replace(idle(2 * JUMP), wrenches=wrenches)
 
 
 def _jumps(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
@@ -294,8 +282,6 @@ def ring_frequency(points: Array, about: float, sample_s: float) -> float:
     """Return the frequency of a decaying ring about an unknown middle [rad/s].
 
     Points at equal times t obey x_2 = p x_1 - q x_0 + r with p = 2 sqrt(q) cos(w t).
-
-    Takes `points` (n,); `about` [rad/s]; `sample_s` [s].
     """
     stride = max(1, int(RADIANS / (about * sample_s)))
     first, second, third = points[: -2 * stride], points[stride:-stride], points[2 * stride :]
@@ -440,7 +426,6 @@ def on_faces(case: HeldCase, name: str) -> tuple[Check, ...]:
 
 
 def _centroid(corners: Array) -> tuple[Array, float]:
-    """Return the centroid and the area of a convex polygon."""
     triangles = np.array(
         [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]
     )

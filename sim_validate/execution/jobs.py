@@ -16,7 +16,6 @@ from scenes.execution.held_mjcf import SAMPLE_S
 from scenes.mjcf_text import quaternion
 from scenes.physics import PhysicsSettings
 from sim_validate.execution.bench import HeldBench, facing
-from sim_validate.execution.enough import NoSqueezeError
 from sim_validate.execution.execute import chosen_squeeze, execute, held_scene, run_trials
 from sim_validate.execution.predictions import held_dynamics
 from sim_validate.execution.settings import ExecutionSettings
@@ -56,9 +55,8 @@ def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
             physics=physics_of(job), threads=job.threads, enough=job.enough,
         )  # fmt: skip
     except NoForcesError as error:
-        answer = error.enough if isinstance(error, NoSqueezeError) else None
-        return ExecutedGrasp(*about, None, str(error), answer)
-    return ExecutedGrasp(*about, found, None, found.enough)
+        return ExecutedGrasp(*about, None, str(error), getattr(error, "enough", None))
+    return ExecutedGrasp(*about, found, enough=found.enough)
 
 
 def physics_of(job: ExecutionJob) -> PhysicsSettings | None:

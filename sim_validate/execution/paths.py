@@ -68,7 +68,6 @@ class Drive:
     table: Table | None = None
 
     def __len__(self) -> int:
-        """Return the number of samples."""
         return len(self.shares)
 
 
@@ -148,10 +147,7 @@ def closing(after_s: float = REST_S) -> Drive:
 
 
 def loaded(share: Array, gravity: Array) -> Drive:
-    """Return the drive in which a squeezed object comes under its weight.
-
-    Takes `share` (n,); `gravity` (3,) or (n, 3) [m/s^2].
-    """
+    """Return the drive in which a squeezed object comes under gravity, (3,) or (n, 3) [m/s^2]."""
     return replace(idle(len(share)), gravity=share[:, None] * gravity, shares=share)
 
 

@@ -1,9 +1,8 @@
 """What users choose for executions: mass, springs, trials, and what counts as survival."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, Literal, TypeAlias, cast, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 from grasp_core.by_value import changed
 from grasp_core.checked import (
@@ -20,7 +19,7 @@ from grasp_core.checked import (
 )
 from grasp_core.errors import InputError, about
 from grasp_core.execution.grips import STIFFNESS_N_PER_M
-from grasp_core.files.json_text import settings_of, shown
+from grasp_core.files.json_text import named_settings, settings_of
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.execution.held import HeldSettings
 
@@ -155,11 +154,7 @@ ANY_MASS_KG = 1.0
 
 @dataclass(frozen=True, slots=True)
 class AskedExecution:
-    """How the grasps of all objects of a file are executed.
-
-    Raises:
-        InputError: The density is out of range.
-    """
+    """How the grasps of all objects of a file are executed."""
 
     settings: ExecutionSettings
     density_kg_m3: float | None = None
@@ -178,13 +173,10 @@ class AskedExecution:
 
 def asked_execution(table: object) -> AskedExecution:
     """Read the table `[execution]` of a settings file."""
-    if not isinstance(table, Mapping):
-        raise InputError(f"{TABLE}: expected a table of settings, got {shown(table)}")
-    given = {**cast("Mapping[str, Any]", table)}
-    _check_names(given, (*(each.name for each in fields(ExecutionSettings)), DENSITY), TABLE)
-    if isinstance(hand := given.get("hand"), dict):
-        known = tuple(each.name for each in fields(HeldSettings))
-        _check_names(cast("dict[str, Any]", hand), known, f"{TABLE}.hand")
+    known = (*(each.name for each in fields(ExecutionSettings)), DENSITY)
+    given = named_settings(table, known, TABLE)
+    if isinstance(given.get("hand"), dict):
+        named_settings(given["hand"], HeldSettings, f"{TABLE}.hand")
     if (MASS in given) == (DENSITY in given):
         got = "both" if MASS in given else "neither"
         raise InputError(f"{TABLE}: expected one of {MASS} and {DENSITY}, got {got}")
@@ -192,14 +184,6 @@ def asked_execution(table: object) -> AskedExecution:
     settings = settings_of(ExecutionSettings, {MASS: ANY_MASS_KG, **given}, [TABLE])
     with about(TABLE):
         return AskedExecution(settings, None if density is None else positive(density, DENSITY))
-
-
-def _check_names(given: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
-    for name in given:
-        if name not in known:
-            raise InputError(
-                f"{where}: no setting is named {shown(name)}; choose from {', '.join(known)}"
-            )
 
 
 def execution_table(asked: AskedExecution) -> dict[str, Any]:

@@ -140,10 +140,7 @@ def _slid(found: Seen, layout: HeldLayout, begun: int) -> Array:
 
 
 def first_trouble(motion: HeldMotion, layout: HeldLayout, friction: Array, begun: int) -> int:
-    """Return the first sample in which a contact slips or opens, or the simulator fails.
-
-    It is the number of samples where there is none.
-    """
+    """Return the first sample in which a contact slips or opens, or the simulator fails; else n."""
     found = seen(motion, layout)
     on_cone = _on_cone(found, friction, begun)[1].any(axis=1)
     troubled = np.flatnonzero(on_cone | ~np.isfinite(motion.joints).all(axis=1))

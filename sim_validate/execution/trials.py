@@ -55,10 +55,7 @@ def misplacements(layout: HeldLayout, off_m: float, off_rad: float, count: int, 
 
 
 def met(layout: HeldLayout, poses: tuple[Pose, ...], off_m: float, off_rad: float) -> Array:
-    """Return how far each fingertip is from its planned place when it stops, (poses, k, 3) [m].
-
-    The displacements are along the axes of the springs.
-    """
+    """Return where fingertips stop, from their planned places along springs, (poses, k, 3) [m]."""
     ways = layout.frames[:, :, 0]
     room = ROOM * (off_m + off_rad * layout.radius_m)
     starts = layout.tip_centers - room * ways
@@ -116,7 +113,6 @@ class Rest:
     down: Array
     """Unit normal out of the object."""
     height: float
-    """Distance of the centre of mass from the table [m]."""
     likelihood: float
     """Share of the sphere that the face takes, as the centre of mass sees it."""
 

@@ -143,6 +143,7 @@ class ExecutedGrasp(ByValue):
 
     id: str
     family: str
+    """Construction of the contacts; empty where a hand executed them."""
     contacts_sha256: str
     """Hash of the contacts, which tells grasps of one id apart."""
     execution: Execution | None

@@ -2,12 +2,11 @@
 
 import re
 import tomllib
-from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import DEEPEST, check_values, shown
+from grasp_core.files.json_text import DEEPEST, check_values
 from grasp_core.files.text_files import read_text
 
 MOST_LETTERS = 2**20
@@ -46,15 +45,6 @@ def tables_of_toml(text: str) -> dict[str, Any]:
         raise InputError(f"the text is not TOML: {_printable(str(error))}") from error
     check_values(found)
     return found
-
-
-def check_names(given: Iterable[str], known: Collection[str], where: str) -> None:
-    """Refuse a setting that does not exist."""
-    for name in given:
-        if name not in known:
-            raise InputError(
-                f"{where}: no setting is named {shown(name)}; choose from {', '.join(known)}"
-            )
 
 
 def _printable(text: str) -> str:

@@ -2,14 +2,10 @@
 
 The squeeze is the best one for fingertips on the springs that the servos amount to, within the
 torques of the motors (see `scenes.hands.held_hand`). Servos are told its torques once, and nothing
-is replanned. Palm and links touch the object where it comes to them. Many grasps are executed, or
-tested by `validate_hand`, in one process or in several.
+is replanned. Palm and links touch the object where it comes to them.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-
-from grasp_core.checked import instance, switch, whole
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.best_squeeze import searched
@@ -23,13 +19,10 @@ from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.execution.held_mjcf import HeldScene
 from scenes.hands.held_hand import finger_springs, held_hand_scene, servo_stiffness, strong_motors
-from sim_validate.execution.enough import Enough, NoSqueezeError
-from sim_validate.execution.execute import executed, surface_reach
+from sim_validate.execution.execute import asked_settings, executed, surface_reach
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.execution.verdict import Execution
-from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict, validate_hand
-from sim_validate.parallel.processes import each
-from sim_validate.simulation.setup import MOST_THREADS, Agenda
+from sim_validate.execution.verdict import ExecutedGrasp, Execution
+from sim_validate.hands.validate_hand import MOST_PUSH_N
 
 
 def execute_hand(
@@ -66,17 +59,7 @@ def execute_hand(
             unstable under the best one.
         UnfaithfulError: The simulator fails on a case with a known answer.
     """
-    if settings is not None:
-        instance(settings, ExecutionSettings, "settings")
-        settings = settings if mass_kg is None else replace(settings, mass_kg=mass_kg)
-    elif mass_kg is not None:
-        settings = hand_execution_settings(mass_kg)
-    else:
-        raise InputError(
-            "execute_hand: expected mass_kg or settings, got neither; give mass_kg=0.3"
-        )
-    whole(threads, "threads", least=1, most=MOST_THREADS)
-    switch(enough, "enough")
+    settings = asked_settings("execute_hand", settings, mass_kg, hand_execution_settings)
 
     def scene_of(own: ExecutionSettings, best: BestSqueeze) -> HeldScene:
         near = surface_reach(body, best.grip, own)
@@ -121,63 +104,13 @@ def hand_squeeze(
     return best
 
 
-@dataclass(frozen=True, slots=True)
-class HandJob:
-    """One pose to test, as it is sent to a worker process."""
-
-    hand: Hand
-    body: Polyhedron
-    reach: HandReach
-    friction: float
-    settings: ExecutionSettings | None = None  # None where it only holds wrenches
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ExecutedHand:
-    """What came of executing one grasp with a hand."""
-
-    grasp: str
-    execution: Execution | None  # None where the grasp cannot be executed
-    refused: str = ""  # why the grasp cannot be executed; empty if it was
-    enough: Enough | None = None  # what would be enough, as in `Execution.enough`
-
-    @property
-    def survived(self) -> bool:
-        """Return whether the object survived every trial."""
-        return self.execution is not None and self.execution.survived
-
-    @property
-    def least_predicted_loss(self) -> float:
-        """Return the least multiple of a trial's load at which the object is lost."""
-        return 0.0 if self.execution is None else self.execution.least_predicted_loss
-
-    @property
-    def good(self) -> bool:
-        """Return whether the object survived every trial, and every control slipped."""
-        return self.survived and self.execution is not None and self.execution.controls_let_go
-
-
-def held_by_hands(jobs: Sequence[HandJob], processes: int) -> Iterator[HandVerdict]:
-    """Yield one verdict per job, in order; the number of processes does not change the results."""
-    yield from each(held_by_hand, jobs, jobs=processes)
-
-
-def held_by_hand(job: HandJob) -> HandVerdict:
-    """Test one pose with the usual wrenches and controls."""
-    agenda = Agenda(critical_friction=False)
-    return validate_hand(job.hand, job.body, job.reach, job.friction, agenda=agenda)
-
-
-def executed_by_hands(jobs: Sequence[HandJob], processes: int) -> Iterator[ExecutedHand]:
-    """Yield one result per job, in order; the number of processes does not change the results."""
-    yield from each(executed_by_hand, jobs, jobs=processes)
-
-
-def executed_by_hand(job: HandJob) -> ExecutedHand:
-    """Execute one grasp with the settings of its job."""
+def executed_by_hand(
+    hand: Hand, body: Polyhedron, reach: HandReach, friction: float, settings: ExecutionSettings
+) -> ExecutedGrasp:
+    """Execute one grasp with a hand; a grasp that cannot be executed is a result with a reason."""
+    about = reach.grasp, "", contacts_sha256(reach.contacts or ())
     try:
-        found = execute_hand(job.hand, job.body, job.reach, job.friction, job.settings)
+        found = execute_hand(hand, body, reach, friction, settings)
     except (InputError, NoForcesError) as error:
-        answer = error.enough if isinstance(error, NoSqueezeError) else None
-        return ExecutedHand(job.reach.grasp, None, str(error), answer)
-    return ExecutedHand(job.reach.grasp, found, enough=found.enough)
+        return ExecutedGrasp(*about, None, str(error), getattr(error, "enough", None))
+    return ExecutedGrasp(*about, found, enough=found.enough)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grasp_core.arrays import Array, to_digits
+from grasp_core.arrays import Array, rounded, to_digits
 from grasp_core.by_value import ByValue
 from grasp_core.checked import SMALLEST
 from grasp_core.objects.polyhedron import Polyhedron
@@ -85,7 +85,7 @@ def _dead_motor(case: HandCase, at_limit: Array, names: tuple[str, ...]) -> Iter
         limits = case.motors.limits.copy()
         limits[joint] = SMALLEST
         dead = replace(case, motors=replace(case.motors, limits=limits))
-        found.append((float(to_digits(np.array(dead.limit(at_limit).upper))), joint, dead))
+        found.append((rounded(dead.limit(at_limit).upper), joint, dead))
     if found:
         _, joint, dead = min(found, key=lambda each: each[:2])
         told = f"the motor of {names[joint]} is dead"
@@ -94,7 +94,7 @@ def _dead_motor(case: HandCase, at_limit: Array, names: tuple[str, ...]) -> Iter
 
 def _low_friction(case: HandCase, at_limit: Array) -> Iterator[HandControl]:
     for share in FRICTIONS:
-        slippery = replace(case, friction=float(to_digits(np.array(share * case.friction))))
+        slippery = replace(case, friction=rounded(share * case.friction))
         told = f"the friction is {slippery.friction:.3g} instead of {case.friction:.3g}"
         found = list(_proved("low_friction", told, slippery, at_limit, USUAL_LOAD))
         if found:

@@ -18,7 +18,6 @@ from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.values import Contact
 from scenes.fingertips import FingerSettings
 from scenes.hands.hand_scene import HandScene, build_hand_scene, hand_physics, limited
 from sim_validate.hands.hand_controls import HandCase, HandControl, hand_controls
@@ -26,12 +25,13 @@ from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.gate import require_faithful
 from sim_validate.simulation.known_cases import Check
-from sim_validate.simulation.limits import SimulatedLimit, bisected_limits, part, ramped_limits
+from sim_validate.simulation.limits import part
 from sim_validate.simulation.loads import planned_loads
 from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.schedules import Load
 from sim_validate.simulation.setup import WEAKEST, Agenda, Setup
 from sim_validate.simulation.traces import LET_GO, HoldVerdict, Outcome, judge
+from sim_validate.validation.validation import held_wrenches
 from sim_validate.validation.verdict import WrenchVerdict
 
 MOST_PUSH_N = 100.0
@@ -154,69 +154,37 @@ def validate_hand(
         raise InputError(f"the contacts of {reach.grasp} are not in force closure at {friction}")
     gate = require_faithful(setup, friction, body.radius)
     checks = (*gate.checks, *require_faithful_hands(setup, friction))
-    trial = _Bout(body, contacts, scene, agenda, setup)
-    return HandVerdict(
-        hand.name, reach.grasp, friction, trial.wrenches(), trial.controls(), checks, scene,
-        setup, agenda,
-    )  # fmt: skip
-
-
-class _Bout:
-    def __init__(
-        self, body: Polyhedron, contacts: tuple[Contact, ...], scene: HandScene, agenda: Agenda,
-        setup: Setup,
-    ) -> None:  # fmt: skip
-        self.scene, self.agenda, self.setup, self.layout = scene, agenda, setup, scene.layout
-        self.case = HandCase(body, contacts, self.layout.friction, self.layout.motors, setup)
-        self.rig = self._rig(scene)
-        self.loads = planned_loads(
-            body, contacts, self.layout.friction, self.rig.idle, agenda, setup,
-            motors=self.layout.motors,
-        )  # fmt: skip
-
-    def _rig(self, scene: HandScene) -> Rig:
-        bench = Bench(scene, threads=self.setup.threads, timeout_s=self.setup.timeout_s)
-        # high friction while closing is that of the grasp, whatever a control's is
-        high = self.setup.hold.settling_friction * self.case.friction
-        forces = self.layout.squeeze_forces
-        return squeezed(bench, self.setup, forces, scene.layout.friction, high)
-
-    def wrenches(self) -> tuple[WrenchVerdict, ...]:
-        """Judge the hold of every load and, if asked for, find its limit."""
-        traces = self.rig.hold([planned.load for planned in self.loads])
-        return tuple(
-            WrenchVerdict(
-                name=planned.name,
-                wrench=planned.load.wrench,
-                predicted_limit=planned.predicted_limit,
-                required_friction=planned.required_friction,
-                hold=judge(trace, self.layout, self.setup.hold),
-                simulated_limit=limit,
-                trace=trace if self.agenda.keep_traces else None,
-            )
-            for planned, trace, limit in zip(self.loads, traces, self._limits(), strict=True)
+    layout, rig = scene.layout, _rig(scene, setup, friction)
+    loads = planned_loads(
+        body, contacts, layout.friction, rig.idle, agenda, setup, motors=layout.motors
+    )
+    wrenches, tried = held_wrenches(rig, loads, agenda), tuple[HandControlVerdict, ...]()
+    if agenda.controls:
+        case = HandCase(body, contacts, layout.friction, layout.motors, setup)
+        weakest = next(planned for planned in loads if planned.name == WEAKEST)
+        names = tuple(joint.name for joint in layout.hand.joints)
+        tried = tuple(
+            HandControlVerdict(control, _held(scene, setup, friction, control, weakest.limit))
+            for control in hand_controls(case, weakest, names)
         )
+    return HandVerdict(
+        hand.name, reach.grasp, friction, wrenches, tried, checks, scene, setup, agenda
+    )
 
-    def _limits(self) -> tuple[SimulatedLimit | None, ...]:
-        limits = [planned.limit for planned in self.loads]
-        if self.agenda.limits == "ramp":
-            return ramped_limits(self.rig, limits)
-        if self.agenda.limits == "bisection":
-            return bisected_limits(self.rig, limits)
-        return (None,) * len(limits)
 
-    def controls(self) -> tuple[HandControlVerdict, ...]:
-        """Try the hand with what provably makes it let go."""
-        if not self.agenda.controls:
-            return ()
-        weakest = next(planned for planned in self.loads if planned.name == WEAKEST)
-        names = tuple(joint.name for joint in self.layout.hand.joints)
-        controls = hand_controls(self.case, weakest, names)
-        return tuple(self._tried(control, weakest.limit) for control in controls)
+def _rig(scene: HandScene, setup: Setup, friction: float) -> Rig:
+    """Close the hand; high friction meanwhile is that of the grasp, whatever a control's is."""
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    high = setup.hold.settling_friction * friction
+    layout = scene.layout
+    return squeezed(bench, setup, layout.squeeze_forces, layout.friction, high)
 
-    def _tried(self, control: HandControl, limit: Load) -> HandControlVerdict:
-        scene = limited(self.scene, control.limits, control.friction)
-        rig = self._rig(scene)
-        high = self.setup.hold.settling_friction * self.case.friction
-        (trace,) = rig.hold([part(rig.idle, limit, control.share)], [high])
-        return HandControlVerdict(control, judge(trace, self.layout, self.setup.hold))
+
+def _held(
+    scene: HandScene, setup: Setup, friction: float, control: HandControl, limit: Load
+) -> HoldVerdict:
+    """Hold what a control must let go of."""
+    rig = _rig(limited(scene, control.limits, control.friction), setup, friction)
+    high = setup.hold.settling_friction * friction
+    (trace,) = rig.hold([part(rig.idle, limit, control.share)], [high])
+    return judge(trace, scene.layout, setup.hold)

@@ -8,10 +8,9 @@ that they let go of some load.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeAlias
 
 import numpy as np
 
@@ -32,7 +31,6 @@ from sim_validate.dexgraspbench import RecordedReach, hand_file, recorded_postur
 from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.hands.validate_hand import hand_setup
-from sim_validate.parallel.processes import each
 from sim_validate.protocols.published import PROTOCOLS, PublishedProtocol
 from sim_validate.protocols.runs import RunVerdict, their_verdict
 from sim_validate.simulation.bench import Bench
@@ -261,16 +259,3 @@ def our_verdict(
         if found.outcome is not Outcome.HELD:
             return OurVerdict(True, False, margin, f"{name}: {found.outcome.value}: {found.reason}")
     return OurVerdict(True, True, margin, "")
-
-
-Case: TypeAlias = Callable[[], Judgement]
-"""A call of `judge_by` or `judge_hand_by`, which can be sent to a worker process: a `partial`."""
-
-
-def judged(cases: Sequence[Case], processes: int) -> Iterator[Judgement]:
-    """Yield one judgement per case, in order; the number of processes does not change them."""
-    yield from each(_judged, cases, jobs=processes)
-
-
-def _judged(case: Case) -> Judgement:
-    return case()

@@ -28,7 +28,6 @@ class Source:
     """Files of a public repository in which a test is stated."""
 
     repository: str
-    """Owner and name on GitHub."""
     commit: str
     paths: tuple[str, ...]
 
@@ -132,13 +131,11 @@ SIX: tuple[Triple, ...] = (
 
 
 def _scaled(way: Triple, size: float) -> Triple:
-    """Return a multiple of a direction."""
     x, y, z = way
     return size * x, size * y, size * z
 
 
 def _pulls(acceleration: float, seconds: float, look_s: float) -> tuple[Run, ...]:
-    """Return one run for each of the six directions."""
     return tuple(
         (Step(seconds, pull_m_s2=_scaled(way, acceleration), look_s=look_s),) for way in SIX
     )

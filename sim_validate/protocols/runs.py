@@ -143,7 +143,6 @@ class TestBench:
     __test__ = False  # no class of tests, whatever its name begins with
 
     def __init__(self, scene: TestedScene, threads: int = 1) -> None:
-        """Compile a scene."""
         self.scene, self.threads = scene, threads
         self.model = compiled(scene.xml)
         self.data = mujoco.MjData(self.model)
@@ -198,7 +197,6 @@ class TestBench:
         return errors
 
     def _touching(self, state: Array) -> frozenset[int]:
-        """Find the fingers that touch the object in a state."""
         if not np.isfinite(state).all():
             return frozenset()
         signature = int(mujoco.mjtState.mjSTATE_INTEGRATION)

@@ -48,11 +48,6 @@ def model_record(hand: Hand) -> dict[str, Any]:
     return {name: _plain(getattr(hand, name)) for name in MODEL} | {"fingers": fingers}
 
 
-def couplings_record(hand: Hand) -> list[dict[str, Any]]:
-    """Write which joints follow others."""
-    return _plain(hand.couplings)
-
-
 def hand_of_model(name: str, record: object, sources: list[str], torque_source: str) -> Hand:
     """Make the hand that a record describes."""
     model = _keyed(record, MODEL, "model")

@@ -25,7 +25,7 @@ from grasp_core.hands.reach import HandReach, ReachReason
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import FINGERS, Contact, Grasp
-from sim_validate.hands.execute_hand import ExecutedHand
+from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.hands.validate_hand import HandVerdict
 from sim_validate.records.executions import EnoughRecord, enough_record, tip_radii
 from sim_validate.records.fields import Count, Finite, ObjectRecord, Positive, Triple, object_record
@@ -207,7 +207,7 @@ class HandTrials:
     """The largest mass in any orientation."""
     verdicts: dict[str, HandVerdict] = field(default_factory=dict[str, HandVerdict])
     """What it held."""
-    executions: dict[str, ExecutedHand] = field(default_factory=dict[str, ExecutedHand])
+    executions: dict[str, ExecutedGrasp] = field(default_factory=dict[str, ExecutedGrasp])
     """What came of executing the grasps with it."""
 
 
@@ -276,11 +276,11 @@ def _record(hand: Hand, found: HandReach, planned: str, tried: HandTrials) -> Re
     return record
 
 
-def _executed(found: ExecutedHand) -> ExecutedHandRecord:
+def _executed(found: ExecutedGrasp) -> ExecutedHandRecord:
     execution = found.execution
     losses = [] if execution is None else [trial.predicted_loss for trial in execution.trials]
     return {
-        "refused": "" if execution is not None else found.refused,
+        "refused": found.reason or "",
         "enough": enough_record(found.enough),
         "execution": None if execution is None else {
             "mass_kg": execution.mass_kg,

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any, cast
 
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import settings_of, shown
+from grasp_core.files.json_text import named_settings, settings_of, shown
 from scenes.fingertips import FingerSettings
 from scenes.physics import PhysicsSettings
-from sim_validate.files.toml_tables import check_names, read_tables
+from sim_validate.files.toml_tables import read_tables
 from sim_validate.simulation.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.simulation.setup import Setup
 
@@ -76,7 +76,6 @@ def tables_of(setup: Setup) -> dict[str, dict[str, Any]]:
 def _filled(path: str, table: str, values: Any, given: dict[str, Any]) -> Any:
     """Replace some fields of a group of settings, each checked against its type."""
     with about(path):
-        check_names(given, OF_USERS[table], table)
-        known = {each.name: getattr(values, each.name) for each in fields(values)}
-        kind = cast("type[Any]", type(values))
-        return settings_of(kind, {**known, **given}, [table])
+        own = named_settings(given, OF_USERS[table], table)
+        usual = {each.name: getattr(values, each.name) for each in fields(values)}
+        return settings_of(cast("type[Any]", type(values)), usual | own, [table])

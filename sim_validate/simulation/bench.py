@@ -175,7 +175,6 @@ class Bench:
     """A compiled scene on which many trials run at once."""
 
     def __init__(self, scene: Scene, *, threads: int = 1, timeout_s: float = math.inf) -> None:
-        """Compile a scene."""
         self.scene, self.threads = scene, threads
         self.deadline = time.monotonic() + timeout_s
         self.model = compiled(scene.xml)

@@ -113,10 +113,7 @@ class EarlyEnds:
     def look(
         self, places: Indices, samples: Indices, joints: Array, speeds: Array
     ) -> tuple[Mask, Mask]:
-        """Tell whether trials need not settle any longer, and whether they are answered, (n,) each.
-
-        Takes `samples` (n,); `joints` (n, 7 + 3k); `speeds` (n, 6 + 3k).
-        """
+        """Look at joints (n, 7 + 3k) and speeds (n, 6 + 3k) of trials (see `Ends`)."""
         settled = answered = np.zeros(len(places), dtype=np.bool_)
         with np.errstate(all="ignore"):  # what diverges is neither settled nor answered
             reach = self._reach(places, speeds)
@@ -242,10 +239,8 @@ class _Springs:
 
 @lru_cache(maxsize=4)
 def _springs(layout: Layout) -> _Springs | None:
-    """Return the linear model of a layout; None where it would not bound the motion.
-
-    Contacts must be hard, and as far from their closest axis as the layout's grasp size.
-    """
+    """Return the linear model of a layout; None where it would not bound the motion."""
+    # contacts must be hard, and as far from their closest axis as the layout's grasp size
     if not layout.has_springs or layout.torsion_m:
         return None
     if grasp_size(layout.contacts) < layout.grasp_size_m * (1.0 - SAME):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, cross, to_digits
+from grasp_core.arrays import Array, cross, rounded, to_digits
 from grasp_core.closure.contacts import contact_frictions, normal_and_tangential, stacked
 from grasp_core.closure.soft_contacts import contact_torsions
 from grasp_core.objects.polyhedron import Polyhedron
@@ -51,11 +51,9 @@ def planned_loads(
     motors: Motors | None = None,
 ) -> tuple[PlannedLoad, ...]:
     """Plan all wrenches to test, in order: along axes, weakest, random, the user's own."""
-    resisted = resisted_by(body, contacts, friction, setup, motors)
+    resisted, share = resisted_by(body, contacts, friction, setup, motors), setup.hold.load_share
     relative = [
-        _load(
-            name, found, setup.hold.load_share * found.limit, idle, body, contacts, setup.torsion_m
-        )
+        _load(name, found, share * found.limit, idle, body, contacts, setup.torsion_m)
         for name, found in _relative(resisted, body.radius, agenda)
     ]
     named = [(each.name, each.wrench) for each in agenda.wrenches]
@@ -133,5 +131,5 @@ def _load(
         torques = (1.0 - share) * resting + share * found.torques
         turning = np.abs(torques[pushing]) / torsion_m
         along = np.sqrt(np.maximum(along**2 - turning**2, (NO_PUSH * along) ** 2))
-    required = float(to_digits((across / along).max()))
+    required = rounded((across / along).max())
     return PlannedLoad(name, load, predicted, limit, required)

@@ -20,7 +20,6 @@ class Watched:
     """The motion in one hold, from the closed fingers to the end."""
 
     joints: Array
-    """Joint positions as in `Motion.joints`, (n, 7 + 3k)."""
     trace: Trace
     times_s: Array
     """Times of the samples, zero at the moment friction was lowered, (n,) [s]."""
@@ -142,10 +141,9 @@ class Rig:
 
 
 def pushes(planned: Array, joints: Array, layout: Layout) -> Array:
-    """Compute the forces of the servos: the planned forces, less what their springs gave way.
+    """Compute forces of servos, (n, k, 3) [N]: the planned ones, less what their springs gave way.
 
-    Takes `planned` (n, k, 3) [N]; `joints` (n, 7 + 3k) [m]. Gives forces along the axes of the
-    contacts, (n, k, 3) [N]; at rest they are the contact forces.
+    They are along the axes of the contacts, and at rest they are the contact forces.
     """
     local = np.einsum("kij,nki->nkj", layout.frames, planned)
     forces = local - layout.drive.stiffness_n_per_m * joints[:, 7:].reshape(local.shape)

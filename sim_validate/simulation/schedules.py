@@ -112,11 +112,7 @@ class HoldProtocol(_Checked):
 
 @dataclass(frozen=True, slots=True)
 class LimitProtocol(_Checked):
-    """How the largest wrench that a grasp resists is found in simulation.
-
-    Raises:
-        InputError: A number is not positive and finite, or out of its range.
-    """
+    """How the largest wrench that a grasp resists is found in simulation."""
 
     spans: tuple[float, ...] = (0.02, 0.1, 0.5)
     """Half widths of the intervals around the predicted limit, relative to it. They are searched in
@@ -132,11 +128,7 @@ class LimitProtocol(_Checked):
 
 @dataclass(frozen=True, slots=True)
 class FrictionProtocol(_Checked):
-    """How the critical friction of a grasp is found in simulation.
-
-    Raises:
-        InputError: A number is not positive and finite, or out of its range.
-    """
+    """How the critical friction of a grasp is found in simulation."""
 
     spans: tuple[float, ...] = (0.01, 0.1, 0.5)
     """Half widths of the intervals around the predicted critical friction, relative to it. They are
@@ -167,12 +159,10 @@ class Load:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Schedule:
-    """The wrench, the finger forces and the friction in each of the n samples of a trial."""
+    """Wrench (n, 6), finger forces (n, k, 3) and friction in each of the n samples of a trial."""
 
     wrenches: Array
-    """External wrench in each sample, (n, 6) [N, N m]."""
     forces: Array
-    """Planned finger forces in each sample, (n, k, 3) [N]."""
     friction: Array
     watched: int
     """Index of the first sample from which the object must stay where it is."""

@@ -118,7 +118,6 @@ class NamedWrench(ByValue):
     """Force, then torque about the centre of mass, in the object's frame, (6,) [N, N m]."""
 
     def __post_init__(self) -> None:
-        """Refuse a wrench that cannot be tested, or a name that a file cannot hold."""
         text(self.name, "name")
         given = frozen(self.wrench, (6,), "wrench")
         object.__setattr__(self, "wrench", frozen(to_digits(given), (6,), "wrench"))
@@ -184,7 +183,6 @@ class Agenda:
     control (contacts that must fail)."""
 
     def __post_init__(self) -> None:
-        """Refuse settings that no trial can use, and names that two wrenches would share."""
         one_of(self.limits, get_args(LimitSearch), "limits")
         whole(self.random_wrenches, "random_wrenches", most=MOST_RANDOM_WRENCHES)
         whole(self.trials, "trials", most=MOST_TRIALS)

@@ -2,7 +2,8 @@
 
 Displacements are differences between the object's pose and its pose at the moment from which it had
 to stay; the number of contacts plays no part. A rotation counts as the path of a point one grasp
-size away. The functions are pure, so that old traces can be judged again.
+size away. The functions are pure, so that old traces can be judged again. Poses are (n, 7): a
+position [m] and a quaternion.
 """
 
 from collections.abc import Sequence
@@ -92,29 +93,20 @@ def _start(motion: Motion, first: int, earlier: Motion | None) -> Array:
 
 
 def displaced(poses: Array, starts: Array, layout: Layout) -> Array:
-    """Measure displacements of n poses from a start each, (n,) [m].
-
-    Takes `poses`, `starts` (n, 7).
-    """
+    """Measure displacements of n poses from a start each, (n,) [m]."""
     shifts, turns = moved(poses, starts, layout)
     return shifts + layout.grasp_size_m * turns
 
 
 def strayed(poses: Array, layout: Layout) -> Array:
-    """Measure displacements of n poses from the planned one, (n,) [m]: as `displaced`, but faster.
-
-    Takes `poses` (n, 7).
-    """
+    """Measure displacements from the planned pose, (n,) [m]: as `displaced`, but faster."""
     shifts = poses[:, :3] + rotated(poses[:, 3:], layout.center) - layout.center
     turns = 2.0 * np.arctan2(_lengths(poses[:, 4:]), np.abs(poses[:, 3]))
     return _lengths(shifts) + layout.grasp_size_m * turns
 
 
 def moved(poses: Array, starts: Array, layout: Layout) -> tuple[Array, Array]:
-    """Measure motion of the point between the contacts [m] and rotation [rad], (n,) each.
-
-    Takes `poses`, `starts` (n, 7).
-    """
+    """Measure motion of the point between the contacts [m] and rotation [rad], (n,) each."""
     ahead = poses[:, :3] + rotated(poses[:, 3:], layout.center)
     shifts = _lengths(ahead - starts[:, :3] - rotated(starts[:, 3:], layout.center))
     return shifts, rotation_angles(poses[:, 3:], starts[:, 3:])

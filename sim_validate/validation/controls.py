@@ -16,7 +16,7 @@ from itertools import combinations
 
 import numpy as np
 
-from grasp_core.arrays import Array, cross, to_digits
+from grasp_core.arrays import Array, cross, rounded, to_digits
 from grasp_core.by_value import ByValue
 from grasp_core.closure.contacts import stacked
 from grasp_core.closure.critical_friction import critical_friction
@@ -225,6 +225,6 @@ def _planned(
     if balanced is None:
         needed, forces = None, closest_forces(*given, normal_force=limits, center=center)
     else:
-        needed, forces = float(to_digits(np.array(balanced[1]))), balanced[0]
+        needed, forces = rounded(balanced[1]), balanced[0]
     settling = setup.hold.settling_friction * max(control.friction, needed or 0.0)
     return ControlLoad(name, Load(wrench, to_digits(forces)), settling, needed)

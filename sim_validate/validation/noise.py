@@ -47,13 +47,12 @@ seed."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Disturbed:
-    """A grasp after one draw of noise."""
+    """A grasp after one draw of noise: `contacts` are `landed` with normals that lean."""
 
     landed: tuple[Contact, ...]
     """Where fingers meet the surface, with the model's normals; fewer than k contacts if some
     miss."""
     contacts: tuple[Contact, ...]
-    """The contacts in `landed`, with surface normals tilted by the noise."""
     missed: tuple[int, ...]
     friction: float
     mass: float
@@ -144,14 +143,10 @@ def robustness(
     agenda: Agenda, setup: Setup,
 ) -> Robustness:  # fmt: skip
     """Repeat the holds of a grasp with noise."""
-    numbers = range(agenda.trials)
-    cases = (
-        disturbed(body, grasp, friction, agenda.noise, agenda.seed, number) for number in numbers
-    )
-    trials = [
-        noisy_trial(body, case, loads, number, setup)
-        for number, case in zip(numbers, cases, strict=True)
-    ]
+    trials = list[NoisyTrial]()
+    for number in range(agenda.trials):
+        case = disturbed(body, grasp, friction, agenda.noise, agenda.seed, number)
+        trials.append(noisy_trial(body, case, loads, number, setup))
     return Robustness(agenda.noise, tuple(trials))
 
 

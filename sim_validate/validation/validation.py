@@ -91,7 +91,8 @@ def tested(
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     rig = squeezed(bench, setup, scene.layout.squeeze_forces, friction)
     loads = planned_loads(body, grasp.contacts, friction, rig.idle, agenda, setup)
-    wrenches = _held_wrenches(body, grasp, rig, loads, agenda)
+    overlap = clashes(body, grasp.positions, grasp.normals, scene.layout.drive.radius_m)
+    wrenches = held_wrenches(rig, loads, agenda, overlap)
     critical = CriticalFriction(grasp.critical_friction)
     if agenda.critical_friction:
         with suppress(UndecidedError):
@@ -120,13 +121,15 @@ def tested(
     )
 
 
-def _held_wrenches(
-    body: Polyhedron, grasp: Grasp, rig: Rig, loads: Sequence[PlannedLoad], agenda: Agenda
+def held_wrenches(
+    rig: Rig, loads: Sequence[PlannedLoad], agenda: Agenda, overlap: Sequence[str] = ()
 ) -> tuple[WrenchVerdict, ...]:
-    """Judge the hold of every load and, if asked for, find its limit."""
-    layout, limits = rig.bench.scene.layout, [planned.limit for planned in loads]
+    """Judge the hold of every load and, if asked for, find its limit.
+
+    What fingertips overlap at the start, if anything, is given in words.
+    """
+    limits = [planned.limit for planned in loads]
     traces = rig.hold([planned.load for planned in loads])
-    overlap = clashes(body, grasp.positions, grasp.normals, layout.drive.radius_m)
     found: Sequence[SimulatedLimit | None] = [None] * len(limits)
     if agenda.limits != "none":
         search = ramped_limits if agenda.limits == "ramp" else bisected_limits
@@ -134,7 +137,7 @@ def _held_wrenches(
     return tuple(
         WrenchVerdict(
             each.name, each.load.wrench, each.predicted_limit, each.required_friction,
-            judge(trace, layout, rig.setup.hold, overlap),
+            judge(trace, rig.bench.scene.layout, rig.setup.hold, overlap),
             limit, trace if agenda.keep_traces else None,
         )
         for each, trace, limit in zip(loads, traces, found, strict=True)

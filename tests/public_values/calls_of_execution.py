@@ -12,7 +12,6 @@ from tests.public_values.bad_values import (
     AT_LEAST_ONE,
     FRICTION,
     NOT_NEGATIVE,
-    PATH,
     POSITIVE,
     SEED,
     SEVERAL,
@@ -105,9 +104,6 @@ CALLS = [
         "physics": optional(VALUE) | {"other gravity": tilted()},
         "reach_m": optional(POSITIVE),
     }),
-    Call("scenes.write_held_scene", lambda: {"scene": held_scene(), "path": "no/such/a.xml"}, {
-        "scene": VALUE, "path": PATH,
-    }, succeeds_in="tests/scenes/execution/test_held_mjcf.py"),
     Call("sv.ExecutionSettings", lambda: fields_of(sv.ExecutionSettings, ONE_TRIAL), {
         "mass_kg": POSITIVE,
         "push_n": POSITIVE,

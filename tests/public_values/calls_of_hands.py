@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 import grasp_core as gc
-import scenes
 from sim_validate.hands.hand_gate import cube, hinged_hand, stance
 from tests.public_values.bad_values import (
     AT_LEAST_ONE,
     FRICTION,
     NOT_NEGATIVE,
-    PATH,
     POSITIVE,
     SEED,
     SEVERAL,
@@ -67,9 +65,6 @@ CALLS = [
         "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": FRICTION, "down": DOWN,
         "physics": optional(VALUE),
     }),
-    Call("scenes.write_hand_scene", lambda: {
-        "scene": scenes.build_hand_scene(**standing()), "path": "no/such/hand.xml",
-    }, {"scene": VALUE, "path": PATH}, succeeds_in="tests/scenes/hands/test_hand_mjcf.py"),
     Call("sv.hand_setup", dict, {}),
     Call("sv.validate_hand", standing, {
         "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": FRICTION, "down": DOWN,

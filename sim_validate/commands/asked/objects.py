@@ -13,7 +13,7 @@ from grasp_core.records.grasps_json import SavedGrasps
 from scenes.example_objects import example_object
 from sim_validate.cli import flag_groups
 from sim_validate.cli.console import Reporter
-from sim_validate.records.grasps import read_grasps
+from sim_validate.records.grasps import grasp_with_id, read_grasps
 
 
 def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
@@ -103,29 +103,26 @@ def asked_finger(planning: flag_groups.Planning) -> Finger | None:
     return Finger(planning.finger_radius_m, planning.approach_m)
 
 
-def saved_grasps(path: Path, reporter: Reporter) -> SavedGrasps | None:
-    """Read a `grasps.json`, and warn of what was changed in its mesh.
+def asked_grasps(
+    path: Path, reporter: Reporter, *, grasp: str | None = None, friction: float | None = None,
+    seed: int | None = None, limit: int | None = None,
+) -> SavedGrasps | None:  # fmt: skip
+    """Read the grasps that are asked for, and warn of what was changed in their mesh.
 
-    None, with a word about it, if the file holds no grasp.
+    They have another friction or seed where one is given. None, with a word about it, if the file
+    holds no grasp.
     """
     saved = read_grasps(path)
     for note in saved.body.surface.notes():
         reporter.warn(f"{saved.body.name}: {note}")
-    if saved.grasps:
-        return saved
-    absence = f"{path} holds no grasp"
-    reporter.say(absence)
-    reporter.document({"absence": absence})
-    return None
-
-
-def chosen_grasps(
-    saved: SavedGrasps, *, friction: float | None, seed: int | None, limit: int | None
-) -> SavedGrasps:
-    """Keep the first grasps, up to a limit, with another friction or seed where one is given."""
+    if not saved.grasps:
+        absence = f"{path} holds no grasp"
+        reporter.say(absence)
+        reporter.document({"absence": absence})
+        return None
     return replace(
         saved,
         friction=saved.friction if friction is None else friction,
         seed=saved.seed if seed is None else seed,
-        grasps=saved.grasps[:limit],
+        grasps=saved.grasps[:limit] if grasp is None else (grasp_with_id(path, saved, grasp),),
     )

@@ -55,10 +55,7 @@ def noise_of(given: flag_groups.Repeats) -> Noise:
 def prepared(
     testing: flag_groups.Testing, planned: Finger | None, seed: int, folder: Path | None
 ) -> tuple[Setup, Agenda]:
-    """Build the settings and the choice of trials from flags and files, before anything runs.
-
-    A setup file overrides the flags.
-    """
+    """Build settings and trials from flags; those of a setup file override them."""
     setup = Setup(
         fingers=with_planned_radius(finger_settings(testing.fingers), planned),
         physics=PhysicsSettings(torsion_m=testing.fingers.torsion_m),

@@ -153,7 +153,7 @@ def test_gravity_has_its_size_in_any_direction():
 
 def test_a_scene_is_written_as_it_is(tmp_path):
     _, _, scene, _ = held("l-bracket")
-    path = scenes.write_held_scene(scene, tmp_path / "held.xml")
+    path = scenes.write_scene(scene, tmp_path / "held.xml")
     assert path.read_text() == scene.xml
     assert mujoco.MjModel.from_xml_path(str(path)).nu == 12
 

@@ -108,5 +108,5 @@ def test_what_makes_no_scene_is_refused():
 
 def test_a_written_scene_is_its_text(tmp_path):
     scene = stood("allegro")[3]
-    path = scenes.write_hand_scene(scene, tmp_path / "hand.xml")
+    path = scenes.write_scene(scene, tmp_path / "hand.xml")
     assert path.read_text() == scene.xml

@@ -20,18 +20,18 @@ def words(tmp_path):
 def test_every_joint_and_fingertip_of_a_file_is_shown(words, capsys):
     assert main([*words, "--json"]) == Exit.GOOD
     facts = json.loads(capsys.readouterr().out)
-    assert [finger["fingertip"] for finger in facts["fingers"]] == list(THREE_TIPS)
+    assert [finger["name"] for finger in facts["fingers"]] == list(THREE_TIPS)
     assert [finger["tip_radius_m"] for finger in facts["fingers"]] == pytest.approx([0.008] * 3)
-    assert [len(finger["joints"]) for finger in facts["fingers"]] == [2, 3, 3]
-    joints = [joint for finger in facts["fingers"] for joint in finger["joints"]]
+    assert [len(finger["links"]) for finger in facts["fingers"]] == [2, 3, 3]
+    joints = [link["joint"] for finger in facts["fingers"] for link in finger["links"]]
     names = [joint["name"] for joint in joints]
     assert names == [name for name in names if f'"{name}"' in three_fingers_mjcf()]
     spread = joints[names.index("left_spread")]
     assert spread["highest_rad"] == pytest.approx(math.radians(50.0))
     assert spread["lowest_rad"] == pytest.approx(-math.radians(50.0))
     assert {joint["torque_limit_n_m"] for joint in joints} == {0.5}
-    assert facts["palm_shapes"] == 1
-    assert facts["may_overlap"] == []
+    assert len(facts["palm"]) == 1
+    assert facts["ignored_pairs"] == []
 
 
 def test_ranges_that_were_meant_in_radians_are_pointed_out(words, capsys):
