@@ -22,7 +22,7 @@ from sim_validate.execution.verdict import (
     held_controls_in_words,
     losses_in_words,
 )
-from sim_validate.files.result_folders import alone_in, remove_executions
+from sim_validate.files.result_folders import alone_in, remove_results
 from sim_validate.records.executions import (
     EXECUTIONS,
     executions_summary,
@@ -78,7 +78,7 @@ def execute_grasps(
     Gives the exit code, and the text of executions.json.
     """
     if folder:
-        remove_executions(folder)
+        remove_results(folder, "executions")
     changed = physics or {}
     tasks = [ExecutionJob(saved.body, g, saved.friction, settings, changed) for g in saved.grasps]
     found: list[ExecutedGrasp] = []

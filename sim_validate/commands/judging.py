@@ -11,7 +11,7 @@ from grasp_core.hands.reach import HandReach
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.files.result_folders import JUDGEMENTS, remove_judgements
+from sim_validate.files.result_folders import JUDGEMENTS, remove_results
 from sim_validate.protocols.judgements_json import judgements_summary, judgements_to_json
 from sim_validate.protocols.judging import Case, Judgement, judge_by, judge_hand_by, judged
 from sim_validate.simulation.setup import Setup
@@ -58,7 +58,7 @@ def _judged(
 ) -> tuple[Exit, str]:  # fmt: skip
     """Judge all cases, and write what is done even if the run is interrupted."""
     if folder:
-        remove_judgements(folder)
+        remove_results(folder, "judgements")
     done: list[Judgement] = []
     try:
         with reporter.progress("judging") as steps:

@@ -28,7 +28,7 @@ from sim_validate.commands.hand import asked_hand
 from sim_validate.commands.judging import judge_hands
 from sim_validate.dexgraspbench import dex_record, write_dex_object, write_dex_record
 from sim_validate.execution.verdict import Execution, held_controls_in_words, loss_in_words
-from sim_validate.files.result_folders import REACHES, alone_in, remove_reaches
+from sim_validate.files.result_folders import REACHES, alone_in, remove_results
 from sim_validate.hands.execute_hand import (
     ExecutedHand,
     HandJob,
@@ -85,7 +85,7 @@ def _reach(
 ) -> tuple[list[HandReach], HandTrials, str]:
     """Look for poses, try them, and write what is done even if the run is interrupted."""
     if command.out is not None:
-        remove_reaches(command.out)
+        remove_results(command.out, "reaches")
     jobs = [
         ReachJob(
             hand, saved.body, grasp, saved.friction, command.seed, not command.contacts_only,
