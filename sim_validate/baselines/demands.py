@@ -12,11 +12,11 @@ from grasp_core.planning.planner import plan
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines.explain import not_survived, unstable
-from sim_validate.baselines.part import TABLE, Source, if_changed, present, source_of
-from sim_validate.baselines.settings import check_names
+from sim_validate.baselines.part import TABLE, IfChanged, Source, present, source_of
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.files.toml_tables import check_names, settings_in
 from sim_validate.records.grasps import read_grasps
 from sim_validate.simulation.setup import Agenda, NamedWrench, Noise, Setup
 from sim_validate.validation.validation import validate
@@ -81,7 +81,7 @@ def _cases_of_file(folder: Path, path: Path, settings: Mapping[str, Any]) -> lis
     saved = read_grasps(path)
     friction = _number(settings.get("friction", saved.friction))
     _check_any(saved.grasps, saved.body, friction)
-    asked = if_changed(settings.get(TABLE, {}))
+    asked = settings_in(IfChanged, settings.get(TABLE, {}), TABLE)
     source = source_of(saved, path, [folder], scale=asked.scale)
     now = present(replace(saved, friction=friction), path, source, asked)
     tested = {grasp.id: grasp for grasp in now.saved.grasps}

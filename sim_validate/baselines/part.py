@@ -8,13 +8,11 @@ baseline; faces are called by their numbers on the planned part, of which ids ar
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, cast
 
 from grasp_core.checked import BOUNDS, number, one_of, positive, switch
 from grasp_core.errors import InputError, MeshError
-from grasp_core.files.json_text import settings_of, shown
 from grasp_core.files.text_files import read_bytes
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
@@ -32,7 +30,6 @@ from grasp_core.transferring.face_changes import (
 from grasp_core.transferring.transfer import CarriedGrasp, Transfer, transfer
 from grasp_core.values import Grasp
 from sim_validate.baselines.baseline import Baseline, RecordedPart, recorded_part
-from sim_validate.baselines.settings import check_names
 
 NOTE, FAIL = "note", "fail"
 TABLE = "changed_part"
@@ -80,15 +77,6 @@ class IfChanged:
 
 
 CARRY = IfChanged()
-
-
-def if_changed(table: object) -> IfChanged:
-    """Read the table `[changed_part]` of a `*.grasps.toml` file, or the same given by a marker."""
-    if not isinstance(table, Mapping):
-        raise InputError(f"{TABLE}: expected a table of settings, got {shown(table)}")
-    given = {**cast("Mapping[str, Any]", table)}
-    check_names(given, [each.name for each in fields(IfChanged)], TABLE)
-    return settings_of(IfChanged, given, [TABLE])
 
 
 @dataclass(frozen=True, slots=True)

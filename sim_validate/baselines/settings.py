@@ -1,7 +1,7 @@
 """Reads and writes the simulation settings and the choice of trials in a baseline's file."""
 
-from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,12 +10,12 @@ from pydantic_core import to_jsonable_python
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import complaint, shown
-from grasp_core.files.json_text import settings_of as read_settings
+from grasp_core.files.json_text import complaint
 from grasp_core.records.grasps_json import SavedGrasps
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface
 from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution, execution_table
+from sim_validate.files.toml_tables import settings_in
 from sim_validate.records.setup_toml import setup_from_file, setup_from_tables, tables_of
 from sim_validate.simulation.setup import (
     Agenda,
@@ -83,26 +83,11 @@ def of_settings(settings: Mapping[str, Any], path: str) -> How:
             wrenches=tuple(NamedWrench(name, w) for name, w in given.wrenches.items()),  # pyright: ignore[reportArgumentType] - an array is made of it
             limits=given.limits,
             trials=given.trials,
-            noise=noise_from_table(given.noise),
+            noise=settings_in(Noise, given.noise, "noise"),
             seed=given.seed,
         )
         execution = None if given.execution is None else asked_execution(given.execution)
     return How(setup, agenda, execution)
-
-
-def noise_from_table(given: Mapping[str, Any]) -> Noise:
-    """Build noise settings from some of their fields."""
-    check_names(given, [each.name for each in fields(Noise)], "noise")
-    return read_settings(Noise, given, ["noise"])
-
-
-def check_names(given: Mapping[str, Any], known: Collection[str], where: str) -> None:
-    """Refuse a setting that does not exist."""
-    for name in given:
-        if name not in known:
-            raise InputError(
-                f"{where}: no setting is named {shown(name)}; choose from {', '.join(known)}"
-            )
 
 
 def setup_for(saved: SavedGrasps, path: Path | None) -> Setup:

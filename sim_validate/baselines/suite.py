@@ -27,21 +27,14 @@ from sim_validate.baselines.part import (
     IfChanged,
     Present,
     Source,
-    if_changed,
     present,
     source_of,
     testable,
 )
 from sim_validate.baselines.part import TABLE as CHANGED
-from sim_validate.baselines.settings import (
-    How,
-    check_names,
-    noise_from_table,
-    of_settings,
-    setup_for,
-)
+from sim_validate.baselines.settings import How, of_settings, setup_for
 from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution
-from sim_validate.files.toml_tables import read_tables
+from sim_validate.files.toml_tables import check_names, read_tables, settings_in
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.wrenches import wrenches_from_file
 from sim_validate.simulation.setup import Agenda, Noise
@@ -194,12 +187,15 @@ def suite_from_toml(path: Path) -> Suite:
 def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
     """Build a suite from the settings of a `*.grasps.toml` file."""
     usual = path.name.removesuffix(ENDING) + ".baseline.json"
-    tables = {"noise": noise_from_table, TABLE: asked_execution, CHANGED: if_changed}
     with about(path):
         _check(given)
         settings: dict[str, Any] = {"baseline": usual, **given}
         settings |= {name: path.parent / settings[name] for name in PATHS if name in settings}
-        settings |= {name: read(given[name]) for name, read in tables.items() if name in given}
+        for name, kind in (("noise", Noise), (CHANGED, IfChanged)):
+            if name in given:
+                settings[name] = settings_in(kind, given[name], name)
+        if TABLE in given:
+            settings[TABLE] = asked_execution(given[TABLE])
     return Suite(path=path, **settings)
 
 

@@ -24,7 +24,7 @@ from grasp_core.checked import (
     one_of,
 )
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import complaint, settings_of, shown
+from grasp_core.files.json_text import complaint, shown
 from grasp_core.hands.named_hands import hand_names, load_hand
 from grasp_core.objects.surface import FaceKind
 from grasp_core.planning.request import METHODS, ConeKind
@@ -36,7 +36,7 @@ from sim_validate.execution.settings import (
     asked_execution,
     execution_table,
 )
-from sim_validate.files.toml_tables import check_names, read_tables
+from sim_validate.files.toml_tables import check_names, read_tables, settings_in
 
 LEARNING = "learning"
 """Name of the table in a settings file."""
@@ -92,20 +92,6 @@ class Learning:
         least = "least_squeeze" in self.figures
         used = {"mass_near": self.mass_near, "seeds": self.seeds, "figures": least}
         return next((name for name, value in used.items() if value), "")
-
-
-def names_of(kind: type[Any]) -> list[str]:
-    """List the names of a class's settings."""
-    return [each.name for each in fields(kind)]
-
-
-def asked_learning(table: object) -> Learning:
-    """Read the table `[learning]` of a settings file."""
-    if not isinstance(table, Mapping):
-        raise InputError(f"{LEARNING}: expected a table of settings, got {shown(table)}")
-    given = cast("Mapping[str, Any]", table)
-    check_names(given, names_of(Learning), LEARNING)
-    return settings_of(Learning, given, [LEARNING])
 
 
 def learning_table(asked: Learning) -> dict[str, Any]:
@@ -211,17 +197,17 @@ def config_from_toml(path: Path) -> DatasetConfig:
 
 def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
     """Build a configuration from named settings with the types that TOML has."""
-    check_names(given, names_of(DatasetConfig), "the settings")
-    tables = {TABLE: asked_execution, LEARNING: asked_learning}
-    own = {name: value for name, value in given.items() if name not in tables}
+    check_names(given, [each.name for each in fields(DatasetConfig)], "the settings")
+    own = {name: value for name, value in given.items() if name not in (TABLE, LEARNING)}
     try:
         config = TypeAdapter(DatasetConfig).validate_json(json.dumps(own), strict=True)
     except ValidationError as error:
         raise InputError(complaint(error, DatasetConfig)) from error
-    more: dict[str, Any] = {
-        name: read(given[name]) for name, read in tables.items() if name in given
-    }
-    return replace(config, **more)
+    if TABLE in given:
+        config = replace(config, execution=asked_execution(given[TABLE]))
+    if LEARNING in given:
+        config = replace(config, learning=settings_in(Learning, given[LEARNING], LEARNING))
+    return config
 
 
 def _is_date(text: str) -> bool:

@@ -23,6 +23,7 @@ from grasp_core.execution.grips import STIFFNESS_N_PER_M
 from grasp_core.files.json_text import settings_of, shown
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.execution.held import HeldSettings
+from sim_validate.files.toml_tables import check_names
 
 TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misplaced"]
 """What a trial does: it turns gravity through all directions, lifts the object off a table, shakes
@@ -181,10 +182,10 @@ def asked_execution(table: object) -> AskedExecution:
     if not isinstance(table, Mapping):
         raise InputError(f"{TABLE}: expected a table of settings, got {shown(table)}")
     given = {**cast("Mapping[str, Any]", table)}
-    _check_names(given, (*(each.name for each in fields(ExecutionSettings)), DENSITY), TABLE)
+    check_names(given, (*(each.name for each in fields(ExecutionSettings)), DENSITY), TABLE)
     if isinstance(hand := given.get("hand"), dict):
         known = tuple(each.name for each in fields(HeldSettings))
-        _check_names(cast("dict[str, Any]", hand), known, f"{TABLE}.hand")
+        check_names(cast("dict[str, Any]", hand), known, f"{TABLE}.hand")
     if (MASS in given) == (DENSITY in given):
         got = "both" if MASS in given else "neither"
         raise InputError(f"{TABLE}: expected one of {MASS} and {DENSITY}, got {got}")
@@ -192,14 +193,6 @@ def asked_execution(table: object) -> AskedExecution:
     settings = settings_of(ExecutionSettings, {MASS: ANY_MASS_KG, **given}, [TABLE])
     with about(TABLE):
         return AskedExecution(settings, None if density is None else positive(density, DENSITY))
-
-
-def _check_names(given: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
-    for name in given:
-        if name not in known:
-            raise InputError(
-                f"{where}: no setting is named {shown(name)}; choose from {', '.join(known)}"
-            )
 
 
 def execution_table(asked: AskedExecution) -> dict[str, Any]:

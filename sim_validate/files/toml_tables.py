@@ -2,14 +2,16 @@
 
 import re
 import tomllib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import DEEPEST, check_values, shown
+from grasp_core.files.json_text import DEEPEST, check_values, settings_of, shown
 from grasp_core.files.text_files import read_text
 
+Settings = TypeVar("Settings")
 MOST_LETTERS = 2**20
 """Largest number of characters of a settings file, which is usually short."""
 ASIDE = re.compile(
@@ -55,6 +57,15 @@ def check_names(given: Iterable[str], known: Collection[str], where: str) -> Non
             raise InputError(
                 f"{where}: no setting is named {shown(name)}; choose from {', '.join(known)}"
             )
+
+
+def settings_in(kind: type[Settings], table: object, where: str) -> Settings:
+    """Make settings of a class from a table with some of them, each checked."""
+    if not isinstance(table, Mapping):
+        raise InputError(f"{where}: expected a table of settings, got {shown(table)}")
+    given = cast("Mapping[str, Any]", table)
+    check_names(given, [each.name for each in fields(cast("type[Any]", kind))], where)
+    return settings_of(kind, given, [where])
 
 
 def _printable(text: str) -> str:
