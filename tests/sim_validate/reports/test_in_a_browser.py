@@ -241,7 +241,7 @@ def test_the_drawing_that_turns_fits_its_window(browser, shown):
     tall = browser.execute_script("return document.documentElement.scrollHeight")
     assert tall <= browser.execute_script("return window.innerHeight")
     said = browser.execute_script("return document.body.innerText")
-    for part in ("friction cone", "force cone", "critical friction", "margin of closure"):
+    for part in ("friction cone", "force cone", "Critical friction", "Margin of closure"):
         assert part in said
 
 
