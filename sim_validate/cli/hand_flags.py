@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
+from tyro.conf import Positional, UseAppendAction, arg
 
 from sim_validate.cli.flag_bounds import within
 from sim_validate.cli.flag_groups import (
@@ -17,7 +17,7 @@ from sim_validate.cli.flag_groups import (
     Jobs,
     ProtocolName,
     Seed,
-    Speech,
+    Spoken,
     Usual,
 )
 from sim_validate.parallel.processes import available_cores
@@ -33,16 +33,15 @@ Fingertips = Annotated[str, arg(metavar="NAME,NAME,...", help=(
 
 
 @dataclass(frozen=True, slots=True)
-class Hand:
+class Hand(Spoken):
     """Show what a hand was read as: fingers, joints with ranges and torque limits, fingertips."""
 
     hand: Positional[HandName]
     fingertips: Fingertips = ""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
-class Reach:
+class Reach(Spoken):
     """Look for poses in which a hand stands in grasps: palm pose and joints, checked exactly."""
 
     grasps: Positional[Path]
@@ -81,6 +80,5 @@ class Reach:
     limit: Count | None = None
     """Look at the first so many grasps only."""
     jobs: Jobs = field(default_factory=available_cores)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for reaches.json; if not given, no file is written."""
