@@ -22,10 +22,9 @@ from sim_validate.cli.flag_groups import (
 )
 from sim_validate.parallel.processes import available_cores
 
-HandName = Annotated[str, arg(help=(
-    "The hand: allegro, allegro-urdf, leap, an MJCF or URDF file, or menagerie:NAME of the package "
-    "mujoco-menagerie."
-))]  # fmt: skip
+HandName = Annotated[
+    str, arg(help="The hand: allegro, allegro-urdf, leap, or an MJCF or URDF file.")
+]
 Fingertips = Annotated[str, arg(metavar="NAME,NAME,...", help=(
     "For a hand from a file: names of sites, geoms or bodies that are fingertips, separated by "
     "commas."

@@ -298,14 +298,6 @@ def test_meshes_in_the_folder_are_read_and_taken_as_boxes(tmp_path):
     assert sorted(shape.half_sizes) == pytest.approx([0.01, 0.02, 0.03], abs=1e-6)
 
 
-def test_a_missing_package_says_what_to_do(monkeypatch):
-    import sys
-
-    monkeypatch.setitem(sys.modules, "mujoco_menagerie", None)
-    with pytest.raises(InputError, match="pip install mujoco-menagerie"):
-        scenes.load_hand("menagerie:wonik_allegro", ["a", "b", "c", "d"])
-
-
 def test_a_file_of_another_kind_is_refused():
     with pytest.raises(InputError, match=r"a file that ends with \.xml"):
         scenes.load_hand("hand.step", ["a", "b", "c", "d"])
