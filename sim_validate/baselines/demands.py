@@ -71,8 +71,16 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
     if args:
         return _cases_of_file(folder, folder / args[0], settings)
     wanted: dict[str, Any] = {"limit": 1, **settings, "friction": friction}
-    body = _body(folder, wanted)
-    grasps = _planned(body, wanted)
+    name = wanted.pop("object", None)
+    lengths = {each: wanted.pop(each) for each in ("unit", "scale") if each in wanted}
+    if not isinstance(name, str):
+        raise InputError("@pytest.mark.grasp needs the path of a grasps.json, or object=...")
+    is_file = Path(name).suffix
+    body = load_polyhedron(folder / name, **lengths) if is_file else example_object(name)
+    try:
+        grasps = plan(body, **wanted).grasps
+    except (TypeError, ValueError) as error:
+        raise InputError(f"@pytest.mark.grasp: a setting is of the wrong kind: {error}") from error
     _check_any(grasps, body, friction)
     return [GraspCase(body, grasp, friction) for grasp in grasps]
 
@@ -106,23 +114,6 @@ def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"friction must be a number, got {value!r}")
     return float(value)
-
-
-def _planned(body: Polyhedron, wanted: Mapping[str, Any]) -> Sequence[Grasp]:
-    try:
-        return plan(body, **wanted).grasps
-    except (TypeError, ValueError) as error:
-        raise InputError(f"@pytest.mark.grasp: a setting is of the wrong kind: {error}") from error
-
-
-def _body(folder: Path, wanted: dict[str, Any]) -> Polyhedron:
-    name = wanted.pop("object", None)
-    lengths = {each: wanted.pop(each) for each in ("unit", "scale") if each in wanted}
-    if not isinstance(name, str):
-        raise InputError("@pytest.mark.grasp needs the path of a grasps.json, or object=...")
-    if Path(name).suffix:
-        return load_polyhedron(folder / name, **lengths)
-    return example_object(name)
 
 
 @dataclass(frozen=True, slots=True)

@@ -140,7 +140,12 @@ class Suite:
         """Simulate all grasps and write the results as the new baseline."""
         now = self.present
         check_writable(self.baseline)
-        before = self._kept_if_any()
+        try:
+            before = self.kept if self.baseline.is_file() else None
+        except InputError as error:
+            raise InputError(
+                f"{error}; remove the file, then write a new baseline with pytest --grasp-bless"
+            ) from error
         how = self._how(before)
         if before is not None:
             how = with_planned_fingers(how, before, now.saved)
@@ -149,14 +154,6 @@ class Suite:
         found = complete(done, now)
         write_baseline(self.baseline, found)
         return found
-
-    def _kept_if_any(self) -> Baseline | None:
-        try:
-            return self.kept if self.baseline.is_file() else None
-        except InputError as error:
-            raise InputError(
-                f"{error}; remove the file, then write a new baseline with pytest --grasp-bless"
-            ) from error
 
     def _how(self, before: Baseline | None) -> How:
         """Take the baseline's settings, or the default ones, replaced by those of the file."""

@@ -250,10 +250,6 @@ def _as_toml(value: object) -> str:
 
 def quoted(text: str) -> str:
     """Write a text as a basic string of TOML, printable and on one line; YAML reads it alike."""
-    return '"' + "".join(map(_escaped, text)) + '"'
-
-
-def _escaped(letter: str) -> str:
-    if letter in '"\\':
-        return "\\" + letter
-    return letter if letter.isprintable() else f"\\U{ord(letter):08x}"
+    plain = text.replace("\\", "\\\\").replace('"', '\\"')
+    letters = (c if c.isprintable() else f"\\U{ord(c):08x}" for c in plain)
+    return f'"{"".join(letters)}"'

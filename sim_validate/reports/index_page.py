@@ -10,10 +10,10 @@ from grasp_core.values import Grasp
 from scenes.drawing.pages import number
 from scenes.drawing.sheets import svg_of
 from sim_validate.records.best import BestFile, shares_of_bound
+from sim_validate.records.verdicts import let_go
 from sim_validate.reports.agreement import (
     Record,
     frictions_in,
-    let_go,
     limits_in,
     quadrants_in,
     wrench_size,

@@ -178,7 +178,7 @@ def changed(path, change):
 
 def counted(document, _=None):
     """Make the summary that of the verdicts."""
-    document["summary"].update(verdicts._counts(document["verdicts"]))
+    document["summary"].update(verdicts.recorded_summary(document["verdicts"]))
 
 
 def without_proofs(document):
