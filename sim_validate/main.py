@@ -14,12 +14,7 @@ import tyro
 from tyro.conf import FlagCreatePairsOff
 
 from grasp_core.errors import GraspError, InputError
-from sim_validate.cli import (
-    baseline_flags,
-    command_flags,
-    dataset_flags,
-    hand_flags,
-)
+from sim_validate.cli import baseline_flags, command_flags, dataset_flags, hand_flags
 from sim_validate.cli.baseline_flags import Baseline
 from sim_validate.cli.command_flags import COMMANDS, Command
 from sim_validate.cli.config_file import with_config
@@ -27,6 +22,7 @@ from sim_validate.cli.dataset_flags import Dataset
 from sim_validate.cli.examples import examples_for
 from sim_validate.cli.exit_codes import Exit, exit_code, reason_of
 from sim_validate.cli.flag_bounds import FlagsError, check
+from sim_validate.cli.flag_groups import Spoken
 
 ACTIONS: dict[type[Any], str] = {
     command_flags.Run: "run:run_object",
@@ -92,20 +88,19 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _complain(str(error), Exit.USAGE)
     except KeyboardInterrupt:
         return _complain("interrupted", Exit.INTERRUPTED)
-    return _dispatch(command)
+    return _dispatch(command.action if isinstance(command, Dataset | Baseline) else command)
 
 
-def execute(command: Command) -> int:
+def execute(command: Spoken) -> int:
     """Carry out a command and return its exit code."""
     from sim_validate.cli.console import Reporter
 
     speech = command.speech
     reporter = Reporter(speech.quiet, speech.verbose, speech.json)
-    asked = command.action if isinstance(command, Dataset | Baseline) else command
-    return resolve_name(f"sim_validate.commands.{ACTIONS[type(asked)]}")(asked, reporter)
+    return resolve_name(f"sim_validate.commands.{ACTIONS[type(command)]}")(command, reporter)
 
 
-def _dispatch(command: Command) -> int:
+def _dispatch(command: Spoken) -> int:
     try:
         from sim_validate.parallel import interrupts
 

@@ -22,12 +22,12 @@ from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene
-from sim_validate.baselines.settings import noise_from_table
 from sim_validate.datasets.manifest import MANIFEST
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
 from sim_validate.datasets.varied import VARIED
+from sim_validate.files.toml_tables import settings_in
 from sim_validate.records.grasps import NAMED, grasp_with_id, read_grasps, some
 from sim_validate.records.setup_toml import OF_USERS, setup_from_tables
 from sim_validate.records.verdicts import verdicts_of
@@ -176,7 +176,7 @@ def _asked(path: Path, verdict: Mapping[str, Any]) -> tuple[Setup, Agenda]:
             for each in verdict["wrenches"]
             if each["name"] not in ours
         ),
-        noise=Noise() if repeats is None else noise_from_table(repeats["noise"]),
+        noise=Noise() if repeats is None else settings_in(Noise, repeats["noise"], "noise"),
         seed=settings["seed"],
     )
     return setup, agenda

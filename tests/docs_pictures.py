@@ -18,14 +18,11 @@ from scenes.drawing.colours import FINGERS
 from scenes.drawing.panels import Entry, Panel, Scale, keyed
 from scenes.drawing.pictures import grasp_figure, grasp_sheet
 from scenes.drawing.sheets import Dots, Sheet, Words, beside, moved, png_of
-from sim_validate.execution.jobs import ExecutionJob, executed_grasp
-from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.records.executions import Executions
 from sim_validate.replaying import Recorded, replayed
 from sim_validate.reports.agreement import Agreement
 from sim_validate.reports.charts.margin_charts import margin_figure
 from sim_validate.reports.charts.motion_charts import motion_panels
-from sim_validate.reports.charts.run_charts import fidelity_panels, survival_sheet
+from sim_validate.reports.charts.run_charts import fidelity_panel
 from sim_validate.reports.charts.wrench_charts import wrench_figure
 from sim_validate.reports.drawn_grasps import certified
 from sim_validate.simulation.setup import Agenda, Setup
@@ -111,18 +108,7 @@ def fidelity():
             found = sv.simulated_critical_friction(body, grasp)
             if grasp.critical_friction > 1e-3:
                 pairs.append((grasp.critical_friction, found))
-    return beside(fidelity_panels([Agreement("critical friction", tuple(pairs))]))
-
-
-def survival():
-    """Survival of executed grasps of a wedge of 0.7 kg, by the acceleration of the palm."""
-    body = scenes.example_object("wedge")
-    settings = ExecutionSettings(0.7)
-    found = [
-        executed_grasp(ExecutionJob(body, grasp, FRICTION, settings))
-        for grasp in gc.plan(body, FRICTION, limit=8).grasps
-    ]
-    return survival_sheet([Executions(body.content_sha256, FRICTION, settings, True, tuple(found))])
+    return fidelity_panel(Agreement("critical friction", tuple(pairs)))
 
 
 def misplaced():
@@ -159,9 +145,8 @@ def kept_by_distance():
 
 PICTURES: dict[str, Callable[[], Sheet]] = {
     make.__name__: make
-    for make in (families, grasp, hand, regions, wrenches, margins, motion, fidelity, survival,
-                 misplaced)
-}  # fmt: skip
+    for make in (families, grasp, hand, regions, wrenches, margins, motion, fidelity, misplaced)
+}
 
 
 def main() -> None:

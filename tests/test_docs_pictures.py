@@ -45,7 +45,7 @@ def test_all_pictures_are_made_by_the_script():
     assert {path.name for path in FOLDER.iterdir()} == {f"{name}.webp" for name in PICTURES}
 
 
-SLOW = {"fidelity", "survival"}
+SLOW = {"fidelity"}
 """Pictures that take seconds, as they need simulation."""
 
 

@@ -5,6 +5,7 @@ one factor from the first sample, so that one still sees which parts move togeth
 """
 
 import importlib
+import importlib.util
 import math
 import os
 import subprocess
@@ -47,7 +48,7 @@ PATIENCE_S = 300.0
 
 
 class GraphicsError(GraspError):
-    """Raised when no graphics library can draw on this machine."""
+    """Raised when this machine lacks what clips are drawn with."""
 
 
 def write_clip(
@@ -107,6 +108,10 @@ def _turned(turn: Any, quaternions: Array) -> Array:
 
 def _written(path: Path, **job_parts: Any) -> Path:
     require_clip(path)
+    if importlib.util.find_spec("PIL") is None:
+        raise GraphicsError(
+            "clips need Pillow: run pip install 'graspproof[clips]' ('.[clips]' in a checkout)"
+        )
     with tempfile.TemporaryDirectory() as folder:
         job, out = Path(folder) / "job.npz", Path(folder) / f"clip{path.suffix.lower()}"
         colours = [rgb(colour) for colour in FINGERS]

@@ -160,12 +160,17 @@ def coarse(vertices: Array, triangles: Indices) -> Array:
 
 def _finger(body: Extent, grasp: Grasp, finger: int, half_angle: float) -> list[Shape]:
     contact, cone = grasp.contacts[finger], grasp.force_cones[finger]
-    straight, *region = _bar_and_region(body, grasp, finger)
-    shapes = [straight, _friction_cone(body, contact, finger, half_angle)]
+    tip, ways, size = contact.position, grasp.approach_directions, finger_size(body)
+    inward = contact.normal if ways is None else ways[finger]
+    shapes = [
+        Shape("finger", finger, polygons=bar(tip, inward, size)),
+        _friction_cone(body, contact, finger, half_angle),
+    ]
     lean = float(angles_between(cone.axis, contact.normal))
     if lean + cone.half_angle <= half_angle + SLACK_RAD:
-        shapes.append(_force_cone(body, grasp, finger))
-    return [*shapes, *region]
+        sides = cone_sides(tip, cone.axis, cone.half_angle, CONE_LENGTH * size)
+        shapes.append(Shape("force cone", finger, polygons=sides))
+    return [*shapes, *_region(grasp, finger)]
 
 
 def _friction_cone(body: Extent, contact: Contact, finger: int, half_angle: float) -> Shape:
@@ -173,13 +178,6 @@ def _friction_cone(body: Extent, contact: Contact, finger: int, half_angle: floa
     rim = cone_rim(tip, contact.normal, half_angle, CONE_LENGTH * finger_size(body))
     spokes = [np.array([tip, corner]) for corner in rim[::5]]
     return Shape("friction cone", finger, lines=(closed(rim), *spokes))
-
-
-def _bar_and_region(body: Extent, grasp: Grasp, finger: int) -> list[Shape]:
-    tip, ways = grasp.contacts[finger].position, grasp.approach_directions
-    inward = grasp.contacts[finger].normal if ways is None else ways[finger]
-    straight = Shape("finger", finger, polygons=bar(tip, inward, finger_size(body)))
-    return [straight, *_region(grasp, finger)]
 
 
 def _region(grasp: Grasp, finger: int) -> list[Shape]:
@@ -190,12 +188,6 @@ def _region(grasp: Grasp, finger: int) -> list[Shape]:
 def bar(tip: Array, inward: Array, size: float) -> tuple[Array, ...]:
     """Return the polygons of a finger of a given size that stands on a point."""
     return tube(tip, tip - BAR_LENGTH * size * inward, BAR_RADIUS * size)
-
-
-def _force_cone(body: Extent, grasp: Grasp, finger: int) -> Shape:
-    cone, tip = grasp.force_cones[finger], grasp.contacts[finger].position
-    sides = cone_sides(tip, cone.axis, cone.half_angle, CONE_LENGTH * finger_size(body))
-    return Shape("force cone", finger, polygons=sides)
 
 
 def _family(body: Extent, grasp: Grasp) -> list[Shape]:
@@ -210,7 +202,11 @@ def _family(body: Extent, grasp: Grasp) -> list[Shape]:
         shapes.append(Shape("line of force", finger, lines=(line,)))
     away = np.linalg.norm(grasp.focus_points - body.center_of_mass, axis=1)
     if grasp.family == "pencil" and away.max() <= FARTHEST * body.radius:
-        shapes += _planes(grasp, beyond)
+        one, two = grasp.focus_points
+        along, x = beyond * _unit(two - one), grasp.positions
+        ends = np.array([one - along, two + along])
+        quads = (np.array([x[first], ends[0], x[first + 1], ends[1]]) for first in (0, 2))
+        shapes.append(Shape("plane", polygons=tuple(quads), lines=(ends,)))
     return shapes
 
 
@@ -224,15 +220,6 @@ def _regulus(body: Extent, grasp: Grasp) -> list[Shape]:
         line = np.array([start, start + (2.0 * ahead + beyond) * way])
         shapes.append(Shape("line of force", finger, lines=(line,)))
     return shapes
-
-
-def _planes(grasp: Grasp, beyond: float) -> list[Shape]:
-    one, two = grasp.focus_points
-    along = beyond * _unit(two - one)
-    ends = np.array([one - along, two + along])
-    x = grasp.positions
-    quads = [np.array([x[first], ends[0], x[first + 1], ends[1]]) for first in (0, 2)]
-    return [Shape("plane", polygons=tuple(quads), lines=(ends,))]
 
 
 def _unit(vector: Array) -> Array:

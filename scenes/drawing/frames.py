@@ -13,7 +13,6 @@ from pathlib import Path
 
 import mujoco  # noqa: TID251 - this is the door to its renderer
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont  # noqa: TID251
 
 DISTANCE = 3.2
 """Distance of the camera from the scene, in radii of the part that is shown."""
@@ -24,6 +23,8 @@ INK, LETTERS = (30, 30, 40), 18
 
 def draw_clip(given: Mapping[str, np.ndarray], out: str) -> None:
     """Draw one frame of a clip for every row of joint positions, and write the clip."""
+    from PIL import Image, ImageDraw, ImageFont  # noqa: TID251 - graphics are tried without it
+
     model = _lit(str(given["xml"]))
     for finger, colour in enumerate(given["colours"]):
         for place in range(model.ngeom):
@@ -39,7 +40,7 @@ def draw_clip(given: Mapping[str, np.ndarray], out: str) -> None:
     if "table" in given:
         data.mocap_pos[0], data.mocap_quat[0] = given["table"][:3], given["table"][3:]
     camera.distance = DISTANCE * float(given["radius"])
-    frames = []
+    frames, font = [], ImageFont.load_default(LETTERS)
     with mujoco.Renderer(model, height, width) as renderer:
         for joints, (azimuth, elevation) in zip(given["joints"], given["angles"], strict=True):
             # MuJoCo's angles are those of the line of sight
@@ -47,7 +48,9 @@ def draw_clip(given: Mapping[str, np.ndarray], out: str) -> None:
             data.qpos[:] = joints
             mujoco.mj_kinematics(model, data)
             renderer.update_scene(data, camera)
-            frames.append(_captioned(renderer.render(), str(given["caption"])))
+            picture, corner = Image.fromarray(renderer.render()), (LETTERS // 2, LETTERS // 2)
+            ImageDraw.Draw(picture).text(corner, str(given["caption"]), INK, font=font)
+            frames.append(picture)
     lasting = round(1000.0 / float(given["rate"]))
     frames[0].save(Path(out), save_all=True, append_images=frames[1:], duration=lasting, loop=0)
 
@@ -69,13 +72,6 @@ def _lit(xml: str) -> mujoco.MjModel:
     model = spec.compile()
     model.vis.headlight.ambient[:], model.vis.headlight.diffuse[:] = AMBIENT, DIFFUSE
     return model
-
-
-def _captioned(pixels: np.ndarray, caption: str) -> Image.Image:
-    picture = Image.fromarray(pixels)
-    font = ImageFont.load_default(LETTERS)
-    ImageDraw.Draw(picture).text((LETTERS // 2, LETTERS // 2), caption, INK, font=font)
-    return picture
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
-from grasp_core.values import Grasp
 from scenes.drawing.drawings import bar, coarse, drawing_of, glass
 from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG, number_places, sheet_of
 from scenes.drawing.shapes import Shape
@@ -37,7 +36,15 @@ def html_of(value: object) -> str | None:
     if isinstance(value, Scene):
         layout = value.layout
         return card(placed(layout), layout.name, [("friction", f"{layout.friction:g}")])
-    return _body(value) if isinstance(value, Polyhedron) else None
+    if not isinstance(value, Polyhedron):
+        return None
+    return card(_alone(value), value.name, [
+        ("faces" if value.patches is None else "patches", str(len(value.faces))),
+        ("triangles", str(len(value.triangles))),
+        ("radius", f"{MM * value.radius:.4g} mm"),
+        ("volume" if value.surface.closed else "volume of the hull",
+         f"{CM3 * value.volume:.4g} cm³"),
+    ])  # fmt: skip
 
 
 def card(drawing: str, title: str, rows: Iterable[Row]) -> str:
@@ -77,15 +84,6 @@ def placed(layout: Layout) -> str:
     return picture([surface, *bars, Shape("contact", points=layout.contacts)], extent, view)
 
 
-def _body(body: Polyhedron) -> str:
-    return card(_alone(body), body.name, [
-        ("faces" if body.patches is None else "patches", str(len(body.faces))),
-        ("triangles", str(len(body.triangles))),
-        ("radius", f"{MM * body.radius:.4g} mm"),
-        ("volume" if body.surface.closed else "volume of the hull", f"{CM3 * body.volume:.4g} cm³"),
-    ])  # fmt: skip
-
-
 def _alone(body: Polyhedron) -> str:
     return picture(glass(body), body, View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, body))
 
@@ -100,9 +98,8 @@ def _plan(plan: Plan) -> str:
     if not len(plan):
         return card(_alone(body), title, [(plan.absence or "",)])
     rows: list[Row] = [("grasp", "family", "radius", "closure margin")]
-    rows += [(g.id, g.family, _radius(g), f"{g.closure_margin:.4g}") for g in plan[:ROWS]]
+    rows += [
+        (g.id, g.family, f"{MM * g.radius:.3g} mm" if g.radius else "-", f"{g.closure_margin:.4g}")
+        for g in plan[:ROWS]
+    ]
     return card(drawing, title, [*rows, ("...",)] if len(plan) > ROWS else rows)
-
-
-def _radius(grasp: Grasp) -> str:
-    return f"{MM * grasp.radius:.3g} mm" if grasp.radius else "-"

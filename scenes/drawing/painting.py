@@ -151,19 +151,15 @@ def joined(surface: Surface, chosen: Array) -> tuple[Array, ...]:
         first[alone].tolist(), second[alone].tolist(), places[alone].tolist(), strict=True
     ):
         ways[start].append((end, place))
-    return tuple(surface.corners[loop] for loop in _loops(ways))
-
-
-def _loops(ways: dict[int, list[tuple[int, int]]]) -> list[list[int]]:
-    loops = list[list[int]]()
+    loops = list[Array]()
     for start in list(ways):
         while ways[start]:
             at, loop = start, list[int]()
             while ways.get(at):
                 at, place = ways[at].pop()
                 loop.append(place)
-            loops.append(loop)
-    return loops
+            loops.append(surface.corners[loop])
+    return tuple(loops)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from scenes.drawing.colours import NEUTRAL
-from scenes.drawing.sheets import LETTER, Area, Dots, Line, Mark, Words, ink_line, outlined
+from scenes.drawing.sheets import LETTER, Area, Dots, Line, Mark, Words, ink_line
 
 NARROW, WIDE = set("ijl.,:;|'!fItr()[] -"), set("mwMW@%+=<>≤")
 NARROW_WIDTH, USUAL_WIDTH, WIDE_WIDTH = 0.42, 0.66, 1.0
@@ -24,17 +24,11 @@ SMALL = 11.0
 ROW, SAMPLE = 16.0, 18.0
 EVEN = 0.2
 """Distance by which a drawn curve may miss its points [pixels]."""
-Shape: TypeAlias = Literal["disc", "square", "diamond", "up", "down", "cross", "plus"]
-CORNERS: dict[Shape, tuple[tuple[float, float], ...]] = {
+Shape: TypeAlias = Literal["disc", "square", "cross"]
+CORNERS: dict[str, tuple[tuple[float, float], ...]] = {
     "square": ((-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)),
-    "diamond": ((0.0, -1.2), (1.0, 0.0), (0.0, 1.2), (-1.0, 0.0)),
-    "up": ((0.0, -1.1), (1.1, 0.9), (-1.1, 0.9)),
-    "down": ((0.0, 1.1), (-1.1, -0.9), (1.1, -0.9)),
     "cross": ((-0.5, 0.0), (-1.0, -0.5), (-0.5, -1.0), (0.0, -0.5), (0.5, -1.0), (1.0, -0.5),
               (0.5, 0.0), (1.0, 0.5), (0.5, 1.0), (0.0, 0.5), (-0.5, 1.0), (-1.0, 0.5)),
-    "plus": ((-0.35, -0.35), (-0.35, -1.1), (0.35, -1.1), (0.35, -0.35), (1.1, -0.35), (1.1, 0.35),
-             (0.35, 0.35), (0.35, 1.1), (-0.35, 1.1), (-0.35, 0.35), (-1.1, 0.35), (-1.1, -0.35)),
-    "disc": tuple((float(np.cos(a)), float(np.sin(a))) for a in np.arange(0.0, 6.28, 0.5236)),
 }  # fmt: skip
 """Corners of markers of size 1, (x, y) with y downwards."""
 
@@ -177,14 +171,11 @@ def _sample(entry: Entry, x: float, y: float) -> Iterable[Mark]:
     return [marker(entry.kind, np.array([x + 0.5 * SAMPLE, y]), 4.0, entry.colour)]
 
 
-def marker(
-    kind: Shape, center: Array, size: float, colour: str, *, hollow: bool = False
-) -> Mark:  # fmt: skip
+def marker(kind: Shape, center: Array, size: float, colour: str) -> Mark:
     """Draw a marker of a shape."""
-    if kind == "disc" and not hollow:
+    if kind == "disc":
         return Dots(center[None], colour, size)
-    corners = center + size * np.array(CORNERS[kind])
-    return outlined([corners], colour, 1.2) if hollow else Area((corners,), colour)
+    return Area((center + size * np.array(CORNERS[kind]),), colour)
 
 
 def thinned(points: Array) -> Array:

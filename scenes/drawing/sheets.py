@@ -248,6 +248,11 @@ def svg_of(sheet: Sheet, *, alone: bool = False, paper: bool = False) -> str:
         "".join(map(_plain, marks)) if plain else f'<g transform="scale(.25)">'
         f"{_drawn(marks, names)}</g>" for plain, marks in runs
     )  # fmt: skip
+    rules = "".join(
+        f".{name}{{{';'.join(f'{key}:{value}' for key, value in look if key != 'class')}}}"
+        for look, name in names.items()
+    )
+    style = f"<style>{rules}{night_style()}</style>" if alone else ""
     width, height = f"{sheet.width:g}", f"{sheet.height:g}"
     kind = ' xmlns="http://www.w3.org/2000/svg"' if alone or paper else ""  # pages know it
     ground = ' style="background:#fff"' if paper else ""
@@ -255,7 +260,7 @@ def svg_of(sheet: Sheet, *, alone: bool = False, paper: bool = False) -> str:
         f'<svg{kind} class="sheet" width="{width}" height="{height}" '
         f'viewBox="0 0 {width} {height}" role="img" aria-label="{escape(sheet.name)}"{ground} '
         f'font-family="{FONT}" fill="none" stroke-linejoin="round">'
-        f"{_style(names) if alone else ''}{inside}</svg>"
+        f"{style}{inside}</svg>"
     )
 
 
@@ -266,14 +271,6 @@ def night_style() -> str:
         for place, colour in enumerate(NIGHT.values())
     )
     return f"@media(prefers-color-scheme:dark){{{rules}}}"
-
-
-def _style(names: Mapping[Look, str]) -> str:
-    rules = "".join(
-        f".{name}{{{';'.join(f'{key}:{value}' for key, value in look if key != 'class')}}}"
-        for look, name in names.items()
-    )
-    return f"<style>{rules}{night_style()}</style>"
 
 
 def _names(runs: Iterable[tuple[bool, list[Mark]]]) -> dict[Look, str]:

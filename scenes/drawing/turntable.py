@@ -5,10 +5,11 @@ screen shows, and takes a tenth of the text of full numbers.
 """
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -34,6 +35,15 @@ UNITS = 1000.0
 """Number of units of length in one object radius."""
 MILLI = 1e3
 WIDTH, HEIGHT = 900, 640
+Fact: TypeAlias = tuple[str, str, str]
+"""Name, value and meaning of a figure on a page."""
+DISC = "radius of the largest disc that fits each region: there every finger may stand anywhere"
+CRITICAL = "least coefficient with which the contacts are in force closure; 0: none is needed"
+MARGIN = "how far inside their friction cones balanced forces can be, with normal parts of sum 1"
+QUALITY = (
+    "largest wrench resisted in every direction, with normal forces of sum 1 N; torques over the "
+    "object's radius"
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -133,10 +143,10 @@ def turntable_page(
         object=body.name,
         family=grasp.family,
         friction=friction,
-        facts=_facts(body, grasp) + ([] if held is None else [
-            (f"fingers of {held.hand.name}", ", ".join(held.finger_names),
+        facts=[*grasp_facts(body, grasp), *([] if held is None else [
+            (f"Fingers of {held.hand.name}", ", ".join(held.finger_names),
              "that touch, by finger of the grasp"),
-        ]),
+        ])],
         style=text_of("style.css"),
         script=text_of("turntable.js"),
         object_drawing=as_text(object_data(body)),
@@ -144,25 +154,21 @@ def turntable_page(
     )  # fmt: skip
 
 
-def _facts(body: Polyhedron, grasp: Grasp) -> list[tuple[str, str, str]]:
-    kind = "faces" if body.patches is None else "patches"
-    disc = f"{number(MILLI * grasp.radius)} mm" if grasp.radius else "none"
-    return [
-        (kind, ", ".join(map(str, grasp.faces)), "that the fingers stand on, by finger"),
-        ("smallest disc", disc, "within it a finger may stand anywhere"),
-        (
-            "critical friction", number(grasp.critical_friction),
-            "least coefficient with which the contacts hold the object",
-        ),
-        (
-            "margin of closure", number(grasp.closure_margin),
-            "how far inside their cones balanced forces can be",
-        ),
-        (
-            "quality", f"{number(grasp.ferrari_canny[0])} N",
-            "largest wrench resisted in every direction, for forces of sum 1 N",
-        ),
-    ]  # fmt: skip
+def grasp_facts(
+    body: Polyhedron, grasp: Grasp, *, at_plan: str = "", in_simulation: str = ""
+) -> Iterator[Fact]:
+    """Yield the figures of a grasp; `at_plan` says at which friction most of them are."""
+    yield (
+        "Faces" if body.patches is None else "Patches",
+        ", ".join(map(str, grasp.faces)), "numbers of those that the fingers stand on, by finger",
+    )  # fmt: skip
+    disc = f"{number(MILLI * grasp.radius)} mm{at_plan}" if grasp.radius else "none is claimed"
+    yield "Smallest independent disc", disc, DISC
+    yield "Critical friction", f"{number(grasp.critical_friction)}{in_simulation}", CRITICAL
+    yield "Margin of closure", f"{number(grasp.closure_margin)}{at_plan}", MARGIN
+    lower, upper = map(number, grasp.ferrari_canny)
+    between = lower if lower == upper else f"{lower} to {upper}"
+    yield "Ferrari-Canny quality", f"{between} N{at_plan}", QUALITY
 
 
 def as_text(data: object) -> str:

@@ -6,7 +6,7 @@ finger, so that all move as one link.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -46,18 +46,18 @@ def hand_from_file(path: Path, fingertips: tuple[str, ...]) -> Hand:
         Coupling(_joint_name(model, joint), _joint_name(model, line.root), line.ratio, line.offset)
         for joint, line in sorted(coupled.lines.items())
     )
-    own = own_chains(fingers, rules)
+    own_fingers, couplings, originals = own_chains(fingers, rules)
+    common = sorted(set(originals.values()))
+    shared = [f"links that fingers have in common: {', '.join(common)}"] if common else []
     palm = tuple(shapes.get(-1, ()))
     hand = Hand(
-        path.stem, palm, own.fingers, (f"{path.name}; {AS_BOXES}",),
+        path.stem, palm, own_fingers, (f"{path.name}; {AS_BOXES}",),
         f"{path.name}; None where it states none",
-        couplings=own.couplings,
-        notes=(
-            *read.notes, *model.notes, *coupled.notes, *own.notes, *_tips_elsewhere(model, found)
-        ),
+        couplings=couplings,
+        notes=(*read.notes, *model.notes, *coupled.notes, *shared, *_tips_elsewhere(model, found)),
     )  # fmt: skip
     middle = overlapping_pairs(hand, 0.5 * hand.ranges.sum(axis=1))
-    pairs = _excluded(model, found) | (middle & _close_by(hand, own.originals))
+    pairs = _excluded(model, found) | (middle & _close_by(hand, originals))
     return replace(hand, ignored_pairs=tuple(sorted(pairs)))
 
 
@@ -234,23 +234,13 @@ def _may_meet(model: HandModel, found: Chains, one: int, other: int) -> bool:
     return bool(((first[..., 0] & second[..., 1]) | (second[..., 0] & first[..., 1])).any())
 
 
-@dataclass(frozen=True, slots=True)
-class OwnChains:
-    """Fingers with chains of their own."""
+def own_chains(
+    fingers: Sequence[HandFinger], couplings: tuple[Coupling, ...]
+) -> tuple[tuple[HandFinger, ...], tuple[Coupling, ...], dict[str, str]]:
+    """Replace links that occur in several fingers by copies in all but the first of them.
 
-    fingers: tuple[HandFinger, ...]
-    couplings: tuple[Coupling, ...]  # those that were given, and of the copies
-    originals: dict[str, str]  # for each copy, the link that it moves with
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Say which links fingers have in common."""
-        shared = sorted(set(self.originals.values()))
-        return (f"links that fingers have in common: {', '.join(shared)}",) if shared else ()
-
-
-def own_chains(fingers: Sequence[HandFinger], couplings: tuple[Coupling, ...]) -> OwnChains:
-    """Replace links that occur in several fingers by copies in all but the first of them."""
+    Gives also the couplings with those of the copies, and the link that each copy moves with.
+    """
     leaders = {each.joint: each for each in couplings}
     seen, originals, kept = set[str](), dict[str, str](), list[HandFinger]()
     added = list[Coupling]()
@@ -269,4 +259,4 @@ def own_chains(fingers: Sequence[HandFinger], couplings: tuple[Coupling, ...]) -
             )  # fmt: skip
         seen |= {link.name for link in finger.links}
         kept.append(replace(finger, links=tuple(links)))
-    return OwnChains(tuple(kept), (*couplings, *added), originals)
+    return tuple(kept), (*couplings, *added), originals

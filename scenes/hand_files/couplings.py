@@ -101,17 +101,15 @@ def _narrowed(model: HandModel, free: int, others: dict[int, Line]) -> tuple[flo
 def _refuse_loops(model: HandModel, used: set[int], name: str) -> None:
     """Refuse what holds bodies or tendons together, where joints of the hand move them."""
     for kind, *bodies in model.loops:
-        one, other = (_moving(model, body) for body in bodies)
+        one, other = (
+            {j for j, own in enumerate(model.raw.jnt_bodyid.tolist()) if own in path}
+            for path in (path_of_body(model, body) for body in bodies)
+        )
         _refuse(model, (one ^ other) & used, name, f"are in a loop that a {kind} closes")
     for tendon in model.tendons:
         if tendon.is_held and (used & set(tendon.joints) or not tendon.joints):
             joints = set(tendon.joints) or used
             _refuse(model, joints, name, f"are coupled by the length of tendon {tendon.name}")
-
-
-def _moving(model: HandModel, body: int) -> set[int]:
-    path = path_of_body(model, body)
-    return {j for j, own in enumerate(model.raw.jnt_bodyid.tolist()) if own in path}
 
 
 def _refuse(model: HandModel, joints: set[int], name: str, why: str) -> None:

@@ -1,7 +1,4 @@
-"""Loads a hand by name, from an MJCF or URDF file, or from the package `mujoco-menagerie`.
-
-This is the only door to that package.
-"""
+"""Loads a hand by name, or from an MJCF or URDF file."""
 
 import importlib
 from collections.abc import Iterable
@@ -16,15 +13,14 @@ from grasp_core.hands.named_hands import HANDS
 from grasp_core.hands.named_hands import load_hand as built_in_hand
 
 ENDINGS = (".xml", ".mjcf", ".urdf")
-MENAGERIE = "menagerie:"
 
 
 def load_hand(hand: str | Path, fingertips: Iterable[str] = ()) -> Hand:
     """Load a hand by name or from a file.
 
     Args:
-        hand: "allegro", "allegro-urdf" or "leap"; the path of an MJCF file (.xml, .mjcf) or a URDF
-            file (.urdf); or "menagerie:NAME" for a model of the package `mujoco-menagerie`.
+        hand: "allegro", "allegro-urdf" or "leap"; or the path of an MJCF file (.xml, .mjcf) or a
+            URDF file (.urdf).
         fingertips: For a file, the name of a site, geom or body for each of three to five
             fingertips. A built-in hand has its own.
 
@@ -36,14 +32,11 @@ def load_hand(hand: str | Path, fingertips: Iterable[str] = ()) -> Hand:
         if names:
             raise InputError(f"the built-in hand {hand} has its own fingertips; leave them out")
         return built_in_hand(hand)
-    if isinstance(hand, str) and hand.startswith(MENAGERIE):
-        path = _menagerie_path(hand[len(MENAGERIE) :])
-    else:
-        path = path_of(hand, "hand")
+    path = path_of(hand, "hand")
     if path.suffix.lower() not in ENDINGS:
         raise InputError(
-            f"hand must be {', '.join(HANDS)}, {MENAGERIE}NAME, or a file that ends with "
-            f"{', '.join(ENDINGS)}, got {str(hand)[:80]!r}"
+            f"hand must be {', '.join(HANDS)}, or a file that ends with {', '.join(ENDINGS)}, got "
+            f"{str(hand)[:80]!r}"
         )
     if not FEWEST_FINGERS <= len(names) <= MOST_FINGERS:
         raise InputError(
@@ -52,28 +45,3 @@ def load_hand(hand: str | Path, fingertips: Iterable[str] = ()) -> Hand:
         )
     building: Any = importlib.import_module("scenes.hand_files.building")  # loads MuJoCo
     return building.hand_from_file(path, names)
-
-
-def _menagerie_path(name: str) -> Path:
-    """Return the path of the own file of a model in Menagerie, which may be downloaded first."""
-    try:
-        menagerie: Any = importlib.import_module("mujoco_menagerie")
-    except ImportError as error:
-        raise InputError(
-            f"menagerie:{name} needs the package mujoco-menagerie: pip install mujoco-menagerie, "
-            "or give the path of a model's file"
-        ) from error
-    robot, _, file = name.partition("/")
-    try:
-        folder = Path(menagerie.get(robot).path())
-    except (menagerie.MenagerieError, KeyError, OSError) as error:
-        said = " ".join(str(error).split())[:200]
-        raise InputError(f"menagerie:{name} cannot be loaded: {said}") from error
-    folder = folder if folder.is_dir() else folder.parent
-    hands = sorted(path.name for path in folder.glob("*.xml") if not path.name.startswith("scene"))
-    chosen = file or next((each for each in hands if "right" in each), hands[0] if hands else "")
-    if chosen not in hands:
-        raise InputError(
-            f"menagerie:{name}: the model has no file {chosen!r}, but {', '.join(hands) or 'none'}"
-        )
-    return folder / chosen

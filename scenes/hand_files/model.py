@@ -80,9 +80,18 @@ def compiled_hand(text: ModelText, name: str) -> HandModel:
     data = mujoco.MjData(model)
     data.qpos[:] = model.qpos0
     mujoco.mj_kinematics(model, data)
+    turns = np.empty((model.ngeom, 9))
+    for quaternion, matrix in zip(model.geom_quat, turns, strict=True):
+        mujoco.mju_quat2Mat(matrix, quaternion)
     bits = np.column_stack([model.geom_contype, model.geom_conaffinity]).astype(np.int64)
     lent = _lent(model, bits)
     bits[np.isin(model.geom_bodyid, lent)] = EVERY_BIT
+    notes = list[str]()
+    if odd:
+        notes.append(f"inertias that no body can have count by their masses alone: {listed(odd)}")
+    if lent:
+        names = listed([model.body(body).name for body in lent])
+        notes.append(f"bodies without shapes that collide do so with all they have: {names}")
     kinds = tuple(mujoco.mjtJoint(int(kind)).name[6:].lower() for kind in model.jnt_type)
     hinges = np.array([kind == "hinge" for kind in kinds], bool)
     slides = np.array([kind == "slide" for kind in kinds], bool)
@@ -100,12 +109,12 @@ def compiled_hand(text: ModelText, name: str) -> HandModel:
         references=np.where(hinges, model.qpos0[model.jnt_qposadr], np.nan),
         torques=_torques(model),
         geom_kinds=tuple(mujoco.mjtGeom(int(kind)).name[7:].lower() for kind in model.geom_type),
-        geom_rotations=_turns(model.geom_quat),
+        geom_rotations=turns.reshape(-1, 3, 3),
         geom_bits=bits,
         joint_rules=_joint_rules(model),
         loops=_loops(model),
         tendons=_tendons(model),
-        notes=_notes(odd, [model.body(body).name for body in lent]),
+        notes=tuple(notes),
     )
 
 
@@ -115,15 +124,6 @@ def _lent(model: mujoco.MjModel, bits: Indices) -> list[int]:
     shown = model.geom_bodyid[model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE]
     marks = np.flatnonzero(model.body_mocapid >= 0).tolist()
     return sorted(set(shown.tolist()) - moving - {0, *marks})
-
-
-def _notes(odd: list[str], lent: list[str]) -> tuple[str, ...]:
-    notes = list[str]()
-    if odd:
-        notes.append(f"inertias that no body can have count by their masses alone: {listed(odd)}")
-    if lent:
-        notes.append(f"bodies without shapes that collide do so with all they have: {listed(lent)}")
-    return tuple(notes)
 
 
 def _impossible(spec: mujoco.MjSpec) -> list[str]:
@@ -193,13 +193,6 @@ def mesh_points(model: HandModel, geom: int) -> Array:
     mesh = raw.geom_dataid[geom]
     first = int(raw.mesh_vertadr[mesh])
     return np.array(raw.mesh_vert[first : first + int(raw.mesh_vertnum[mesh])], float)
-
-
-def _turns(quaternions: Array) -> Array:
-    found = np.empty((len(quaternions), 9))
-    for quaternion, matrix in zip(quaternions, found, strict=True):
-        mujoco.mju_quat2Mat(matrix, quaternion)
-    return found.reshape(-1, 3, 3)
 
 
 def _torques(model: mujoco.MjModel) -> Array:

@@ -28,7 +28,7 @@ from grasp_core.values import Grasp
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.simulation.setup import WEAKEST
 from sim_validate.simulation.traces import Outcome
-from sim_validate.validation.verdict import Verdict, WrenchVerdict
+from sim_validate.validation.verdict import Verdict
 
 DIGITS = 12
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
@@ -256,7 +256,9 @@ def entry_of(
 ) -> Entry:
     """Summarise a verdict as an entry of a baseline."""
     weakest = next(trial for trial in verdict.wrenches if trial.name == WEAKEST)
-    predicted, simulated = _limits(weakest, radius_m)
+    scaled = weakest.wrench / np.array([1.0] * 3 + [radius_m] * 3)
+    predicted = weakest.predicted_limit * float(np.linalg.norm(scaled))
+    limit = weakest.simulated_limit
     friction, repeats = verdict.critical_friction, verdict.robustness
     noisy = () if repeats is None else repeats.trials
     holds = [trial.hold for trial in verdict.wrenches]
@@ -264,7 +266,7 @@ def entry_of(
         "critical_friction": friction.predicted,
         "simulated_critical_friction": friction.simulated,
         "limit_n": predicted,
-        "simulated_limit_n": simulated,
+        "simulated_limit_n": None if limit is None else predicted * limit.share,
         "displacement_m": float(np.max([hold.displacement_m for hold in holds])),
         "rotation_rad": float(np.max([hold.rotation_rad for hold in holds])),
     }
@@ -283,13 +285,6 @@ def entry_of(
         execution=None if executed is None else execution_entry(executed),
         **{name: rounded(value) for name, value in measured.items()},  # pyright: ignore
     )
-
-
-def _limits(trial: WrenchVerdict, radius_m: float) -> tuple[float, float | None]:
-    scaled = trial.wrench / np.array([1.0] * 3 + [radius_m] * 3)
-    predicted = trial.predicted_limit * float(np.linalg.norm(scaled))
-    found = trial.simulated_limit
-    return predicted, None if found is None else predicted * found.share
 
 
 def baseline_to_json(baseline: Baseline) -> str:

@@ -24,6 +24,8 @@ DIGITS_OF_CHANGE = 2
 LEAST_DIGITS = 4
 DECISIVE = ("graspproof", "mujoco", "machine")
 ASIDE = "python"
+Rows = tuple[tuple[str, float, float, float], ...]
+"""Name, relative and absolute band, and sign of each number: of 1 a larger number is worse."""
 PREDICTED = ("load_multiple", "predicted_first_slip")
 """Numbers of an execution that the analysis gives."""
 
@@ -67,10 +69,19 @@ class Difference:
 
 def differences(one: Entry, other: Entry, bands: Bands) -> tuple[Difference, ...]:
     """List every difference between two verdicts on a grasp."""
+    critical = bands.least + bands.friction
+    rows = (
+        ("critical_friction", bands.predicted, critical, 1.0),
+        ("simulated_critical_friction", bands.simulated, critical, 1.0),
+        ("limit_n", bands.predicted, bands.least, -1.0),
+        ("simulated_limit_n", bands.simulated, bands.least, -1.0),
+        ("displacement_m", 0.0, bands.displacement_m, 1.0),
+        ("rotation_rad", 0.0, bands.rotation_rad, 1.0),
+    )
     return (
         *_of_wrenches(one, other),
         *_of_controls(one, other, bands),
-        *_of_numbers(one, other, _rows(bands)),
+        *_of_numbers(one, other, rows),
         *_of_repeats(one, other, bands),
         *_of_executions(one.execution, other.execution, bands),
     )
@@ -104,22 +115,6 @@ def _of_controls(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]
     if one.controls != other.controls:
         text = f"negative controls: {one.controls} -> {other.controls}"
         yield Difference(text, worse=other.controls < one.controls, counts=bands.same_part)
-
-
-Rows = tuple[tuple[str, float, float, float], ...]
-"""Name, relative and absolute band, and sign of each number: of 1 a larger number is worse."""
-
-
-def _rows(bands: Bands) -> Rows:
-    critical = bands.least + bands.friction
-    return (
-        ("critical_friction", bands.predicted, critical, 1.0),
-        ("simulated_critical_friction", bands.simulated, critical, 1.0),
-        ("limit_n", bands.predicted, bands.least, -1.0),
-        ("simulated_limit_n", bands.simulated, bands.least, -1.0),
-        ("displacement_m", 0.0, bands.displacement_m, 1.0),
-        ("rotation_rad", 0.0, bands.rotation_rad, 1.0),
-    )
 
 
 def _of_numbers(

@@ -13,10 +13,11 @@ from grasp_core.planning.planner import plan
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines.explain import not_survived, unstable
-from sim_validate.baselines.part import TABLE, Source, if_changed, present, source_of
+from sim_validate.baselines.part import TABLE, IfChanged, Source, present, source_of
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.files.toml_tables import settings_in
 from sim_validate.records.grasps import read_grasps
 from sim_validate.simulation.setup import Agenda, NamedWrench, Noise, Setup
 from sim_validate.validation.validation import validate
@@ -71,8 +72,16 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
     if args:
         return _cases_of_file(folder, folder / args[0], settings)
     wanted: dict[str, Any] = {"limit": 1, **settings, "friction": friction}
-    body = _body(folder, wanted)
-    grasps = _planned(body, wanted)
+    name = wanted.pop("object", None)
+    lengths = {each: wanted.pop(each) for each in ("unit", "scale") if each in wanted}
+    if not isinstance(name, str):
+        raise InputError("@pytest.mark.grasp needs the path of a grasps.json, or object=...")
+    is_file = Path(name).suffix
+    body = load_polyhedron(folder / name, **lengths) if is_file else example_object(name)
+    try:
+        grasps = plan(body, **wanted).grasps
+    except (TypeError, ValueError) as error:
+        raise InputError(f"@pytest.mark.grasp: a setting is of the wrong kind: {error}") from error
     _check_any(grasps, body, friction)
     return [GraspCase(body, grasp, friction) for grasp in grasps]
 
@@ -81,7 +90,7 @@ def _cases_of_file(folder: Path, path: Path, settings: Mapping[str, Any]) -> lis
     saved = read_grasps(path)
     friction = _number(settings.get("friction", saved.friction))
     _check_any(saved.grasps, saved.body, friction)
-    asked = if_changed(settings.get(TABLE, {}))
+    asked = settings_in(IfChanged, settings.get(TABLE, {}), TABLE)
     source = source_of(saved, path, [folder], scale=asked.scale)
     now = present(replace(saved, friction=friction), path, source, asked)
     tested = {grasp.id: grasp for grasp in now.saved.grasps}
@@ -106,23 +115,6 @@ def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"friction must be a number, got {value!r}")
     return float(value)
-
-
-def _planned(body: Polyhedron, wanted: Mapping[str, Any]) -> Sequence[Grasp]:
-    try:
-        return plan(body, **wanted).grasps
-    except (TypeError, ValueError) as error:
-        raise InputError(f"@pytest.mark.grasp: a setting is of the wrong kind: {error}") from error
-
-
-def _body(folder: Path, wanted: dict[str, Any]) -> Polyhedron:
-    name = wanted.pop("object", None)
-    lengths = {each: wanted.pop(each) for each in ("unit", "scale") if each in wanted}
-    if not isinstance(name, str):
-        raise InputError("@pytest.mark.grasp needs the path of a grasps.json, or object=...")
-    if Path(name).suffix:
-        return load_polyhedron(folder / name, **lengths)
-    return example_object(name)
 
 
 @dataclass(frozen=True, slots=True)

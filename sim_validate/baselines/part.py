@@ -6,14 +6,13 @@ baseline; faces are called by their numbers on the planned part, of which ids ar
 """
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from grasp_core.checked import BOUNDS, number, one_of, positive, switch
 from grasp_core.errors import InputError, MeshError
-from grasp_core.files.json_text import named_settings, settings_of
 from grasp_core.files.text_files import read_bytes
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
@@ -29,7 +28,6 @@ from grasp_core.transferring.face_changes import (
     likeness,
 )
 from grasp_core.transferring.transfer import CarriedGrasp, Transfer, transfer
-from grasp_core.values import Grasp
 from sim_validate.baselines.baseline import Baseline, RecordedPart, recorded_part
 
 NOTE, FAIL = "note", "fail"
@@ -78,11 +76,6 @@ class IfChanged:
 
 
 CARRY = IfChanged()
-
-
-def if_changed(table: object) -> IfChanged:
-    """Read the table `[changed_part]` of a `*.grasps.toml` file, or the same given by a marker."""
-    return settings_of(IfChanged, named_settings(table, IfChanged, TABLE), [TABLE])
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,13 +272,11 @@ class Present:
         named = (each.grasp for each in self._moved if each.old.id == name)
         return next((grasp.id for grasp in named if grasp), None)
 
-    @property
-    def _planned_grasps(self) -> Sequence[Grasp]:
-        return self.saved.grasps if self.carried is None else [each.old for each in self._moved]
-
     def first(self, limit: int | None) -> "Present":
         """Return only the first grasps of the file, up to a limit."""
-        return self.only(*(grasp.id for grasp in self._planned_grasps[:limit]))
+        moved = [each.old for each in self._moved]
+        grasps = self.saved.grasps if self.carried is None else moved
+        return self.only(*(grasp.id for grasp in grasps[:limit]))
 
     def only(self, *names: str) -> "Present":
         """Return only the grasps with these ids, of those that the file has."""

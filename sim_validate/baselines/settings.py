@@ -10,12 +10,12 @@ from pydantic_core import to_jsonable_python
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import complaint, named_settings
-from grasp_core.files.json_text import settings_of as read_settings
+from grasp_core.files.json_text import complaint
 from grasp_core.records.grasps_json import SavedGrasps
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface
 from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution, execution_table
+from sim_validate.files.toml_tables import settings_in
 from sim_validate.records.setup_toml import setup_from_file, setup_from_tables, tables_of
 from sim_validate.simulation.setup import (
     Agenda,
@@ -83,16 +83,11 @@ def of_settings(settings: Mapping[str, Any], path: str) -> How:
             wrenches=tuple(NamedWrench(name, w) for name, w in given.wrenches.items()),  # pyright: ignore[reportArgumentType] - an array is made of it
             limits=given.limits,
             trials=given.trials,
-            noise=noise_from_table(given.noise),
+            noise=settings_in(Noise, given.noise, "noise"),
             seed=given.seed,
         )
         execution = None if given.execution is None else asked_execution(given.execution)
     return How(setup, agenda, execution)
-
-
-def noise_from_table(given: Mapping[str, Any]) -> Noise:
-    """Build noise settings from some of their fields."""
-    return read_settings(Noise, named_settings(given, Noise, "noise"), ["noise"])
 
 
 def setup_for(saved: SavedGrasps, path: Path | None) -> Setup:

@@ -27,20 +27,14 @@ from sim_validate.baselines.part import (
     IfChanged,
     Present,
     Source,
-    if_changed,
     present,
     source_of,
     testable,
 )
 from sim_validate.baselines.part import TABLE as CHANGED
-from sim_validate.baselines.settings import (
-    How,
-    noise_from_table,
-    of_settings,
-    setup_for,
-)
+from sim_validate.baselines.settings import How, of_settings, setup_for
 from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution
-from sim_validate.files.toml_tables import read_tables
+from sim_validate.files.toml_tables import read_tables, settings_in
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.wrenches import wrenches_from_file
 from sim_validate.simulation.setup import Agenda, Noise
@@ -146,7 +140,12 @@ class Suite:
         """Simulate all grasps and write the results as the new baseline."""
         now = self.present
         check_writable(self.baseline)
-        before = self._kept_if_any()
+        try:
+            before = self.kept if self.baseline.is_file() else None
+        except InputError as error:
+            raise InputError(
+                f"{error}; remove the file, then write a new baseline with pytest --grasp-bless"
+            ) from error
         how = self._how(before)
         if before is not None:
             how = with_planned_fingers(how, before, now.saved)
@@ -155,14 +154,6 @@ class Suite:
         found = complete(done, now)
         write_baseline(self.baseline, found)
         return found
-
-    def _kept_if_any(self) -> Baseline | None:
-        try:
-            return self.kept if self.baseline.is_file() else None
-        except InputError as error:
-            raise InputError(
-                f"{error}; remove the file, then write a new baseline with pytest --grasp-bless"
-            ) from error
 
     def _how(self, before: Baseline | None) -> How:
         """Take the baseline's settings, or the default ones, replaced by those of the file."""
@@ -193,12 +184,15 @@ def suite_from_toml(path: Path) -> Suite:
 def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
     """Build a suite from the settings of a `*.grasps.toml` file."""
     usual = path.name.removesuffix(ENDING) + ".baseline.json"
-    tables = {"noise": noise_from_table, TABLE: asked_execution, CHANGED: if_changed}
     with about(path):
         _check(given)
         settings: dict[str, Any] = {"baseline": usual, **given}
         settings |= {name: path.parent / settings[name] for name in PATHS if name in settings}
-        settings |= {name: read(given[name]) for name, read in tables.items() if name in given}
+        for name, kind in (("noise", Noise), (CHANGED, IfChanged)):
+            if name in given:
+                settings[name] = settings_in(kind, given[name], name)
+        if TABLE in given:
+            settings[TABLE] = asked_execution(given[TABLE])
     return Suite(path=path, **settings)
 
 

@@ -14,7 +14,7 @@ from sim_validate.cli.flag_groups import (
     Jobs,
     Repeats,
     Seed,
-    Speech,
+    Spoken,
     UnitName,
     Usual,
 )
@@ -40,7 +40,7 @@ class ChangedPart:
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class Record(Spoken):
     """Simulate grasps and write a baseline: a file that records how stable each grasp is."""
 
     grasps: Positional[Path]
@@ -62,11 +62,10 @@ class Record:
     """Seed of all random choices; if not given, the seed that the grasps were planned with."""
     changed: OmitArgPrefixes[ChangedPart] = field(default_factory=ChangedPart)
     jobs: Jobs = field(default_factory=available_cores)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class Check(Spoken):
     """Simulate the grasps of a baseline again, and report how each result has changed."""
 
     baseline: Positional[Path]
@@ -81,7 +80,6 @@ class Check:
     """Write the new results over the baseline, even if grasps have become worse."""
     changed: OmitArgPrefixes[ChangedPart] = field(default_factory=ChangedPart)
     jobs: Jobs = field(default_factory=available_cores)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +90,3 @@ class Baseline:
         Annotated[Record, subcommand("record", prefix_name=False)]
         | Annotated[Check, subcommand("check", prefix_name=False)]
     ]
-
-    @property
-    def speech(self) -> Speech:
-        """How much the command prints."""
-        return self.action.speech

@@ -32,7 +32,7 @@ from sim_validate.cli.flag_groups import (
     Point,
     ProtocolName,
     Seed,
-    Speech,
+    Spoken,
     Testing,
     Tips,
     Trials,
@@ -48,13 +48,12 @@ RUN_LIMIT = 100
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class Run(Spoken):
     """Plan grasps, simulate them and negative controls (contacts that must fail); write all."""
 
     object: Positional[ObjectName]
     planning: OmitArgPrefixes[Planning] = field(default_factory=partial(Planning, limit=RUN_LIMIT))
     testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for the results; if not given, graspproof-out/OBJECT."""
     no_report: bool = False
@@ -72,7 +71,7 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class Plan(Spoken):
     """Find force-closure grasps of an object, each with a checked certificate of force closure."""
 
     object: Positional[ObjectName]
@@ -92,13 +91,12 @@ class Plan:
     wrenches: Path | None = None
     """With --measure task: JSON file of the task's wrenches (see docs/files.md)."""
     jobs: Jobs = field(default_factory=available_cores)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for grasps.json; if not given, no file is written."""
 
 
 @dataclass(frozen=True, slots=True)
-class Validate:
+class Validate(Spoken):
     """Simulate the grasps of a file in MuJoCo, with negative controls: contacts that must fail."""
 
     grasps: Positional[Path]
@@ -113,14 +111,13 @@ class Validate:
     """Judge the grasps by the published test of another tool, beside our verdict under its loads
     and the predicted margin, instead of by our usual trials; may be repeated."""
     testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for verdicts.json, or for judgements.json with --protocol; if not given, no file is
     written."""
 
 
 @dataclass(frozen=True, slots=True)
-class Execute:
+class Execute(Spoken):
     """Simulate grasps as a robot executes them: true mass, springy fingers, one fixed squeeze."""
 
     grasps: Positional[Path]
@@ -142,13 +139,12 @@ class Execute:
     setup: Path | None = None
     """A TOML file whose table `physics` has settings of the simulator (see docs/files.md)."""
     jobs: Jobs = field(default_factory=available_cores)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for executions.json; if not given, no file is written."""
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class Scene(Spoken):
     """Write grasps as MuJoCo scenes, which MuJoCo's own viewer can open.
 
     Without a mass, the scenes are those of `validate`: masses are scaled to suit the grasp, and
@@ -170,13 +166,12 @@ class Scene:
     tips: OmitArgPrefixes[Tips] = field(default_factory=Tips)
     down: Annotated[Direction, arg(metavar="X Y Z")] = UPRIGHT
     """With a mass or a density: direction of gravity in the object's frame."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for the scenes; if not given, a single scene is printed."""
 
 
 @dataclass(frozen=True, slots=True)
-class Export:
+class Export(Spoken):
     """Write grasps for other programs: MoveIt, or viewers and editors of 3D scenes."""
 
     grasps: Positional[Path]
@@ -193,11 +188,10 @@ class Export:
     fingertip_radius_m: Usual | None = None
     """Radius of the fingertips [m]; if not given, the one planned for, or a tenth of the object's
     radius, or less if that does not fit."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class View(Spoken):
     """Look at a grasp: in MuJoCo's viewer if there is a display, or in a file."""
 
     grasps: Positional[Path]
@@ -216,11 +210,10 @@ class View:
     hand: bool = True
     """Show the hand of the reaches.json beside the grasps, where it reaches the grasp, in the
     picture and on the page."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class Report(Spoken):
     """Write the results of a run as pages that open in a browser, without any network."""
 
     folder: Positional[Path]
@@ -232,13 +225,12 @@ class Report:
     graphics are available."""
     jobs: Count = field(default_factory=available_cores)
     """Largest number of processes."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for the pages; if not given, `report` in the run's folder."""
 
 
 @dataclass(frozen=True, slots=True)
-class Regions:
+class Regions(Spoken):
     """Prove regions in which each finger may stand anywhere, whatever the others do."""
 
     grasps: Positional[Path]
@@ -260,13 +252,12 @@ class Regions:
     """Number of cones that one attempt at a proof may use. More cones take longer and enlarge radii
     by some hundredths, or not at all where they are as large as possible."""
     jobs: Jobs = field(default_factory=available_cores)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for regions.json and the proofs; if not given, no file is written."""
 
 
 @dataclass(frozen=True, slots=True)
-class Replay:
+class Replay(Spoken):
     """Simulate one recorded trial again, and write its motion, sample by sample, and a clip."""
 
     source: Positional[Path]
@@ -285,11 +276,10 @@ class Replay:
     """The grasps.json that the verdicts are about, if it is not beside them."""
     out: Path | None = None
     """Folder for scene.xml, trace.csv and, where graphics are available, clip.gif."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
-class Analyze:
+class Analyze(Spoken):
     """Judge contacts of any origin: force closure with a certificate, quality, wrench limits."""
 
     contacts: Positional[Path]
@@ -311,11 +301,10 @@ class Analyze:
     """Number of edges of the pyramids that replace friction cones in two quality measures,
     min-weight and hull volume."""
     jobs: Jobs = field(default_factory=available_cores)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
-class Transfer:
+class Transfer(Spoken):
     """Carry grasps over to a part that has changed since they were planned, and judge them anew."""
 
     grasps: Positional[Path]
@@ -331,37 +320,32 @@ class Transfer:
     """Centre of mass of the changed part in the file's frame, in metres; if not given, that of
     uniform density, or the old part's if that was given."""
     limits: OmitArgPrefixes[MeshLimits] = field(default_factory=MeshLimits)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for transfer.json and the grasps.json of the changed part; if not given, no file is
     written."""
 
 
 @dataclass(frozen=True, slots=True)
-class Inspect:
+class Inspect(Spoken):
     """Show a mesh as a polyhedron: faces, mass properties, face quadruples to grasp by."""
 
     object: Positional[ObjectName]
     picture: Annotated[Path, ends_in(*PICTURES)] | None = None
     """Write the object as a picture (svg, png)."""
     mesh: OmitArgPrefixes[Mesh] = field(default_factory=Mesh)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
-class Objects:
+class Objects(Spoken):
     """List the names of the built-in objects."""
 
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
-
 
 @dataclass(frozen=True, slots=True)
-class Doctor:
+class Doctor(Spoken):
     """Check this installation: versions, solvers and simulator."""
 
     compile: bool = False
     """Compile all inner loops first, on two cores if there are two, as for an image."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 Command = (

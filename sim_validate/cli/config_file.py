@@ -5,7 +5,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, cast, get_args, get_type_hints
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import place
 from sim_validate.cli.flag_bounds import FlagsError
 
@@ -60,10 +60,8 @@ def _read(path: Path, known: set[str]) -> list[str]:
         if name.replace("-", "_") not in known:
             said = f"--config {path}: {place([name])}: unknown flag; keys are long flags"
             raise FlagsError(said)
-    try:
+    with about(f"--config {path}"):
         return flags_from(settings)
-    except InputError as error:
-        raise InputError(f"--config {path}: {error}") from error
 
 
 def _as_flags(name: str, value: Any) -> list[str]:

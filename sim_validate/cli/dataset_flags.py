@@ -8,7 +8,7 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, subcommand
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from sim_validate.cli.flag_bounds import FINITE, at_least
-from sim_validate.cli.flag_groups import Count, Friction, Lengths, Positive, Seed, Speech
+from sim_validate.cli.flag_groups import Count, Friction, Lengths, Positive, Seed, Spoken
 from sim_validate.datasets.tables import SplitName
 from sim_validate.parallel.processes import available_cores
 
@@ -98,7 +98,7 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True)
-class Build:
+class Build(Spoken):
     """Plan and simulate grasps of many objects and write tables; run it again to resume."""
 
     objects: Positional[tuple[str, ...]]
@@ -110,11 +110,10 @@ class Build:
     learned: OmitArgPrefixes[Learned] = field(default_factory=Learned)
     settings: OmitArgPrefixes[Settings] = field(default_factory=Settings)
     work: OmitArgPrefixes[Work] = field(default_factory=Work)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
-class Import:
+class Import(Spoken):
     """Judge grasps made by another tool, simulate them, and write them as a dataset."""
 
     contacts: Positional[Path]
@@ -127,11 +126,10 @@ class Import:
     """Read the file's normals as pointing out of the object, not into it."""
     settings: OmitArgPrefixes[Settings] = field(default_factory=Settings)
     work: OmitArgPrefixes[Work] = field(default_factory=Work)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
-class Verify:
+class Verify(Spoken):
     """Check files and rows of a dataset, prove force closure again, and redo a sample."""
 
     dataset: Positional[Path]
@@ -140,11 +138,10 @@ class Verify:
     """Share of all objects and frictions that is computed again, at least one; 0 for none."""
     seed: Seed = 0
     """Seed of the random choice of the sample that is computed again."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
-class Export:
+class Export(Spoken):
     """Write the grasps of a dataset that are in force closure for another program."""
 
     dataset: Positional[Path]
@@ -155,7 +152,6 @@ class Export:
     """Format: Isaac grasp files, one for each object at each friction."""
     split: SplitName | None = None
     """Export only the objects of this split; if not given, all objects."""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,8 +164,3 @@ class Dataset:
         | Annotated[Verify, subcommand("verify", prefix_name=False)]
         | Annotated[Export, subcommand("export", prefix_name=False)]
     ]
-
-    @property
-    def speech(self) -> Speech:
-        """How much the command prints."""
-        return self.action.speech

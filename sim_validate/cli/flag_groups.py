@@ -84,6 +84,13 @@ class Speech:
     """Print more, and show where an internal error happened."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spoken:
+    """The flags that every command has."""
+
+    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
+
+
 @dataclass(frozen=True, slots=True)
 class MeshLimits:
     """How large a mesh file and its contents may be."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
+from tyro.conf import Positional, UseAppendAction, arg
 
 from sim_validate.cli.flag_bounds import within
 from sim_validate.cli.flag_groups import (
@@ -17,15 +17,14 @@ from sim_validate.cli.flag_groups import (
     Jobs,
     ProtocolName,
     Seed,
-    Speech,
+    Spoken,
     Usual,
 )
 from sim_validate.parallel.processes import available_cores
 
-HandName = Annotated[str, arg(help=(
-    "The hand: allegro, allegro-urdf, leap, an MJCF or URDF file, or menagerie:NAME of the package "
-    "mujoco-menagerie."
-))]  # fmt: skip
+HandName = Annotated[
+    str, arg(help="The hand: allegro, allegro-urdf, leap, or an MJCF or URDF file.")
+]
 Fingertips = Annotated[str, arg(metavar="NAME,NAME,...", help=(
     "For a hand from a file: names of sites, geoms or bodies that are fingertips, separated by "
     "commas."
@@ -33,16 +32,15 @@ Fingertips = Annotated[str, arg(metavar="NAME,NAME,...", help=(
 
 
 @dataclass(frozen=True, slots=True)
-class Hand:
+class Hand(Spoken):
     """Show what a hand was read as: fingers, joints with ranges and torque limits, fingertips."""
 
     hand: Positional[HandName]
     fingertips: Fingertips = ""
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
-class Reach:
+class Reach(Spoken):
     """Look for poses in which a hand stands in grasps: palm pose and joints, checked exactly."""
 
     grasps: Positional[Path]
@@ -81,6 +79,5 @@ class Reach:
     limit: Count | None = None
     """Look at the first so many grasps only."""
     jobs: Jobs = field(default_factory=available_cores)
-    speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
     out: Path | None = None
     """Folder for reaches.json; if not given, no file is written."""

@@ -21,7 +21,7 @@ from sim_validate.execution.verdict import (
     held_controls_in_words,
     losses_in_words,
 )
-from sim_validate.files.result_folders import alone_in, remove_executions
+from sim_validate.files.result_folders import alone_in, remove_results
 from sim_validate.records.executions import (
     EXECUTIONS,
     executions_summary,
@@ -73,7 +73,7 @@ def execute_grasps(
 ) -> tuple[Exit, str]:  # fmt: skip
     """Execute grasps; return the exit code and the text of executions.json."""
     if folder:
-        remove_executions(folder)
+        remove_results(folder, "executions")
     changed, count = physics or {}, len(saved.grasps)
     tasks = [ExecutionJob(saved.body, g, saved.friction, settings, changed) for g in saved.grasps]
     results = reporter.counted(

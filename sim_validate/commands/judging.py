@@ -11,7 +11,7 @@ from grasp_core.hands.reach import HandReach
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.files.result_folders import JUDGEMENTS, remove_judgements
+from sim_validate.files.result_folders import JUDGEMENTS, remove_results
 from sim_validate.parallel import processes
 from sim_validate.protocols.judgements_json import judgements_summary, judgements_to_json
 from sim_validate.protocols.judging import Judgement, judge_by, judge_hand_by
@@ -53,7 +53,7 @@ def _judged(
     reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
     if folder:
-        remove_judgements(folder)
+        remove_results(folder, "judgements")
     found = processes.each(call, cases, jobs=jobs)
     results = reporter.counted("judging", found, len(cases), "passed", lambda one: one.theirs)
     text_of = partial(judgements_to_json, saved.body, saved.friction)

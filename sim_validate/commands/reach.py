@@ -35,7 +35,7 @@ from sim_validate.execution.verdict import (
     held_controls_in_words,
     loss_in_words,
 )
-from sim_validate.files.result_folders import REACHES, alone_in, remove_reaches
+from sim_validate.files.result_folders import REACHES, alone_in, remove_results
 from sim_validate.hands.execute_hand import executed_by_hand, hand_execution_settings
 from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict, validate_hand
 from sim_validate.parallel import processes
@@ -86,7 +86,7 @@ def _reach(
     command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, reporter: Reporter
 ) -> tuple[list[HandReach], HandTrials, str]:
     if command.out is not None:
-        remove_reaches(command.out)
+        remove_results(command.out, "reaches")
     asked: AskedRecord = {
         "regions": not command.contacts_only, "table_down": command.table,
         "clearance_m": command.clearance_m, "starts": command.starts, "seed": command.seed,
@@ -98,7 +98,7 @@ def _reach(
     if command.mass_kg is not None:
         asked["execution"] = asdict(hand_execution_settings(command.mass_kg).used)
     found, tried = list[HandReach](), HandTrials()
-    if jobs and must_compile(REACHING, command.jobs):
+    if saved.grasps and must_compile(REACHING, command.jobs):
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
     try:
@@ -114,7 +114,7 @@ def _reach(
         stands = sum(one.reached for one in found)
         held = len(tried.verdicts) == stands or not tries_ours(command)
         lifted = len(tried.executions) == stands or command.mass_kg is None
-        complete = len(found) == len(jobs) and held and lifted
+        complete = len(found) == len(saved.grasps) and held and lifted
         text = reaches_to_json(
             hand, saved.body, saved.friction, asked, found, complete=complete,
             grasps=saved.grasps, tried=tried,

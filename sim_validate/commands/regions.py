@@ -8,7 +8,7 @@ from grasp_core.errors import InputError
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.files.result_folders import alone_in, remove_regions
+from sim_validate.files.result_folders import alone_in, remove_results
 from sim_validate.parallel.certifying import Asked, certified
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.regions import REGIONS, write_regions
@@ -30,7 +30,7 @@ def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
     )  # fmt: skip
     with alone_in(command.out):
         if command.out is not None:
-            remove_regions(command.out)
+            remove_results(command.out, "regions")
         with reporter.progress("certifying") as steps:
             found = certified(saved.body, chosen, asked, jobs=command.jobs, progress=steps.update)
             document = write_regions(command.out, saved.body, asked, found)

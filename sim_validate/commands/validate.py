@@ -14,7 +14,7 @@ from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.objects import asked_grasps
 from sim_validate.commands.asked.trials import prepared
 from sim_validate.commands.judging import judge_grasps
-from sim_validate.files.result_folders import alone_in, remove_verdicts
+from sim_validate.files.result_folders import alone_in, remove_results
 from sim_validate.files.writing import write_arrays
 from sim_validate.records.verdicts import summary, trace_arrays, verdicts_to_json
 from sim_validate.simulation.gate import require_faithful
@@ -55,7 +55,7 @@ def simulate_grasps(
     for check in gate.checks:
         reporter.detail(str(check))
     if folder:
-        remove_verdicts(folder)
+        remove_results(folder, "verdicts")
     tasks = [Job(saved.body, g, saved.friction, agenda, setup) for g in saved.grasps]
 
     def kept(verdict: Verdict) -> bool:

@@ -24,7 +24,7 @@ from grasp_core.checked import (
     one_of,
 )
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import complaint, named_settings, settings_of, shown
+from grasp_core.files.json_text import complaint, named_settings, shown
 from grasp_core.hands.named_hands import hand_names, load_hand
 from grasp_core.objects.surface import FaceKind
 from grasp_core.planning.request import METHODS, ConeKind
@@ -36,7 +36,7 @@ from sim_validate.execution.settings import (
     asked_execution,
     execution_table,
 )
-from sim_validate.files.toml_tables import read_tables
+from sim_validate.files.toml_tables import read_tables, settings_in
 
 LEARNING = "learning"
 """Name of the table in a settings file."""
@@ -92,11 +92,6 @@ class Learning:
         least = "least_squeeze" in self.figures
         used = {"mass_near": self.mass_near, "seeds": self.seeds, "figures": least}
         return next((name for name, value in used.items() if value), "")
-
-
-def asked_learning(table: object) -> Learning:
-    """Read the table `[learning]` of a settings file."""
-    return settings_of(Learning, named_settings(table, Learning, LEARNING), [LEARNING])
 
 
 def learning_table(asked: Learning) -> dict[str, Any]:
@@ -203,16 +198,16 @@ def config_from_toml(path: Path) -> DatasetConfig:
 def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
     """Build a configuration from named settings with the types that TOML has."""
     given = named_settings(given, DatasetConfig, "the settings")
-    tables = {TABLE: asked_execution, LEARNING: asked_learning}
-    own = {name: value for name, value in given.items() if name not in tables}
+    own = {name: value for name, value in given.items() if name not in (TABLE, LEARNING)}
     try:
         config = TypeAdapter(DatasetConfig).validate_json(json.dumps(own), strict=True)
     except ValidationError as error:
         raise InputError(complaint(error, DatasetConfig)) from error
-    more: dict[str, Any] = {
-        name: read(given[name]) for name, read in tables.items() if name in given
-    }
-    return replace(config, **more)
+    if TABLE in given:
+        config = replace(config, execution=asked_execution(given[TABLE]))
+    if LEARNING in given:
+        config = replace(config, learning=settings_in(Learning, given[LEARNING], LEARNING))
+    return config
 
 
 def _is_date(text: str) -> bool:
@@ -255,10 +250,6 @@ def _as_toml(value: object) -> str:
 
 def quoted(text: str) -> str:
     """Write a text as a basic string of TOML, printable and on one line; YAML reads it alike."""
-    return '"' + "".join(map(_escaped, text)) + '"'
-
-
-def _escaped(letter: str) -> str:
-    if letter in '"\\':
-        return "\\" + letter
-    return letter if letter.isprintable() else f"\\U{ord(letter):08x}"
+    plain = text.replace("\\", "\\\\").replace('"', '\\"')
+    letters = (c if c.isprintable() else f"\\U{ord(c):08x}" for c in plain)
+    return f'"{"".join(letters)}"'

@@ -1,6 +1,6 @@
 """Computes one unit of work: grasps are planned or given, simulated, and turned into rows."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,8 +12,7 @@ from grasp_core.values import Grasp
 from sim_validate.datasets.figures import Executed, executed_by
 from sim_validate.datasets.given_contacts import GivenGrasp
 from sim_validate.datasets.meshes import mesh_path, mesh_text
-from sim_validate.datasets.rows import GIVEN, GraspRows, Row, Rows, object_row
-from sim_validate.datasets.tables import Column
+from sim_validate.datasets.rows import GIVEN, GraspRows, Rows, object_row
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.datasets.varied import Varying, validated_with
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
@@ -47,15 +46,13 @@ def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
         "executions": tuple(found.executions),
     }  # fmt: skip
     rows: Rows = {
-        name: tuple(only(row, columns) for row in every[name])
+        name: tuple(
+            {each.name: row[each.name] for each in columns if each.name in row}
+            for row in every[name]
+        )
         for name, columns in unit.config.tables.items()
     }
     return Made(body.content_sha256, row["split"], rows, making.files)
-
-
-def only(row: Row, columns: Iterable[Column]) -> Row:
-    """Return the cells of a row that its table has columns for."""
-    return {each.name: row[each.name] for each in columns if each.name in row}
 
 
 class _Making:
@@ -93,7 +90,6 @@ class _Making:
                 self.found.add_untried(given, str(error))
 
     def _judge(self, given: GivenGrasp) -> None:
-        """Simulate a given grasp: as a grasp if force-closed, else as a negative control."""
         friction = self.unit.friction
         seated = seat(self.body, given.points, given.normals)
         grasp = grasp_of(seated, friction, given.id)

@@ -4,7 +4,7 @@ import hashlib
 import json
 from pathlib import Path
 
-from grasp_core.errors import InputError, MeshError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import record_of
 from grasp_core.mesh_files.reading import MeshFile, read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, MeshChoices, content_hash
@@ -15,8 +15,6 @@ from grasp_core.records.grasps_schema import SurfaceRecord
 from sim_validate.files.paths import path_inside
 
 FOLDER = "meshes"
-
-
 SURFACE = "# surface "
 """Beginning of the first line, a comment that says what is known of the triangles."""
 
@@ -53,19 +51,12 @@ def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Pol
     """Read an object of a dataset from its canonical mesh."""
     path, mesh = mesh_path(folder, object_id), stored_surface(folder, object_id)
     said, known = mesh.data.partition(b"\n")[0].decode("utf-8", "replace"), None
-    try:
+    with about(path):
         if said.startswith(SURFACE):
-            record = record_of(SurfaceRecord, said.removeprefix(SURFACE), "surface")
-            known = surface_of_record(record)
+            with about("first line"):
+                record = record_of(SurfaceRecord, said.removeprefix(SURFACE), "surface")
+                known = surface_of_record(record)
         return polyhedron_from_mesh(
-            mesh.vertices,
-            mesh.triangles,
-            MeshChoices(faces),
-            name=name,
-            source_sha256=hashlib.sha256(mesh.data).hexdigest(),
-            known=known,
-        )
-    except MeshError as error:
-        raise MeshError(error.reason, f"{path}: {error.message}") from error
-    except InputError as error:
-        raise InputError(f"{path}, first line: {error}") from error
+            mesh.vertices, mesh.triangles, MeshChoices(faces), name=name,
+            source_sha256=hashlib.sha256(mesh.data).hexdigest(), known=known,
+        )  # fmt: skip

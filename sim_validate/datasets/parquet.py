@@ -110,7 +110,13 @@ def _opened(path: Path, name: Name, tables: Tables) -> Generator[Any]:
     arrow, parquet = pyarrow(), pyarrow_parquet()
     try:
         with parquet.ParquetFile(path, page_checksum_verification=True) as file:
-            _check_columns(path, file.schema_arrow, name, tables)
+            came, wanted = file.schema_arrow, schema_of(tables[name])
+            if came.names != wanted.names or came.types != wanted.types:
+                what = "column types" if came.names == wanted.names else "columns"
+                raise InputError(
+                    f"{path}: expected the {what} of the table {name} in this version of "
+                    "graspproof, got others; build the dataset again"
+                )
             _check_size(path, file.metadata)
             yield file
     # ValueError: also for names that are not valid text
@@ -119,16 +125,6 @@ def _opened(path: Path, name: Name, tables: Tables) -> Generator[Any]:
         raise InputError(
             f"{path}: this file is not Parquet, or is damaged ({said}); copy the dataset again"
         ) from error
-
-
-def _check_columns(path: Path, came: Any, name: Name, tables: Tables) -> None:
-    wanted = schema_of(tables[name])
-    if came.names != wanted.names or came.types != wanted.types:
-        what = "column types" if came.names == wanted.names else "columns"
-        raise InputError(
-            f"{path}: expected the {what} of the table {name} in this version of graspproof, got "
-            "others; build the dataset again"
-        )
 
 
 def _check_size(path: Path, claimed: Any) -> None:
@@ -180,16 +176,14 @@ def _cell(value: Any) -> Any:
 def schema_of(columns: tuple[Column, ...]) -> Any:
     """Return columns of a table as an Arrow schema, with units and meanings as metadata."""
     arrow = pyarrow()
-    return arrow.schema([_field(column) for column in columns])
-
-
-def _field(column: Column) -> Any:
-    arrow = pyarrow()
-    kind = getattr(arrow, TYPES[column.kind])()
-    for size in reversed(column.shape):
-        kind = arrow.list_(kind, size)
-    about = {"meaning": column.meaning} | ({"unit": column.unit} if column.unit else {})
-    return arrow.field(column.name, kind, metadata=about)
+    found = list[Any]()
+    for column in columns:
+        kind = getattr(arrow, TYPES[column.kind])()
+        for size in reversed(column.shape):
+            kind = arrow.list_(kind, size)
+        about = {"meaning": column.meaning} | ({"unit": column.unit} if column.unit else {})
+        found.append(arrow.field(column.name, kind, metadata=about))
+    return arrow.schema(found)
 
 
 class TableFiles:

@@ -1,7 +1,7 @@
 """Makes the row of an object, and chooses its split by the hash of its mesh."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -22,8 +22,8 @@ from sim_validate.datasets.given_contacts import GivenGrasp
 from sim_validate.datasets.tables import SPLITS, Name, id_beginning
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.datasets.varied import VARIED, Tried, ratio_of
-from sim_validate.simulation.traces import HoldVerdict, Outcome
-from sim_validate.validation.controls import ControlVerdict
+from sim_validate.simulation.traces import Outcome
+from sim_validate.validation.controls import ControlTrial, ControlVerdict
 from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 Row: TypeAlias = Mapping[str, Any]
@@ -179,7 +179,7 @@ class GraspRows:
             }
         )
         self._add_executions(name, executed)
-        self._add_trials(name, verdict.wrenches, _wrench_row)
+        self._add_trials(name, verdict.wrenches)
         for control in verdict.controls:
             kind = control.control.name
             said = {
@@ -209,7 +209,7 @@ class GraspRows:
             }
         )
         self._add_executions(name, executed)
-        self._add_trials(name, verdict.tried, lambda _: {})
+        self._add_trials(name, verdict.tried)
 
     def _add_executions(self, name: str, executed: Executed) -> None:
         asked = self.unit.config.execution
@@ -257,36 +257,25 @@ class GraspRows:
         }
 
     def _add_trials(
-        self, name: str, tried: Iterable[Any], more: Callable[[Any], dict[str, Any]]
+        self, name: str, tried: Sequence[WrenchVerdict] | Sequence[ControlTrial]
     ) -> None:
         for number, trial in enumerate(tried):
-            self.trials.append(
-                {
-                    "grasp_id": name,
-                    "trial": number,
-                    "name": trial.name,
-                    "wrench_n_nm": trial.wrench.tolist(),
-                    "required_friction": trial.required_friction,
-                    **_hold_row(trial.hold),
-                    **more(trial),
-                }
-            )
-
-
-def _wrench_row(trial: WrenchVerdict) -> dict[str, Any]:
-    found, predicted = trial.simulated_limit, trial.predicted_limit
-    return {
-        "predicted_limit": predicted,
-        "simulated_limit": None if found is None else found.share * predicted,
-    }
-
-
-def _hold_row(hold: HoldVerdict) -> dict[str, Any]:
-    return {
-        "outcome": hold.outcome.value,
-        "reason": hold.reason,
-        "displacement_m": hold.displacement_m,
-        "rotation_rad": hold.rotation_rad,
-        "slip_m": for_fingers(hold.slip_m.tolist(), None),
-        "failed_after_s": hold.failed_after_s,
-    }
+            hold = trial.hold
+            row: dict[str, Any] = {
+                "grasp_id": name,
+                "trial": number,
+                "name": trial.name,
+                "wrench_n_nm": trial.wrench.tolist(),
+                "required_friction": trial.required_friction,
+                "outcome": hold.outcome.value,
+                "reason": hold.reason,
+                "displacement_m": hold.displacement_m,
+                "rotation_rad": hold.rotation_rad,
+                "slip_m": for_fingers(hold.slip_m.tolist(), None),
+                "failed_after_s": hold.failed_after_s,
+            }
+            if isinstance(trial, WrenchVerdict):
+                found, predicted = trial.simulated_limit, trial.predicted_limit
+                row["predicted_limit"] = predicted
+                row["simulated_limit"] = None if found is None else found.share * predicted
+            self.trials.append(row)

@@ -99,26 +99,20 @@ def units_of(config: DatasetConfig) -> list[WorkUnit]:
     """Split a configuration into units of work, each one object at one friction, sorted by name."""
     hashes = {name: _source_sha256(name) for name in config.objects}
     paths = {name: Path(name).resolve() if is_mesh_file(name) else None for name in hashes}
+    parts: list[tuple[GivenGrasp, ...]] = [()]
+    if config.contacts:
+        given = read_given(Path(config.contacts), outward=config.outward)
+        parts = [given[i : i + PART] for i in range(0, len(given), PART)]
     units = [
-        WorkUnit(name, paths[name], hashes[name], friction, of_unit(config, name, friction), part)
+        WorkUnit(
+            name, paths[name], hashes[name], friction,
+            replace(config, objects=(name,), frictions=(friction,)), part,
+        )
         for name in config.objects
         for friction in config.frictions
-        for part in _parts(config)
-    ]
+        for part in parts
+    ]  # fmt: skip
     return sorted(units, key=lambda unit: unit.id)
-
-
-def of_unit(config: DatasetConfig, name: str, friction: float) -> DatasetConfig:
-    """Return the settings of one unit, whose size does not grow with the number of objects."""
-    return replace(config, objects=(name,), frictions=(friction,))
-
-
-def _parts(config: DatasetConfig) -> list[tuple[GivenGrasp, ...]]:
-    """Divide the given grasps among units; one empty part if grasps are planned."""
-    if not config.contacts:
-        return [()]
-    given = read_given(Path(config.contacts), outward=config.outward)
-    return [given[i : i + PART] for i in range(0, len(given), PART)]
 
 
 def body_of(unit: WorkUnit) -> Polyhedron:

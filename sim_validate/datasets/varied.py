@@ -118,27 +118,6 @@ def variants(
         yield from _moved(body, grasp, friction, number, draws(seed, grasp.id, "moved_out", number))
 
 
-def with_mass(variant: Variant, lost_kg: float, rng: np.random.Generator) -> Variant | None:
-    """Return a variant with a mass near the one at which the object is predicted to be lost.
-
-    Takes `lost_kg` [kg]. Gives the variant; None if that mass is zero or infinite.
-    """
-    mass_kg = _short(_ratio("mass_near", rng) * lost_kg)
-    if not 0.0 < mass_kg < math.inf:
-        return None
-    return replace(variant, mass_kg=mass_kg, mass_ratio=mass_kg / lost_kg)
-
-
-def unmoved(body: Polyhedron, grasp: Grasp, friction: float, number: int) -> Variant:
-    """Return a grasp as it is, of which only the mass is to be varied."""
-    at = Seated(body, grasp.faces, grasp.contacts, 0.0)
-    kind = "mass_near"
-    return Variant(
-        f"{kind}-{number}", kind, at, friction, grasp, np.zeros(FINGERS), UNMOVED,
-        grasp.critical_friction,
-    )  # fmt: skip
-
-
 def draws(seed: int, grasp: str, kind: str, number: int) -> np.random.Generator:
     """Return the generator of one varied grasp's draws."""
     digest = hashlib.sha256(f"{seed} {grasp} {kind} {number}".encode()).digest()
@@ -282,11 +261,16 @@ class Varying:
         if not isinstance(executed, ExecutedGrasp) or executed.execution is None:
             return
         lost_kg = executed.least_predicted_loss * executed.execution.mass_kg
-        alone = replace(verdict, controls=())
+        alone, kind = replace(verdict, controls=()), "mass_near"
+        at = Seated(body, grasp.faces, grasp.contacts, 0.0)
         for number in range(self.asked.mass_near):
-            rng = draws(self.agenda.seed, grasp.id, "mass_near", number)
-            each = with_mass(unmoved(body, grasp, self.friction, number), lost_kg, rng)
-            if each is not None:
+            rng = draws(self.agenda.seed, grasp.id, kind, number)
+            mass_kg = _short(_ratio(kind, rng) * lost_kg)
+            if 0.0 < mass_kg < math.inf:
+                each = Variant(
+                    f"{kind}-{number}", kind, at, self.friction, grasp, np.zeros(FINGERS), UNMOVED,
+                    grasp.critical_friction, mass_kg, mass_kg / lost_kg,
+                )  # fmt: skip
                 yield Tried(each, alone, self._executed(each))
 
     def _verdict(self, variant: Variant, gate: Gate) -> Verdict | ControlVerdict:

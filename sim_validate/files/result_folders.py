@@ -15,6 +15,7 @@ from collections.abc import Generator, Iterable
 from contextlib import contextmanager, suppress
 from itertools import chain
 from pathlib import Path
+from typing import Literal, TypeAlias
 
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import UNFINISHED, remove_unfinished, write_text
@@ -22,10 +23,21 @@ from grasp_core.files.text_files import UNFINISHED, remove_unfinished, write_tex
 REPORT, INDEX, GRASPS = "report", "index.html", "grasps"
 STYLE = "style.css"
 STATIC = (STYLE, "gallery.js", "tables.js", "turntable.js")
-OF_GRASPS = ("transfer.json", "grasps.json")
 BEST = ("best.json", "best-proof.npz")
 REACHES = "reaches.json"
 JUDGEMENTS = "judgements.json"
+Kind: TypeAlias = Literal["verdicts", "regions", "executions", "reaches", "judgements", "grasps"]
+FILES: dict[Kind, tuple[str, ...]] = {
+    "verdicts": ("verdicts.json",), "regions": ("regions.json",),
+    "executions": ("executions.json",), "reaches": (REACHES,), "judgements": (JUDGEMENTS,),
+    "grasps": ("transfer.json", "grasps.json", *BEST),
+}  # fmt: skip
+OF_EACH_GRASP: dict[Kind, tuple[str, str, bytes]] = {
+    "verdicts": ("traces", ".npz", b".times_s.npy"),
+    "regions": ("proofs", ".npz", b"object_sha256.npy"),
+    "grasps": ("scenes", ".xml", b"`graspproof scene"),
+}
+"""Folder, ending and distinctive bytes of those files of which each grasp has one."""
 PICTURES, CLIPS = "pictures", "clips"
 MARK = ".graspproof-report"
 MARKED = "The pages here were written by graspproof, which may replace them.\n"
@@ -36,56 +48,17 @@ PARTS = ("scenes", "traces", "proofs", *PAGES, *(f"{REPORT}/{part}" for part in 
 """Subfolders into which commands write."""
 
 
-def remove_results(folder: Path) -> None:
-    """Remove grasps and all results about them."""
-    remove_verdicts(folder)
-    remove_regions(folder)
-    remove_executions(folder)
-    remove_reaches(folder)
-    remove_judgements(folder)
-    _remove(
-        [
-            *_of_grasps(folder / "scenes", ".xml", b"`graspproof scene"),
-            *(folder / name for name in (*OF_GRASPS, *BEST)),
-        ]
-    )
-
-
-def remove_verdicts(folder: Path) -> None:
-    """Remove verdicts, their traces, and pages that show them."""
+def remove_results(folder: Path, kind: Kind = "grasps") -> None:
+    """Remove results of one kind, and pages that show them; grasps take all other kinds along."""
     remove_report(folder / REPORT)
-    _remove([folder / "verdicts.json", *_of_grasps(folder / "traces", ".npz", b".times_s.npy")])
-
-
-def remove_regions(folder: Path) -> None:
-    """Remove certified regions, their proofs, and pages that show them."""
-    remove_report(folder / REPORT)
-    _remove([folder / "regions.json", *_of_grasps(folder / "proofs", ".npz", b"object_sha256.npy")])
-
-
-def remove_executions(folder: Path) -> None:
-    """Remove the results of executed grasps, and pages that show them."""
-    remove_report(folder / REPORT)
-    _remove([folder / "executions.json"])
-
-
-def remove_reaches(folder: Path) -> None:
-    """Remove the poses of a hand in grasps, and pages that show them."""
-    remove_report(folder / REPORT)
-    _remove([folder / REACHES])
-
-
-def remove_judgements(folder: Path) -> None:
-    """Remove what published tests say of grasps, and pages that show it."""
-    remove_report(folder / REPORT)
-    _remove([folder / JUDGEMENTS])
-
-
-def _of_grasps(folder: Path, suffix: str, mark: bytes) -> list[Path]:
-    return [
-        path for path in folder.glob(f"*{suffix}")
-        if ID.fullmatch(path.stem) or (path.is_file() and mark in path.read_bytes())
-    ]  # fmt: skip
+    for each in FILES if kind == "grasps" else (kind,):
+        _remove(folder / name for name in FILES[each])
+        if each in OF_EACH_GRASP:
+            part, suffix, mark = OF_EACH_GRASP[each]
+            _remove([
+                path for path in (folder / part).glob(f"*{suffix}")
+                if ID.fullmatch(path.stem) or (path.is_file() and mark in path.read_bytes())
+            ])  # fmt: skip
 
 
 def _remove(paths: Iterable[Path]) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -30,15 +31,6 @@ class Asked:
     max_cones: int = CONES
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Task:
-    """One grasp whose regions are to be certified, as it is sent to a worker process."""
-
-    body: Polyhedron
-    grasp: Grasp
-    asked: Asked
-
-
 def certified(
     body: Polyhedron, grasps: Sequence[Grasp], asked: Asked, *, jobs: int,
     progress: Callable[[int, int], None],
@@ -47,20 +39,19 @@ def certified(
 
     Takes `progress` (done, total).
     """
-    tasks = [_Task(body, grasp, asked) for grasp in grasps]
-    for done, found in enumerate(zip(grasps, each(_certify, tasks, jobs=jobs), strict=True)):
-        progress(done + 1, len(tasks))
+    proofs = each(partial(_certify, body, asked), grasps, jobs=jobs)
+    for done, found in enumerate(zip(grasps, proofs, strict=True), start=1):
+        progress(done, len(grasps))
         yield found
 
 
-def _certify(task: _Task) -> CertifiedRegions | str:
-    asked, grasp = task.asked, task.grasp
+def _certify(body: Polyhedron, asked: Asked, grasp: Grasp) -> CertifiedRegions | str:
     left = asked.friction * (1.0 - asked.reserve)
     try:
         if not force_closure(grasp.positions, grasp.normals, left).closed:
             return f"not in force closure at friction {left:.6g}"
         proved = certify_regions(
-            task.body, grasp, asked.friction, reserve=asked.reserve, recenter=asked.recenter,
+            body, grasp, asked.friction, reserve=asked.reserve, recenter=asked.recenter,
             clearance=asked.clearance, max_cones=asked.max_cones,
         )  # fmt: skip
     except (UndecidedError, SolverError) as error:

@@ -1,12 +1,13 @@
 """Moves the contacts of a plan's grasps on their faces to raise their quality, in parallel."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.better_contacts import Improvement, optimize_contacts
+from grasp_core.optimizing.better_contacts import optimize_contacts
 from grasp_core.optimizing.ceiling import quality_ceiling
 from grasp_core.planning.result import Moved, Plan
 from grasp_core.values import Grasp
@@ -17,19 +18,6 @@ SAME_CONTACTS = 0.01
 optimum end some thousandths from it."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Task:
-    """One grasp whose contacts are to be moved, as it is sent to a worker process."""
-
-    body: Polyhedron
-    grasp: Grasp
-    friction: float
-    finger_radius: float | None
-    seed: int
-    parts: int | None
-    """Largest number of cases for the bound; None for no bound."""
-
-
 def improved(
     body: Polyhedron, found: Plan, *, finger_radius: float | None, parts: int | None, jobs: int,
     progress: Callable[[int, int, str], None],
@@ -38,17 +26,15 @@ def improved(
 
     The plan keeps only one of several grasps that end at the same contacts.
 
-    Takes `finger_radius` [m]; `progress` (done, total, how many are raised).
+    Takes `finger_radius` [m]; `parts`, the largest number of cases for the bound, None for no
+    bound; `progress` (done, total, how many are raised).
     """
-    tasks = [
-        _Task(body, grasp, found.friction, finger_radius, found.seed, parts)
-        for grasp in found.grasps
-    ]
+    improve = partial(_improve, body, found.friction, finger_radius, found.seed, parts)
     done: list[tuple[Grasp, Moved]] = []
-    for grasp, moved in each(_improve, tasks, jobs=jobs):
+    for grasp, moved in each(improve, found.grasps, jobs=jobs):
         done.append((grasp, moved))
         raised = sum(one.gain > 1.0 for _, one in done)
-        progress(len(done), len(tasks), f"({raised} raised)")
+        progress(len(done), len(found.grasps), f"({raised} raised)")
     done.sort(key=lambda pair: -pair[0].ferrari_canny[0])
     kept: list[Grasp] = []
     for grasp, _ in done:
@@ -64,19 +50,19 @@ def _same_contacts(one: Grasp, two: Grasp, slack: float) -> bool:
     return faces and float(np.abs(one.positions[order] - two.positions[other]).max()) <= slack
 
 
-def _improve(task: _Task) -> tuple[Grasp, Moved]:
-    found: Improvement = optimize_contacts(
-        task.body, task.grasp, task.friction, finger_radius=task.finger_radius, seed=task.seed
-    )
+def _improve(
+    body: Polyhedron, friction: float, finger_radius: float | None, seed: int, parts: int | None,
+    grasp: Grasp,
+) -> tuple[Grasp, Moved]:  # fmt: skip
+    found = optimize_contacts(body, grasp, friction, finger_radius=finger_radius, seed=seed)
     ceiling = None
-    if task.parts is not None:
+    if parts is not None:
         ceiling = quality_ceiling(
-            task.body, task.grasp.faces, task.friction, known=found.after.lower,
-            finger_radius=found.clearances, parts=task.parts,
+            body, grasp.faces, friction, known=found.after.lower,
+            finger_radius=found.clearances, parts=parts,
         ).upper  # fmt: skip
     before, after = found.before, found.after
     moved = Moved(
-        found.grasp.id, task.grasp.id, (before.lower, before.upper), (after.lower, after.upper),
-        ceiling,
-    )  # fmt: skip
+        found.grasp.id, grasp.id, (before.lower, before.upper), (after.lower, after.upper), ceiling
+    )
     return found.grasp, moved

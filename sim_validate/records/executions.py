@@ -5,7 +5,7 @@ never comes is infinite.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, cast
@@ -228,9 +228,9 @@ def _record(grasp: ExecutedGrasp) -> ExecutionRecord:
         "squeeze_n": None if found is None else found.squeeze.tolist(),
         "tip_radius_m": tip_radii(found),
         "enough": enough_record(grasp.enough),
-        "trials": _records(grasp.trials),
-        "controls": _records(() if found is None else found.controls),
-        "skipped": _records(() if found is None else found.skipped),
+        "trials": [cast("Any", asdict(each)) for each in grasp.trials],
+        "controls": [] if found is None else [cast("Any", asdict(c)) for c in found.controls],
+        "skipped": [] if found is None else [cast("Any", asdict(s)) for s in found.skipped],
         "physics": None if found is None or found.physics is None else found.physics.record(),
     }
 
@@ -246,11 +246,6 @@ def enough_record(found: Enough | None) -> EnoughRecord | None:
     if found is None:
         return None
     return cast("EnoughRecord", finite(asdict(found)))
-
-
-def _records(values: Sequence[Any]) -> list[Any]:
-    """Write trials, controls or what was skipped: every field, by its name."""
-    return [asdict(value) for value in values]
 
 
 def load_executions(path: str | Path) -> Executions:
@@ -317,7 +312,12 @@ def _grasp(record: ExecutionRecord, settings: ExecutionSettings, where: Where) -
     if record["reason"] is None:
         found = replace(_execution(record, settings, where), enough=enough)
     else:
-        _require_nothing(record, where)
+        for name, result in record.items():
+            if name in RESULTS and result not in (None, []):
+                raise InputError(
+                    f"{place([*where, name])}: expected nothing (null or an empty list) beside a "
+                    "reason"
+                )
     grasp = ExecutedGrasp(
         record["id"], record["family"], record["contacts_sha256"], found, record["reason"], enough
     )
@@ -341,14 +341,6 @@ def enough_of(record: EnoughRecord | None, where: Where) -> Enough | None:
             record["load_multiple"], push, record["stiffness_n_per_m"],
             loss if push is None or loss is not None else math.inf, record["reason"],
         )  # fmt: skip
-
-
-def _require_nothing(record: ExecutionRecord, where: Where) -> None:
-    for name, result in record.items():
-        if name in RESULTS and result not in (None, []):
-            raise InputError(
-                f"{place([*where, name])}: expected nothing (null or an empty list) beside a reason"
-            )
 
 
 def _execution(record: ExecutionRecord, settings: ExecutionSettings, where: Where) -> Execution:

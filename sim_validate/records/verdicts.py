@@ -235,16 +235,37 @@ def gate_record(gate: Gate) -> GateRecord:
 
 def summary(verdicts: Iterable[Verdict]) -> Summary:
     """Count grasps that held, negative controls that let go, and contradictions."""
-    listed = list(verdicts)
-    controls = [control for verdict in listed for control in verdict.controls]
+    return _summary([
+        (each.held, [(one.held, one.let_go) for one in each.controls], len(each.mismatches))
+        for each in verdicts
+    ])  # fmt: skip
+
+
+def recorded_summary(verdicts: Iterable[VerdictRecord]) -> Summary:
+    """Count the same in recorded verdicts."""
+    return _summary([
+        (each["held"], [(one["held"], let_go(one)) for one in each["controls"].values()],
+         len(each["mismatches"]))
+        for each in verdicts
+    ])  # fmt: skip
+
+
+def _summary(ended: Sequence[tuple[bool, Sequence[tuple[bool, bool]], int]]) -> Summary:
+    """Count grasps by whether each held, its controls (held, let go), and its contradictions."""
+    controls = [control for _, own, _ in ended for control in own]
     return {
-        "grasps": len(listed),
-        "grasps_held": sum(verdict.held for verdict in listed),
+        "grasps": len(ended),
+        "grasps_held": sum(held for held, _, _ in ended),
         "controls": len(controls),
-        "controls_held": sum(control.held for control in controls),
-        "controls_let_go": sum(control.let_go for control in controls),
-        "mismatches": sum(len(verdict.mismatches) for verdict in listed),
+        "controls_held": sum(held for held, _ in controls),
+        "controls_let_go": sum(let_go for _, let_go in controls),
+        "mismatches": sum(count for _, _, count in ended),
     }
+
+
+def let_go(control: Mapping[str, Any]) -> bool:
+    """Tell whether every load moved the object of a recorded negative control, as it must."""
+    return all(trial["outcome"] in LET_GO for trial in control["wrenches"])
 
 
 def _verdict_record(body: Polyhedron, verdict: Verdict) -> VerdictRecord:
@@ -471,11 +492,7 @@ def _verdict(record: VerdictRecord) -> SavedVerdict:
         held=record["held"],
         outcome=record["outcome"],
         mismatches=tuple(record["mismatches"]),
-        controls_let_go=all(
-            trial["outcome"] in LET_GO
-            for control in record["controls"].values()
-            for trial in control["wrenches"]
-        ),
+        controls_let_go=all(map(let_go, record["controls"].values())),
         predicted_critical_friction=friction["predicted"],
         simulated_critical_friction=friction["simulated"],
         displacement_m=max((trial["displacement_m"] or 0.0 for trial in trials), default=0.0),
@@ -493,7 +510,7 @@ def verdicts_of(text: str) -> VerdictsFile:
                 f"verdicts[{number}].{name}: {found} contradicts {why}; write the file again, or "
                 "remove it"
             )
-    for name, count in _counts(verdicts).items():
+    for name, count in recorded_summary(verdicts).items():
         if record["summary"][name] != count:
             raise InputError(
                 f"summary.{name}: expected {count}, as the verdicts say, got "
@@ -517,17 +534,3 @@ def _contradictions(verdict: VerdictRecord) -> Iterator[tuple[str, object, str]]
     repeats = verdict.get("robustness")
     if repeats and repeats["held"] + len(repeats["not_held"]) != repeats["trials"]:
         yield "robustness.held", repeats["held"], "the number of repeats and those not held"
-
-
-def _counts(verdicts: Sequence[VerdictRecord]) -> dict[str, int]:
-    controls = [control for verdict in verdicts for control in verdict["controls"].values()]
-    return {
-        "grasps": len(verdicts),
-        "grasps_held": sum(each["held"] for each in verdicts),
-        "controls": len(controls),
-        "controls_held": sum(each["held"] for each in controls),
-        "controls_let_go": sum(
-            all(trial["outcome"] in LET_GO for trial in each["wrenches"]) for each in controls
-        ),
-        "mismatches": sum(len(each["mismatches"]) for each in verdicts),
-    }

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from sim_validate.records.verdicts import let_go
 from sim_validate.simulation.traces import LET_GO, Outcome
 from sim_validate.validation.verdict import AGREEMENT
 
@@ -127,8 +128,3 @@ def said_of(verdict: Record | None) -> tuple[str, str]:
     if not all(map(let_go, controls)):
         return "a negative control is undecided", BAD
     return outcome.replace("_", " "), GOOD if verdict["held"] else BAD
-
-
-def let_go(control: Record) -> bool:
-    """Tell whether every load moved the object of a negative control, as it must."""
-    return all(trial["outcome"] in GONE for trial in control["wrenches"])

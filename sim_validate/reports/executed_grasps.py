@@ -175,7 +175,10 @@ def _facts(executions: Executions, found: Execution | None) -> Iterable[tuple[st
     settings = executions.settings
     yield "Mass", f"{settings.mass_kg:.4g} kg, at friction {executions.friction:g}"
     yield "Push of a finger", f"at most {settings.push_n:.4g} N"
-    yield "Springs", _springs(settings, found)
+    tips = f"fingertips of {MILLI * settings.hand.tip_mass_kg:.4g} g"
+    if found is not None and found.tip_radius_m is not None:
+        tips += f" and {MILLI * float(found.tip_radius_m.max()):.4g} mm radius"
+    yield "Springs", f"{settings.stiffness_n_per_m:.5g} N/m, {tips}"
     yield "Counts as held", f"up to {settings.most_mm:g} mm and {settings.most_deg:g} deg"
     if found is not None:
         sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(found.squeeze, axis=1))
@@ -190,13 +193,6 @@ def _facts(executions: Executions, found: Execution | None) -> Iterable[tuple[st
             yield "So the palm may accelerate by", spare
         if found.enough is not None:
             yield "What would be enough", str(found.enough)
-
-
-def _springs(settings: ExecutionSettings, found: Execution | None) -> str:
-    tips = f"fingertips of {MILLI * settings.hand.tip_mass_kg:.4g} g"
-    if found is not None and found.tip_radius_m is not None:
-        tips += f" and {MILLI * float(found.tip_radius_m.max()):.4g} mm radius"
-    return f"{settings.stiffness_n_per_m:.5g} N/m, {tips}"
 
 
 def _trial(trial: ExecutionTrial, settings: ExecutionSettings) -> Record:

@@ -4,7 +4,6 @@ import math
 import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
@@ -12,9 +11,10 @@ from grasp_core.arrays import Array
 from grasp_core.cones.spanning import angles_between
 from grasp_core.values import Grasp
 from scenes.drawing.pages import NOTHING, number
-from scenes.drawing.turntable import as_text, grasp_data
+from scenes.drawing.turntable import Fact, as_text, grasp_data, grasp_facts
 from sim_validate.records.best import BestFile, shares_of_bound
-from sim_validate.reports.agreement import BAD, GOOD, Record, as_predicted, let_go, wrench_size
+from sim_validate.records.verdicts import let_go
+from sim_validate.reports.agreement import BAD, GOOD, Record, as_predicted, wrench_size
 from sim_validate.reports.drawn_grasps import Drawn, certified, largest_push
 from sim_validate.reports.executed_grasps import execute_command, execution_section, said_of_both
 from sim_validate.reports.pages import page
@@ -24,19 +24,11 @@ from sim_validate.reports.run_folder import GRASPS, RunFolder
 MILLI, MICRO, PERCENT = 1e3, 1e6, 100.0
 ROTATED, MIRRORED = "rotated", "mirrored"
 """Kinds of copies of a grasp, as the pages call them."""
-Fact: TypeAlias = tuple[str, str, str]
 FAMILIES = {
     "concurrent": "the lines of force meet in one point",
     "pencil": "two pairs of lines, which meet in points of a common line",
     "regulus": "the lines of force are skew and lie on one ruled surface",
 }
-DISC = "radius of the largest disc that fits each region: there every finger may stand anywhere"
-CRITICAL = "least coefficient with which the contacts are in force closure; 0: none is needed"
-MARGIN = "how far inside their friction cones balanced forces can be, with normal parts of sum 1"
-QUALITY = (
-    "largest wrench resisted in every direction, with normal forces of sum 1 N; torques over the "
-    "object's radius"
-)
 SPAN = (
     "half-angle of the widest cones around the normals of which any choice of directions "
     "positively spans space; 0: none do, and the force cones lean"
@@ -125,19 +117,9 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[Fac
     planned = run.saved.friction
     at_plan = "" if planned == run.friction else f", at friction {planned:g} as planned"
     yield "Family", grasp.family, FAMILIES[grasp.family]
-    yield (
-        "Faces" if run.saved.body.patches is None else "Patches",
-        ", ".join(map(str, grasp.faces)), "numbers of those that the fingers stand on, by finger",
-    )  # fmt: skip
-    disc = f"{number(MILLI * grasp.radius)} mm{at_plan}" if grasp.radius else "none is claimed"
-    yield "Smallest independent disc", disc, DISC
     simulated = None if verdict is None else verdict["critical_friction"]["simulated"]
     in_simulation = "" if simulated is None else f", in simulation {number(simulated)}"
-    yield "Critical friction", f"{number(grasp.critical_friction)}{in_simulation}", CRITICAL
-    yield "Margin of closure", f"{number(grasp.closure_margin)}{at_plan}", MARGIN
-    lower, upper = map(number, grasp.ferrari_canny)
-    between = lower if lower == upper else f"{lower} to {upper}"
-    yield "Ferrari-Canny quality", f"{between} N{at_plan}", QUALITY
+    yield from grasp_facts(run.saved.body, grasp, at_plan=at_plan, in_simulation=in_simulation)
     yield from possible_facts(run.possible, grasp.id)
     yield "Normals span up to", f"{number(math.degrees(grasp.span_angle))}°", SPAN
     for place, focus in enumerate(grasp.focus_points):

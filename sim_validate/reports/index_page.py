@@ -10,19 +10,15 @@ from grasp_core.values import Grasp
 from scenes.drawing.pages import number
 from scenes.drawing.sheets import svg_of
 from sim_validate.records.best import BestFile, shares_of_bound
+from sim_validate.records.verdicts import let_go
 from sim_validate.reports.agreement import (
     Record,
     frictions_in,
-    let_go,
     limits_in,
     quadrants_in,
     wrench_size,
 )
-from sim_validate.reports.charts.run_charts import (
-    fidelity_panels,
-    survival_sentence,
-    survival_sheet,
-)
+from sim_validate.reports.charts.run_charts import fidelity_panel
 from sim_validate.reports.executed_grasps import (
     described_executions,
     execution_row,
@@ -101,15 +97,11 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         tried=bool(verdicts),
         quadrants=quadrants_in(verdicts),
         agreements=found,
-        fidelity=list(map(svg_of, fidelity_panels(found))) if verdicts else [],
+        fidelity=[svg_of(fidelity_panel(each)) for each in found] if verdicts else [],
         limits=bool(limits.pairs),
         mismatches=[f"{each['id']}: {line}" for each in verdicts for line in each["mismatches"]],
         controls=_controls(verdicts),
-        executions={
-            "runs": [described_executions(each) for each in executed],
-            "sentence": survival_sentence(executed),
-            "chart": svg_of(survival_sheet(executed)),
-        } if executed else None,
+        executions=[described_executions(each) for each in executed],
         judged=[
             {"name": name, "object": run.saved.body.name, **counts}
             for run in runs if run.judgements is not None

@@ -23,8 +23,9 @@ from sim_validate.cli import (
     hand_flags,
 )
 from sim_validate.cli.flag_bounds import Bound
-from sim_validate.datasets.config import asked_learning
+from sim_validate.datasets.config import Learning
 from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.files.toml_tables import settings_in
 from sim_validate.simulation.setup import Noise
 from tests.sim_validate.rigs import grasps
 
@@ -123,7 +124,10 @@ Settings = {
     "random wrenches": (
         flag_groups.Testing, "random_wrenches", lambda value: sv.Agenda(random_wrenches=value),
     ),
-    "synthetic": (dataset_flags.Learned, "synthetic", lambda v: asked_learning({"synthetic": v})),
+    "synthetic": (
+        dataset_flags.Learned, "synthetic",
+        lambda value: settings_in(Learning, {"synthetic": value}, "learning"),
+    ),
     **{
         f"execute {name}": (flag_groups.Executing, name, executing(name)) for name in EXECUTION
     },

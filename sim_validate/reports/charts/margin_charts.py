@@ -40,6 +40,8 @@ MIDDLE, HALF = np.array([220.0, 130.0]), 100.0
 """Middle of a map on its panel, and half of its height [pixels]."""
 APART = 0.15
 """Least distance of a number below the scale from its ends, as a share of its length."""
+BOX = np.array([(-12.0, -8.0), (12.0, -8.0), (12.0, 8.0), (-12.0, 8.0)])
+"""Ground of the name of a direction, around its middle [pixels]."""
 LABEL = 18.0
 """Distance from the circle of the least value within which a label gives way [pixels]."""
 ROWS = 60
@@ -153,15 +155,11 @@ def _map(values: Array, kind: str, unit: str) -> Sheet:
         place = np.array(on_map(*(np.array(math.radians(angle)) for angle in angles)))
         middle = MIDDLE + HALF * place * np.array([1.0, -1.0])
         aside = np.array([0.0, LABEL if np.hypot(*(middle - least)) < LABEL else 0.0])
-        marks += _label(name, middle + aside)
+        middle = middle + aside
+        x, y = middle.tolist()
+        marks += [Area((BOX + middle,), PAPER, 0.85), Words(x, y, name, "middle", SMALL)]
     marks += [outlined([circle(least, 6.0)], PAPER, 5.0), outlined([circle(least, 6.0)], BAD, 2.5)]
     return Sheet(WIDTH, HEIGHT, title, (*marks, *_scale(low, high)))
-
-
-def _label(name: str, middle: Array) -> tuple[Mark, Mark]:
-    box = np.array([(-12.0, -8.0), (12.0, -8.0), (12.0, 8.0), (-12.0, 8.0)])
-    x, y = middle.tolist()
-    return Area((box + middle,), PAPER, 0.85), Words(x, y, name, "middle", SMALL)
 
 
 def _scale(low: float, high: float) -> Iterator[Mark]:

@@ -1,6 +1,7 @@
 """Clips: motions made larger as they are, and drawn where graphics are available."""
 
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -88,6 +89,13 @@ def test_without_graphics_the_message_says_so(scene, tmp_path, monkeypatch):
     with pytest.raises(
         GraphicsError, match=r"MuJoCo cannot draw on this machine: no-such-library: .+"
     ):
+        write_clip(scene, np.eye(1, 19, 3), tmp_path / "clip.gif", "")
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_pillow_the_extra_is_named(scene, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "PIL", None)
+    with pytest.raises(GraphicsError, match=r"graspproof\[clips\]"):
         write_clip(scene, np.eye(1, 19, 3), tmp_path / "clip.gif", "")
     assert not list(tmp_path.iterdir())
 

@@ -205,11 +205,3 @@ def test_meshes_in_the_folder_are_read_and_taken_as_boxes(tmp_path):
     hand = scenes.load_hand(written(tmp_path, text), ("s0", "s1", "s2", "s3"))
     (shape,) = hand.palm
     assert sorted(shape.half_sizes) == pytest.approx([0.01, 0.02, 0.03], abs=1e-6)
-
-
-def test_a_missing_package_says_what_to_do(monkeypatch):
-    import sys
-
-    monkeypatch.setitem(sys.modules, "mujoco_menagerie", None)
-    with pytest.raises(InputError, match="pip install mujoco-menagerie"):
-        scenes.load_hand("menagerie:wonik_allegro", ["a", "b", "c", "d"])

@@ -1,12 +1,13 @@
 """The push and stiffness that are said to be enough: executed again with them, objects are kept."""
 
+import math
 from dataclasses import replace
 
 import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.execution.enough import CLEAR, Enough, NoSqueezeError
+from sim_validate.execution.enough import CLEAR, Enough, NoSqueezeError, accelerations_g
 from sim_validate.execution.execute import chosen_squeeze
 from sim_validate.execution.verdict import losses_in_words
 from sim_validate.hands.execute_hand import hand_execution_settings
@@ -122,3 +123,20 @@ def test_what_contradicts_itself_is_refused():
         Enough(2.0, push_n=3.0)
     with pytest.raises(gc.InputError, match="or a reason why there is none"):
         Enough(2.0)
+
+
+def test_accelerations_are_those_of_the_trials():
+    asked = sv.ExecutionSettings(
+        0.3, shake_g=0.5, stop_m_per_s2=2.0 * G, stop_from_m_per_s=1.0, knock_n_s=0.02
+    )
+    peaks = accelerations_g(asked)
+    assert peaks["weight"] == peaks["misplaced"] == 0.0
+    # as asked for, not as samples of the sinusoid reach it
+    assert peaks["shake along"] == peaks["shake about"] == 0.5
+    assert peaks["stop"] == pytest.approx(2.0, rel=1e-9)
+    # the path of least jerk reaches 10 / sqrt(3) of its height over its time squared
+    lift = 10.0 / math.sqrt(3.0) * asked.lift_m / asked.lift_s**2 / G
+    assert peaks["lift"] == pytest.approx(lift, rel=0.01)
+    # half a sine of 20 ms, whose four samples miss its top
+    knock = 0.5 * math.pi * 0.02 / 0.02 / asked.mass_kg / G
+    assert 0.89 * knock < peaks["knock"] < knock

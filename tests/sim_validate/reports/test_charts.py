@@ -28,7 +28,7 @@ from sim_validate.reports.charts.margin_charts import (
     pixels,
 )
 from sim_validate.reports.charts.motion_charts import friction_used, motion_panels
-from sim_validate.reports.charts.run_charts import fidelity_panels
+from sim_validate.reports.charts.run_charts import fidelity_panel
 from sim_validate.reports.charts.wrench_charts import shadow_of, wrench_panels
 from sim_validate.simulation.setup import Agenda, Setup
 from tests.scenes.drawing.whole import assert_whole
@@ -207,7 +207,7 @@ def test_what_differs_stands_out(unit):
     agreements = [Agreement("a", pairs), Agreement("b", ())]
     assert agreements[0].worst == math.inf
     assert agreements[0].differ() == (False, True, True)
-    one, two = fidelity_panels(agreements)
+    one, two = map(fidelity_panel, agreements)
     assert {"identity", "1 agree", "2 differ"} <= {words.text for words in one.words()}
     assert {mark.colour for mark in one.marks if isinstance(mark, Dots)} == {GOOD}
     assert [mark.fill for mark in one.marks if isinstance(mark, Area)].count(
@@ -271,10 +271,11 @@ def test_labels_of_charts_are_whole(kind, wedge, trial):
         "wrenches": lambda: wrench_panels(*wedge, FRICTION),
         "margins": lambda: margin_panels(*wedge, FRICTION),
         "motion": lambda: motion_panels(trial, 1e-5),
-        "fidelity": lambda: fidelity_panels(
-            [Agreement("critical friction", pairs), Agreement("b", ((1e-4, 1e-4), (0.5, 0.7))),
-             Agreement("largest wrench [N], torques over grasp size", ((3.0, 3.1),))]
-        ),
+        "fidelity": lambda: [
+            fidelity_panel(Agreement("critical friction", pairs)),
+            fidelity_panel(Agreement("b", ((1e-4, 1e-4), (0.5, 0.7)))),
+            fidelity_panel(Agreement("largest wrench [N], torques over grasp size", ((3.0, 3.1),))),
+        ],
     }[kind]()  # fmt: skip
     assert len(sheets) >= 2
     for sheet in sheets:

@@ -165,6 +165,6 @@ def test_the_command_view_shows_the_hand_unless_it_is_left_out(run, tmp_path, ca
         path = tmp_path / f"{name}.html"
         assert main([*asked, str(path), *more]) == Exit.GOOD
         assert ('"role":"hand"' in path.read_text()) == shown
-        assert ("fingers of allegro" in path.read_text()) == shown
+        assert ("Fingers of allegro" in path.read_text()) == shown
     assert main(["view", str(run), "--grasp", OTHER, "--page", str(tmp_path / "c.html")]) == 0
     assert "the hand is not shown" in capsys.readouterr().err

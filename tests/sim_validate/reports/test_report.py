@@ -151,7 +151,7 @@ def copy(small_run, tmp_path):
 
 def counted(document, _=None):
     """Make the summary that of the verdicts."""
-    document["summary"].update(verdicts._counts(document["verdicts"]))
+    document["summary"].update(verdicts.recorded_summary(document["verdicts"]))
 
 
 def without_proofs(document):
