@@ -11,9 +11,7 @@ from tests.public_values.bad_values import (
     AT_LEAST_ONE,
     FRICTION,
     NOT_NEGATIVE,
-    PATH,
     POSITIVE,
-    SEED,
     SEVERAL,
     SWITCH,
     VALUE,
@@ -54,39 +52,26 @@ DOWN = optional(array([0.0, 0.0, -1.0])) | {"zero": [0.0, 0.0, 0.0]}
 
 CALLS = [
     Call("gc.hand_motors", lambda: {"hand": hinged_hand(), "reach": stance(0.5)}, {
-        "hand": VALUE, "reach": VALUE, "down": DOWN, "any_orientation": SWITCH,
+        "down": DOWN, "any_orientation": SWITCH,
     }),
     Call("gc.hand_payload", lambda: {
         "hand": weighing(), "body": cube(), "reach": stance(0.5), "friction": 0.5,
         "max_push_n": 10.0,
     }, {
-        "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": each_of(FRICTION, "zero"),
+        "friction": each_of(FRICTION, "zero"),
         "max_push_n": POSITIVE, "gap": POSITIVE | {"one": 1.0, "too fine": 1e-5},
     }),
-    Call("scenes.build_hand_scene", standing, {
-        "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": FRICTION, "down": DOWN,
-        "physics": optional(VALUE),
-    }),
+    Call("scenes.build_hand_scene", standing, {"down": DOWN}),
     Call("scenes.write_hand_scene", lambda: {
         "scene": scenes.build_hand_scene(**standing()), "path": "no/such/hand.xml",
-    }, {"scene": VALUE, "path": PATH}, succeeds_in="tests/scenes/hands/test_hand_mjcf.py"),
-    Call("sv.hand_setup", dict, {}),
-    Call("sv.validate_hand", standing, {
-        "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": FRICTION, "down": DOWN,
-        "agenda": optional(VALUE), "setup": optional(VALUE),
-    }),
+    }, succeeds_in="tests/scenes/hands/test_hand_mjcf.py"),
+    Call("sv.hand_setup", dict),
+    Call("sv.validate_hand", standing, {"down": DOWN}),
     Call("sv.execute_hand", lambda: standing() | {"mass_kg": 0.1}, {
-        "hand": VALUE, "body": VALUE, "reach": VALUE, "friction": FRICTION,
-        "settings": optional(VALUE), "mass_kg": POSITIVE, "threads": AT_LEAST_ONE,
-        "enough": SWITCH,
+        "settings": optional(VALUE),
     }, succeeds_in="tests/sim_validate/hands/test_execute_hand.py"),
     Call("gc.load_hand", lambda: {"name": "leap"}, {"name": WORD}),
     Call("gc.reach_with", reaching, {
-        "hand": VALUE,
-        "body": VALUE,
-        "grasp": VALUE,
-        "friction": FRICTION,
-        "seed": SEED,
         "regions": SWITCH,
         "table_down": optional(array([0.0, 0.0, -1.0])) | {"zero": [0.0, 0.0, 0.0]},
         "clearance_m": NOT_NEGATIVE | {"large": 0.5},
