@@ -3,6 +3,7 @@
 import ast
 import importlib
 import inspect
+import re
 import textwrap
 from collections.abc import Iterator
 from functools import cached_property
@@ -28,46 +29,32 @@ def page() -> str:
     parts = [INTRODUCTION]
     for name, short in PACKAGES.items():
         package = importlib.import_module(name)
-        summary = first_line(package)
         heading = f"import {name}" + (f" as {short}" if short != name else "")
+        summary = (package.__doc__ or "").partition("\n")[0]
         parts.append(f"\n## `{heading}`\n\n{summary}\n")
         parts += [entry(short, each, getattr(package, each)) for each in sorted(package.__all__)]
     return "".join(parts)
 
 
-def first_line(thing: Any) -> str:
-    return (inspect.getdoc(thing) or "").partition("\n")[0]
-
-
 def entry(short: str, name: str, thing: Any) -> str:
     """What is said of one public name."""
     if inspect.isclass(thing):
-        return f"\n### class `{short}.{name}`\n\n{described(thing)}" + "".join(of_class(thing))
+        members = "".join(f"{line}\n" for line in members_of(thing))
+        end = f"\n{members}" if members else ""
+        return f"\n### class `{short}.{name}`\n\n{described(thing)}{end}"
     if callable(thing):
         return f"\n### `{short}.{name}{signature(thing)}`\n\n{described(thing)}"
     return f"\n### `{short}.{name}`\n\n"
 
 
 def signature(function: Any) -> str:
-    """Names of arguments with their defaults."""
+    """Names of arguments with their defaults, which are dots where they have no short name."""
     plain = [
-        each.replace(annotation=inspect.Parameter.empty, default=default_of(each))
+        each.replace(annotation=inspect.Parameter.empty)
         for each in inspect.signature(function).parameters.values()
         if each.name not in {"self", "cls"}
     ]
-    return str(inspect.Signature(plain))
-
-
-class Unnamed:
-    """A default that has no short name."""
-
-    def __repr__(self) -> str:
-        return "..."
-
-
-def default_of(parameter: inspect.Parameter) -> Any:
-    value = parameter.default
-    return Unnamed() if callable(value) and value is not inspect.Parameter.empty else value
+    return re.sub(r"<[^<>]*>", "...", str(inspect.Signature(plain)))
 
 
 def described(thing: Any) -> str:
@@ -90,39 +77,27 @@ def flowed(text: str) -> str:
     return "\n\n".join(parts)
 
 
-def of_class(kind: type) -> Iterator[str]:
+def members_of(kind: type) -> Iterator[str]:
     """Fields with what is said below each, then properties and methods."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
     assert isinstance(tree, ast.ClassDef)
-    lines = []
     for part, after in zip(tree.body, [*tree.body[1:], None], strict=True):
         is_text = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
         said = flowed(str(after.value.value)) if is_text else ""
         if isinstance(part, ast.AnnAssign) and not ast.unparse(part.target).startswith("_"):
             default = f" = {ast.unparse(part.value)}" if part.value else ""
-            kind_of = ast.unparse(part.annotation)
-            lines.append(
-                f"* `{ast.unparse(part.target)}: {kind_of}{short_default(default)}`: {said}"
-            )
+            default = "" if "(" in default else default
+            name = f"{ast.unparse(part.target)}: {ast.unparse(part.annotation)}{default}"
         elif isinstance(part, ast.Assign) and isinstance(part.value, ast.Constant):
-            lines.append(f"* `{ast.unparse(part.targets[0])} = {part.value.value!r}`: {said}")
+            name = f"{ast.unparse(part.targets[0])} = {part.value.value!r}"
         elif isinstance(part, ast.FunctionDef) and not part.name.startswith("_"):
-            lines.append(f"* `{called(kind, part)}`: {ast.get_docstring(part, clean=True) or ''}"
-                         .partition("\n")[0])  # fmt: skip
-    if lines:
-        yield "\n" + "\n".join(line.rstrip().removesuffix(":") for line in lines) + "\n"
-
-
-def short_default(text: str) -> str:
-    return "" if "(" in text else text
-
-
-def called(kind: type, part: ast.FunctionDef) -> str:
-    """How a property or a method is written."""
-    held = inspect.getattr_static(kind, part.name)
-    if isinstance(held, property | cached_property):
-        return f".{part.name}"
-    return f".{part.name}{signature(getattr(kind, part.name))}"
+            held = inspect.getattr_static(kind, part.name)
+            is_value = isinstance(held, property | cached_property)
+            name = f".{part.name}" + ("" if is_value else signature(getattr(kind, part.name)))
+            said = (ast.get_docstring(part) or "").partition("\n")[0]
+        else:
+            continue
+        yield f"* `{name}`" + (f": {said}" if said else "")
 
 
 if __name__ == "__main__":

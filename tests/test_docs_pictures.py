@@ -1,19 +1,13 @@
 """Pictures of the pages are those that the script makes, and can be read."""
 
 import io
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
-import grasp_core as gc
-import scenes
-from scenes.drawing.pictures import grasp_figure
-from scenes.drawing.sheets import Dots, png_of
-from sim_validate.reports.charts.margin_charts import margin_figure
-from sim_validate.reports.charts.wrench_charts import wrench_figure
-from tests.docs_pictures import FOLDER, FRICTION, PICTURES, best
+from scenes.drawing.sheets import png_of
+from tests.docs_pictures import FOLDER, PICTURES
 from tests.scenes.drawing.whole import assert_whole
 
 BLOCK = 16
@@ -45,42 +39,14 @@ def test_all_pictures_are_made_by_the_script():
     assert {path.name for path in FOLDER.iterdir()} == {f"{name}.webp" for name in PICTURES}
 
 
-SLOW = {"fidelity"}
-"""Pictures that take seconds, as they need simulation."""
+SIMULATED = {"fidelity"}
 
 
-def marked(name, *more):
-    return pytest.param(name, *more, marks=[pytest.mark.slow] if name in SLOW else [], id=name)
-
-
-@pytest.mark.parametrize("name", [marked(name) for name in PICTURES])
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name in SIMULATED)) for name in PICTURES],
+)
 def test_a_picture_is_the_one_that_is_kept(name):
     figure = PICTURES[name]()
     assert apart(figure, kept(name)) < ANOTHER
     assert_whole(figure)
-
-
-def another_grasp():
-    body = scenes.example_object("wedge")
-    return body, gc.plan(body, FRICTION, families=("pencil",), limit=2).grasps[1]
-
-
-def with_other_figures():
-    figure = PICTURES["fidelity"]()
-    more = Dots(np.array([[150.0, 250.0], [200.0, 250.0]]), "#0072B2", 8.0)
-    return replace(figure, marks=(*figure.marks, more))
-
-
-@pytest.mark.parametrize(
-    ("name", "make"),
-    [
-        marked("grasp", lambda: grasp_figure(*another_grasp(), FRICTION)),
-        marked("wrenches", lambda: wrench_figure(*another_grasp(), FRICTION)),
-        marked(
-            "margins", lambda: margin_figure(*best("wedge", "pencil", FRICTION), 0.8 * FRICTION)
-        ),
-        marked("fidelity", with_other_figures),
-    ],
-)
-def test_another_picture_would_be_noticed(name, make):
-    assert apart(make(), kept(name)) > ANOTHER

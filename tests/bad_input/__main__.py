@@ -6,7 +6,7 @@ Prints the exit code of every case, so that two trees of the code can be compare
 import argparse
 import sys
 
-from tests.bad_input.catalogue import GROUPS, cases_of
+from tests.bad_input.cases import GROUPS, cases_of
 from tests.bad_input.trying import complaints, tried
 
 SECONDS, MEGABYTES = 10.0, 2048.0

@@ -2,7 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
+
+GROUPS = (
+    "of_files", "of_obj", "of_binary_meshes", "of_topology", "of_physics",
+    "of_data_files", "of_surroundings",
+)  # fmt: skip
+"""Modules; the last three make whole files first, which takes a while."""
 
 Make = Callable[[Path], list[str]]
 """Writes files into an empty folder, which is the working directory, and gives a command line."""
@@ -25,15 +32,9 @@ class Case:
 def file_case(
     group: str, name: str, file: str, data: bytes | str, says: str, *, command: str = "inspect"
 ) -> Case:
-    """A file that a command is to refuse, naming it.
+    """A file that a command is to refuse, naming it, with words of the message, parted by `|`.
 
-    Args:
-        group: Of the catalogue.
-        name: Of the case.
-        file: What the file is called.
-        data: What it holds.
-        says: Words of the message, parted by `|`.
-        command: The command, of which FILE stands for the file, or it comes last.
+    In the command FILE stands for the file, or it comes last.
     """
 
     def make(folder: Path) -> list[str]:
@@ -49,3 +50,8 @@ def file_case(
 def flag_case(group: str, line: str, says: str, code: int = 2) -> Case:
     """A command line that is to be refused."""
     return Case(group, line, lambda _: line.split(), code, tuple(says.split("|")))
+
+
+def cases_of(group: str) -> list[Case]:
+    """Every case of a group."""
+    return import_module(f"tests.bad_input.{group}").cases()

@@ -1,11 +1,10 @@
-"""What several benchmarks plan: built-in objects, scaled ones, hulls, the meshes of a folder."""
+"""What several benchmarks plan: built-in objects, scaled ones and hulls."""
 
 import numpy as np
 import trimesh
 
 import grasp_core as gc
 import scenes
-from grasp_core.mesh_files.reading import FORMATS
 
 FAMILIES = ("concurrent", "pencil", "regulus", "free")
 PAPER = FAMILIES[:3]
@@ -26,8 +25,3 @@ def sphere_hull(faces, seed=0):
     hull = trimesh.convex.convex_hull(points / np.linalg.norm(points, axis=1, keepdims=True))
     name = f"hull of {faces} faces"
     return gc.Polyhedron.from_mesh(hull.vertices, hull.faces, name=name, faces="planar")
-
-
-def meshes_in(folder):
-    """The mesh files of a folder, by name."""
-    return sorted(p for p in folder.iterdir() if p.suffix.lstrip(".").lower() in FORMATS)

@@ -27,6 +27,10 @@ PATH = {"none": None, "number": 3, "empty": "", "zero byte": "a\0b", "bytes": b"
 VALUE = {"none": None, "text": "a", "number": 3, "object": object(), "class": int}
 TEXT = {"none": None, "number": 3, "bytes": b"a", "list": ["a"]}
 SEVERAL = {"none": None, "text": "abcd", "number": 3, "of objects": [object()] * 4}
+FACE_INDICES = SEVERAL | {
+    "three": (0, 1, 2), "beyond": (0, 1, 2, 9), "negative": (-1, 1, 2, 3),
+    "fraction": (0.5, 1, 2, 3), "bools": (True, 1, 2, 3), "huge": (0, 1, 2, 10**30),
+}  # fmt: skip
 
 
 def unless(kinds, *labels):
@@ -87,3 +91,22 @@ def units(good):
 def spread(good):
     """Of an argument that is points like these, which must not be too close to tell apart."""
     return array(good) | {"tiny": 1e-300 * np.array(good)}
+
+
+USUAL = (
+    dict.fromkeys(("body", "grasp", "hand", "reach", "scene", "record", "grip", "plan"), VALUE)
+    | dict.fromkeys(("setup", "physics", "patches", "agenda", "view"), optional(VALUE))
+    | dict.fromkeys(("solver", "norm", "cones", "objective", "measure", "rank_by"), WORD)
+    | dict.fromkeys(("jobs", "threads", "max_face_parts"), AT_LEAST_ONE)
+    | dict.fromkeys(("mass_kg", "torque_scale", "max_normal_force", "max_normal_force_n"), POSITIVE)
+    | dict.fromkeys(("largest_part", "enough"), SWITCH)
+    | dict.fromkeys(("name", "object_path"), TEXT)
+    | {
+        "friction": FRICTION,
+        "path": PATH,
+        "seed": SEED,
+        "flatness_m": optional(NOT_NEGATIVE),
+        "progress": {"number": 3, "text": "a"},
+    }
+)
+"""What is refused of an argument of this name, where a call says nothing else."""

@@ -1,7 +1,8 @@
 """A public function or class with a call that succeeds, and what such calls are made of."""
 
+import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -10,6 +11,7 @@ from typing import Any
 import grasp_core as gc
 import scenes
 import sim_validate as sv
+from tests.public_values.bad_values import PATH, USUAL
 
 FOLDER = TemporaryDirectory()
 
@@ -52,8 +54,8 @@ class Call:
     name: str
     """As users write it."""
     valid: Callable[[], Mapping[str, Any]]
-    refused: Mapping[str, Mapping[str, Any]]
-    """By argument and label."""
+    special: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """What is refused, by argument and label, where the name of the argument does not say it."""
     succeeds_in: str = ""
     """The test that makes a call that succeeds, where that needs more than values."""
     slow: bool = False
@@ -66,6 +68,12 @@ class Call:
             found = getattr(found, part)
         return found
 
+    @property
+    def refused(self) -> Mapping[str, Mapping[str, Any]]:
+        """What must be refused of each argument, by label."""
+        names = inspect.signature(self.target).parameters
+        return {name: USUAL[name] for name in names if name in USUAL} | self.special
+
 
 def of_grasp(**more):
     return lambda: {"body": body(), "grasp": grasp(), **more}
@@ -74,3 +82,10 @@ def of_grasp(**more):
 def fields_of(kind, value):
     """The arguments that make such a value again."""
     return {each.name: getattr(value, each.name) for each in fields(kind) if each.init}
+
+
+def reading(name, path, tested):
+    """The call of a function that reads a file, with one that is not there."""
+    return Call(
+        name, lambda: {"path": path}, {"path": PATH | {"nowhere": path}}, succeeds_in=tested
+    )

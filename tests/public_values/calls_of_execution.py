@@ -13,9 +13,7 @@ from tests.public_values.bad_values import (
     FRICTION,
     NOT_NEGATIVE,
     POSITIVE,
-    SEED,
     SEVERAL,
-    SWITCH,
     VALUE,
     WORD,
     array,
@@ -52,7 +50,6 @@ def held(**more):
 
 
 ARGUMENTS = {
-    "body": VALUE,
     "contacts": SEVERAL | {"one": grasp().contacts[:1]},
     "friction": each_of(FRICTION, "zero"),
     "stiffness": each_of(POSITIVE) | {"not symmetric": np.triu(np.ones((4, 3, 3)))},
@@ -67,7 +64,6 @@ CALLS = [
         "squeeze": array(np.zeros((4, 3))) | {"unbalanced": np.ones((4, 3))},
     }),
     Call("gc.first_slip", lambda: {"grip": gripped(), "wrench": WRENCH}, {
-        "grip": VALUE,
         "wrench": array(WRENCH) | {"zero": 0.0 * WRENCH, "tiny": 1e-300 * WRENCH},
         "model": WORD,
         "max_push_n": unless(POSITIVE, "infinite", "huge") | {"less than at rest": 0.5},
@@ -83,7 +79,6 @@ CALLS = [
         "motors": MOTORS | {"that carry links": CARRYING},
     }),
     Call("gc.any_direction", lambda: {"mass_kg": 1.0, "acceleration_m_per_s2": 1.0}, {
-        "mass_kg": POSITIVE,
         "acceleration_m_per_s2": NOT_NEGATIVE,
         "gravity": optional(array(GRAVITY)),
     }),
@@ -97,19 +92,14 @@ CALLS = [
         "down": array(GRAVITY) | {"zero": (0.0, 0.0, 0.0), "minute": (1e-300, 0.0, 0.0)},
     }),
     Call("scenes.build_held_scene", lambda: {"body": body(), "grip": gripped(), "mass_kg": 0.1}, {
-        "body": VALUE,
-        "grip": VALUE,
-        "mass_kg": POSITIVE,
         "settings": optional(VALUE),
         "physics": optional(VALUE) | {"other gravity": tilted()},
         "reach_m": optional(POSITIVE),
     }),
     Call("sv.ExecutionSettings", lambda: fields_of(sv.ExecutionSettings, ONE_TRIAL), {
-        "mass_kg": POSITIVE,
         "push_n": POSITIVE,
         "stiffness_n_per_m": POSITIVE,
         "tip_radius_m": optional(POSITIVE),
-        "hand": VALUE,
         "trials": SEVERAL | {"none of them": (), "unknown": ("lift", "throw"), "one": "lift"},
         "lift_m": POSITIVE,
         "lift_s": POSITIVE | {"a millisecond": 1e-3, "an hour": 3600.0},
@@ -121,20 +111,16 @@ CALLS = [
         "off_mm": NOT_NEGATIVE,
         "off_deg": NOT_NEGATIVE | {"a whole turn": 360.0},
         "misplacements": AT_LEAST_ONE,
-        "seed": SEED,
         "most_mm": POSITIVE,
         "most_deg": POSITIVE,
     }),
     Call("sv.execute", lambda: {
         "body": body(), "grasp": grasp(), "friction": 0.5, "settings": ONE_TRIAL,
     }, {
-        "body": VALUE,
         "grasp": SEVERAL | {"one": grasp().contacts[:1]},
         "friction": each_of(FRICTION, "zero"),
         "settings": VALUE,
         "mass_kg": optional(POSITIVE),
-        "threads": AT_LEAST_ONE,
         "physics": optional(VALUE) | {"other gravity": tilted()},
-        "enough": SWITCH,
     }),
 ]  # fmt: skip

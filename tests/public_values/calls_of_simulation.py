@@ -7,11 +7,9 @@ import sim_validate as sv
 from tests.public_values.bad_values import (
     AT_LEAST_ONE,
     COUNT,
-    FRICTION,
     NOT_NEGATIVE,
     PATH,
     POSITIVE,
-    SEED,
     SEVERAL,
     SWITCH,
     TEXT,
@@ -21,49 +19,38 @@ from tests.public_values.bad_values import (
     optional,
     unless,
 )
-from tests.public_values.call import Call, body, grasp, of_grasp, plan, scene
+from tests.public_values.call import Call, body, grasp, of_grasp, plan, reading, scene
 
 WRENCH = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 CENTER = np.zeros(3)
-BODY_AND_GRASP = {"body": VALUE, "grasp": VALUE}
 IN_HAND = {"hand": optional(VALUE), "reach": optional(VALUE)}
 CALLS = [
     Call("scenes.build_scene", of_grasp(), {
-        "body": VALUE,
         "grasp": VALUE | {"contacts of objects": [object()] * 4, "empty": (), "one": "grasp"},
-        "friction": FRICTION,
         "fingers": optional(VALUE) | {"too large": scenes.FingerSettings(radius_m=1.0)},
-        "physics": optional(VALUE),
         "surface": WORD,
     }),
-    Call("scenes.write_scene", lambda: {"scene": scene(), "path": "no/such/folder/a.xml"}, {
-        "scene": VALUE, "path": PATH,
-    }, succeeds_in="tests/scenes/test_mjcf.py"),
+    Call("scenes.write_scene", lambda: {"scene": scene(), "path": "no/such/folder/a.xml"},
+         succeeds_in="tests/scenes/test_mjcf.py"),
     Call("scenes.export_grasps", lambda: {"plan": plan(), "path": "no/such/a.glb", "to": "gltf"}, {
-        "plan": VALUE,
         "path": PATH | {"unknown ending": "a.obj", "no ending": "a"},
         "to": WORD,
         "fingertip_radius_m": optional(POSITIVE),
     }, succeeds_in="tests/scenes/test_exports.py"),
-    Call("scenes.example_names", dict, {}),
+    Call("scenes.example_names", dict),
     Call("scenes.example_object", lambda: {"name": "box"}, {
         "name": TEXT | {
             "unknown": "bx", "empty": "", "long": "a" * 10**5, "few faces": "random-3-1",
             "other digits": "random-\u0662\u0660-7", "no seed": "random-20",
         },
     }),
-    Call("scenes.grasp_figure", of_grasp(friction=0.5), BODY_AND_GRASP | {
-        "friction": FRICTION, "view": optional(VALUE), "legend": SWITCH, **IN_HAND,
-    }),
-    Call("scenes.show", of_grasp(), BODY_AND_GRASP | {"friction": FRICTION} | IN_HAND),
-    Call("scenes.write_picture", of_grasp(path="a.png"), BODY_AND_GRASP | {
+    Call("scenes.grasp_figure", of_grasp(friction=0.5), {"legend": SWITCH, **IN_HAND}),
+    Call("scenes.show", of_grasp(), IN_HAND),
+    Call("scenes.write_picture", of_grasp(path="a.png"), {
         "path": PATH | {"unknown ending": "a.gif", "no ending": "a"},
-        "friction": FRICTION,
-        "view": optional(VALUE),
         **IN_HAND,
     }, succeeds_in="tests/scenes/drawing/test_pictures.py"),
     Call("scenes.FingerSettings", dict, {
-        "max_normal_force_n": POSITIVE,
         "radius_m": optional(POSITIVE),
         "mass_kg": optional(POSITIVE) | {"a picogram": 1e-12, "a mountain": 1e12},
         "stiffness_n_per_m": optional(POSITIVE),
@@ -91,21 +78,14 @@ CALLS = [
     Call("sv.load_dataset", lambda: {"folder": "no/such/folder"}, {
         "folder": PATH | {"nowhere": "no/such/folder"}, "split": optional(WORD),
     }, succeeds_in="tests/sim_validate/datasets/test_loading.py"),
-    Call("sv.load_regions", lambda: {"path": "no/such/file.npz"}, {
-        "path": PATH | {"nowhere": "no/such/file.npz"},
-    }, succeeds_in="tests/sim_validate/commands/test_regions.py"),
-    Call("sv.load_executions", lambda: {"path": "no/such/executions.json"}, {
-        "path": PATH | {"nowhere": "no/such/executions.json"},
-    }, succeeds_in="tests/sim_validate/records/test_executions.py"),
-    Call("sv.load_verdicts", lambda: {"path": "no/such/verdicts.json"}, {
-        "path": PATH | {"nowhere": "no/such/verdicts.json"},
-    }, succeeds_in="tests/sim_validate/records/test_verdicts.py"),
-    Call("sv.margin_figure", of_grasp(friction=0.5), BODY_AND_GRASP | {
-        "friction": FRICTION, "max_normal_force_n": POSITIVE,
+    reading("sv.load_regions", "no/such/file.npz", "tests/sim_validate/commands/test_regions.py"),
+    reading("sv.load_executions", "no/such/executions.json",
+            "tests/sim_validate/records/test_executions.py"),
+    reading("sv.load_verdicts", "no/such/verdicts.json",
+            "tests/sim_validate/records/test_verdicts.py"),
+    Call("sv.margin_figure", of_grasp(friction=0.5), {
     }, slow=True),
-    Call("sv.wrench_figure", of_grasp(friction=0.5), BODY_AND_GRASP | {
-        "friction": FRICTION, "view": optional(VALUE),
-    }),
+    Call("sv.wrench_figure", of_grasp(friction=0.5)),
     Call("sv.write_report", lambda: {"folder": "no/such/folder"}, {
         "folder": PATH | {"nowhere": "no/such/folder"},
         "out": optional(PATH),
@@ -116,24 +96,17 @@ CALLS = [
         "ready": {"none": None, "number": 3, "text": "a"},
     }, succeeds_in="tests/sim_validate/reports/test_report.py"),
     Call("sv.validate", of_grasp(agenda=sv.Agenda(critical_friction=False, controls=False)),
-         BODY_AND_GRASP | {
-        "friction": FRICTION,
-        "agenda": optional(VALUE),
+         {
         "setup": optional(VALUE) | {"of another class": scenes.PhysicsSettings()},
     }, slow=True),
     Call("sv.validate_all", lambda: {
         "body": body(), "grasps": plan(),
         "agenda": sv.Agenda(critical_friction=False, controls=False),
     }, {
-        "body": VALUE,
         "grasps": SEVERAL | {"a grasp": grasp(), "several plans": [plan()]},
-        "friction": FRICTION,
-        "agenda": optional(VALUE),
         "setup": optional(VALUE) | {"of another class": scenes.PhysicsSettings()},
-        "jobs": AT_LEAST_ONE,
-        "progress": {"number": 3, "text": "a"},
     }, slow=True),
-    Call("sv.simulated_critical_friction", of_grasp(), BODY_AND_GRASP | {"setup": optional(VALUE)},
+    Call("sv.simulated_critical_friction", of_grasp(),
          slow=True),
     Call("sv.Agenda", dict, {
         "random_wrenches": COUNT,
@@ -142,7 +115,6 @@ CALLS = [
         "limits": WORD,
         "trials": COUNT,
         "noise": VALUE,
-        "seed": SEED,
     }),
     Call("sv.HoldProtocol", dict, {
         **{f"{phase}_s": POSITIVE | {"a day": 86400.0}
@@ -164,7 +136,6 @@ CALLS = [
     Call("sv.Setup", dict, {
         **dict.fromkeys(("fingers", "physics", "hold", "limit", "friction"), VALUE),
         "surface": WORD,
-        "threads": AT_LEAST_ONE,
         "timeout_s": unless(POSITIVE, "infinite", "tiny", "huge"),
     }),
 ]  # fmt: skip

@@ -7,9 +7,9 @@ from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 from tests.public_values.bad_values import (
     AT_LEAST_ONE,
     COUNT,
+    FACE_INDICES,
     NOT_NEGATIVE,
     NOT_NUMBERS,
-    PATH,
     POSITIVE,
     SEVERAL,
     SWITCH,
@@ -25,10 +25,6 @@ from tests.public_values.bad_values import (
 from tests.public_values.call import Call, body, fields_of, grasp, mesh_file
 
 CENTER = np.zeros(3)
-FACE_INDICES = SEVERAL | {
-    "three": (0, 1, 2), "beyond": (0, 1, 2, 9), "negative": (-1, 1, 2, 3),
-    "fraction": (0.5, 1, 2, 3), "bools": (True, 1, 2, 3), "huge": (0, 1, 2, 10**30),
-}  # fmt: skip
 
 
 def mesh():
@@ -37,13 +33,9 @@ def mesh():
 
 CALLS = [
     Call("gc.load_polyhedron", lambda: {"path": mesh_file()}, {
-        "path": PATH,
         "unit": WORD,
         "scale": POSITIVE,
         "faces": WORD,
-        "patches": optional(VALUE),
-        "flatness_m": optional(NOT_NEGATIVE),
-        "largest_part": SWITCH,
         "center_of_mass": unless(array(CENTER), "none") | {"far away": [1.0, 0.0, 0.0]},
         "limits": VALUE,
     }),
@@ -59,17 +51,10 @@ CALLS = [
             "fractions": body().triangles + 0.5, "negative": body().triangles - 1,
             "beyond": body().triangles + 1,
         },
-        "name": TEXT,
         "faces": WORD,
-        "patches": optional(VALUE),
-        "flatness_m": optional(NOT_NEGATIVE),
-        "largest_part": SWITCH,
         "center_of_mass": unless(array(CENTER), "none") | {"far away": [1.0, 0.0, 0.0]},
     }),
-    Call("gc.from_trimesh", lambda: {"mesh": body().to_trimesh()}, {
-        "mesh": VALUE, "name": TEXT, "faces": WORD, "patches": optional(VALUE),
-        "flatness_m": optional(NOT_NEGATIVE), "largest_part": SWITCH,
-    }),
+    Call("gc.from_trimesh", lambda: {"mesh": body().to_trimesh()}, {"mesh": VALUE, "faces": WORD}),
     Call("gc.Contact", lambda: {"position": CENTER, "normal": [0.0, 0.0, 1.0]}, {
         "position": array(CENTER), "normal": units([0.0, 0.0, 1.0]),
     }),
@@ -126,7 +111,6 @@ CALLS = [
         "repairs": SEVERAL,
     }),
     Call("gc.Polyhedron", lambda: fields_of(gc.Polyhedron, body()), {
-        "name": TEXT,
         "vertices": array(body().vertices),
         "triangles": array(body().triangles) | {"beyond": [[0, 1, 9]]},
         "faces": SEVERAL,
@@ -135,7 +119,6 @@ CALLS = [
         "inertia": array(np.eye(3)),
         "content_sha256": TEXT,
         "source_sha256": TEXT,
-        "patches": optional(VALUE),
         "surface": VALUE,
         "notes": SEVERAL,
     }),

@@ -41,13 +41,6 @@ NAMED_OTHERWISE = {
     ("gc.Polyhedron.from_mesh", "triangles"): "triangle",
     ("scenes.example_object", "name"): "name|object",
     ("scenes.write_picture", "path"): "path|picture's name",
-    ("sv.load_regions", "path"): "path|no/such",
-    ("sv.load_executions", "path"): "path|no/such",
-    ("sv.load_verdicts", "path"): "path|no/such",
-    ("gc.load_grasps", "path"): "path|no/such",
-    ("sv.load_dataset", "folder"): "folder|no/such",
-    ("sv.load_dex_record", "path"): "path|no/such",
-    ("sv.write_report", "folder"): "folder|no/such",
 }
 """What messages say of arguments in place of their names."""
 LONGEST_MESSAGE = 400
@@ -95,7 +88,8 @@ def complaint(call, argument, value):
         return repr(error)
     else:
         return "is taken"
-    named = re.search(NAMED_OTHERWISE.get((call.name, argument), argument), said)
+    words = NAMED_OTHERWISE.get((call.name, argument), argument)
+    named = re.search(words, said) or ("no/such" in str(value) and str(value) in said)
     return "" if named and len(said) < LONGEST_MESSAGE and "\n" not in said else said
 
 

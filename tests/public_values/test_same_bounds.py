@@ -1,7 +1,7 @@
 """A setting has the same bounds as a flag and in Python: each refuses what the other refuses."""
 
 import math
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
 from typing import Annotated, get_args, get_origin, get_type_hints
 
 import pytest
@@ -22,6 +22,7 @@ from sim_validate.cli import (
     flag_groups,
     hand_flags,
 )
+from sim_validate.cli.command_flags import Command
 from sim_validate.cli.flag_bounds import Bound
 from sim_validate.datasets.config import Learning
 from sim_validate.execution.settings import ExecutionSettings
@@ -169,6 +170,31 @@ def test_a_flag_and_python_refuse_the_same_values(name):
         refused.add(python)
         assert holds(given) == python, (name, given)
     assert refused == {True, False}
+
+
+def numbers_of(flags):
+    """The flags of a command and its groups that are numbers, as name and type."""
+    for name, kind in get_type_hints(flags, include_extras=True).items():
+        parts = list(parts_of(kind))
+        for part in parts:
+            if isinstance(part, type) and is_dataclass(part):
+                yield from numbers_of(part)
+        if int in parts or float in parts:
+            yield name, parts
+
+
+def parts_of(kind):
+    yield kind
+    for part in get_args(kind):
+        yield from parts_of(part)
+
+
+@pytest.mark.parametrize("command", get_args(Command))
+def test_every_number_of_a_command_has_bounds(command):
+    for name, parts in numbers_of(command):
+        bounds = [part for part in parts if isinstance(part, Bound) and "zero" not in part.says]
+        for value in (math.nan, math.inf, -math.inf):
+            assert not all(bound.holds(value) for bound in bounds), name
 
 
 def test_torsion_has_one_range_and_no_values_that_mujoco_would_raise():
