@@ -116,10 +116,3 @@ def test_contacts_on_a_line_leave_a_turn_unopposed(count):
     positions = np.outer(np.arange(count), [1.0, 2.0, 3.0])
     value = gc.smallest_singular_value(positions, torque_scale=1.0)
     assert value == pytest.approx(0.0, abs=1e-12)
-
-
-def test_bad_arguments_are_refused():
-    with pytest.raises(gc.InputError, match="edges must be a whole number from 3"):
-        gc.min_weight(TETRA_CENTERS, TETRA_NORMALS, 0.5, edges=2)
-    with pytest.raises(gc.InputError, match="torque_scale must be a number from 1e-09"):
-        gc.hull_volume(TETRA_CENTERS, TETRA_NORMALS, 0.5, torque_scale=-1.0)

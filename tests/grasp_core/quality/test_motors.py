@@ -146,13 +146,9 @@ def test_limits_rise_with_torque_in_proportion_and_a_dead_joint_only_lowers_them
         levers, wrench = hand_of(rng, 4).levers, rng.normal(size=6)
 
         def limit(torques, positions=positions, normals=normals, levers=levers, wrench=wrench):
+            motors = gc.Motors.of(levers, torques)
             return gc.max_resisted_wrench(
-                positions,
-                normals,
-                0.6,
-                wrench,
-                max_normal_force=1e3,
-                motors=gc.Motors.of(levers, torques),
+                positions, normals, 0.6, wrench, max_normal_force=1e3, motors=motors
             )
 
         dead = np.ones(len(levers))
@@ -182,17 +178,6 @@ def test_a_limit_of_other_motors_or_with_other_multipliers_does_not_verify():
             refused += 1
 
 
-def test_motors_are_refused_where_they_cannot_carry_the_links_or_belong_to_other_contacts():
-    with pytest.raises(gc.InputError, match=r"joint 1 asks for 0\.3 N m, but its limit is 0\.2"):
-        gc.Motors.of(np.eye(2, 6), 0.2, [0.1, 0.3])
-    with pytest.raises(gc.InputError, match="limits must be torques"):
-        gc.Motors.of(np.eye(2, 6), 0.0)
-    positions, normals = random_contacts(np.random.default_rng(0))
-    given = {"max_normal_force": 1.0, "motors": gc.Motors.of(np.eye(2, 6), 1.0)}
-    with pytest.raises(gc.InputError, match="columns for each of 4 contacts, 12 in all"):
-        gc.max_resisted_wrench(positions, normals, 0.5, np.eye(6)[0], **given)
-
-
 def test_motors_in_any_orientation_give_up_what_their_links_ask_in_the_worst():
     """One joint carries up to 0.05 of its 0.3 N m, the other sqrt(3) / 4 of its newton metre."""
     weights = np.array([[0.0, -0.03, 0.04], [0.25, 0.25, 0.25]])
@@ -202,8 +187,6 @@ def test_motors_in_any_orientation_give_up_what_their_links_ask_in_the_worst():
     assert gc.Motors.in_any_orientation(np.eye(2, 6), 0.3, 0.0 * weights) == gc.Motors.of(
         np.eye(2, 6), 0.3
     )
-    with pytest.raises(gc.InputError, match=r"weights of joint 1 ask for 0\.433013 N m in some"):
-        gc.Motors.in_any_orientation(np.eye(2, 6), 0.4, weights)
 
 
 def test_forces_within_lowered_limits_are_within_all_torques_in_every_orientation():
