@@ -83,25 +83,7 @@ def test_two_fingers_have_no_stiffness_about_their_line():
         _ = grip.response
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"squeeze": np.ones((4, 3))}, "squeeze must balance: a wrench of"),
-        ({"squeeze": np.zeros((3, 3))}, r"squeeze must have shape \(4, 3\)"),
-        ({"stiffness": 0.0}, "stiffness must be positive"),
-        ({"stiffness": np.diag([1.0, 1.0, -1.0]) * np.ones((4, 1, 1))}, "stiffness must be pos"),
-        ({"stiffness": np.triu(np.ones((4, 3, 3)))}, "symmetric"),
-        ({"stiffness": [1.0, 2.0]}, r"stiffness must have shape \(4,\)"),
-        ({"tip_radius_m": -0.1}, "tip_radius_m must be from 0"),
-        ({"friction": -0.1}, "friction must not be negative"),
-        ({"contacts": opposed()[:1]}, "at least two are needed, got 1"),
-        ({"contacts": [1, 2]}, "contacts must be a Contact, got 1"),
-        ({"contacts": 5}, "contacts must be a sequence of Contact values"),
-        ({"body": None}, "body must be a Polyhedron"),
-    ],
-)
-def test_what_is_wrong_is_refused(change, message):
-    good = {"body": box(), "contacts": opposed(), "friction": 0.5, "squeeze": pressed(5.0)}
-    assert gc.grip(**good).sound()
-    with pytest.raises(gc.InputError, match=message):
-        gc.grip(**(good | change))
+def test_a_stiffness_that_is_not_positive_definite_is_refused():
+    wrong = np.diag([1.0, 1.0, -1.0]) * np.ones((4, 1, 1))
+    with pytest.raises(gc.InputError, match="stiffness must be pos"):
+        gc.grip(box(), opposed(), 0.5, pressed(5.0), stiffness=wrong)
