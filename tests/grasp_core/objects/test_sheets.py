@@ -53,15 +53,6 @@ def test_a_large_hole_leaves_the_volume_unknown_and_the_fingers_pushing_inwards(
         body.mass_at(1000.0)
 
 
-def test_a_given_centre_of_mass_is_not_said_to_be_that_of_the_hull():
-    points, faces = ball(0.042)
-    body = gc.Polyhedron.from_mesh(points, faces, center_of_mass=[0.0, 0.0, 0.001])
-    assert body.surface.center_given
-    assert body.center_of_mass.tolist() == [0.0, 0.0, 0.001]
-    (note,) = (note for note in body.notes if "convex hull" in note)
-    assert "its volume is of the convex hull" in note
-
-
 @pytest.mark.parametrize(
     "mesh",
     [ball(0.0), ball(-0.02), ball(0.01), sheet()],
