@@ -119,16 +119,6 @@ def ways(mesh, seed):
     return found
 
 
-def text_stl(points, faces):
-    """A text STL in millimetres with six significant digits, as OpenSCAD writes it."""
-    lines = ["solid part"]
-    for face in faces:
-        lines += ["facet normal 0 0 0", "outer loop"]
-        lines += ["vertex " + " ".join(f"{1e3 * x:g}" for x in points[corner]) for corner in face]
-        lines += ["endloop", "endfacet"]
-    return "\n".join([*lines, "endsolid part", ""])
-
-
 def winding(mesh, points):
     """The winding number of a closed mesh about each point, by solid angles."""
     a, b, c = ((mesh.triangles[None, :, k] - points[:, None]) for k in range(3))

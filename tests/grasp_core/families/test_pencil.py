@@ -5,7 +5,6 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.cones.spanning import balancing_weights
-from grasp_core.families.concurrent import place_concurrent
 from grasp_core.families.constructions import AS_LISTED
 from grasp_core.families.pencil import CELL_A, CELL_B, pencil_radius_bounds, place_pencil
 from grasp_core.families.placements import Placement
@@ -48,16 +47,6 @@ def test_the_tetrahedron_has_discs_of_half_the_cone_angle_in_all_pairings(theta_
         assert math.sqrt(3.0) * placed.merit > 1.1 * radius
         discs = placed.positions, placed.radii
         assert least_margin(quad, *discs, extremes(quad), math.tan(theta) + BORDER) > 0.0
-
-
-@pytest.mark.parametrize(("theta_deg", "radius"), [(5.0, 0.059163), (10.0, 0.113774)])
-def test_the_double_wedge_bar_has_pencils_of_the_known_radius(theta_deg, radius):
-    """r = sqrt(2) t / (1 + t), t = tan(theta / 2), on the ends; no concurrent grasp there."""
-    theta, unit = math.radians(theta_deg), example_object("double-wedge-bar").radius / 0.02
-    best = max(pencils("double-wedge-bar", theta), key=lambda found: found[2].merit)
-    quad, cones, placed = best
-    assert unit * placed.merit == pytest.approx(radius, abs=1e-6)
-    assert not isinstance(place_concurrent(quad, cones, least=0.0), Placement)
 
 
 def test_every_elongated_quadruple_has_one_feasible_pairing():

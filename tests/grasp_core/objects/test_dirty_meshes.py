@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from tests.grasp_core.dirty_meshes import REFUSALS, plan, pushes_into, shapes, text_stl, ways
+from tests.bad_input.mesh_texts import stl_text
+from tests.grasp_core.dirty_meshes import REFUSALS, plan, pushes_into, shapes, ways
 
 EVERYDAY = ("dodecahedron", "ball 0", "cup 1")
 KNOWN = 0.02
@@ -20,7 +21,9 @@ def load(dirty, mesh, faces, folder):
     if dirty is not None:
         return gc.Polyhedron.from_mesh(dirty.vertices, dirty.triangles, faces=faces), dirty.moved
     path = folder / "part.stl"
-    path.write_text(text_stl(np.array(mesh.vertices), mesh.faces))
+    # millimetres with six significant digits, as OpenSCAD writes them
+    points = [[float(f"{1e3 * x:g}") for x in point] for point in mesh.vertices]
+    path.write_text(stl_text(points, mesh.faces))
     return gc.load_polyhedron(path, unit="mm", faces=faces), np.zeros(3)
 
 

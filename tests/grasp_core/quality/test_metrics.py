@@ -7,7 +7,6 @@ from scipy.spatial import ConvexHull
 
 import grasp_core as gc
 from grasp_core.closure.contacts import contact_frames
-from scenes.example_objects import example_object
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
 
 
@@ -66,15 +65,6 @@ def test_min_weight_of_generic_contacts_is_positive_only_with_closure():
 def test_weights_of_contacts_that_push_one_way_cannot_balance():
     normals = np.tile([0.0, 0, 1], (4, 1))
     assert gc.min_weight(TETRA_CENTERS, normals, 0.5) == -math.inf
-
-
-def test_frames_of_many_contacts_are_those_of_one_set():
-    grasps = gc.plan(example_object("random-12-1"), 0.5, limit=20).grasps
-    normals = np.array([grasp.normals for grasp in grasps])
-    normals = np.concatenate([normals, np.eye(3)[[[0, 1, 2, 0]]], -np.eye(3)[[[0, 1, 2, 0]]]])
-    for frames, units in zip(contact_frames(normals), normals, strict=True):
-        np.testing.assert_allclose(frames, contact_frames(units), atol=1e-15)
-    assert len(normals) >= 20
 
 
 def test_hull_volume_is_that_of_qhull_on_the_edges():
