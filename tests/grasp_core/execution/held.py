@@ -40,7 +40,9 @@ def opposed_grip(push=5.0, friction=0.5, **springs):
 @cache
 def planned(name, limit=3):
     body = scenes.example_object(name)
-    return body, gc.plan(body, 0.5, limit=limit).grasps
+    grasps = gc.plan(body, 0.5, limit=limit).grasps
+    assert len(grasps) == limit
+    return body, grasps
 
 
 def bodies_and_grasps(limit=2, names=("box", "dodecahedron", "wedge")):

@@ -82,20 +82,17 @@ def test_opposed_fingers_whose_links_hang_alike_hold_what_the_closed_form_says(m
 
 
 def test_the_mass_is_held_in_many_orientations_and_no_more_in_the_weakest():
-    rng, tested = np.random.default_rng(0), 0
+    rng = np.random.default_rng(0)
     for hand in hands():
         found = carried_mass(hand)
         assert found.verify()
         assert 0.0 < found.lower <= found.upper <= found.lower * (1.0 + GAP) * (1.0 + PROGRAM)
         assert min(held(hand, way) for way in directions(40, rng)) >= found.lower * (1.0 - PROGRAM)
         assert held(hand, found.weakest) <= found.upper * (1.0 + PROGRAM)
-        tested += 1
-    assert tested == 6
 
 
 @pytest.mark.parametrize("gap", [1e-3, 0.1])
 def test_links_without_weight_leave_the_mass_of_a_payload_with_forces_chosen_anew(gap):
-    tested = 0
     for hand in hands():
         plain = dataclasses.replace(hand, weights=0.0 * hand.weights)
         found = carried_mass(plain, gap)
@@ -108,8 +105,6 @@ def test_links_without_weight_leave_the_mass_of_a_payload_with_forces_chosen_ane
         assert found.lower <= free.upper * (1.0 + PROGRAM)
         assert found.upper >= free.lower * (1.0 - PROGRAM)
         assert found.upper <= found.lower * (1.0 + gap) * (1.0 + PROGRAM)
-        tested += 1
-    assert tested == 6
 
 
 @pytest.mark.parametrize("mu", [0.0, 1e-9])

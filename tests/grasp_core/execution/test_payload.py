@@ -40,7 +40,7 @@ def test_four_opposed_fingers_hold_what_the_closed_forms_say(mu):
 
 def test_the_free_mass_is_that_of_many_orientations():
     """No orientation holds less than the lower bound, and a hundred more do not either."""
-    rng, tested = np.random.default_rng(0), 0
+    rng = np.random.default_rng(0)
     for body, grasp, found in payloads():
         weights = np.zeros((162, 6))
         weights[:, :3] = G * np.vstack([orientations(), directions(100, rng)])
@@ -51,12 +51,9 @@ def test_the_free_mass_is_that_of_many_orientations():
         assert found.free.lower <= least * (1.0 + 1e-6)
         assert least <= 1.2 * found.free.upper
         assert found.free.upper <= found.free.lower * (1.0 + GAP) * (1.0 + 1e-6)
-        tested += len(weights)
-    assert tested == 12 * 162
 
 
 def test_the_fixed_mass_is_held_in_every_orientation_and_is_no_larger_than_the_free_one():
-    tested = 0
     for _, _, found in payloads():
         assert found.verify()
         assert found.fixed.scale <= found.free.upper
@@ -68,13 +65,11 @@ def test_the_fixed_mass_is_held_in_every_orientation_and_is_no_larger_than_the_f
         ]
         assert found.mass_kg <= min(slips)
         assert min(slips) <= 1.3 * found.mass_kg
-        tested += len(slips)
-    assert tested == 12 * 62
 
 
 def test_masses_with_motors_are_proved_and_those_of_many_orientations():
     """The fixed mass is no larger than the free one, as tips of no radius do not roll."""
-    rng, hands, tested, lowered = np.random.default_rng(0), np.random.default_rng(0), 0, 0
+    rng, hands, lowered = np.random.default_rng(0), np.random.default_rng(0), 0
     for body, grasp in bodies_and_grasps():
         motors = hand_of(hands, 4, 0.15, 0.0)
         held = {"max_push_n": 10.0, "tip_radius_m": 0.0}
@@ -99,8 +94,6 @@ def test_masses_with_motors_are_proved_and_those_of_many_orientations():
         assert found.free.upper <= free.free.upper * (1.0 + GAP)
         assert found.mass_kg <= free.mass_kg * (1.0 + 3e-4)
         lowered += found.free.upper < 0.9 * free.free.lower
-        tested += len(slips)
-    assert tested == 6 * 82
     assert lowered == 6
 
 
@@ -108,7 +101,7 @@ def test_motors_in_any_orientation_carry_object_and_links_in_every_one():
     """Both masses are held with the links' own torque in each orientation. What is held there is at
     most (c + w) / (c - w) times as much (see `Motors.in_any_orientation`).
     """
-    rng, tested = np.random.default_rng(3), 0
+    rng = np.random.default_rng(3)
     for body, grasp in bodies_and_grasps(limit=1):
         hand = hand_of(rng, 4, 0.15, 0.0)
         weights = 0.1 * hand.limits[:, None] * rng.normal(size=(len(hand.limits), 3))
@@ -129,8 +122,6 @@ def test_motors_in_any_orientation_carry_object_and_links_in_every_one():
             assert held <= most * sure * (1.0 + 1e-6)
             slip = gc.first_slip(found.fixed.grip, load, model="linear", motors=turned)
             assert slip.multiple >= found.mass_kg
-            tested += 1
-    assert tested == 3 * 62
 
 
 def test_payloads_of_other_motors_are_no_certificate():

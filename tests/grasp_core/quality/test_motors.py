@@ -93,7 +93,6 @@ def test_limits_lie_between_programs_with_pyramids_in_and_around_the_cones():
 
 def test_no_allowed_forces_pass_the_bound_of_facet_and_multipliers():
     rng = np.random.default_rng(1)
-    tested = 0
     for _ in range(CASES):
         positions, normals = random_contacts(rng)
         motors, wrench = hand_of(rng, 4, 1.0, joints=4, lever_m=1.0), rng.normal(size=6)
@@ -111,8 +110,6 @@ def test_no_allowed_forces_pass_the_bound_of_facet_and_multipliers():
         forces *= np.minimum(1.0, (room / np.abs(along)).min(axis=1))[:, None, None]
         reached = forces.reshape(400, -1) @ grasp_map(positions).T @ found.facet
         assert reached.max() <= found.upper + 1e-6
-        tested += len(reached)
-    assert tested == CASES * 400
 
 
 def test_strong_motors_change_nothing():
