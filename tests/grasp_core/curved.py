@@ -39,3 +39,13 @@ def met(body, face, point):
     inward /= np.linalg.norm(inward, axis=1, keepdims=True)
     heights = np.einsum("fi,fi->f", hit[:, 0] - point, inward) / (inward @ face.normal)
     return heights, inward
+
+
+def check_patches(body, rng, count, lean=1e-9):
+    """Over each point of a patch is one point of the surface, as near and as steep as it says."""
+    for face in body.faces:
+        for point in inside(face.polygon, rng, count):
+            heights, inward = met(body, face, point)
+            np.testing.assert_allclose(heights, heights[:1], atol=1e-7 * body.radius)
+            assert np.abs(heights).max() <= face.depth + 1e-9 * body.radius
+            assert np.arccos(np.minimum(inward @ face.normal, 1.0)).max() <= face.spread + lean

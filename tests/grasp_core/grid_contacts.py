@@ -77,7 +77,7 @@ def scattered(rng, count):
     body = rng.choice([*BODIES, "none"])
     if body == "none":
         return random_contacts(rng, count, spread=rng.uniform(0.2, 1.6))
-    points, normals = BODIES[body][0](rng, count)
+    points, normals = BODIES[body](rng, count)
     size = 10.0 ** rng.uniform(-3.0, 3.0)
     return moved(rng, points, normals, size) if rng.uniform() < 0.3 else (points, normals)
 

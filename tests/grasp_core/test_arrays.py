@@ -8,13 +8,10 @@ import grasp_core as gc
 from grasp_core.arrays import (
     are_units,
     frozen,
-    frozen_indices,
-    frozen_units,
     is_array,
     is_indices,
     to_digits,
 )
-from grasp_core.errors import InputError
 from scenes.example_objects import example_object
 
 
@@ -25,31 +22,6 @@ def test_a_frozen_array_is_a_read_only_copy():
     assert kept[0] == 0.0
     with pytest.raises(ValueError, match="read-only"):
         kept[0] = 1.0
-
-
-@pytest.mark.parametrize(
-    ("value", "message"),
-    [
-        ([1.0, 2.0], r"v must have shape \(3,\), got \(2,\)"),
-        ([1.0, np.nan, 0.0], "v must be finite"),
-        ([1.0, np.inf, 0.0], "v must be finite"),
-        (["a", "b", "c"], "v must be an array of numbers"),
-    ],
-)
-def test_a_bad_array_is_refused_by_name(value, message):
-    with pytest.raises(InputError, match=message):
-        frozen(value, (3,), "v")
-
-
-def test_a_vector_that_is_not_unit_is_refused_with_its_length():
-    with pytest.raises(InputError, match="normal must have length 1, got 2"):
-        frozen_units([0.0, 0.0, 2.0], (3,), "normal")
-
-
-@pytest.mark.parametrize("bad", [[0.5], [-1]])
-def test_indices_are_whole_and_not_negative(bad):
-    with pytest.raises(InputError, match="whole numbers"):
-        frozen_indices(bad, (None,), "i")
 
 
 @pytest.mark.parametrize("largest", [1.0, 0.05, 3.0, 1e-3, 120.0])

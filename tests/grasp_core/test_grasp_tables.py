@@ -39,11 +39,6 @@ def test_a_slice_is_a_plan_of_the_same_object(plan):
     assert some.counts is plan.counts
 
 
-def test_an_empty_plan_is_still_a_result(plan):
-    assert len(plan[:0]) == 0
-    assert plan[:0]
-
-
 @pytest.mark.parametrize(
     ("demand", "meets"),
     [
@@ -80,9 +75,7 @@ def test_demands_are_met_together(plan):
 @pytest.mark.parametrize(
     ("demand", "words"),
     [
-        ({"family": "square"}, "family"),
         ({"family": ["pencil", "square"]}, "family"),
-        ({"family": 3}, "family"),
         ({"min_radius_m": "a"}, "min_radius_m"),
         ({"max_critical_friction": float("nan")}, "max_critical_friction"),
         ({"where": 3}, "where"),

@@ -8,7 +8,6 @@ import grasp_core as gc
 from tests.judges import (
     TETRA_CENTERS,
     TETRA_NORMALS,
-    TETRAHEDRON,
     pyramid_margin,
     random_contacts,
 )
@@ -57,21 +56,6 @@ def test_parallel_faces(a, h, w, expected):
     positions = np.array([[-w / 2, a, 0], [-w / 2, -a, 0], [w / 2, h + a, 0], [w / 2, h - a, 0]])
     normals = np.array([[1.0, 0, 0], [1, 0, 0], [-1, 0, 0], [-1, 0, 0]])
     assert gc.critical_friction(positions, normals) == pytest.approx(expected, abs=1e-7)
-
-
-@pytest.mark.parametrize(
-    ("length", "l", "m", "s", "expected"),
-    [
-        (3, 0.3, -0.3, 0.5, 0.390567), (3, 0.2, -0.2, 0.5, 0.272166), (1, 0.3, -0.3, 0.4, 0.468521),
-        (3, 0.5, 0.0, 0.5, 0.287093), (3, 0.4, 0.1, 0.5, 0.173077), (3, 0.6, -0.1, 0.5, 0.396322),
-        (3, 0.3, 0.3, 0.5, 0.0),
-    ],
-)  # fmt: skip
-def test_ends_of_a_double_wedge_bar(length, l, m, s, expected):  # noqa: E741 - the oracle's letters
-    x = length + 1 - s
-    positions = np.array([[-x, s, l], [-x, -s, -l], [x, m, s], [x, -m, -s]])
-    normals = np.array([[1.0, -1, 0], [1, 1, 0], [-1, 0, -1], [-1, 0, 1]]) / math.sqrt(2.0)
-    assert gc.critical_friction(positions, normals) == pytest.approx(expected, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -132,15 +116,6 @@ def test_contacts_on_one_line_are_never_closed():
     assert not certificate.closed
     assert certificate.verify()
     assert gc.critical_friction(positions, normals) == math.inf
-
-
-def test_normals_that_all_point_one_way_need_infinite_friction():
-    positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
-    normals = np.tile([0.0, 0, 1], (4, 1))
-    assert gc.critical_friction(positions, normals) == math.inf
-    certificate = gc.force_closure(positions, normals, 5.0)
-    assert not certificate.closed
-    assert certificate.verify()
 
 
 def test_friction_may_differ_between_contacts():
@@ -233,24 +208,6 @@ def test_no_contact_force_works_along_the_separating_wrench():
             assert work.max() <= 1e-9 * np.abs(y).max()
             tested += len(forces)
     assert tested >= 2000
-
-
-@pytest.mark.parametrize(
-    ("positions", "normals", "friction", "message"),
-    [
-        (TETRAHEDRON, 2 * TETRA_NORMALS, 0.5, "length 1"),
-        (TETRAHEDRON, TETRA_NORMALS[:3], 0.5, "shape"),
-        (TETRAHEDRON[:1], TETRA_NORMALS[:1], 0.5, "at least two"),
-        (TETRAHEDRON, None, 0.5, "normals are missing"),
-        (TETRAHEDRON, TETRA_NORMALS, -0.1, "must not be negative"),
-        (TETRAHEDRON, TETRA_NORMALS, math.nan, "finite"),
-        (TETRAHEDRON * math.inf, TETRA_NORMALS, 0.5, "finite"),
-        (TETRAHEDRON, TETRA_NORMALS, [0.5, 0.5], "shape"),
-    ],
-)
-def test_bad_arguments_are_refused(positions, normals, friction, message):
-    with pytest.raises(gc.InputError, match=message):
-        gc.force_closure(positions, normals, friction)
 
 
 def certificates_of_both_kinds():

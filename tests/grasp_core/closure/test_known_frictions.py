@@ -59,6 +59,19 @@ def wedge_contacts(length, l, m, s):  # noqa: E741 - the oracle's letters
     return positions, units([[1, -1, 0], [1, 1, 0], [-1, 0, -1], [-1, 0, 1]])
 
 
+@pytest.mark.parametrize(
+    ("length", "l", "m", "s", "expected"),
+    [
+        (3, 0.3, -0.3, 0.5, 0.390567), (3, 0.2, -0.2, 0.5, 0.272166), (1, 0.3, -0.3, 0.4, 0.468521),
+        (3, 0.5, 0.0, 0.5, 0.287093), (3, 0.4, 0.1, 0.5, 0.173077), (3, 0.6, -0.1, 0.5, 0.396322),
+        (3, 0.3, 0.3, 0.5, 0.0),
+    ],
+)  # fmt: skip
+def test_ends_of_a_double_wedge_bar(length, l, m, s, expected):  # noqa: E741 - as above
+    found = gc.critical_friction(*wedge_contacts(length, l, m, s))
+    assert found == pytest.approx(expected, abs=1e-6)
+
+
 @pytest.mark.parametrize("s", [0.3, 0.5])
 @pytest.mark.parametrize("l", [0.0, 0.1, 0.3])
 def test_the_length_of_a_double_wedge_bar_does_not_matter(l, s):  # noqa: E741 - as above

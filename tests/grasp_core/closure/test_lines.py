@@ -1,5 +1,3 @@
-from itertools import permutations
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,6 @@ DEPENDENT = 1e-9
 """Wrenches of balanced unit forces on a unit-size object below this are rounding."""
 APART = 0.3
 """Least angle between chosen rulings [rad]: nearer lines are nearly the same line."""
-CLASSES = ("planar", "concurrent", "pencil", "regulus", "independent")
 
 
 def random_directions(rng, count=4):
@@ -118,14 +115,6 @@ def test_a_class_survives_motion_scale_sliding_order_and_flips(construct, expect
             assert gc.classify_lines(*moved(rng, points, directions)) == expected
 
 
-def test_the_fingers_of_a_pencil_may_come_in_any_order():
-    points, directions = two_pencils(np.random.default_rng(2))
-    orders = [list(order) for order in permutations(range(4))]
-    found = {gc.classify_lines(points[order], directions[order]) for order in orders}
-    assert len(orders) == 24
-    assert found == {"pencil"}
-
-
 def test_two_pencils_remain_two_until_their_foci_meet():
     rng = np.random.default_rng(3)
     for gap, expected in ((1e-2, "pencil"), (1e-3, "pencil"), (0.0, "concurrent")):
@@ -149,22 +138,6 @@ def test_a_regulus_with_one_line_turned_away_is_independent(construct):
         points, directions = construct(rng)
         directions[rng.integers(4)] += 1e-3 * random_directions(rng, 1)[0]
         assert gc.classify_lines(*moved(rng, points, directions)) == "independent"
-
-
-def test_the_constructions_have_the_skew_pairs_of_their_class():
-    """Of the six pairs of lines, all are skew in a regulus and four in two pencils."""
-    rng = np.random.default_rng(6)
-    expected = {two_pencils: 4, rulings_of_a_hyperboloid: 6, through_a_point: 0}
-    for construct, skew in expected.items():
-        for _ in range(50):
-            points, directions = construct(rng)
-            volumes = [
-                np.linalg.det([points[i] - points[j], directions[i], directions[j]])
-                for i in range(4)
-                for j in range(i)
-            ]
-            assert (np.abs(volumes) > 1e-4).sum() == skew
-            assert (np.abs(volumes) < 1e-12).sum() == 6 - skew
 
 
 @pytest.mark.parametrize(
@@ -225,16 +198,6 @@ def test_a_line_named_twice_leaves_the_class_of_the_others():
         assert gc.classify_lines(*moved(rng, points[chosen], directions[chosen])) == "planar"
 
 
-def test_coinciding_lines_and_points_get_some_class():
-    rng = np.random.default_rng(9)
-    for _ in range(50):
-        for construct, _ in CONSTRUCTIONS:
-            points, directions = construct(rng)
-            lines = rng.integers(0, 4, 4)
-            assert gc.classify_lines(points[lines], directions[lines]) in CLASSES
-            assert gc.classify_lines(np.zeros((4, 3)), directions) in ("planar", "concurrent")
-
-
 def test_lines_given_by_their_common_point_up_to_rounding_are_concurrent():
     """The spread of the points is then noise, and no length to measure lines against."""
     rng = np.random.default_rng(11)
@@ -244,21 +207,6 @@ def test_lines_given_by_their_common_point_up_to_rounding_are_concurrent():
         assert gc.classify_lines((focus + steps) - steps, directions) == "concurrent"
 
 
-def test_what_is_no_line_is_refused():
-    points, directions = at_random(np.random.default_rng(12))
-    zero = directions * [[1.0], [0.0], [1.0], [1.0]]
-    with pytest.raises(gc.InputError, match="must not be zero"):
-        gc.classify_lines(points, zero)
-    for wrong in (points[:3], points[:, :2], np.vstack([points, points]), points.ravel()):
-        with pytest.raises(gc.InputError, match="points must have shape"):
-            gc.classify_lines(wrong, directions)
-        with pytest.raises(gc.InputError, match="directions must have shape"):
-            gc.classify_lines(points, wrong)
-    for entry in (np.nan, np.inf):
-        with pytest.raises(gc.InputError, match="must be finite"):
-            gc.classify_lines(np.where(points == points[0, 0], entry, points), directions)
-
-
 def test_many_sets_of_lines_are_classified_at_once():
     rng = np.random.default_rng(11)
     names = [name for _, name in CONSTRUCTIONS]
@@ -266,5 +214,3 @@ def test_many_sets_of_lines_are_classified_at_once():
     points, directions = (np.array(each) for each in zip(*sets, strict=True))
     assert classify_each(points, directions) == names
     assert classify_each(points[:0], directions[:0]) == []
-    with pytest.raises(gc.InputError, match="directions must not be zero"):
-        classify_each(points, 0.0 * directions)

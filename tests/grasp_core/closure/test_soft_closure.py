@@ -1,61 +1,25 @@
 """Force closure of contacts with torsion, beside hand-worked cases, pyramids and samples."""
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 import grasp_core as gc
-from tests.judges import PROVED, random_contacts, random_rotation
-from tests.marks import more
+from tests.grasp_core.soft_cones import OPPOSITE, ball_edges, inradius, wrenches_of
+from tests.judges import PROVED, least_weight_program, random_contacts, random_rotation
 
 CASES = 60
 SAMPLES = 400
-OPPOSITE = np.array([[-0.05, 0, 0], [0.05, 0, 0]]), np.array([[1.0, 0, 0], [-1, 0, 0]])
 
 
-def cone_edges(sides, *, outer):
-    """Unit vectors, or longer ones around all of them, whose hull is inside or around the ball."""
-    angles = 2.0 * np.pi * np.arange(sides) / sides
-    heights = np.cos(np.pi * (np.arange(sides // 2) + 0.5) / (sides // 2))
-    ring = np.column_stack([np.cos(angles), np.sin(angles)])
-    edges = [np.append(np.sqrt(1 - h * h) * way, h) for h, way in itertools.product(heights, ring)]
-    edges = np.array([*edges, [0, 0, 1.0], [0, 0, -1.0]])
-    if not outer:
-        return edges
-    # of all directions, none is farther from an edge than half a ring and half a step of height
-    farthest = np.pi / sides + np.pi / (sides // 2)
-    return edges / np.cos(farthest)
-
-
-def wrenches_of(x, n, mu, mu_t, edges):
-    """Wrenches of forces and torques of unit push along edges of each cone, at unit size."""
+def closed_by_program(x, n, mu, mu_t, edges):
+    """Whether positive weights balance the edges' wrenches, at unit size and of rank six."""
     arms = x - x.mean(axis=0)
     size = np.linalg.norm(arms, axis=1).max()
-    rows = []
-    for arm, normal, friction, torsion in zip(arms / size, n, mu, mu_t, strict=True):
-        tangents = np.linalg.svd(normal[None])[2][1:]
-        f = normal + friction * edges[:, :2] @ tangents
-        torque = np.cross(arm, f) + np.outer(edges[:, 2] * torsion / size, normal)
-        rows.append(np.hstack([f, torque]))
-    return np.vstack(rows)
-
-
-def closed_by_program(W):
-    """Whether some positive weights balance wrenches of rank six; None where it is too close."""
-    count = len(W)
-    A = np.hstack([-np.eye(count), np.ones((count, 1))])
-    equal = np.vstack([np.append(W.T, np.zeros((6, 1)), axis=1), np.append(np.ones(count), 0.0)])
-    answer = linprog(
-        np.append(np.zeros(count), -1.0), A_ub=A, b_ub=np.zeros(count), A_eq=equal,
-        b_eq=np.append(np.zeros(6), 1.0), bounds=[(None, None)] * (count + 1), method="highs",
-    )  # fmt: skip
-    if answer.status != 0:
-        return False
-    full = np.linalg.matrix_rank(W, 1e-9) == 6
-    return full and answer.x[-1] > PROVED
+    W = wrenches_of(arms / size, n, mu, mu_t / size, edges)
+    weights, _ = least_weight_program(W)
+    return np.linalg.matrix_rank(W, 1e-9) == 6 and weights.min() > PROVED
 
 
 def drawn(rng, count):
@@ -95,20 +59,20 @@ def test_torsion_adds_what_a_missing_turn_about_one_axis_needs():
         assert found.verify()
 
 
-@pytest.mark.parametrize("count", [2, 3, *more(4)])
+@pytest.mark.parametrize("count", [2, 3])
 def test_pyramids_inside_and_around_the_cones_agree(count):
     """Pyramids inside that close prove closure, pyramids around that do not prove the opposite."""
     rng = np.random.default_rng(count)
-    inner, outer = cone_edges(12, outer=False), cone_edges(24, outer=True)
+    inner, outer = ball_edges(12), ball_edges(24) / inradius(24)
     seen = {True: 0, False: 0}
     for _ in range(CASES):
         x, n, mu, mu_t = drawn(rng, count)
         found = gc.force_closure(x, n, mu, torsion_m=mu_t)
         assert found.verify()
         seen[found.closed] += 1
-        if closed_by_program(wrenches_of(x, n, mu, mu_t, inner)):
+        if closed_by_program(x, n, mu, mu_t, inner):
             assert found.closed
-        if not closed_by_program(wrenches_of(x, n, mu, mu_t, outer)):
+        if not closed_by_program(x, n, mu, mu_t, outer):
             assert not found.closed
     assert min(seen.values()) >= 3
 
@@ -173,16 +137,6 @@ def test_a_certificate_holds_for_its_own_torsion_only():
     assert not replace(open_, torsion_m=np.full(2, 0.01)).verify()
 
 
-@pytest.mark.parametrize(
-    ("friction", "torsion_m", "message"),
-    [
-        (0.0, 0.01, "torsion_m must be zero where friction is"),
-        (0.5, -0.01, "torsion_m must be lengths from 0"),
-        (0.5, [0.01], "torsion_m must have shape"),
-        (0.5, "a", "torsion_m must be an array of numbers"),
-        (0.5, float("nan"), "torsion_m must be finite"),
-    ],
-)
-def test_torsion_that_makes_no_sense_is_refused(friction, torsion_m, message):
-    with pytest.raises(gc.InputError, match=message):
-        gc.force_closure(*OPPOSITE, friction, torsion_m=torsion_m)
+def test_torsion_without_friction_is_refused():
+    with pytest.raises(gc.InputError, match="torsion_m must be zero where friction is"):
+        gc.force_closure(*OPPOSITE, 0.0, torsion_m=0.01)

@@ -8,6 +8,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.soft_closure import friction_interval
 from grasp_core.closure.soft_contacts import SoftContacts, margin_ceiling, proved_margin
+from tests.grasp_core.soft_cones import OPPOSITE
 from tests.judges import random_contacts
 
 CASES = 60
@@ -26,15 +27,10 @@ def test_two_offset_fingers_need_the_slope_of_the_line_between_them(offset):
 
 
 def test_opposite_soft_fingers_close_at_any_friction():
-    x, n = np.array([[-0.05, 0, 0], [0.05, 0, 0]]), np.array([[1.0, 0, 0], [-1, 0, 0]])
-    assert gc.critical_friction(x, n, torsion_m=0.005) == 0.0
+    assert gc.critical_friction(*OPPOSITE, torsion_m=0.005) == 0.0
 
 
 def test_a_twist_that_torsion_shares_needs_less_friction():
-    """Four fingers on two faces, at (+-a, +-w/2) with the upper pair shifted by s across.
-
-    The pairs balance the couple s N by friction, mu N per finger over the lever a, or by torsion.
-    """
     rng = np.random.default_rng(1)
     less = 0
     for _ in range(CASES):

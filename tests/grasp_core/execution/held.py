@@ -1,6 +1,7 @@
 """Grips for tests: four fingers on a box with answers by hand, and planned grasps."""
 
 from functools import cache
+from itertools import combinations
 
 import numpy as np
 
@@ -39,15 +40,38 @@ def opposed_grip(push=5.0, friction=0.5, **springs):
 @cache
 def planned(name, limit=3):
     body = scenes.example_object(name)
-    return body, gc.plan(body, 0.5, limit=limit).grasps
+    grasps = gc.plan(body, 0.5, limit=limit).grasps
+    assert len(grasps) == limit
+    return body, grasps
 
 
-def planned_grips(names=("box", "dodecahedron", "wedge"), limit=2, push=8.0, **springs):
+def bodies_and_grasps(limit=2, names=("box", "dodecahedron", "wedge")):
     for name in names:
         body, grasps = planned(name, limit)
         for grasp in grasps:
-            forces = push * even_forces(grasp.positions, grasp.normals, 0.35)
-            yield gc.grip(body, grasp, 0.5, forces, **springs)
+            yield body, grasp
+
+
+def planned_grips(names=("box", "dodecahedron", "wedge"), limit=2, push=8.0, **springs):
+    for body, grasp in bodies_and_grasps(limit, names):
+        forces = push * even_forces(grasp.positions, grasp.normals, 0.35)
+        yield gc.grip(body, grasp, 0.5, forces, **springs)
+
+
+def loads_of(grip, count, rng):
+    """Wrenches in all directions, with torques relative to the grip's size, (count, 6)."""
+    return directions(count, rng, 6) * np.repeat([1.0, grip.size], 3)
+
+
+@cache
+def orientations():
+    """Corners, middles of edges and middles of faces of an icosahedron as unit vectors, (62, 3)."""
+    body = scenes.example_object("icosahedron")
+    corners = body.vertices - body.center_of_mass
+    edges = {tuple(sorted(pair)) for face in body.triangles for pair in combinations(face, 2)}
+    chosen = [*np.arange(12)[:, None], *map(list, edges), *body.triangles]
+    found = np.array([corners[each].sum(axis=0) for each in chosen])
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 
 def directions(count, rng, size=3):

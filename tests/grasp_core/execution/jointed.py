@@ -31,11 +31,11 @@ def lifting(count, limit):
     return gc.Motors.of(levers, limit)
 
 
-def hand_of(rng, contacts, torque, weight=0.5, joints=3):
+def hand_of(rng, contacts, torque, weight=0.5, joints=3, lever_m=0.04):
     """A hand with so many joints for each finger, as long as fingers are, whose links weigh."""
     levers = np.zeros((joints * contacts, 3 * contacts))
     for finger in range(contacts):
         own = slice(joints * finger, joints * (finger + 1))
-        levers[own, 3 * finger : 3 * finger + 3] = 0.04 * rng.normal(size=(joints, 3))
+        levers[own, 3 * finger : 3 * finger + 3] = lever_m * rng.normal(size=(joints, 3))
     limits = torque * rng.uniform(0.5, 1.5, size=len(levers))
     return gc.Motors(levers, limits, weight * limits * rng.uniform(-1.0, 1.0, size=len(levers)))

@@ -9,7 +9,7 @@ import grasp_core as gc
 from grasp_core.closure.contacts import cross_matrix
 from grasp_core.execution.beyond_slip import _returned, loss_multiples
 from grasp_core.execution.first_slip import slip_steps
-from tests.grasp_core.execution.held import box, directions, opposed_grip, planned_grips
+from tests.grasp_core.execution.held import box, directions, loads_of, opposed_grip, planned_grips
 
 SINK = np.array([[0.0, 0.0, -1.0, 0.0, 0.0, 0.0]])
 FAR = 1.0
@@ -88,7 +88,7 @@ def test_planned_grips_lose_their_object_where_many_small_steps_do():
     rng, most_m, most_rad = np.random.default_rng(5), 2e-3, 0.04
     ratios = []
     for grip in planned_grips(limit=2, push=4.0, tip_radius_m=0.01):
-        loads = directions(6, rng, 6) * np.repeat([1.0, grip.size], 3)
+        loads = loads_of(grip, 6, rng)
         found = loss_multiples(grip, loads, most_m, most_rad)
         for load, loss in zip(loads, found, strict=True):
             slip = slip_steps(grip.local_squeeze, grip.response @ load, grip.friction).min()
@@ -103,7 +103,7 @@ def test_planned_grips_lose_their_object_where_many_small_steps_do():
 def test_last_digits_of_a_load_do_not_decide_its_loss():
     rng, changes, count = np.random.default_rng(7), np.random.default_rng(1), 0
     for grip in planned_grips(limit=3, push=5.0, tip_radius_m=0.01):
-        loads = directions(40, rng, 6) * np.repeat([1.0, grip.size], 3)
+        loads = loads_of(grip, 40, rng)
         found = loss_multiples(grip, loads, 1e-3, FAR)
         for size in (1e-12, 1e-9):
             changed = loads * (1.0 + size * changes.normal(size=loads.shape))
@@ -115,7 +115,7 @@ def test_last_digits_of_a_load_do_not_decide_its_loss():
 def test_losses_are_after_the_slip_and_before_the_limit_without_slip():
     rng, count = np.random.default_rng(7), 0
     for grip in planned_grips(limit=3, push=5.0, tip_radius_m=0.01):
-        loads = directions(40, rng, 6) * np.repeat([1.0, grip.size], 3)
+        loads = loads_of(grip, 40, rng)
         slips = [slip_steps(grip.local_squeeze, grip.response @ w, grip.friction).min()
                  for w in loads]  # fmt: skip
         motion = loads @ grip.compliance.T
@@ -133,7 +133,7 @@ def test_losses_are_after_the_slip_and_before_the_limit_without_slip():
 
 def test_each_load_is_followed_by_itself():
     (grip, *_) = planned_grips(limit=1, push=5.0, tip_radius_m=0.01)
-    loads = directions(12, np.random.default_rng(9), 6) * np.repeat([1.0, grip.size], 3)
+    loads = loads_of(grip, 12, np.random.default_rng(9))
     together = loss_multiples(grip, loads, 1e-3, 0.05)
     alone = [loss_multiples(grip, load[None], 1e-3, 0.05)[0] for load in loads]
     assert together == pytest.approx(alone, rel=1e-6)

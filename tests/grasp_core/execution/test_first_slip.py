@@ -5,7 +5,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.contacts import grasp_map, normal_and_tangential
-from tests.grasp_core.execution.held import directions, opposed_grip, planned_grips
+from tests.grasp_core.execution.held import loads_of, opposed_grip, planned_grips
 
 ACROSS = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 ALONG = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -42,10 +42,6 @@ def test_unstable_grips_are_reported():
     for model in ("finite", "linear"):
         found = gc.first_slip(grip, ACROSS, model=model)
         assert (found.event, found.multiple, found.contact) == ("unstable", 0.0, -1)
-
-
-def loads_of(grip, count, rng):
-    return directions(count, rng, 6) * np.repeat([1.0, grip.size], 3)
 
 
 def test_the_linear_model_is_the_limit_of_stiff_fingertips():
@@ -96,7 +92,6 @@ def test_no_first_slip_is_above_the_closure_limit(most):
 
 def test_linear_forces_balance_at_rest_where_tips_do_not_roll():
     """The comparison with the closure limit of the contacts at rest is exact for point tips."""
-    tested = 0
     for i, grip in enumerate(planned_grips(stiffness=1000.0, tip_radius_m=0.0)):
         for load in loads_of(grip, 4, np.random.default_rng(i)):
             found = gc.first_slip(grip, load, model="linear", max_push_n=20.0)
@@ -106,20 +101,9 @@ def test_linear_forces_balance_at_rest_where_tips_do_not_roll():
                 grip.arms, grip.normals, 0.5, load, max_normal_force=20.0
             )
             assert found.multiple <= limit * (1.0 + 1e-6)
-            tested += 1
-    assert tested == 24
 
 
-def test_what_is_wrong_is_refused():
+def test_a_grip_that_was_not_made_as_one_is_refused():
     grip = opposed_grip(push=5.0)
-    for change, message in (
-        ({"wrench": np.zeros(6)}, "wrench must not be zero"),
-        ({"wrench": np.ones(5)}, "wrench must have shape"),
-        ({"model": "exact"}, "model must be one of finite, linear"),
-        ({"max_push_n": 0.0}, "max_push_n must be a number from"),
-        ({"max_push_n": 2.0}, "squeeze: contact 0 of the grip is not held at rest"),
-        ({"grip": None}, "grip must be a Grip"),
-        ({"grip": dataclasses.replace(grip, normals=2.0 * grip.normals)}, "as gc.grip makes it"),
-    ):
-        with pytest.raises(gc.InputError, match=message):
-            gc.first_slip(**({"grip": grip, "wrench": ACROSS} | change))
+    with pytest.raises(gc.InputError, match=r"as gc\.grip makes it"):
+        gc.first_slip(dataclasses.replace(grip, normals=2.0 * grip.normals), ACROSS)

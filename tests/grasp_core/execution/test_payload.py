@@ -4,33 +4,23 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-import scenes
 from grasp_core.execution.payload import GAP
-from tests.grasp_core.execution.held import box, directions, opposed, planned
+from tests.grasp_core.execution.held import (
+    bodies_and_grasps,
+    box,
+    directions,
+    opposed,
+    orientations,
+)
 from tests.grasp_core.execution.jointed import hand_of, pushing
 
 G = 9.80665
 
 
-def orientations():
-    """Forty-two evenly spread directions: corners and middles of the edges of an icosahedron."""
-    corners = scenes.example_object("icosahedron").vertices
-    corners = corners - corners.mean(axis=0)
-    corners /= np.linalg.norm(corners, axis=1, keepdims=True)
-    middles = [a + b for i, a in enumerate(corners) for b in corners[:i] if a @ b > 0.0]
-    middles = np.array(middles) / np.linalg.norm(middles, axis=1, keepdims=True)
-    found = np.vstack([corners, middles])
-    assert len(found) == 42
-    return found
-
-
-def payloads(names=("box", "dodecahedron", "wedge"), limit=2):
-    for name in names:
-        body, grasps = planned(name, limit)
-        for grasp in grasps:
-            for stiffness in (500.0, 3000.0):
-                given = {"max_push_n": 10.0, "stiffness": stiffness}
-                yield body, grasp, gc.payload(body, grasp, 0.5, **given)
+def payloads():
+    for body, grasp in bodies_and_grasps():
+        for stiffness in (500.0, 3000.0):
+            yield body, grasp, gc.payload(body, grasp, 0.5, max_push_n=10.0, stiffness=stiffness)
 
 
 @pytest.mark.parametrize("mu", [0.1, 0.4, 0.9])
@@ -50,9 +40,9 @@ def test_four_opposed_fingers_hold_what_the_closed_forms_say(mu):
 
 def test_the_free_mass_is_that_of_many_orientations():
     """No orientation holds less than the lower bound, and a hundred more do not either."""
-    rng, tested = np.random.default_rng(0), 0
+    rng = np.random.default_rng(0)
     for body, grasp, found in payloads():
-        weights = np.zeros((142, 6))
+        weights = np.zeros((162, 6))
         weights[:, :3] = G * np.vstack([orientations(), directions(100, rng)])
         limits = gc.wrench_limits(
             grasp, None, 0.5, weights, max_normal_force=10.0, center=body.center_of_mass
@@ -61,12 +51,9 @@ def test_the_free_mass_is_that_of_many_orientations():
         assert found.free.lower <= least * (1.0 + 1e-6)
         assert least <= 1.2 * found.free.upper
         assert found.free.upper <= found.free.lower * (1.0 + GAP) * (1.0 + 1e-6)
-        tested += len(weights)
-    assert tested == 1704
 
 
 def test_the_fixed_mass_is_held_in_every_orientation_and_is_no_larger_than_the_free_one():
-    tested = 0
     for _, _, found in payloads():
         assert found.verify()
         assert found.fixed.scale <= found.free.upper
@@ -78,32 +65,18 @@ def test_the_fixed_mass_is_held_in_every_orientation_and_is_no_larger_than_the_f
         ]
         assert found.mass_kg <= min(slips)
         assert min(slips) <= 1.3 * found.mass_kg
-        tested += len(slips)
-    assert tested == 504
-
-
-def jointed(torque=0.15, weight=0.0, **more):
-    """Payloads of planned grasps with hands at random."""
-    rng = np.random.default_rng(0)
-    for name in ("box", "dodecahedron", "wedge"):
-        body, grasps = planned(name, 2)
-        for grasp in grasps:
-            motors = hand_of(rng, 4, torque, weight)
-            yield (
-                body,
-                grasp,
-                motors,
-                gc.payload(body, grasp, 0.5, max_push_n=10.0, motors=motors, **more),
-            )
 
 
 def test_masses_with_motors_are_proved_and_those_of_many_orientations():
     """The fixed mass is no larger than the free one, as tips of no radius do not roll."""
-    rng, tested, lowered = np.random.default_rng(0), 0, 0
-    for body, grasp, motors, found in jointed(tip_radius_m=0.0):
+    rng, hands, lowered = np.random.default_rng(0), np.random.default_rng(0), 0
+    for body, grasp in bodies_and_grasps():
+        motors = hand_of(hands, 4, 0.15, 0.0)
+        held = {"max_push_n": 10.0, "tip_radius_m": 0.0}
+        found = gc.payload(body, grasp, 0.5, motors=motors, **held)
         assert found.verify()
         assert found.mass_kg <= found.free.upper
-        weights = np.zeros((62, 6))
+        weights = np.zeros((82, 6))
         weights[:, :3] = G * np.vstack([orientations(), directions(20, rng)])
         given = {"max_normal_force": 10.0, "center": body.center_of_mass, "motors": motors}
         limits = gc.wrench_limits(grasp, None, 0.5, weights, **given)
@@ -117,12 +90,10 @@ def test_masses_with_motors_are_proved_and_those_of_many_orientations():
             for weight in weights
         ]
         assert found.mass_kg <= min(slips)
-        free = gc.payload(body, grasp, 0.5, max_push_n=10.0, tip_radius_m=0.0)
+        free = gc.payload(body, grasp, 0.5, **held)
         assert found.free.upper <= free.free.upper * (1.0 + GAP)
         assert found.mass_kg <= free.mass_kg * (1.0 + 3e-4)
         lowered += found.free.upper < 0.9 * free.free.lower
-        tested += len(slips)
-    assert tested == 372
     assert lowered == 6
 
 
@@ -130,9 +101,8 @@ def test_motors_in_any_orientation_carry_object_and_links_in_every_one():
     """Both masses are held with the links' own torque in each orientation. What is held there is at
     most (c + w) / (c - w) times as much (see `Motors.in_any_orientation`).
     """
-    rng, tested = np.random.default_rng(3), 0
-    for name in ("box", "dodecahedron", "wedge"):
-        body, (grasp, *_) = planned(name, 1)
+    rng = np.random.default_rng(3)
+    for body, grasp in bodies_and_grasps(limit=1):
         hand = hand_of(rng, 4, 0.15, 0.0)
         weights = 0.1 * hand.limits[:, None] * rng.normal(size=(len(hand.limits), 3))
         motors = gc.Motors.in_any_orientation(hand.levers, hand.limits, weights)
@@ -152,18 +122,6 @@ def test_motors_in_any_orientation_carry_object_and_links_in_every_one():
             assert held <= most * sure * (1.0 + 1e-6)
             slip = gc.first_slip(found.fixed.grip, load, model="linear", motors=turned)
             assert slip.multiple >= found.mass_kg
-            tested += 1
-    assert tested == 126
-
-
-def test_motors_that_carry_links_in_one_orientation_are_refused_with_advice():
-    for carried in (0.01, [0.0, 0.0, 0.01, 0.0]):
-        with pytest.raises(gc.InputError, match=r"no gravity for a payload.*in_any_orientation"):
-            gc.payload(
-                box(), opposed(), 0.4, max_push_n=10.0, motors=pushing(opposed(), 0.25, carried)
-            )
-    with pytest.raises(gc.InputError, match="columns for each of 4 contacts"):
-        gc.payload(box(), opposed(), 0.4, max_push_n=10.0, motors=gc.Motors.of(np.eye(2, 9), 1.0))
 
 
 def test_payloads_of_other_motors_are_no_certificate():

@@ -6,6 +6,8 @@ from grasp_core.execution.first_slip import first_slip
 from grasp_core.execution.worst_loads import Reactions
 from tests.grasp_core.execution.held import directions, planned_grips
 
+G = 9.80665
+
 
 def sets(grip):
     """A ball of forces, any wrenches, and a ball of forces and some torques about an offset."""
@@ -29,7 +31,7 @@ def cases():
 
 def test_no_sampled_load_slips_before_the_worst_and_the_worst_does():
     """10,000 directions on the ellipsoid's surface and 2,000 places inside it, for each set."""
-    rng, tested = np.random.default_rng(0), 0
+    rng = np.random.default_rng(0)
     for _, loads, reactions in cases():
         angles, scales = reactions.worst_angles()
         contact = int(scales.argmin())
@@ -42,8 +44,6 @@ def test_no_sampled_load_slips_before_the_worst_and_the_worst_does():
         worst = reactions.worst_of(contact, angles[contact])
         assert abs(margins(reactions, scale * worst[None])[0, contact]) < 1e-5
         assert margins(reactions, 1.001 * scale * worst[None])[0, contact] < 0.0
-        tested += len(z)
-    assert tested == 180_000
 
 
 def test_any_reactions_have_their_worst_angle_found():
@@ -65,7 +65,6 @@ def test_any_reactions_have_their_worst_angle_found():
 
 def test_multipliers_prove_below_the_worst_scale_and_none_do_above():
     """By the S-lemma no multiplier at all proves a scale that is not survived; 200 are tried."""
-    tested = 0
     for _, _, reactions in cases():
         scale = reactions.worst_angles()[1].min()
         for share in (0.0, 0.3, 0.99, 1.0 - 1e-7):
@@ -76,8 +75,6 @@ def test_multipliers_prove_below_the_worst_scale_and_none_do_above():
         for factor in np.geomspace(1e-3, 1e3, 200):
             assert not reactions.survives(above, factor * best)
         assert not reactions.survives(0.5 * scale, -best)
-        tested += 1
-    assert tested == 18
 
 
 def test_the_worst_load_is_the_first_slip_of_the_linear_model():
@@ -92,3 +89,16 @@ def test_the_worst_load_is_the_first_slip_of_the_linear_model():
         assert found.multiple == pytest.approx(scales[contact], rel=2e-6)
         tested += 1
     assert tested == 12
+
+
+def test_a_weight_in_any_direction_is_a_ball_of_forces():
+    loads = gc.any_direction(0.5, 2.0)
+    assert not loads.offset.any()
+    assert loads.axes[:3] == pytest.approx(0.5 * (G + 2.0) * np.eye(3))
+    assert not loads.axes[3:].any()
+
+
+def test_gravity_of_a_palm_that_does_not_turn_is_the_offset():
+    loads = gc.any_direction(0.5, 2.0, gravity=[0.0, 0.0, -G])
+    assert loads.offset == pytest.approx([0, 0, -0.5 * G, 0, 0, 0])
+    assert loads.axes[:3] == pytest.approx(np.eye(3))

@@ -15,7 +15,7 @@ from grasp_core.families.placements import NoPlacement, Placement
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
-from tests.grasp_core.quadruples import tilted_side_cones
+from tests.grasp_core.families.disc_borders import on_borders
 
 TOLERANCE = 1e-7
 """Ten times the residual at which a program's answer is accepted, in object radii."""
@@ -79,12 +79,7 @@ def test_contacts_anywhere_in_the_discs_are_in_force_closure():
             for _ in range(4):
                 turns = rng.uniform(0, 2 * np.pi, 4)
                 reach = placed.radii * np.array(rng.choice([1.0, 1.0, 0.5], 4))
-                points = [
-                    center + length * piece.frame @ [math.cos(turn), math.sin(turn)]
-                    for piece, center, length, turn in zip(
-                        quad, placed.positions, reach, turns, strict=True
-                    )
-                ]
+                points = on_borders(quad, placed.positions, reach, turns)
                 normals = [piece.normal for piece in quad]
                 assert gc.force_closure(points, normals, math.tan(theta) + 1e-5).closed
                 tested += 1
@@ -124,29 +119,6 @@ def test_no_placement_is_larger_than_its_bound_and_refusals_are_bounded():
     assert tested >= 50
 
 
-def test_tilted_cones_hold_a_box_by_its_four_sides():
-    """Known optimum for half-size 1, friction 0.5: tilt 14.036, half-angle 12.529 degrees give
-    discs of 0.2284 with 32-sided pyramids; 16 sides give a little less.
-    """
-    box = gc.Polyhedron.from_mesh(*cube_mesh())
-    pieces = [p for p in unit_pieces(box) if abs(p.normal[2]) < 0.5]
-    tilt, half_angle = math.radians(14.036), math.radians(12.529)
-    cones = tilted_side_cones(pieces, tilt, half_angle)
-    assert gc.cones_positively_span([c.axis for c in cones], [half_angle - 1e-4] * 4)
-    placed = place_concurrent(pieces, cones, least=1e-4)
-    assert isinstance(placed, Placement)
-    assert 0.98 * 0.2284 < placed.merit * box.radius < 0.2290
-    rng = np.random.default_rng(4)
-    for turns in rng.uniform(0, 2 * np.pi, (20, 4)):
-        points = [
-            box.radius * (center + radius * piece.frame @ [math.cos(turn), math.sin(turn)])
-            for piece, center, radius, turn in zip(
-                pieces, placed.positions, placed.radii, turns, strict=True
-            )
-        ]
-        assert gc.force_closure(points, [p.normal for p in pieces], 0.5 + 1e-5).closed
-
-
 def test_facets_lie_inside_the_circular_cone():
     cone = ForceCone(np.array([0.0, 0.6, 0.8]), math.radians(20.0))
     G = inscribed_facets(cone, np.array([1.0, 0.2, 0.1]))
@@ -156,11 +128,3 @@ def test_facets_lie_inside_the_circular_cone():
         edge *= np.sign(edge @ cone.axis) / np.linalg.norm(edge)
         assert math.acos(edge @ cone.axis) == pytest.approx(cone.half_angle, abs=1e-12)
         assert (G @ edge >= -1e-12).all()
-
-
-def cube_mesh():
-    corners = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)])
-    from grasp_core.objects.booleans import hull
-
-    solid = hull(corners)
-    return solid.vertices, solid.triangles

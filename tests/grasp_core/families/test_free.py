@@ -27,10 +27,6 @@ from tests.grasp_core.families.free_cases import (
     wrench,
 )
 from tests.judges import pyramid_margin
-from tests.marks import more
-
-NEEDS_A_SPLIT = ("cross", (29, 14, 25, 21), 0.8)
-"""A grasp that neither the forces of the patch nor those of shrunk patches lead to."""
 
 
 def random_contacts(rng, pieces):
@@ -111,15 +107,14 @@ def test_placements_balance_strictly_inside_their_faces_and_cones():
     assert len(found) >= 250
 
 
-@pytest.mark.parametrize("every", [5, *more(1)])
-def test_a_linear_program_with_inner_pyramids_accepts_the_placements(every):
-    found = of_kind(Placement)[::every]
+def test_a_linear_program_with_inner_pyramids_accepts_the_placements():
+    found = of_kind(Placement)[::5]
     for pieces, friction, placed in found:
         normals = normals_of(pieces)
         assert pyramid_margin(placed.positions, normals, friction, 128, outer=False) > 0.0
         spread = np.linalg.svd(placed.positions - placed.positions.mean(axis=0), compute_uv=False)
         assert spread[1] > free.LEAST_INSET
-    assert len(found) >= 250 // every
+    assert len(found) >= 50
 
 
 def test_symmetric_faces_too_are_held_by_a_regulus():
@@ -146,41 +141,38 @@ def test_nearly_every_quadruple_with_a_closed_patch_gets_a_grasp():
     assert len(found) >= 0.98 * len(closed)
 
 
-@pytest.mark.parametrize("every", [4, *more(1)])
-def test_no_contacts_in_closure_are_found_where_absence_is_proved(every):
+def test_no_contacts_in_closure_are_found_where_absence_is_proved():
     rng = np.random.default_rng(3)
-    absent = of_kind(Absence)[::every]
+    absent = of_kind(Absence)[::4]
     for pieces, friction, absence in absent:
         assert absence.verify()
         best = climb(rng, pieces, friction, samples=40, steps=20)
         assert pyramid_margin(best, normals_of(pieces), friction, 16, outer=False) <= 0.0
-    assert len(absent) >= 60 // every
+    assert len(absent) >= 15
 
 
-@pytest.mark.parametrize("each", [1, *more(6)])
-def test_absence_holds_up_to_the_friction_at_which_the_patch_closes(each):
+def test_absence_holds_up_to_the_friction_at_which_the_patch_closes():
     """Just above it a grasp is found at once, or nearly always."""
     rng = np.random.default_rng(4)
     tested = found = 0
     for name in OBJECTS:
-        for _ in range(each):
-            pieces = quadruple(name, rng.choice(len(faces_of(name)), 4, replace=False))
-            lower, upper = 0.0, 4.0
-            for _ in range(16):
-                middle = 0.5 * (lower + upper)
-                held = isinstance(place(pieces, middle), Absence)
-                lower, upper = (middle, upper) if held else (lower, middle)
-            if lower == 0.0 or upper == 4.0:
-                continue
-            absence = place(pieces, lower)
-            assert isinstance(absence, Absence)
-            assert absence.verify()
-            climb(rng, pieces, lower, samples=40, steps=40)
-            above = place(pieces, 1.02 * upper + 1e-3)
-            assert not isinstance(above, Absence)
-            found += isinstance(above, Placement)
-            tested += 1
-    assert tested >= 2.5 * each
+        pieces = quadruple(name, rng.choice(len(faces_of(name)), 4, replace=False))
+        lower, upper = 0.0, 4.0
+        for _ in range(16):
+            middle = 0.5 * (lower + upper)
+            held = isinstance(place(pieces, middle), Absence)
+            lower, upper = (middle, upper) if held else (lower, middle)
+        if lower == 0.0 or upper == 4.0:
+            continue
+        absence = place(pieces, lower)
+        assert isinstance(absence, Absence)
+        assert absence.verify()
+        climb(rng, pieces, lower, samples=40, steps=40)
+        above = place(pieces, 1.02 * upper + 1e-3)
+        assert not isinstance(above, Absence)
+        found += isinstance(above, Placement)
+        tested += 1
+    assert tested >= 3
     assert found >= 0.9 * tested
 
 
@@ -245,7 +237,6 @@ def test_a_grasp_of_two_parallel_slabs_is_not_along_one_line():
 
 def test_the_parts_reached_by_cutting_cover_the_faces_without_overlap():
     rng = np.random.default_rng(6)
-    tested = 0
     for name in OBJECTS:
         pieces = quadruple(name, rng.choice(len(faces_of(name)), 4, replace=False))
         paths = [()]
@@ -260,8 +251,6 @@ def test_the_parts_reached_by_cutting_cover_the_faces_without_overlap():
                 for part in parts
             ]
             assert sum(inside) == 1
-            tested += 1
-    assert tested == 200
 
 
 def holds(corners, point):
@@ -291,27 +280,14 @@ def test_leaves_that_do_not_cover_the_faces_prove_nothing():
     one, two = halves(of_kind(Absence)[0][2]).leaves
     absence = of_kind(Absence)[0][2]
     (whole,) = absence.leaves
-    for leaves in ((), (one,), (two,), (one, two, whole), (one, whole), (one, two, two)):
+    false_name = ((2,), two[1])
+    for leaves in ((), (one,), (two,), (one, two, whole), (one, whole), (one, two, two),
+                   (one, one), (two, two), (two, false_name)):  # fmt: skip
         assert not replace(absence, leaves=leaves).verify()
     many = split_absence()
     for left_out in range(len(many.leaves)):
         kept = many.leaves[:left_out] + many.leaves[left_out + 1 :]
         assert not replace(many, leaves=kept).verify()
-
-
-def test_a_half_proved_twice_does_not_prove_the_other_half():
-    absence = of_kind(Absence)[0][2]
-    one, two = halves(absence).leaves
-    assert not replace(absence, leaves=(one, one)).verify()
-    assert not replace(absence, leaves=(two, two)).verify()
-
-
-def test_a_half_under_another_name_does_not_prove_the_other_half():
-    """Only 0 and 1 name halves."""
-    absence = of_kind(Absence)[0][2]
-    _, (path, proof) = halves(absence).leaves
-    assert path == (1,)
-    assert not replace(absence, leaves=(((1,), proof), ((2,), proof))).verify()
 
 
 def test_a_proof_for_other_pieces_or_more_friction_proves_nothing():

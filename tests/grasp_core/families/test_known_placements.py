@@ -2,15 +2,12 @@
 
 import math
 from collections import Counter
-from functools import partial
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
 from grasp_core.closure.lines import plucker_vectors
-from grasp_core.cones.pyramids import inscribed_facets
-from grasp_core.families import concurrent as concurrent_grasps
 from grasp_core.families.concurrent import place_concurrent
 from grasp_core.families.pencil import CELL_A, place_pencil
 from grasp_core.families.placements import NoPlacement, Placement
@@ -18,7 +15,7 @@ from grasp_core.geometry.polygons import edge_rows, plane_frame
 from grasp_core.objects.booleans import hull
 from grasp_core.objects.face_pieces import FacePiece, unit_pieces
 from grasp_core.values import ForceCone
-from scenes.example_objects import example_object
+from tests.grasp_core.families.disc_borders import on_borders
 from tests.grasp_core.quadruples import tilted_side_cones
 from tests.grasp_core.regular_solids import TOLERANCE, all_signs, quadruples
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
@@ -66,22 +63,6 @@ def test_equal_displacements_leave_no_focus_unless_there_is_enough_friction(shif
     for share, kind in ((0.5, NoPlacement), (0.99, NoPlacement), (1.025, Placement)):
         cones = [ForceCone(normal, math.atan(share * needed)) for normal in normals]
         assert isinstance(place_concurrent(pieces, cones, least=0.0), kind)
-
-
-@pytest.mark.parametrize(
-    ("theta_deg", "radius"), [(5.0, 0.0466666), (10.0, 0.0940532), (15.0, 0.1429247)]
-)
-def test_concurrent_discs_of_a_tetrahedron_with_pyramids_of_eight_sides(
-    monkeypatch, theta_deg, radius
-):
-    """r = rho0 tan(theta) cos(pi / 8), with rho0 = 1 / sqrt(3) for vertices at sqrt(3)."""
-    monkeypatch.setattr(concurrent_grasps, "inscribed_facets", partial(inscribed_facets, sides=8))
-    pieces = unit_pieces(example_object("tetrahedron"))
-    cones = [ForceCone(piece.normal, math.radians(theta_deg)) for piece in pieces]
-    placed = place_concurrent(pieces, cones, least=1e-4)
-    assert isinstance(placed, Placement)
-    assert math.sqrt(3.0) * placed.radii == pytest.approx(radius, abs=2e-7)
-    assert placed.foci == pytest.approx(0.0, abs=TOLERANCE)
 
 
 def bar(length):
@@ -157,3 +138,7 @@ def test_tilted_cones_hold_a_cube_by_its_four_sides(friction, tilt_deg, half_ang
     placed = place_concurrent(sides, cones, least=1e-4)
     assert isinstance(placed, Placement)
     assert 0.983 * radius < body.radius * placed.merit < 1.005 * radius
+    rng = np.random.default_rng(4)
+    for turns in rng.uniform(0, 2 * np.pi, (10, 4)):
+        points = on_borders(sides, placed.positions, placed.radii, turns)
+        assert gc.force_closure(points, [p.normal for p in sides], friction + 1e-5).closed

@@ -18,18 +18,17 @@ from grasp_core.cones.spanning import balancing_weights
 from grasp_core.families.pencil import CELL_A, place_pencil
 from grasp_core.families.placements import Placement
 from grasp_core.families.regulus import LEAST_DEPTH, place_regulus
+from tests.grasp_core.families.disc_borders import descended_margin
 from tests.grasp_core.families.printed_paper import (
     LEAST,
     PAIR,
     Discs,
     focus_gap,
-    focus_line,
     printed_pencil,
     printed_regulus,
     unit,
 )
 from tests.grasp_core.quadruples import paired_quadruples
-from tests.marks import MORE
 
 TOLERANCE = 1e-7
 """Ten times the residual at which a program's answer is accepted, in object radii."""
@@ -54,43 +53,6 @@ def in_a_safe_cell(quad, discs):
         for i, p, r in zip(PAIR, quad, discs.radii, strict=True)
     ]
     return gap >= -TOLERANCE or -gap <= min(reach) + TOLERANCE
-
-
-def closure_margin(quad, discs, turns, friction):
-    """Closure margin of contacts at these angles on the borders; 0 where it is undecided."""
-    border = [p.frame @ [math.cos(t), math.sin(t)] for p, t in zip(quad, turns, strict=True)]
-    points = discs.centers + discs.radii[:, None] * np.array(border)
-    try:
-        return gc.force_closure(points, [p.normal for p in quad], friction).margin
-    except gc.UndecidedError:
-        return 0.0
-
-
-def extremes(quad):
-    """Border angles along the pair-plane normals, then along the focus line."""
-    N, u = focus_line(quad)
-    for along in ([N[i] for i in PAIR], [u] * 4):
-        flat = [p.frame.T @ direction for p, direction in zip(quad, along, strict=True)]
-        angles = np.arctan2([y for _, y in flat], [x for x, _ in flat])
-        yield from angles + math.pi * np.array(list(product((0, 1), repeat=4)))
-
-
-def adversarial_margin(quad, discs, friction):
-    """Coordinate descent of the margin over the four border angles, until it is negative."""
-
-    def margin(turns):
-        return closure_margin(quad, discs, turns, friction)
-
-    best, turns = min(((margin(row), row) for row in extremes(quad)), key=lambda pair: pair[0])
-    step = 0.8
-    while step > 0.1 and best >= 0.0:
-        moves = [turns + step * move for move in np.vstack([np.eye(4), -np.eye(4)])]
-        lowest, where = min(((margin(row), row) for row in moves), key=lambda pair: pair[0])
-        if lowest < best:
-            best, turns = lowest, where
-        else:
-            step *= 0.5
-    return best
 
 
 @pytest.mark.parametrize(
@@ -200,29 +162,32 @@ def test_swapping_the_foci_of_the_counterexample_closes_every_corner_choice():
     assert worst == pytest.approx(0.01097, abs=1e-5)
 
 
-@pytest.mark.parametrize("count", [12, pytest.param(30, marks=MORE)])
-def test_an_adversary_breaks_printed_pencils_but_no_corrected_one(count):
+def test_an_adversary_breaks_printed_pencils_but_no_corrected_one():
     """At the centres of all discs the forces along the normals balance, and nearly all random
     contacts are closed too: only a search over the borders shows what the printed program does.
     """
     theta = math.radians(5.0)
     friction = math.tan(theta) + BORDER
     printed, broken, corrected = 0, 0, 0
-    for quad, cones in paired_quadruples("random-16-1", theta, count):
+
+    def adversarial_margin(quad, discs):
+        return descended_margin(quad, discs.centers, discs.radii, friction, step=0.8, finest=0.1)
+
+    for quad, cones in paired_quadruples("random-16-1", theta, 12):
         discs = printed_pencil(quad, theta)
         if discs is not None and not in_a_safe_cell(quad, discs):
             printed += 1
-            broken += adversarial_margin(quad, discs, friction) < -TOLERANCE
+            broken += adversarial_margin(quad, discs) < -TOLERANCE
         placed = place_pencil(quad, cones, least=LEAST, least_gap=LEAST)
         if isinstance(placed, Placement):
             discs = Discs(placed.positions, placed.radii, placed.foci)
             assert in_a_safe_cell(quad, discs)
-            assert adversarial_margin(quad, discs, friction) > 0.0
+            assert adversarial_margin(quad, discs) > 0.0
             corrected += 1
 
-    assert printed >= 40 * count // 30
-    assert broken >= 1 + count // 30
-    assert corrected >= 2 * count
+    assert printed >= 16
+    assert broken >= 1
+    assert corrected >= 24
 
 
 def fourth_singular_value(points, directions):

@@ -36,15 +36,8 @@ def imbalance(grasp, forces, wrench, center):
 
 
 def balanced_wrenches(rng, positions, normals, friction, limits, count):
-    """Wrenches that forces inside the pyramids and between the limits balance, (count, 6).
-
-    Args:
-        positions: (k, 3)
-        normals: (k, 3)
-        friction: (k,)
-        limits: The least and the largest normal force.
-        count: The number of wrenches.
-    """
+    """Wrenches that forces in the pyramids of contacts (k, 3) balance, with normal parts between
+    the two limits, (count, 6)."""
     size = (count, len(positions))
     along = rng.uniform(limits[0], min(limits[1], limits[0] + 5.0), size)
     across = 0.98 * INSCRIBED * friction * along * np.sqrt(rng.uniform(size=size))

@@ -12,6 +12,16 @@ from tests.grasp_core.forces.loads import LIMITS, SLACK, balanced_wrenches, case
 from tests.judges import random_contacts
 
 
+def least_share(arms, normals, friction, wrench):
+    """Bounds on the share of the frictions at which the wrench is just resisted, by bisection."""
+    lower, upper = 0.0, 1.0
+    for _ in range(20):
+        middle = 0.5 * (lower + upper)
+        limit = limit_of(WrenchBody(arms, normals, middle * friction, LIMITS[1]), wrench)
+        lower, upper = (lower, middle) if limit.limit >= 1.0 else (middle, upper)
+    return np.array([lower, upper])
+
+
 def test_least_friction_is_near_the_true_minimum():
     """The true one by bisection on exact cones without a lower limit, which can only be less.
 
@@ -20,11 +30,7 @@ def test_least_friction_is_near_the_true_minimum():
     tested = 0
     for body, grasp, wrench in cases(per_object=1):
         arms = grasp.positions - body.center_of_mass
-        lower, upper = 0.0, 0.5
-        for _ in range(20):
-            middle = 0.5 * (lower + upper)
-            limit = limit_of(WrenchBody(arms, grasp.normals, np.full(4, middle), LIMITS[1]), wrench)
-            lower, upper = (lower, middle) if limit.limit >= 1.0 else (middle, upper)
+        lower, upper = 0.5 * least_share(arms, grasp.normals, np.full(4, 0.5), wrench)
         _, needed = least_friction_forces(
             grasp.positions, grasp.normals, 0.5, wrench,
             normal_force=(0.0, LIMITS[1]), center=body.center_of_mass,
@@ -37,17 +43,12 @@ def test_least_friction_is_near_the_true_minimum():
 def test_least_friction_uses_the_least_share_of_frictions_that_differ():
     """The least share, by bisection on exact cones; the forces then need no more of any contact."""
     rng = np.random.default_rng(7)
-    tested = 0
     for trial in range(12):
         positions, normals = random_contacts(rng, 4 + trial % 3)
         friction = rng.uniform(0.2, 1.0, len(positions))
         friction[0] *= trial % 2
         load = balanced_wrenches(rng, positions, normals, friction, (0.0, 10.0), 1)[0]
-        lower, upper = 0.0, 1.0
-        for _ in range(20):
-            middle = 0.5 * (lower + upper)
-            limit = limit_of(WrenchBody(positions, normals, middle * friction, 10.0), load)
-            lower, upper = (lower, middle) if limit.limit >= 1.0 else (middle, upper)
+        lower, upper = least_share(positions, normals, friction, load)
         forces = contact_forces(
             positions, normals, friction, load, objective="least_friction", normal_force=(0.0, 10.0)
         )
@@ -55,5 +56,3 @@ def test_least_friction_uses_the_least_share_of_frictions_that_differ():
         pressed = across > SLACK
         share = (across[pressed] / (friction * along)[pressed]).max(initial=0.0)
         assert lower * (1 - 1e-3) <= share <= upper * (1 + 5e-3) + 1e-5
-        tested += 1
-    assert tested == 12

@@ -8,7 +8,6 @@ import pytest
 import grasp_core as gc
 from grasp_core.geometry.nearest_points import Surface, nearest_on_triangles
 from tests.grasp_core.curved import bumpy_ellipsoid
-from tests.marks import more
 
 ROUNDING = 2.0**-52
 
@@ -81,7 +80,7 @@ def test_distances_are_those_of_rational_arithmetic(size, height):
     assert inside >= 30
 
 
-@pytest.mark.parametrize("diameter", [1e-3, 2.0, *more(0.1)])
+@pytest.mark.parametrize("diameter", [1e-3, 2.0])
 def test_points_inside_of_every_triangle_are_on_the_surface(diameter):
     """Whatever the size: triangles of an object of 1 mm have some 1e-9 square metres."""
     body = gc.Polyhedron.from_mesh(*bumpy_ellipsoid(subdivisions=2), patches=gc.PatchLimits(most=4))

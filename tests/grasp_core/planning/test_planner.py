@@ -17,7 +17,6 @@ from grasp_core.planning.request import METHODS
 from scenes.example_objects import example_object
 from tests.benchmarks.objects import sphere_hull
 from tests.judges import pyramid_margin, random_rotation
-from tests.marks import MORE, more
 
 TEN_DEGREES = math.tan(math.radians(10.0))
 RADIUS_ACCURACY = 1e-6
@@ -61,25 +60,24 @@ NORMAL = [(name, "normal") for name in ("icosahedron", "random-20-7", "random-30
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("limit", "least"), [(8, 40), pytest.param(40, 150, marks=MORE)])
-def test_no_returned_grasp_fails_an_independent_pyramid_of_64_sides(limit, least):
+def test_no_returned_grasp_fails_an_independent_pyramid_of_64_sides():
     """Inner pyramids accept each grasp, so outer ones must as well; critical friction agrees."""
     tested = 0
     for name, cones in TILTED + NORMAL:
         families = ("concurrent",) if name == "screwdriver" else FAMILIES
         body = example_object(name)
-        for grasp in gc.plan(body, 0.5, limit=limit, families=families, cones=cones).grasps:
+        for grasp in gc.plan(body, 0.5, limit=8, families=families, cones=cones).grasps:
             for outer in (False, True):
                 assert pyramid_margin(grasp.positions, grasp.normals, 0.5, 64, outer=outer) > 1e-9
             below = 0.99 * grasp.critical_friction
             if below > 1e-3:
                 assert pyramid_margin(grasp.positions, grasp.normals, below, 64, outer=False) < 1e-9
             tested += 1
-    assert tested >= least
+    assert tested >= 40
 
 
-def test_every_grasp_lies_on_its_faces_inside_its_regions():
-    tested = 0
+def test_every_grasp_lies_on_its_faces_inside_its_regions_whose_corners_are_closed():
+    rng, tested = np.random.default_rng(7), 0
     for name, cones in TILTED + NORMAL:
         body = example_object(name)
         for grasp in gc.plan(body, 0.4, limit=20, families=DISCS, cones=cones).grasps:
@@ -92,18 +90,15 @@ def test_every_grasp_lies_on_its_faces_inside_its_regions():
                 assert region.inscribed_radius >= grasp.radius * (1 - RADIUS_ACCURACY)
                 assert contact.normal @ plane.normal == pytest.approx(1.0)
                 assert _inside(contact.position, region.polygon, plane.normal)
+            borders = [region.polygon for region in grasp.regions]
+            for _ in range(4):
+                points = [corners[rng.integers(len(corners))] for corners in borders]
+                assert gc.force_closure(points, grasp.normals, 0.4).closed
             tested += 1
     assert tested >= 90
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "wedge",
-        "box",
-        *(pytest.param(n, marks=MORE) for n in ("random-10-1", "octahedron")),
-    ],
-)
+@pytest.mark.parametrize("name", ["wedge", "box"])
 def test_moving_turning_and_scaling_the_object_moves_its_grasps(name):
     rng = np.random.default_rng(1)
     body = example_object(name)
@@ -120,27 +115,13 @@ def test_moving_turning_and_scaling_the_object_moves_its_grasps(name):
     assert len(here.grasps) >= 50
 
 
-FEW, MANY = (0.1, 0.5), (0.05, 0.1, 0.2, 0.35, 0.7)
-
-
-@pytest.mark.parametrize(
-    ("name", "frictions", "least"),
-    [
-        ("wedge", FEW, 50),
-        pytest.param("wedge", MANY, 200, marks=MORE),
-        pytest.param("random-10-1", MANY, 500, marks=MORE),
-        pytest.param("random-12-1", MANY, 1000, marks=MORE),
-    ],
-)
-def test_more_friction_never_loses_a_grasp(name, frictions, least):
-    body, tested = example_object(name), 0
-    plans = [gc.plan(body, friction, families=DISCS, cones="normal") for friction in frictions]
-    for less, greater in pairwise(plans):
-        radii = {grasp.id: grasp.radius for grasp in greater.grasps}
-        for grasp in less.grasps:
-            assert radii[grasp.id] >= grasp.radius * (1 - RADIUS_ACCURACY)
-            tested += 1
-    assert tested >= least
+def test_more_friction_never_loses_a_grasp():
+    body = example_object("wedge")
+    less, greater = (gc.plan(body, mu, families=DISCS, cones="normal") for mu in (0.1, 0.5))
+    radii = {grasp.id: grasp.radius for grasp in greater.grasps}
+    for grasp in less.grasps:
+        assert radii[grasp.id] >= grasp.radius * (1 - RADIUS_ACCURACY)
+    assert len(less.grasps) >= 50
 
 
 def test_a_smaller_theta_is_allowed_and_gives_smaller_discs():
@@ -160,23 +141,6 @@ def test_progress_is_reported_as_quadruples_are_tried():
     assert done == sorted(done)
     assert seen[-1][0] == seen[-1][1] == len(METHODS) * 70
     assert len(seen) >= 13
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"friction": 0.0}, "friction must be a number from 1e-09"),
-        ({"friction": math.nan}, "friction must be a number from 1e-09"),
-        ({"theta_deg": 30.0}, "theta_deg must be a number from 1e-09"),
-        ({"theta_deg": -1.0}, "theta_deg must be a number from 1e-09"),
-        ({"limit": 0}, "limit must be a whole number from 1"),
-        ({"families": ["spiral"]}, "families must be among"),
-        ({"families": []}, "families must be among"),
-    ],
-)
-def test_bad_requests_are_refused(arguments, message):
-    with pytest.raises(gc.InputError, match=message):
-        gc.plan(example_object("tetrahedron"), **arguments)
 
 
 def test_an_object_with_too_many_faces_is_refused_at_once():
@@ -261,7 +225,7 @@ def test_every_face_quadruple_is_held_absent_or_named_undecided():
     assert found.counts.families["free"].undecided == len(found.undecided)
 
 
-@pytest.mark.parametrize("name", ["box", "wedge", *more("prism", "l-bracket")])
+@pytest.mark.parametrize("name", ["box", "wedge"])
 def test_every_four_faces_are_held_or_proved_to_hold_nothing(name):
     """Also where no normals span: with tilted cones most grasps have regions."""
     for friction in (0.3, 0.8):
@@ -275,25 +239,17 @@ def test_every_four_faces_are_held_or_proved_to_hold_nothing(name):
             assert counts.rejected == 0
 
 
-@pytest.mark.parametrize(
-    ("name", "least"),
-    [
-        ("box", 25),
-        pytest.param("wedge", 70, marks=MORE),
-        pytest.param("octahedron", 100, marks=MORE),
-    ],
-)
-def test_what_less_friction_holds_more_friction_holds(name, least):
+def test_what_less_friction_holds_more_friction_holds():
     tested = 0
     plans = [
-        gc.plan(example_object(name), friction, families=METHODS, cones="tilted")
+        gc.plan(example_object("box"), friction, families=METHODS, cones="tilted")
         for friction in (0.1, 0.3, 0.7)
     ]
     for pair in pairwise(plans):
         held = [{tuple(sorted(g.faces)) for g in plan.grasps} for plan in pair]
         assert held[0] <= held[1]
         tested += len(held[0])
-    assert tested >= least
+    assert tested >= 25
 
 
 def test_what_is_left_open_is_decided_when_asked_and_the_gap_is_said_before():

@@ -103,14 +103,6 @@ def _closest(grasps):
     return min(_apart(a, b) for place, a in enumerate(grasps) for b in grasps[:place])
 
 
-@pytest.mark.parametrize("name", ["l-bracket", "wedge"])
-def test_diverse_grasps_begin_with_the_largest_disc(name):
-    """Also where free grasps, which have none, are far from edges."""
-    found = gc.plan(example_object(name), 0.5, rank_by="diverse", limit=3).grasps
-    everything = gc.plan(example_object(name), 0.5).grasps
-    assert found[0].radius == max(grasp.radius for grasp in everything)
-
-
 def test_with_everything_found_families_take_turns_largest_first():
     """Grasps that the free method found regions for take turns with those of their family."""
     body = example_object("l-bracket")

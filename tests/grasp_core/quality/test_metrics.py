@@ -7,7 +7,6 @@ from scipy.spatial import ConvexHull
 
 import grasp_core as gc
 from grasp_core.closure.contacts import contact_frames
-from scenes.example_objects import example_object
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
 
 
@@ -68,15 +67,6 @@ def test_weights_of_contacts_that_push_one_way_cannot_balance():
     assert gc.min_weight(TETRA_CENTERS, normals, 0.5) == -math.inf
 
 
-def test_frames_of_many_contacts_are_those_of_one_set():
-    grasps = gc.plan(example_object("random-12-1"), 0.5, limit=20).grasps
-    normals = np.array([grasp.normals for grasp in grasps])
-    normals = np.concatenate([normals, np.eye(3)[[[0, 1, 2, 0]]], -np.eye(3)[[[0, 1, 2, 0]]]])
-    for frames, units in zip(contact_frames(normals), normals, strict=True):
-        np.testing.assert_allclose(frames, contact_frames(units), atol=1e-15)
-    assert len(normals) >= 20
-
-
 def test_hull_volume_is_that_of_qhull_on_the_edges():
     rng = np.random.default_rng(3)
     for _ in range(10):
@@ -116,10 +106,3 @@ def test_contacts_on_a_line_leave_a_turn_unopposed(count):
     positions = np.outer(np.arange(count), [1.0, 2.0, 3.0])
     value = gc.smallest_singular_value(positions, torque_scale=1.0)
     assert value == pytest.approx(0.0, abs=1e-12)
-
-
-def test_bad_arguments_are_refused():
-    with pytest.raises(gc.InputError, match="edges must be a whole number from 3"):
-        gc.min_weight(TETRA_CENTERS, TETRA_NORMALS, 0.5, edges=2)
-    with pytest.raises(gc.InputError, match="torque_scale must be a number from 1e-09"):
-        gc.hull_volume(TETRA_CENTERS, TETRA_NORMALS, 0.5, torque_scale=-1.0)

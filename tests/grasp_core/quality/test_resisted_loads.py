@@ -10,10 +10,10 @@ from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.quality.ferrari_canny import wrench_set_quality
 from grasp_core.quality.measures import Measure, resisted_loads
 from scenes.example_objects import example_object
+from tests.judges import TETRA_NORMALS
 
 WEIGHT = Measure("weight")
 OCTAHEDRON = np.vstack([np.eye(3), -np.eye(3)])
-TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
 
 
 def arranged(places, friction):
@@ -33,7 +33,7 @@ def some_task(rng, count=4):
     return Measure("task", rng.normal(size=(count, 6)) * rng.uniform(0.1, 10.0))
 
 
-@pytest.mark.parametrize(("places", "ball"), [(OCTAHEDRON, 3**-0.5), (TETRAHEDRON, 1.0 / 3.0)])
+@pytest.mark.parametrize(("places", "ball"), [(OCTAHEDRON, 3**-0.5), (-TETRA_NORMALS, 1.0 / 3.0)])
 @pytest.mark.parametrize("friction", [0.02, 0.1])
 def test_contacts_on_a_sphere_hold_nearly_the_ball_in_the_hull_of_their_normals(
     places, ball, friction

@@ -9,38 +9,17 @@ from scipy.optimize import linprog
 
 import grasp_core as gc
 from grasp_core.closure.wrench_sets import WrenchSet
+from tests.grasp_core.soft_cones import OPPOSITE, ball_edges, inradius, wrenches_of
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
 
 CASES = 20
 SIDES = 16
 LARGEST = 10.0
-OPPOSITE = np.array([[-0.05, 0, 0], [0.05, 0, 0]]), np.array([[1.0, 0, 0], [-1, 0, 0]])
-
-
-def ball_edges():
-    """Unit vectors whose hull is inside the unit ball and holds the ball of `INRADIUS`."""
-    angles, steps = 2.0 * np.pi * np.arange(SIDES) / SIDES, np.pi / (SIDES // 2)
-    tilts = steps * (np.arange(SIDES // 2) + 0.5)
-    ring = [
-        [np.sin(tilt) * np.cos(a), np.sin(tilt) * np.sin(a), np.cos(tilt)]
-        for tilt, a in itertools.product(tilts, angles)
-    ]
-    return np.array([*ring, [0, 0, 1.0], [0, 0, -1.0]])
-
-
-INRADIUS = np.cos(np.pi / SIDES + np.pi / (SIDES // 2))
-"""No direction is farther from an edge than half a step around and half a step of tilt; so the hull
-of the edges has a support of at least the cosine of that in every direction."""
 
 
 def limit_by_program(x, n, mu, mu_t, load, edges):
     """The largest multiple with forces and torques along edges of each cone."""
-    columns = []
-    for point, normal, friction, torsion in zip(x, n, mu, mu_t, strict=True):
-        tangents = np.linalg.svd(normal[None])[2][1:]
-        f = normal + friction * edges[:, :2] @ tangents
-        columns.append(np.hstack([f, np.cross(point, f) + np.outer(torsion * edges[:, 2], normal)]))
-    W = np.vstack(columns).T
+    W = wrenches_of(x, n, mu, mu_t, edges).T
     pushes = np.kron(np.eye(len(x)), np.ones(len(edges)))
     found = linprog(
         np.append(np.zeros(W.shape[1]), -1.0),
@@ -80,14 +59,14 @@ def test_two_opposite_fingers_hold_a_twist_and_a_force_as_their_cones_say():
 @pytest.mark.parametrize("count", [2, 3, 4])
 def test_limits_lie_between_those_of_pyramids_inside_and_around_the_cones(count):
     rng = np.random.default_rng(count)
-    inside, more = ball_edges(), 0
+    inside, more = ball_edges(SIDES), 0
     for _ in range(CASES):
         x, n, mu, mu_t = drawn(rng, count)
         load = rng.normal(size=6)
         (found,) = gc.wrench_limits(x, n, mu, load[None], max_normal_force=LARGEST, torsion_m=mu_t)
         assert found.verify(x, n, mu, max_normal_force=LARGEST, torsion_m=mu_t)
         lower = limit_by_program(x, n, mu, mu_t, load, inside)
-        upper = limit_by_program(x, n, mu, mu_t, load, inside / INRADIUS)
+        upper = limit_by_program(x, n, mu, mu_t, load, inside / inradius(SIDES))
         # conic and linear programs are good to some 1e-7 of the largest force
         assert lower - 1e-6 * LARGEST <= found.limit <= found.upper <= upper + 1e-6 * LARGEST
         hard = gc.max_resisted_wrench(x, n, mu, load, max_normal_force=LARGEST)

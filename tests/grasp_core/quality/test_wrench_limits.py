@@ -127,13 +127,6 @@ def test_the_centre_of_torques_may_be_far_away(far):
     assert there.facet @ moved == pytest.approx(-1.0, rel=1e-12 * far + 1e-7)
 
 
-def test_a_zero_wrench_and_a_bad_force_are_refused():
-    with pytest.raises(gc.InputError, match="must not be zero"):
-        max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, np.zeros(6), max_normal_force=1.0)
-    with pytest.raises(gc.InputError, match="max_normal_force must be a number from 1e-09"):
-        max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, np.ones(6), max_normal_force=0.0)
-
-
 def test_a_long_facet_that_does_no_work_bounds_nothing():
     """Two opposite fingers resist a pull at friction, but not the turn about their line."""
     points, normals = np.array([[1.0, 0, 0], [-1.0, 0, 0]]), np.array([[-1.0, 0, 0], [1.0, 0, 0]])

@@ -15,23 +15,6 @@ def text():
     return plan_to_json(body, gc.plan(body, 0.5, limit=6))
 
 
-def test_a_plan_survives_the_file_to_the_last_bit(text):
-    body = example_object("wedge")
-    plan = gc.plan(body, 0.5, limit=6)
-    saved = grasps_from_json(text)
-    assert saved.body.content_sha256 == body.content_sha256
-    assert saved.friction == 0.5
-    assert [g.id for g in saved.grasps] == [g.id for g in plan.grasps]
-    for one, two in zip(saved.grasps, plan.grasps, strict=True):
-        np.testing.assert_array_equal(one.positions, two.positions)
-        np.testing.assert_array_equal(one.normals, two.normals)
-        assert one.critical_friction == two.critical_friction
-        assert one.family == two.family
-        np.testing.assert_array_equal(one.witness.forces, two.witness.forces)
-        for a, b in zip(one.regions, two.regions, strict=True):
-            np.testing.assert_array_equal(a.polygon, b.polygon)
-
-
 def test_the_ways_of_planned_fingers_survive_the_file():
     body = example_object("l-bracket")
     plan = gc.plan(body, 0.5, limit=1, finger=gc.Finger(0.004, 0.05))

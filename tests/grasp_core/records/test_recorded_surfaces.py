@@ -80,12 +80,13 @@ def test_a_body_and_what_is_known_of_it_come_back_from_a_file(make, tmp_path):
     assert again.read_bytes() == (tmp_path / "grasps.json").read_bytes()
 
 
-def changed(body, tmp_path, **fields):
-    """Load the file of a plan after some fields of its surface were changed."""
+def changed(body, tmp_path, more=(), **fields):
+    """Load the file of a plan after fields of its surface, and more of its object, were changed."""
     plan = gc.plan(body, 0.5, families="concurrent", limit=1)
     path = gc.save_grasps(tmp_path / "grasps.json", plan)
     document = json.loads(path.read_text())
     document["object"]["surface"].update(fields)
+    document["object"].update(more)
     path.write_text(json.dumps(document))
     return gc.load_grasps(path)
 
@@ -94,13 +95,7 @@ def changed(body, tmp_path, **fields):
     ("fields", "says"),
     [
         ({"caps": [192]}, r"caps .*below 192, got 192"),
-        ({"caps": [-1]}, "caps"),
-        ({"caps": [0.5]}, "caps"),
-        ({"holes": -1}, "holes"),
-        ({"dropped": 1.5}, "dropped"),
-        ({"flatness_m": float("nan")}, "flatness_m"),
         ({"closed": "yes"}, "closed"),
-        ({"repairs": [1]}, "repairs"),
         ({"other": 1}, "other"),
     ],
 )
@@ -115,14 +110,5 @@ def test_an_open_surface_that_a_file_calls_closed_gives_no_mass(tmp_path):
     with pytest.raises(gc.InputError, match="gives no mass"):
         body.mass_at(1000.0)
     assert changed(capped(), tmp_path, closed=False).body.mass_at(1000.0) == pytest.approx(0.21)
-
-
-def test_planar_faces_of_an_open_surface_that_a_file_calls_closed_are_refused(tmp_path):
-    plan = gc.plan(opened(), 0.5, families="concurrent", limit=1)
-    path = gc.save_grasps(tmp_path / "grasps.json", plan)
-    document = json.loads(path.read_text())
-    document["object"]["patches"] = None
-    document["object"]["surface"]["closed"] = True
-    path.write_text(json.dumps(document))
     with pytest.raises(gc.InputError, match=r"GP-MESH-OPEN: .*: 28 edges belong"):
-        gc.load_grasps(path)
+        changed(opened(), tmp_path, {"patches": None}, closed=True)

@@ -8,9 +8,8 @@ import grasp_core.regions.largest_discs as search
 from grasp_core.closure.contacts import contact_frames
 from grasp_core.regions.proof import SLACK
 from grasp_core.regions.sites import Sites
-from tests.judges import random_rotation
+from tests.judges import TETRA_NORMALS, random_rotation
 
-TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
 CONES = 3_000
 
 
@@ -36,9 +35,9 @@ def corners_of(sites, i):
 def perturbed(seed):
     rng = np.random.default_rng(seed)
     turn = random_rotation(rng)
-    normals = -TETRAHEDRON + 0.15 * rng.normal(size=(4, 3))
+    normals = -TETRA_NORMALS + 0.15 * rng.normal(size=(4, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return (TETRAHEDRON + 0.1 * rng.normal(size=(4, 3))) @ turn.T, normals @ turn.T
+    return (TETRA_NORMALS + 0.1 * rng.normal(size=(4, 3))) @ turn.T, normals @ turn.T
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -22,6 +22,11 @@ def proved():
     return certify_regions(body, grasp, 0.5, max_cones=SMALL)
 
 
+def corners_of(proved):
+    """Corners of the regions in the coordinates of the proof."""
+    return [(region.polygon - proved.origin) / proved.scale for region in proved.regions]
+
+
 def random_tree(rng, cuts):
     """A tree in levels, cut at random; every cone covered by the same forces."""
     codes, width = [], 64
@@ -68,7 +73,7 @@ def test_cones_are_cut_exactly():
 def test_where_a_cover_says_so_its_forces_have_power(proved):
     """On twists between the rays, for points between the corners, by the definition."""
     rng = np.random.default_rng(1)
-    regions = [(r.polygon - proved.origin) / proved.scale for r in proved.regions]
+    regions = corners_of(proved)
     tried = 0
     for where, rays in proved.cover.leaves():
         for place in rng.integers(len(rays), size=min(len(rays), 40)):
@@ -165,7 +170,7 @@ def test_a_cover_that_was_tampered_with_is_refused(proved, changed):
 
 
 def test_what_a_proof_does_not_speak_of_is_refused(proved):
-    corners = [(region.polygon - proved.origin) / proved.scale for region in proved.regions]
+    corners = corners_of(proved)
     assert proved.cover.verify(corners, proved.normals, proved.friction)
     assert not proved.cover.verify(corners[:3], proved.normals[:3], proved.friction[:3])
     assert not proved.cover.verify(corners, proved.normals, proved.friction[:3])
@@ -176,14 +181,14 @@ def test_what_a_proof_does_not_speak_of_is_refused(proved):
 @pytest.mark.parametrize("size", [1e-200, 1e-100, 1e100])
 def test_the_size_of_forces_proves_nothing(proved, size):
     """Squares of tiny numbers are zero: a friction cone could not be told from a line."""
-    corners = [(region.polygon - proved.origin) / proved.scale for region in proved.regions]
+    corners = corners_of(proved)
     scaled = dataclasses.replace(proved.cover, forces=size * proved.cover.forces)
     assert scaled.verify(corners, proved.normals, proved.friction)
     assert not scaled.verify(corners, proved.normals, np.full(4, 0.01))
 
 
 def test_pulling_contacts_are_not_taken_for_pushing_ones(proved):
-    corners = [(region.polygon - proved.origin) / proved.scale for region in proved.regions]
+    corners = corners_of(proved)
     assert not proved.cover.verify(corners, -proved.normals, -proved.friction)
     assert not proved.cover.verify(corners, -proved.normals, proved.friction)
     assert not proved.cover.verify([np.zeros((0, 3))] * 4, proved.normals, proved.friction)
@@ -209,10 +214,3 @@ def test_larger_regions_and_less_friction_are_not_proved(proved, finger):
     regions = tuple(grown if i == finger else r for i, r in enumerate(proved.regions))
     assert not dataclasses.replace(proved, regions=regions).verify()
     assert not dataclasses.replace(proved, friction=0.9 * proved.friction).verify()
-
-
-def test_shapes_are_checked():
-    with pytest.raises(gc.InputError, match="forces"):
-        TwistCover(np.eye(6), [LEAF] * 64, np.zeros((63, 4, 3)))
-    with pytest.raises(gc.InputError, match="codes"):
-        TwistCover(np.eye(6), [LEAF + 1] * 64, np.zeros((0, 4, 3)))

