@@ -15,7 +15,7 @@ import math
 from bisect import bisect
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from heapq import heapify, heappop, heappush
 from itertools import chain, islice, takewhile
 from typing import TypeAlias
@@ -283,23 +283,6 @@ def best_first(found: Certified) -> SortKey:
     return -graded(found.placement.merit), four(sorted(found.faces)), found.faces
 
 
-def search_construction(
-    construction: Construction,
-    shapes: Shapes,
-    friction: float,
-    blocks: Blocks,
-    search: MethodSearch,
-) -> Iterator[list[Certified]]:
-    """Try a construction on blocks of quadruples; yield the grasps kept from each quadruple.
-
-    With a limit the search ends when no upper bound exceeds the worst grasp kept. A construction
-    without bounds ends as soon as the limit is reached.
-    """
-    places = range(len(blocks[0]))
-    for found in found_in(construction, shapes, friction, blocks, places, search):
-        yield search.keep_each(found)
-
-
 def found_in(
     construction: Construction,
     shapes: Shapes,
@@ -312,8 +295,9 @@ def found_in(
 
     Whoever keeps them in `search` does so before asking for the next: that raises the threshold.
     """
-    tries, tally = Tries(construction, shapes, friction), search.gathered.tally
-    quadruples = _in_order(construction, AttemptBounds(shapes), blocks, places, search)
+    settling, tally = Settling(construction, shapes), search.gathered.tally
+    best_first = BestFirst(construction, AttemptBounds(shapes), tally)
+    quadruples = _in_order(best_first, blocks, places, search)
     while group := _next_few(quadruples, search):
         # grasps kept meanwhile may have raised the threshold
         worth = [
@@ -321,7 +305,8 @@ def found_in(
             for attempts in group
         ]
         every = list(chain.from_iterable(worth))
-        found = iter(tries.certified(every, search.least(construction), tally))
+        least = search.least(construction)
+        found = iter(certified_attempts(settling, friction, every, least, tally))
         for attempts in worth:
             here = [one for one in islice(found, len(attempts)) if one is not None]
             kept = _without_duplicates(here)
@@ -346,15 +331,10 @@ def _next_few(
 
 
 def _in_order(
-    construction: Construction,
-    bounded: AttemptBounds,
-    blocks: Blocks,
-    places: range,
-    search: MethodSearch,
+    best_first: BestFirst, blocks: Blocks, places: range, search: MethodSearch
 ) -> Iterator[tuple[Attempt, ...]]:
     """Yield the attempts on each quadruple: over many blocks with a limit, else block by block."""
-    best_first = BestFirst(construction, bounded, search.gathered.tally)
-    rooms, make = blocks
+    construction, (rooms, make) = best_first.construction, blocks
     if construction.limits is not None:
         size = 1 if search.limit is None else TOGETHER
         for start in range(0, len(places), size):
@@ -370,49 +350,30 @@ def _in_order(
         yield from takewhile(lambda _: not search.full, some)
 
 
-@dataclass(frozen=True, eq=False)
-class Tries:
-    """Tries one construction on many quadruples of faces together."""
-
-    construction: Construction
-    shapes: Shapes
-    friction: float
-    """Coulomb coefficient at every contact."""
-
-    def certified(
-        self, attempts: Sequence[Attempt], least: float, tally: Tally
-    ) -> list[Certified | None]:
-        """Construct and certify a grasp for each attempt; None where there is none."""
-        ends = self._settling.of(attempts, least)
-        tally.count("tried", len(attempts))
-        tally.count("solved", sum(end.solved for end in ends))
-        tally.count("undecided", sum(end.failed for end in ends))
-        tally.count("infeasible", sum(not (end.settled or end.failed) for end in ends))
-        family = self.construction.family
-        candidates = [
-            Candidate(named(family[0], attempt.faces), attempt.faces, family, *end.settled)
-            for attempt, end in zip(attempts, ends, strict=True)
-            if end.settled is not None
-        ]
-        certified = iter(self._spanning(certify_each(candidates, self.friction), candidates))
-        found = [None if end.settled is None else next(certified) for end in ends]
-        tally.count("rejected", len(candidates) - sum(one is not None for one in found))
-        return found
-
-    @cached_property
-    def _settling(self) -> Settling:
-        return Settling(self.construction, self.shapes)
-
-    @staticmethod
-    def _spanning(
-        certified: Sequence[Certified | None], candidates: Sequence[Candidate]
-    ) -> list[Certified | None]:
-        if not candidates:
-            return []
+def certified_attempts(
+    settling: Settling, friction: float, attempts: Sequence[Attempt], least: float, tally: Tally
+) -> list[Certified | None]:
+    """Construct and certify a grasp for each attempt; None where there is none."""
+    ends = settling.of(attempts, least)
+    tally.count("tried", len(attempts))
+    tally.count("solved", sum(end.solved for end in ends))
+    tally.count("undecided", sum(end.failed for end in ends))
+    tally.count("infeasible", sum(not (end.settled or end.failed) for end in ends))
+    family = settling.construction.family
+    candidates = [
+        Candidate(named(family[0], attempt.faces), attempt.faces, family, *end.settled)
+        for attempt, end in zip(attempts, ends, strict=True)
+        if end.settled is not None
+    ]
+    certified = certify_each(candidates, friction)
+    if candidates:
         axes = np.array([[cone.axis for cone in each.cones] for each in candidates])
         angles = np.array([[cone.half_angle for cone in each.cones] for each in candidates])
         spans = each_cones_positively_span(axes, angles).tolist()
-        return [one if span else None for one, span in zip(certified, spans, strict=True)]
+        certified = [one if span else None for one, span in zip(certified, spans, strict=True)]
+    tally.count("rejected", len(candidates) - sum(one is not None for one in certified))
+    placed = iter(certified)
+    return [None if end.settled is None else next(placed) for end in ends]
 
 
 def _without_duplicates(found: list[Certified]) -> list[Certified]:

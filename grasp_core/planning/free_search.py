@@ -24,12 +24,12 @@ from grasp_core.families.constructions import (
 )
 from grasp_core.families.free import RESTARTS, Absence, Undecided, close_patches, place_free
 from grasp_core.families.placements import Placement
-from grasp_core.families.placing import MOST_CHOICES, Attempt, Cones, chosen_shapes
+from grasp_core.families.placing import MOST_CHOICES, Attempt, Cones, Settling, chosen_shapes
 from grasp_core.families.true_surface import on_true_surface
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, choices_near
 from grasp_core.objects.standard_order import Standard
-from grasp_core.planning.certify import Candidate, Certified, certify, named
-from grasp_core.planning.family_search import Gathered, Tries, best_first
+from grasp_core.planning.certify import Candidate, Certified, certify_each, named
+from grasp_core.planning.family_search import Gathered, best_first, certified_attempts
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, cones_around
 from grasp_core.planning.request import COMPLETE_PARTS, FAMILIES, PlanRequest
 from grasp_core.planning.result import Tally
@@ -237,7 +237,7 @@ def _certified(
     cones = four(ForceCone(piece.normal, request.theta) for piece in pieces)
     points = regions_of(point_region, pieces, cones, placement)
     candidate = Candidate(named("f", faces), faces, "regulus", pieces, cones, placement, points)
-    certified = certify(candidate, request.friction)
+    (certified,) = certify_each([candidate], request.friction)
     if certified is None:
         gathered.tally.count("rejected")
     return certified
@@ -257,6 +257,6 @@ def _upgraded(
         )
         for order in construction.orders
     ]
-    tries = Tries(construction, shapes, friction)
-    found = tries.certified(attempts, construction.least, Tally())
+    settling = Settling(construction, shapes)
+    found = certified_attempts(settling, friction, attempts, construction.least, Tally())
     return min((one for one in found if one), key=best_first, default=None)

@@ -197,6 +197,19 @@ def blocks_of(work: Object, family: Family) -> list[Block]:
     return [Block(family, place) for place in range(len(work.blocks(family)[0]))]
 
 
+def search_family(work: Object, family: Family, search: MethodSearch) -> Iterator[list[Certified]]:
+    """Search all blocks until no upper bound exceeds the worst grasp kept; yield those kept.
+
+    A construction without bounds ends as soon as the limit is reached.
+    """
+    blocks = work.blocks(family)
+    for found in found_in(
+        CONSTRUCTIONS[family], work.on.shapes, work.request.friction, blocks,
+        range(len(blocks[0])), search,
+    ):  # fmt: skip
+        yield search.keep_each(found)
+
+
 def search_blocks(found: Iterator[Found], search: MethodSearch) -> Iterator[list[Certified]]:
     """Keep the grasps that blocks hold; yield those of each quadruple."""
     for each in found:
@@ -211,12 +224,18 @@ def search_batches(
     held: AbstractSet[FaceQuadruple],
     elsewhere: Elsewhere | None,
 ) -> Iterator[list[Certified]]:
-    """Go through the quadruples that no family holds; yield the grasps kept on each."""
-    split = ((batch, without_grasp(work.on, batch, held)) for batch in batches(work.on, BATCH))
+    """Go through the quadruples that no family holds, until the limit; yield the grasps on each."""
+    size = BATCH if search.limit is None else LIMITED_BATCH
+    split = ((batch, without_grasp(work.on, batch, held)) for batch in batches(work.on, size))
     every, ahead = tee(split)
     parts = (Batch(to_try) for _, to_try in ahead)
     for (batch, to_try), each in zip(every, each_found(work, parts, elsewhere), strict=True):
-        yield from kept_on(batch, to_try, each.grasps, search)
+        if search.full:
+            return
+        tried, grasps = set(to_try), iter(each.grasps)
+        for faces in batch:
+            yield search.keep_each(next(grasps)) if faces in tried else []
+        next(grasps, None)  # runs the search to its end, where its counts are complete
         search.take(each.gathered, each.seconds)
 
 
@@ -232,31 +251,6 @@ def search_undecided(
         for grasps in each.grasps:
             yield search.keep_each(grasps)
         search.take(each.gathered, each.seconds)
-
-
-def search_free(
-    on: Standard, request: PlanRequest, search: MethodSearch, held: AbstractSet[FaceQuadruple]
-) -> Iterator[list[Certified]]:
-    """Go through the quadruples that no family holds, until the limit is reached."""
-    for batch in batches(on, LIMITED_BATCH):
-        if search.full:
-            return
-        to_try = without_grasp(on, batch, held)
-        found = found_on(on, to_try, request, search.gathered)
-        yield from kept_on(batch, to_try, ([each] if each else [] for each in found), search)
-
-
-def kept_on(
-    batch: Sequence[FaceQuadruple],
-    tried: Sequence[FaceQuadruple],
-    found: Iterable[list[Certified]],
-    search: MethodSearch,
-) -> Iterator[list[Certified]]:
-    """Keep the grasps found on a batch; yield those of each quadruple, tried or not."""
-    these, grasps = set(tried), iter(found)
-    for faces in batch:
-        yield search.keep_each(next(grasps)) if faces in these else []
-    next(grasps, None)  # runs the search to its end, where its counts are complete
 
 
 def batches(on: Standard, size: int) -> Iterator[Sequence[FaceQuadruple]]:

@@ -22,7 +22,7 @@ from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.as_given import absence_as_given, as_given, faces_as_given
-from grasp_core.planning.certify import to_grasp, to_grasps
+from grasp_core.planning.certify import to_grasps
 from grasp_core.planning.methods import Progress, Searches, outcomes, prepared, run, unreached
 from grasp_core.planning.parts import finding_elsewhere
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
@@ -132,7 +132,7 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
     check_request(body, request)
     on, searches = prepared(body, request)
     every = run(on, request, searches, None)
-    return (to_grasp(body, friction, as_given(each, on)) for each in every)
+    return (to_grasps(body, friction, [as_given(each, on)])[0] for each in every)
 
 
 def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
