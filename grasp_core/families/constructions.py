@@ -37,9 +37,9 @@ class Construction:
     """Function that places contacts, given pieces, force cones and the least merit that counts."""
     limits: slice | None
     """Columns of `disc_limits`, one per finger order; None where no disc is claimed."""
-    admits: Callable[[Array, Array], NDArray[np.bool_]]
+    admits: Callable[[Array, Array], NDArray[np.bool_]] | None
     """Function that returns for which quadruples a program may be feasible, (q,), from normals in
-    finger order, (q, 4, 3), and half-angles, (q,) [rad]."""
+    finger order, (q, 4, 3), and half-angles, (q,) [rad]; None for all."""
     region: Region
     """Function that makes the region of one finger, in the pieces' units."""
 
@@ -47,10 +47,6 @@ class Construction:
     def least(self) -> float:
         """Return the merit that a placement must exceed to count."""
         return LEAST_RADIUS if self.limits else -math.inf
-
-
-def _always_admitted(_: Array, half_angles: Array) -> NDArray[np.bool_]:
-    return np.ones(len(half_angles), dtype=np.bool_)
 
 
 def _cone_region(
@@ -89,11 +85,9 @@ def point_region(_: FacePiece, __: ForceCone, placed: Placement, finger: int) ->
 
 CONSTRUCTIONS: dict[Family, Construction] = {
     "concurrent": Construction(
-        "concurrent", AS_LISTED, place_concurrent, slice(0, 1), _always_admitted, _cone_region
+        "concurrent", AS_LISTED, place_concurrent, slice(0, 1), None, _cone_region
     ),
-    "pencil": Construction(
-        "pencil", PAIRINGS, place_pencil, slice(1, 4), _always_admitted, _disc_region
-    ),
+    "pencil": Construction("pencil", PAIRINGS, place_pencil, slice(1, 4), None, _disc_region),
     "regulus": Construction(
         "regulus", PAIRINGS, lambda pieces, cones, _: place_regulus(pieces, cones), None,
         nearly_symmetric, point_region,

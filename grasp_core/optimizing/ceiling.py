@@ -30,7 +30,7 @@ from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.best_grasp import FINER, lowered_twists, refuted_by_one
 from grasp_core.optimizing.best.grounds import Grounds, first_nodes, grounds_on
-from grasp_core.optimizing.best.search import Searching, StopAfter
+from grasp_core.optimizing.best.search import Searching, Stop
 from grasp_core.optimizing.best.support_cuts import LEAST_THRESHOLD, SEARCHED_BELOW, CutTree, Slack
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
@@ -151,7 +151,7 @@ def _lowered(
     alone = np.eye(3)[None]
     proved = Slack.of(friction, len(alone), FERRARI_CANNY)
     searched = Slack.of(friction, len(alone), FERRARI_CANNY, SEARCHED_BELOW)
-    stop = StopAfter(parts)
+    stop = Stop(parts)
     searching = Searching(grounds, friction, 1, stop)
     nodes = first_nodes(grounds, alone, owners)
     twists = lowered_twists(searching, np.random.default_rng(SEED))

@@ -113,19 +113,20 @@ def witness_faults(
     """Return why the witness forces of each set of contacts are wrong, or None."""
     along, across = normal_and_tangential(forces, normals)
     stacked = forces.reshape(len(forces), -1)
-    missed = np.linalg.norm(np.einsum("gwj,gj->gw", grasp_map(points), stacked), axis=-1)
-    inside = (along > 0.0).all(axis=-1) & (across <= friction * along + BALANCED).all(axis=-1)
+    wrenches = np.einsum("gwj,gj->gw", grasp_map(points), stacked)
+    missed = np.linalg.norm(wrenches, axis=-1)
     rules = {
         "the normal parts of the witness forces do not sum to one": (
             np.abs(along.sum(axis=-1) - 1.0) <= BALANCED
         ),
-        "a witness force is outside its friction cone": inside,
+        "a witness force is outside its friction cone": (
+            (along > 0.0).all(axis=-1) & (across <= friction * along + BALANCED).all(axis=-1)
+        ),
         "the witness forces do not balance": missed <= BALANCED,
     }
-    faults = [
-        next((fault for fault, kept in rules.items() if not kept[place]), None)
-        for place in range(len(points))
-    ]
+    kept = np.stack(list(rules.values()), axis=1).tolist()
+    faults = [next((fault for fault, fits in zip(rules, row, strict=True) if not fits), None)
+              for row in kept]  # fmt: skip
     sound = [place for place, fault in enumerate(faults) if fault is None]
     for place, found in zip(sound, classify_each(points[sound], forces[sound]), strict=True):
         if found != families[place]:

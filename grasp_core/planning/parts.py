@@ -22,7 +22,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard, clear_of_edges, standard, with_halves
 from grasp_core.planning.certify import Certified
 from grasp_core.planning.family_search import Gathered, MethodSearch, found_in
-from grasp_core.planning.free_search import found_on, found_with_more_parts
+from grasp_core.planning.free_search import found_on
 from grasp_core.planning.planned_cones import PlannedCones
 from grasp_core.planning.quadruples import Blocks, all_blocks, kept, spanning_blocks
 from grasp_core.planning.reach import Reach
@@ -49,19 +49,13 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Quadruples to be decided together by the free method."""
+    """Quadruples to be decided together by the free method, or again with more parts."""
 
     quadruples: tuple[FaceQuadruple, ...]
+    again: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Completion:
-    """A quadruple to be decided once more by the free method, with more parts."""
-
-    faces: FaceQuadruple
-
-
-Part: TypeAlias = Block | Batch | Completion
+Part: TypeAlias = Block | Batch
 
 
 @dataclass(slots=True, eq=False)
@@ -107,12 +101,9 @@ class Object:
                     construction, self.on.shapes, self.request.friction, self.blocks(family),
                     places, search,
                 )  # fmt: skip
-            case Batch(quadruples):
-                for found in found_on(self.on, quadruples, self.request, gathered):
+            case Batch(quadruples, again):
+                for found in found_on(self.on, quadruples, self.request, gathered, again=again):
                     yield [found] if found else []
-            case Completion(faces):
-                found = found_with_more_parts(self.on, faces, self.request, gathered)
-                yield [found] if found else []
 
     def blocks(self, family: Family) -> Blocks:
         """Return the blocks for a construction; without bounds it uses cones around normals."""
@@ -244,9 +235,8 @@ def search_undecided(
 ) -> Iterator[list[Certified]]:
     """Go once more, with more parts, through the quadruples that were left undecided."""
     open_yet = tuple(search.gathered.undecided)
-    for faces, each in zip(
-        open_yet, each_found(work, map(Completion, open_yet), elsewhere), strict=True
-    ):
+    parts = (Batch((faces,), again=True) for faces in open_yet)
+    for faces, each in zip(open_yet, each_found(work, parts, elsewhere), strict=True):
         del search.gathered.undecided[faces]
         for grasps in each.grasps:
             yield search.keep_each(grasps)

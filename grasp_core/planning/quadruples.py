@@ -88,9 +88,10 @@ class ConedQuadruples:
             bounds = np.where(np.isnan(limits), np.inf, limits)
             bounds = np.minimum(bounds, self.rooms[:, None, None])
         for column, order in enumerate(construction.orders):
-            admitted = construction.admits(
-                self.normals[spans][:, order], self.half_angles[spans, NORMAL]
-            )
+            if construction.admits is None:
+                break
+            normals = self.normals[spans][:, order]
+            admitted = construction.admits(normals, self.half_angles[spans, NORMAL])
             kept = np.where(admitted[:, None], bounds[spans, :, column], -np.inf)
             bounds[spans, :, column] = kept
         return np.where(usable[:, :, None] & (bounds >= LEAST_RADIUS), bounds, -np.inf)

@@ -10,11 +10,12 @@ import importlib
 import math
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array
 from grasp_core.errors import SolverError
 
 RESIDUAL = 1e-7
@@ -131,32 +132,23 @@ def _outside(program: ConicProgram, rows: Array, *, dual: bool) -> float:
     return float(worst)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Columns:
-    """A matrix in compressed columns, with the attributes that Clarabel reads.
+def _columns(A: Array) -> SimpleNamespace:
+    """Compress a matrix to columns without its zeros, with the attributes that Clarabel reads.
 
     A sparse matrix of scipy has these attributes too, but it checks its data again, and importing
     it takes longer than planning on a small object.
     """
-
-    data: Array
-    indices: Indices
-    indptr: Indices
-    shape: tuple[int, ...]
-    has_canonical_format: bool = True
-
-
-def _columns(A: Array) -> _Columns:
-    """Compress a matrix to columns without its zeros."""
     columns = A.T
     filled = columns != 0.0
     starts = np.concatenate([[0], filled.sum(axis=1).cumsum()])
-    places = filled.nonzero()[1]
-    return _Columns(columns[filled], places, starts, A.shape)
+    return SimpleNamespace(
+        data=columns[filled], indices=filled.nonzero()[1], indptr=starts, shape=A.shape,
+        has_canonical_format=True,
+    )  # fmt: skip
 
 
 @cache
-def _no_squares(n: int) -> _Columns:
+def _no_squares(n: int) -> SimpleNamespace:
     return _columns(np.zeros((n, n)))
 
 

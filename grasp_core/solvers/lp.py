@@ -181,20 +181,6 @@ def _checked_bound(program: LinearProgram, multipliers: Array, cutoff: float) ->
     return Below(bound, multipliers)
 
 
-def _solved(program: LinearProgram, strategy: int) -> Optimum | Infeasible:
-    solver, status = _run(program, strategy)
-    kinds = _highspy().HighsModelStatus
-    if status == kinds.kOptimal:
-        solution = solver.getSolution()
-        x, duals = np.array(solution.col_value), np.array(solution.row_dual)
-        return _checked_optimum(program, x, duals)
-    if status == kinds.kInfeasible:
-        return _checked_ray(program, np.array(solver.getDualRay()[2]))
-    raise SolverError(
-        f"HiGHS ended without an optimum or a proof: {solver.modelStatusToString(status)}"
-    )
-
-
 def _checked_optimum(program: LinearProgram, x: Array, duals: Array) -> Optimum:
     G, h = program.stacked()
     rows = len(program.b)
@@ -228,8 +214,8 @@ def _checked_ray(program: LinearProgram, ray: Array) -> Infeasible:
     raise SolverError("HiGHS called the linear program infeasible, but its proof fails the check")
 
 
-def _run(program: LinearProgram, strategy: int) -> tuple[Any, Any]:
-    highspy = _highspy()
+def _solved(program: LinearProgram, strategy: int) -> Optimum | Infeasible:
+    highspy, solver = _highs()
     G, h = program.stacked()
     lower = np.full(len(h), -np.inf)
     lower[len(program.b) :] = h[len(program.b) :]
@@ -245,22 +231,27 @@ def _run(program: LinearProgram, strategy: int) -> tuple[Any, Any]:
     model.a_matrix_.start_ = np.concatenate([[0], np.cumsum(filled.sum(axis=1))])
     model.a_matrix_.index_ = np.nonzero(filled)[1]
     model.a_matrix_.value_ = G[filled]
-    solver = _solver()
     solver.clearSolver()
     solver.setOptionValue("simplex_strategy", strategy)
     solver.passModel(model)
     solver.run()
-    return solver, solver.getModelStatus()
+    status = solver.getModelStatus()
+    if status == highspy.HighsModelStatus.kOptimal:
+        solution = solver.getSolution()
+        x, duals = np.array(solution.col_value), np.array(solution.row_dual)
+        return _checked_optimum(program, x, duals)
+    if status == highspy.HighsModelStatus.kInfeasible:
+        return _checked_ray(program, np.array(solver.getDualRay()[2]))
+    raise SolverError(
+        f"HiGHS ended without an optimum or a proof: {solver.modelStatusToString(status)}"
+    )
 
 
 @cache
-def _highspy() -> Any:
-    return importlib.import_module("highspy")
-
-
-@cache
-def _solver() -> Any:
-    solver = _highspy().Highs()
+def _highs() -> tuple[Any, Any]:
+    """Return the package of HiGHS, and a solver with the options that proofs need."""
+    highspy: Any = importlib.import_module("highspy")
+    solver = highspy.Highs()
     options = {
         "output_flag": False,
         "threads": 1,
@@ -271,4 +262,4 @@ def _solver() -> Any:
     }
     for name, value in options.items():
         solver.setOptionValue(name, value)
-    return solver
+    return highspy, solver

@@ -8,6 +8,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 
 from grasp_core.by_value import counted
@@ -16,7 +17,7 @@ from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.files.text_files import write_text
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_payload
-from grasp_core.hands.reach import HandReach, uncoupled
+from grasp_core.hands.reach import HandReach, reach_with, uncoupled
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.cli import hand_flags
@@ -37,8 +38,8 @@ from sim_validate.hands.execute_hand import (
     held_by_hands,
 )
 from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict
+from sim_validate.parallel import processes
 from sim_validate.parallel.compiling import REACHING, compile_loops, must_compile
-from sim_validate.parallel.reaching import ReachJob, reached
 from sim_validate.records.grasps import grasp_with_id
 from sim_validate.records.reaches import AskedRecord, HandTrials, reaches_summary, reaches_to_json
 from sim_validate.reports.run_folder import GRASPS
@@ -86,13 +87,6 @@ def _reach(
     """Look for poses, try them, and write what is done even if the run is interrupted."""
     if command.out is not None:
         remove_reaches(command.out)
-    jobs = [
-        ReachJob(
-            hand, saved.body, grasp, saved.friction, command.seed, not command.contacts_only,
-            command.table, command.clearance_m, command.starts,
-        )
-        for grasp in saved.grasps
-    ]  # fmt: skip
     asked: AskedRecord = {
         "regions": not command.contacts_only, "table_down": command.table,
         "clearance_m": command.clearance_m, "starts": command.starts, "seed": command.seed,
@@ -100,23 +94,28 @@ def _reach(
     if command.mass_kg is not None:
         asked["execution"] = asdict(hand_execution_settings(command.mass_kg).used)
     found, tried = list[HandReach](), HandTrials()
-    if jobs and must_compile(REACHING, command.jobs):
+    if saved.grasps and must_compile(REACHING, command.jobs):
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
+    look = partial(
+        reach_with, hand, saved.body, friction=saved.friction, regions=not command.contacts_only,
+        table_down=command.table, clearance_m=command.clearance_m, starts=command.starts,
+        seed=command.seed,
+    )  # fmt: skip
     try:
         with reporter.progress("reaching") as steps:
-            for each in reached(jobs, command.jobs):
-                found.append(each)
-                good = sum(one.reached for one in found)
-                steps.update(len(found), len(jobs), f"({good} reached)")
+            for one in processes.each(look, saved.grasps, jobs=command.jobs):
+                found.append(one)
+                good = sum(pose.reached for pose in found)
+                steps.update(len(found), len(saved.grasps), f"({good} reached)")
         tried.payloads.update(carried(hand, saved, found))
         simulated(command, hand, saved, found, reporter, tried.verdicts)
         executed(command, hand, saved, found, reporter, tried.executions)
     finally:
-        stands = sum(each.reached for each in found)
+        stands = sum(one.reached for one in found)
         held = len(tried.verdicts) == stands or not tries_ours(command)
         lifted = len(tried.executions) == stands or command.mass_kg is None
-        complete = len(found) == len(jobs) and held and lifted
+        complete = len(found) == len(saved.grasps) and held and lifted
         text = reaches_to_json(
             hand, saved.body, saved.friction, asked, found, complete=complete,
             grasps=saved.grasps, tried=tried,

@@ -74,10 +74,10 @@ that a search may be asked for."""
 
 
 class Stop:
-    """Tells threads to stop, after a time or when asked."""
+    """Tells threads to stop: when asked, or one thread after some nodes, whatever the clock."""
 
-    def __init__(self) -> None:
-        self._event = threading.Event()
+    def __init__(self, nodes: float = math.inf) -> None:
+        self._event, self._left = threading.Event(), nodes
 
     def __call__(self) -> bool:
         """Return whether to stop."""
@@ -89,17 +89,6 @@ class Stop:
 
     def spend(self, nodes: int) -> None:
         """Take note that a thread has visited so many nodes."""
-
-
-class StopAfter(Stop):
-    """Stops one thread after a number of nodes, which does not depend on the clock."""
-
-    def __init__(self, nodes: int) -> None:
-        super().__init__()
-        self._left = nodes
-
-    def spend(self, nodes: int) -> None:
-        """Count nodes, and stop when there were enough."""
         self._left -= nodes
         if self._left <= 0:
             self.now()
