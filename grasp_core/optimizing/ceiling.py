@@ -26,7 +26,7 @@ from grasp_core.by_value import ByValue
 from grasp_core.checked import BOUNDS, LARGEST, coefficient, number, several, whole
 from grasp_core.errors import InputError
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
-from grasp_core.objects.on_faces import check_body
+from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.best_grasp import FINER, lowered_twists, refuted_by_one
 from grasp_core.optimizing.best.grounds import Grounds, first_nodes, grounds_on
@@ -103,12 +103,7 @@ def quality_ceiling(
         InputError: An argument is out of range.
         SolverError: A program's answer failed its check.
     """
-    check_body(body)
-    if body.patches is not None:
-        raise InputError(
-            f"quality_ceiling: expected an object with planar faces, got {body.name} with curved "
-            "ones; take a mesh with fewer, planar faces"
-        )
+    check_planar(body, "quality_ceiling")
     friction = coefficient(friction)
     number(known, "known", least=0.0, most=LARGEST)
     number(gap, "gap", least=SMALLEST_GAP, most=LARGEST_GAP)

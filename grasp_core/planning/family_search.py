@@ -174,7 +174,8 @@ class BestFirst:
         # no discs even of the least radius: settled here, whatever was found elsewhere
         none = solved.any(axis=1) & (tight.max(axis=1) <= construction.least)
         choices = int(solved.transpose(0, 2, 1)[none].sum())
-        self.tally.exclude(int(none.sum()), choices)
+        excluded = int(none.sum())
+        self.tally.update(tried=excluded, infeasible=excluded, solved=choices)
         tight[tight <= worth] = -np.inf
         best = coarse(np.asarray(np.max(tight, axis=(1, 2)), dtype=np.float64))
         for each in np.flatnonzero(best > -np.inf).tolist():
@@ -203,7 +204,7 @@ class Gathered:
 
     def add(self, other: "Gathered") -> None:
         """Add what the next part of the search gathered."""
-        self.tally.add(other.tally)
+        self.tally.update(other.tally)
         self.absences.update(other.absences)
         self.undecided.update(other.undecided)
 
@@ -229,8 +230,8 @@ class MethodSearch:
     @property
     def counts(self) -> MethodCounts:
         """Return the counts so far, with the quadruples that are still undecided."""
-        counts = self.gathered.tally.counts
-        return replace(counts, undecided=counts.undecided + len(self.gathered.undecided))
+        tally, still = self.gathered.tally, len(self.gathered.undecided)
+        return MethodCounts(**{**tally, "undecided": tally["undecided"] + still})
 
     @property
     def full(self) -> bool:
@@ -262,12 +263,12 @@ class MethodSearch:
         faces = four(sorted(found.faces))
         way = self.reach(found)
         if way.reason:
-            self.gathered.tally.count("unreachable")
+            self.gathered.tally["unreachable"] += 1
             self.unreached[faces] = way.reason
             return []
         if found.method != self.method or way.directions is not None:
             found = replace(found, method=self.method, ways_out=way.directions)
-        self.gathered.tally.count("found")
+        self.gathered.tally["found"] += 1
         self.held.add(faces)
         key = best_first(found)
         place = bisect(self._keys, key)
@@ -310,7 +311,7 @@ def found_in(
         for attempts in worth:
             here = [one for one in islice(found, len(attempts)) if one is not None]
             kept = _without_duplicates(here)
-            tally.count("duplicates", len(here) - len(kept))
+            tally["duplicates"] += len(here) - len(kept)
             yield kept
 
 
@@ -355,10 +356,10 @@ def certified_attempts(
 ) -> list[Certified | None]:
     """Construct and certify a grasp for each attempt; None where there is none."""
     ends = settling.of(attempts, least)
-    tally.count("tried", len(attempts))
-    tally.count("solved", sum(end.solved for end in ends))
-    tally.count("undecided", sum(end.failed for end in ends))
-    tally.count("infeasible", sum(not (end.settled or end.failed) for end in ends))
+    tally["tried"] += len(attempts)
+    tally["solved"] += sum(end.solved for end in ends)
+    tally["undecided"] += sum(end.failed for end in ends)
+    tally["infeasible"] += sum(not (end.settled or end.failed) for end in ends)
     family = settling.construction.family
     candidates = [
         Candidate(named(family[0], attempt.faces), attempt.faces, family, *end.settled)
@@ -371,7 +372,7 @@ def certified_attempts(
         angles = np.array([[cone.half_angle for cone in each.cones] for each in candidates])
         spans = each_cones_positively_span(axes, angles).tolist()
         certified = [one if span else None for one, span in zip(certified, spans, strict=True)]
-    tally.count("rejected", len(candidates) - sum(one is not None for one in certified))
+    tally["rejected"] += len(candidates) - sum(one is not None for one in certified)
     placed = iter(certified)
     return [None if end.settled is None else next(placed) for end in ends]
 

@@ -55,7 +55,7 @@ def found_on(
     if again:
         request = replace(request, max_face_parts=COMPLETE_PARTS)
     else:
-        gathered.tally.count("tried", len(to_try))
+        gathered.tally["tried"] += len(to_try)
     search = _FreeSearch(on, request, gathered)
     known = {} if again else search.patches(to_try)
     placed = [search.placed_on(faces, known.get(faces)) for faces in to_try]
@@ -115,12 +115,12 @@ class _FreeSearch:
             # choices of halves gave none: whole faces may be proved to hold none
             whole = four(on.owners[face] for face in faces)
             hulls = tuple(shape.hull for shape in chosen_shapes(on.shapes, whole))
-            gathered.tally.count("solved")
+            gathered.tally["solved"] += 1
             answer = self._place(hulls, self._rng(faces), restarts=0)
             answers = [(hulls, answer if isinstance(answer, Absence) else Undecided(1.0))]
         proofs = tuple(proof for _, proof in answers if isinstance(proof, Absence))
         if len(proofs) == len(answers):
-            gathered.tally.count("infeasible")
+            gathered.tally["infeasible"] += 1
             gathered.absences[faces] = proofs
         else:
             gathered.undecided[faces] = max(
@@ -139,7 +139,7 @@ class _FreeSearch:
         """
         rng, tally = self._rng(faces), self.gathered.tally
         hulls = tuple(shape.hull for shape in shapes)
-        tally.count("solved")
+        tally["solved"] += 1
         whole = self._place(hulls, rng, known=known)
         if isinstance(whole, Absence) or all(len(shape.pieces) == 1 for shape in shapes):
             return [(hulls, whole)]
@@ -148,7 +148,7 @@ class _FreeSearch:
         most = MOST_CHOICES * self.request.max_face_parts
         answers: list[Answer] = []
         for pieces in choices_near(shapes, at, most):
-            tally.count("solved")
+            tally["solved"] += 1
             answers.append((pieces, self._place(pieces, rng, restarts=0)))
             if isinstance(answers[-1][1], Placement):
                 return answers
@@ -220,7 +220,7 @@ class _FreeSearch:
         candidate = Candidate(named("f", faces), faces, "regulus", pieces, cones, placement, points)
         (certified,) = certify_each([candidate], request.friction)
         if certified is None:
-            self.gathered.tally.count("rejected")
+            self.gathered.tally["rejected"] += 1
         return certified
 
 

@@ -110,7 +110,8 @@ def _held(searches: Searches) -> set[FaceQuadruple]:
 def _prune(method: Method, search: MethodSearch, quadruples: int) -> None:
     """Count what was not tried; each quadruple counts once per order of the fingers."""
     orders = 1 if method == "free" else len(CONSTRUCTIONS[method].orders)
-    search.gathered.tally.prune(quadruples * orders)
+    tally = search.gathered.tally
+    tally["pruned"] = quadruples * orders - tally["tried"]
 
 
 def _share(limit: int, before: Sequence[int]) -> int:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from grasp_core.files.text_files import write_text
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
@@ -58,7 +58,9 @@ def execute_file(command: command_flags.Execute, reporter: Reporter) -> int:
     if command.grasp is not None:
         saved = replace(saved, grasps=(grasp_with_id(command.grasps, saved, command.grasp),))
     chosen = chosen_grasps(saved, friction=command.friction, seed=command.seed, limit=command.limit)
-    settings = execution_settings(chosen, command.executing, command.trials, command.down)
+    settings = execution_settings(
+        chosen.body, chosen.seed, chosen.finger, command.executing, command.trials, command.down
+    )
     physics = {} if command.setup is None else physics_from_file(command.setup)
     with alone_in(command.out):
         code, text = execute_grasps(
@@ -70,7 +72,7 @@ def execute_file(command: command_flags.Execute, reporter: Reporter) -> int:
 
 
 def execute_grasps(
-    saved: SavedGrasps, settings: ExecutionSettings, *, jobs: int, folder: Path | None,
+    saved: Plan, settings: ExecutionSettings, *, jobs: int, folder: Path | None,
     reporter: Reporter, physics: Mapping[str, object] | None = None,
 ) -> tuple[Exit, str]:  # fmt: skip
     """Execute grasps, show the results, and write them even if the run is interrupted.

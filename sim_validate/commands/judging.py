@@ -8,7 +8,7 @@ from pathlib import Path
 from grasp_core.files.text_files import write_text
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.files.result_folders import JUDGEMENTS, remove_judgements
@@ -21,7 +21,7 @@ TOTALS = ("test", "grasps", "theirs passed", "ours held", "predicted", "theirs a
 
 
 def judge_grasps(
-    saved: SavedGrasps, names: Sequence[str], setup: Setup, *, jobs: int, folder: Path | None,
+    saved: Plan, names: Sequence[str], setup: Setup, *, jobs: int, folder: Path | None,
     reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
     """Judge the grasps of a file by tests with four fingertips.
@@ -37,7 +37,7 @@ def judge_grasps(
 
 
 def judge_hands(
-    saved: SavedGrasps, hand: Hand, found: Sequence[HandReach], names: Sequence[str], *,
+    saved: Plan, hand: Hand, found: Sequence[HandReach], names: Sequence[str], *,
     jobs: int, folder: Path | None, reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
     """Judge the poses of a hand in the grasps of a file by tests.
@@ -54,7 +54,7 @@ def judge_hands(
 
 
 def _judged(
-    saved: SavedGrasps, cases: Sequence[Case], jobs: int, folder: Path | None, reporter: Reporter
+    saved: Plan, cases: Sequence[Case], jobs: int, folder: Path | None, reporter: Reporter
 ) -> tuple[Exit, str]:  # fmt: skip
     """Judge all cases, and write what is done even if the run is interrupted."""
     if folder:

@@ -19,7 +19,7 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_payload
 from grasp_core.hands.reach import HandReach, reach_with, uncoupled
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
@@ -82,7 +82,7 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
 
 
 def _reach(
-    command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, reporter: Reporter
+    command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporter
 ) -> tuple[list[HandReach], HandTrials, str]:
     """Look for poses, try them, and write what is done even if the run is interrupted."""
     if command.out is not None:
@@ -181,7 +181,7 @@ def _row(hand: Hand, each: HandReach) -> tuple[str, ...]:
     return (each.grasp, "yes", names, str(each.starts), *yes)
 
 
-def carried(hand: Hand, saved: SavedGrasps, found: Sequence[HandReach]) -> dict[str, HandPayload]:
+def carried(hand: Hand, saved: Plan, found: Sequence[HandReach]) -> dict[str, HandPayload]:
     """Find the largest mass in any orientation, by the ids of the grasps that are reached.
 
     There is none for a hand whose motors or links are not known well enough, and for grasps in
@@ -227,7 +227,7 @@ def tries_ours(command: hand_flags.Reach) -> bool:
 
 
 def simulated(
-    command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, found: Sequence[HandReach],
+    command: hand_flags.Reach, hand: Hand, saved: Plan, found: Sequence[HandReach],
     reporter: Reporter, verdicts: dict[str, HandVerdict],
 ) -> None:  # fmt: skip
     """Test the hand in each grasp that it reaches, and enter verdicts by the ids of the grasps.
@@ -272,7 +272,7 @@ def show_simulated(verdicts: Mapping[str, HandVerdict], reporter: Reporter) -> N
 
 
 def executed(
-    command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, found: Sequence[HandReach],
+    command: hand_flags.Reach, hand: Hand, saved: Plan, found: Sequence[HandReach],
     reporter: Reporter, results: dict[str, ExecutedHand],
 ) -> None:  # fmt: skip
     """Execute each grasp that the hand reaches, and enter what is found by the ids of the grasps.

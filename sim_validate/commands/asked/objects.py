@@ -9,7 +9,7 @@ from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.objects.surface import PatchLimits
 from grasp_core.planning.reach import Finger
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from scenes.example_objects import example_object
 from sim_validate.cli import flag_groups
 from sim_validate.cli.console import Reporter
@@ -103,7 +103,7 @@ def asked_finger(planning: flag_groups.Planning) -> Finger | None:
     return Finger(planning.finger_radius_m, planning.approach_m)
 
 
-def saved_grasps(path: Path, reporter: Reporter) -> SavedGrasps | None:
+def saved_grasps(path: Path, reporter: Reporter) -> Plan | None:
     """Read a `grasps.json`, and warn of what was changed in its mesh.
 
     None, with a word about it, if the file holds no grasp.
@@ -120,8 +120,8 @@ def saved_grasps(path: Path, reporter: Reporter) -> SavedGrasps | None:
 
 
 def chosen_grasps(
-    saved: SavedGrasps, *, friction: float | None, seed: int | None, limit: int | None
-) -> SavedGrasps:
+    saved: Plan, *, friction: float | None, seed: int | None, limit: int | None
+) -> Plan:
     """Keep the first grasps, up to a limit, with another friction or seed where one is given."""
     return replace(
         saved,
