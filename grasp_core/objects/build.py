@@ -214,6 +214,7 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tup
     if corners.shape[1] != 3 or corners.dtype.kind not in "iu":  # noqa: PLR2004
         message = f"triangles must be whole numbers (t, 3), got {corners.dtype} {corners.shape}"
         raise MeshError(MeshRefusal.INDEX, message)
+    corners = corners.astype(np.int64)
     if len(corners) > most:
         too_many(len(corners), most)
     if not np.isfinite(points).all():
@@ -235,7 +236,7 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tup
             f"{LARGEST_EXTENT_M} m; its unit makes it too {wrong}"
         )
         raise MeshError(MeshRefusal.SIZE, message)
-    return points, corners.astype(np.int64)
+    return points, corners
 
 
 def content_hash(points: Array, corners: Indices) -> str:

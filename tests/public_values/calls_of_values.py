@@ -66,10 +66,6 @@ CALLS = [
         "largest_part": SWITCH,
         "center_of_mass": unless(array(CENTER), "none") | {"far away": [1.0, 0.0, 0.0]},
     }),
-    Call("gc.from_trimesh", lambda: {"mesh": body().to_trimesh()}, {
-        "mesh": VALUE, "name": TEXT, "faces": WORD, "patches": optional(VALUE),
-        "flatness_m": optional(NOT_NEGATIVE), "largest_part": SWITCH,
-    }),
     Call("gc.Contact", lambda: {"position": CENTER, "normal": [0.0, 0.0, 1.0]}, {
         "position": array(CENTER), "normal": units([0.0, 0.0, 1.0]),
     }),
