@@ -13,7 +13,8 @@ from grasp_core.families.concurrent import cone_footprint, place_concurrent, pla
 from grasp_core.families.pencil import place_pencil
 from grasp_core.families.placements import LEAST_RADIUS, NoPlacement, Placement
 from grasp_core.families.regulus import nearly_symmetric, place_regulus
-from grasp_core.objects.face_pieces import FacePiece, inscribed_disc_radius
+from grasp_core.geometry.polygons import edge_rows
+from grasp_core.objects.face_pieces import FacePiece, inscribed_radius
 from grasp_core.values import ContactRegion, Family, ForceCone
 
 FingerOrder: TypeAlias = tuple[int, int, int, int]
@@ -53,7 +54,8 @@ def _cone_region(
     piece: FacePiece, cone: ForceCone, placed: Placement, finger: int
 ) -> ContactRegion:
     polygon = cone_footprint(piece, cone, placed.foci[0], placed.positions[finger])
-    return ContactRegion("cone", polygon, inscribed_disc_radius(polygon, piece))
+    E, b = edge_rows((polygon - piece.origin) @ piece.frame)
+    return ContactRegion("cone", polygon, inscribed_radius(E, b))
 
 
 def circle() -> Array:

@@ -213,11 +213,6 @@ def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
     )
 
 
-def inscribed_disc_radius(polygon: Array, piece: FacePiece) -> float:
-    """Compute the radius of the largest disc in a convex polygon (k, 3) on a piece."""
-    return inscribed_radius(*edge_rows((polygon - piece.origin) @ piece.frame))
-
-
 def inscribed_disc_radius_of(polygon: Array, normal: Array) -> float:
     """Compute the radius of the largest disc in a convex polygon (k, 3), wound about the normal."""
     return inscribed_radius(*edge_rows((polygon - polygon[0]) @ plane_frame(normal)))

@@ -202,12 +202,6 @@ class Gathered:
     )
     undecided: dict[FaceQuadruple, float] = field(default_factory=dict[FaceQuadruple, float])
 
-    def add(self, other: "Gathered") -> None:
-        """Add what the next part of the search gathered."""
-        self.tally.update(other.tally)
-        self.absences.update(other.absences)
-        self.undecided.update(other.undecided)
-
 
 @dataclass(slots=True, eq=False)
 class MethodSearch:
@@ -245,38 +239,35 @@ class MethodSearch:
         worst = self.best[-1].placement.merit if self.full else -math.inf
         return max(worst * (1.0 + SAME_MERIT), construction.least)
 
-    def may_gain(self, construction: Construction, room: float) -> bool:
-        """Return whether a grasp with discs of radius `room` could enter the best ones."""
-        return room > self.least(construction)
-
     def take(self, gathered: Gathered, seconds: float) -> None:
         """Add the proofs and counts of a part, and the time that another process took [s]."""
-        self.gathered.add(gathered)
+        self.gathered.tally.update(gathered.tally)
+        self.gathered.absences.update(gathered.absences)
+        self.gathered.undecided.update(gathered.undecided)
         self.seconds += seconds
 
     def keep_each(self, found: Sequence[Certified]) -> list[Certified]:
-        """Keep grasps on one quadruple; return the ones that fingers reach."""
-        return [one for each in found for one in self.keep(each)]
-
-    def keep(self, found: Certified) -> list[Certified]:
-        """Count a grasp and keep it if fingers reach it; return it in a list, or an empty list."""
-        faces = four(sorted(found.faces))
-        way = self.reach(found)
-        if way.reason:
-            self.gathered.tally["unreachable"] += 1
-            self.unreached[faces] = way.reason
-            return []
-        if found.method != self.method or way.directions is not None:
-            found = replace(found, method=self.method, ways_out=way.directions)
-        self.gathered.tally["found"] += 1
-        self.held.add(faces)
-        key = best_first(found)
-        place = bisect(self._keys, key)
-        self._keys.insert(place, key)
-        self.best.insert(place, found)
-        if self.limit is not None:
-            del self.best[self.limit :], self._keys[self.limit :]
-        return [found]
+        """Count grasps on one quadruple, and keep and return the ones that fingers reach."""
+        kept: list[Certified] = []
+        for each in found:
+            faces, way = four(sorted(each.faces)), self.reach(each)
+            if way.reason:
+                self.gathered.tally["unreachable"] += 1
+                self.unreached[faces] = way.reason
+                continue
+            one = each
+            if each.method != self.method or way.directions is not None:
+                one = replace(each, method=self.method, ways_out=way.directions)
+            self.gathered.tally["found"] += 1
+            self.held.add(faces)
+            key = best_first(one)
+            place = bisect(self._keys, key)
+            self._keys.insert(place, key)
+            self.best.insert(place, one)
+            if self.limit is not None:
+                del self.best[self.limit :], self._keys[self.limit :]
+            kept.append(one)
+        return kept
 
 
 def best_first(found: Certified) -> SortKey:
@@ -300,13 +291,9 @@ def found_in(
     best_first = BestFirst(construction, AttemptBounds(shapes), tally)
     quadruples = _in_order(best_first, blocks, places, search)
     while group := _next_few(quadruples, search):
-        # grasps kept meanwhile may have raised the threshold
-        worth = [
-            [each for each in attempts if search.may_gain(construction, each.bounds[0])]
-            for attempts in group
-        ]
+        least = search.least(construction)  # grasps kept meanwhile may have raised it
+        worth = [[each for each in attempts if each.bounds[0] > least] for attempts in group]
         every = list(chain.from_iterable(worth))
-        least = search.least(construction)
         found = iter(certified_attempts(settling, friction, every, least, tally))
         for attempts in worth:
             here = [one for one in islice(found, len(attempts)) if one is not None]
@@ -340,7 +327,7 @@ def _in_order(
         size = 1 if search.limit is None else TOGETHER
         for start in range(0, len(places), size):
             some = places[start : start + size]
-            if search.may_gain(construction, float(rooms[some].max())):
+            if float(rooms[some].max()) > search.least(construction):
                 yield from best_first.over(blocks, some, search.least)
         return
     for place in places:

@@ -13,7 +13,7 @@ from collections.abc import Set as AbstractSet
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
-from itertools import combinations, islice, tee
+from itertools import chain, combinations, islice, tee
 from typing import TypeAlias
 
 from grasp_core.families.constructions import CONSTRUCTIONS
@@ -245,7 +245,8 @@ def search_undecided(
 
 def batches(on: Standard, size: int) -> Iterator[Sequence[FaceQuadruple]]:
     """Yield all quadruples of faces in batches; the ones with two halves of a face come last."""
-    quadruples = _every_quadruple(on)
+    whole = combinations(range(len(on.faces)), FINGERS)
+    quadruples = chain(whole, map(four, on.shared.tolist()))
     while batch := list(islice(quadruples, size)):
         yield batch
 
@@ -259,10 +260,3 @@ def without_grasp(
         for faces in batch
         if faces not in held and len(chosen_shapes(on.shapes, faces)) == FINGERS
     )
-
-
-def _every_quadruple(on: Standard) -> Iterator[FaceQuadruple]:
-    """Yield all quadruples of faces, in the order of `batches`."""
-    yield from combinations(range(len(on.faces)), FINGERS)
-    for faces in on.shared.tolist():
-        yield four(faces)

@@ -160,25 +160,20 @@ def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible |
         return _checked_ray(program, multipliers[:count])
     multipliers[basis] = np.linalg.solve(vertex.T, program.c)
     if status == kernel.BELOW:
-        return _checked_bound(program, multipliers[:count], cutoff)
+        proof = multipliers[:count]
+        proof[: len(program.b)] = np.maximum(proof[: len(program.b)], 0.0)
+        off, bound = float(np.abs(program.c - G.T @ proof).max()), float(h @ proof)
+        if not (off <= RESIDUAL and bound <= cutoff):  # nor if one is not a number
+            raise SolverError(
+                f"the simplex method put the optimum below {cutoff:.3g}, but proved {bound:.3g}"
+            )
+        return Below(bound, proof)
     if basis[-1] >= count:
         raise SolverError(
             "the simplex method reached its largest numbers; the program may be unbounded"
         )
     x = np.asarray(np.linalg.solve(vertex, h[basis]), dtype=np.float64)
     return _checked_optimum(program, x, multipliers[:count])
-
-
-def _checked_bound(program: LinearProgram, multipliers: Array, cutoff: float) -> Below:
-    G, h = program.stacked()
-    multipliers[: len(program.b)] = np.maximum(multipliers[: len(program.b)], 0.0)
-    off = float(np.abs(program.c - G.T @ multipliers).max())
-    bound = float(h @ multipliers)
-    if not (off <= RESIDUAL and bound <= cutoff):  # nor if one is not a number
-        raise SolverError(
-            f"the simplex method put the optimum below {cutoff:.3g}, but proved {bound:.3g}"
-        )
-    return Below(bound, multipliers)
 
 
 def _checked_optimum(program: LinearProgram, x: Array, duals: Array) -> Optimum:

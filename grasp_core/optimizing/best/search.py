@@ -249,12 +249,11 @@ class Searching:
     nodes: int = 0  # how many nodes were visited in all levels
 
     def __post_init__(self) -> None:
-        self.pool = self.empty_pool()
-
-    @property
-    def count(self) -> int:
-        """Return the number of pieces."""
-        return len(self.grounds.counts)
+        pieces = len(self.grounds.counts)
+        self.pool = compiled(TWISTS).Pool(
+            np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((pieces, 6, POOL)),
+            np.zeros(POOL, np.int64), np.full(POOL, -1), np.zeros(1, np.int64),
+        )  # fmt: skip
 
     @property
     def pieces(self) -> Any:
@@ -273,14 +272,6 @@ class Searching:
         scale = math.ldexp(1.0, math.frexp(ASIDE * self.measure.size)[1])
         loads = scale * on_grid(self.measure.loads / scale, SEARCH_DIGITS)
         return kernel.Demand(int(kinds[self.measure.name]), loads)
-
-    def empty_pool(self) -> Any:
-        """Return a pool without twists."""
-        return compiled(TWISTS).Pool(
-            np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((self.count, 6, POOL)),
-            np.zeros(POOL, np.int64),
-            np.full(POOL, -1), np.zeros(1, np.int64),
-        )  # fmt: skip
 
     def learn(self, twists: Array, pool: Any = None, now: int = 0) -> None:
         """Add twists, (n, 6), to a pool, the common one by default."""
