@@ -41,8 +41,7 @@ class Construction:
     admits: Callable[[Array, Array], NDArray[np.bool_]] | None
     """Function that returns for which quadruples a program may be feasible, (q,), from normals in
     finger order, (q, 4, 3), and half-angles, (q,) [rad]; None for all."""
-    region: Region
-    """Function that makes the region of one finger, in the pieces' units."""
+    region: Region  # function that makes the region of one finger, in the pieces' units
 
     @property
     def least(self) -> float:

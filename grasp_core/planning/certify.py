@@ -59,8 +59,7 @@ class Certified(Candidate):
 
     span_angle: float
     margin: float
-    method: Method
-    """The method whose search found it: `free` may find grasps of any family."""
+    method: Method  # the method whose search found it: `free` may find grasps of any family
     ways_out: Array | None = None
     """Unit vectors along which fingers can leave, (4, 3); None if no free lines were sought."""
 

@@ -85,8 +85,7 @@ class BestFirst:
     construction: Construction
     bounded: AttemptBounds
     """Bounds the disc radii of attempts on the object's faces by small linear programs."""
-    tally: Tally
-    """Counts quadruples whose bounds prove that they have no grasp at all."""
+    tally: Tally  # counts quadruples whose bounds prove that they have no grasp at all
 
     def over(
         self, blocks: Blocks, places: range, least: Callable[[Construction], float]

@@ -62,8 +62,7 @@ Part: TypeAlias = Block | Batch
 class Found:
     """What a part of a search holds."""
 
-    gathered: Gathered
-    """Proofs and counts, complete once all grasps were taken."""
+    gathered: Gathered  # proofs and counts, complete once all grasps were taken
     grasps: Iterable[list[Certified]]
     """Grasps on each quadruple, those that were not tried left out; for `Batch` in its order."""
     seconds: float = 0.0

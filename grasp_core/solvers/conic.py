@@ -37,16 +37,11 @@ stops early, and succeeds with other settings."""
 class ConicProgram:
     """The data of one conic program, rows ordered as zero, non-negative, second-order."""
 
-    q: Array
-    """Coefficients of the objective q.x, (n,)."""
-    A: Array
-    """Matrix of the constraints b - A x in K, (rows, n)."""
-    b: Array
-    """Right-hand sides of the constraints, (rows,)."""
-    zeros: int
-    """Number of rows of b - A x that must be zero."""
-    nonnegatives: int
-    """Number of rows of b - A x that must not be negative."""
+    q: Array  # coefficients of the objective q.x, (n,)
+    A: Array  # matrix of the constraints b - A x in K, (rows, n)
+    b: Array  # right-hand sides of the constraints, (rows,)
+    zeros: int  # number of rows of b - A x that must be zero
+    nonnegatives: int  # number of rows of b - A x that must not be negative
     cones: tuple[int, ...] = ()
     """Length of each second-order cone, whose rows satisfy s0 >= |(s1, ...)|."""
 
@@ -56,8 +51,7 @@ class ConicSolution:
     """A primal and a dual solution, both checked against the program's data."""
 
     x: Array
-    z: Array
-    """Dual variable: one multiplier per row of the program, (rows,)."""
+    z: Array  # dual variable: one multiplier per row of the program, (rows,)
     value: float
 
 

@@ -40,16 +40,11 @@ thousand ends as unknown with one and is solved with the other."""
 class LinearProgram:
     """The data of one linear program; the equalities may be missing."""
 
-    c: Array
-    """Coefficients of the objective c.x, (n,)."""
-    A: Array
-    """Matrix of the inequalities, (rows, n)."""
-    b: Array
-    """Right-hand sides of the inequalities, (rows,)."""
-    A_eq: Array | None = None
-    """Matrix of the equalities, (equalities, n)."""
-    b_eq: Array | None = None
-    """Right-hand sides of the equalities, (equalities,)."""
+    c: Array  # coefficients of the objective c.x, (n,)
+    A: Array  # matrix of the inequalities, (rows, n)
+    b: Array  # right-hand sides of the inequalities, (rows,)
+    A_eq: Array | None = None  # matrix of the equalities, (equalities, n)
+    b_eq: Array | None = None  # right-hand sides of the equalities, (equalities,)
 
     def stacked(self) -> tuple[Array, Array]:
         """Return the rows of inequalities and then of equalities, with right-hand sides."""
@@ -72,16 +67,14 @@ class Optimum:
 class Infeasible:
     """A proof (Farkas), by a combination of the rows, that no |x|_1 <= `FARTHEST` is feasible."""
 
-    multipliers: Array
-    """Multipliers y, then z, of the combination, (rows + equalities,)."""
+    multipliers: Array  # multipliers y, then z, of the combination, (rows + equalities,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Below:
     """A proof, by multipliers as for an optimum, that no feasible value reaches the cutoff."""
 
-    bound: float
-    """Upper bound on all feasible values that the multipliers prove, b.y + b_eq.z."""
+    bound: float  # upper bound on all feasible values that the multipliers prove, b.y + b_eq.z
     multipliers: Array
     """Multipliers y, then z, (rows + equalities,); the first `rows` are non-negative."""
 

@@ -132,8 +132,7 @@ class Part:
     finished: bool = False
     left: list[Nodes] = field(default_factory=list[Nodes])
     """Nodes that are left to parts of their own, in the order of the tree."""
-    parts: list["Part"] = field(default_factory=list["Part"])
-    """These parts."""
+    parts: list["Part"] = field(default_factory=list["Part"])  # these parts
 
 
 class Steps(NamedTuple):
@@ -243,8 +242,7 @@ class Searching:
     jobs: int
     stop: Stop
     measure: Measure = FERRARI_CANNY
-    spare: float = 0.0
-    """How far below threshold times demand a support still counts as an answer."""
+    spare: float = 0.0  # how far below threshold times demand a support still counts as an answer
     pool: Any = None
     nodes: int = 0  # how many nodes were visited in all levels
 
