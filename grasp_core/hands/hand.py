@@ -271,8 +271,7 @@ class Hand(ByValue):
     @property
     def free_joints(self) -> tuple[Joint, ...]:
         """Return the joints that follow no other, in the order of `joints`."""
-        followers = {coupling.joint for coupling in self.couplings}
-        return tuple(joint for joint in self.joints if joint.name not in followers)
+        return tuple(self.joints[int(place)] for place in self.drives.free)
 
     @property
     def ranges(self) -> Array:

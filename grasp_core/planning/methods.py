@@ -13,9 +13,9 @@ from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Certified
 from grasp_core.planning.family_search import MethodSearch
 from grasp_core.planning.parts import (
+    Block,
     Elsewhere,
     Object,
-    blocks_of,
     each_found,
     in_standard_order,
     search_batches,
@@ -77,7 +77,11 @@ def _steps(
     """
     on, limit, dealt_with, kept_so_far = work.on, work.request.searched, 0, list[int]()
     families: list[Family] = [family for family in FAMILIES if family in searches]
-    parts = {family: blocks_of(work, family) for family in families if limit is None}
+    parts = {
+        family: [Block(family, place) for place in range(len(work.blocks(family)[0]))]
+        for family in families
+        if limit is None
+    }
     found = each_found(work, chain.from_iterable(parts.values()), elsewhere)
     for family in families:
         search = searches[family]

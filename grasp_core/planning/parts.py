@@ -182,11 +182,6 @@ def each_found(work: Object, parts: Iterable[Part], elsewhere: Elsewhere | None)
     return map(work.found, parts) if elsewhere is None else elsewhere(parts, work.found_at_once)
 
 
-def blocks_of(work: Object, family: Family) -> list[Block]:
-    """List the parts of the search with one construction."""
-    return [Block(family, place) for place in range(len(work.blocks(family)[0]))]
-
-
 def search_family(work: Object, family: Family, search: MethodSearch) -> Iterator[list[Certified]]:
     """Search all blocks until no upper bound exceeds the worst grasp kept; yield those kept.
 
