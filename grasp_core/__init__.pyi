@@ -38,7 +38,6 @@ from grasp_core.hands.reach import HandReach as HandReach
 from grasp_core.hands.reach import reach_with as reach_with
 from grasp_core.mesh_files.limits import MeshLimits as MeshLimits
 from grasp_core.objects.polyhedron import Polyhedron as Polyhedron
-from grasp_core.objects.polyhedron import from_trimesh as from_trimesh
 from grasp_core.objects.polyhedron import load_polyhedron as load_polyhedron
 from grasp_core.objects.surface import Face as Face
 from grasp_core.objects.surface import PatchLimits as PatchLimits

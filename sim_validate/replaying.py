@@ -18,7 +18,7 @@ from grasp_core.errors import InputError, about
 from grasp_core.files.text_files import read_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import seat
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene
@@ -123,7 +123,7 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
     return of_verdict(path, saved, verdicts[grasp.id], replace(wanted, grasp=grasp.id))
 
 
-def _grasps_behind(path: Path, record: Mapping[str, Any]) -> SavedGrasps:
+def _grasps_behind(path: Path, record: Mapping[str, Any]) -> Plan:
     """Read the grasps that verdicts are about, at the friction that they were tested at."""
     if not path.is_file():
         raise InputError(
@@ -138,9 +138,7 @@ def _grasps_behind(path: Path, record: Mapping[str, Any]) -> SavedGrasps:
     return replace(saved, friction=record["friction"])
 
 
-def of_verdict(
-    path: Path, saved: SavedGrasps, verdict: Mapping[str, Any], wanted: Wanted
-) -> Recorded:
+def of_verdict(path: Path, saved: Plan, verdict: Mapping[str, Any], wanted: Wanted) -> Recorded:
     """Read a contact set, and how its trials ended, from the verdict on one grasp."""
     grasp = grasp_with_id(path, saved, wanted.grasp)
     if contacts_sha256(grasp.contacts) != verdict["contacts_sha256"]:

@@ -13,7 +13,8 @@ from grasp_core.families.concurrent import cone_footprint, place_concurrent, pla
 from grasp_core.families.pencil import place_pencil
 from grasp_core.families.placements import LEAST_RADIUS, NoPlacement, Placement
 from grasp_core.families.regulus import nearly_symmetric, place_regulus
-from grasp_core.objects.face_pieces import FacePiece, inscribed_disc_radius
+from grasp_core.geometry.polygons import edge_rows
+from grasp_core.objects.face_pieces import FacePiece, inscribed_radius
 from grasp_core.values import ContactRegion, Family, ForceCone
 
 FingerOrder: TypeAlias = tuple[int, int, int, int]
@@ -37,11 +38,10 @@ class Construction:
     """Function that places contacts, given pieces, force cones and the least merit that counts."""
     limits: slice | None
     """Columns of `disc_limits`, one per finger order; None where no disc is claimed."""
-    admits: Callable[[Array, Array], NDArray[np.bool_]]
+    admits: Callable[[Array, Array], NDArray[np.bool_]] | None
     """Function that returns for which quadruples a program may be feasible, (q,), from normals in
-    finger order, (q, 4, 3), and half-angles, (q,) [rad]."""
-    region: Region
-    """Function that makes the region of one finger, in the pieces' units."""
+    finger order, (q, 4, 3), and half-angles, (q,) [rad]; None for all."""
+    region: Region  # function that makes the region of one finger, in the pieces' units
 
     @property
     def least(self) -> float:
@@ -49,15 +49,12 @@ class Construction:
         return LEAST_RADIUS if self.limits else -math.inf
 
 
-def _always_admitted(_: Array, half_angles: Array) -> NDArray[np.bool_]:
-    return np.ones(len(half_angles), dtype=np.bool_)
-
-
 def _cone_region(
     piece: FacePiece, cone: ForceCone, placed: Placement, finger: int
 ) -> ContactRegion:
     polygon = cone_footprint(piece, cone, placed.foci[0], placed.positions[finger])
-    return ContactRegion("cone", polygon, inscribed_disc_radius(polygon, piece))
+    E, b = edge_rows((polygon - piece.origin) @ piece.frame)
+    return ContactRegion("cone", polygon, inscribed_radius(E, b))
 
 
 def circle() -> Array:
@@ -89,11 +86,9 @@ def point_region(_: FacePiece, __: ForceCone, placed: Placement, finger: int) ->
 
 CONSTRUCTIONS: dict[Family, Construction] = {
     "concurrent": Construction(
-        "concurrent", AS_LISTED, place_concurrent, slice(0, 1), _always_admitted, _cone_region
+        "concurrent", AS_LISTED, place_concurrent, slice(0, 1), None, _cone_region
     ),
-    "pencil": Construction(
-        "pencil", PAIRINGS, place_pencil, slice(1, 4), _always_admitted, _disc_region
-    ),
+    "pencil": Construction("pencil", PAIRINGS, place_pencil, slice(1, 4), None, _disc_region),
     "regulus": Construction(
         "regulus", PAIRINGS, lambda pieces, cones, _: place_regulus(pieces, cones), None,
         nearly_symmetric, point_region,

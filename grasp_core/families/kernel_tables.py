@@ -17,63 +17,46 @@ as asked for, or placed."""
 class FaceTable(NamedTuple):
     """Convex faces at unit size, with the letters of `FacePiece`."""
 
-    normals: Array
-    """Inward unit normals, (f, 3)."""
-    origins: Array
-    """Origins of the plane coordinates, (f, 3)."""
-    frames: Array
-    """Frames of the plane coordinates, (f, 3, 2)."""
+    normals: Array  # inward unit normals, (f, 3)
+    origins: Array  # origins of the plane coordinates, (f, 3)
+    frames: Array  # frames of the plane coordinates, (f, 3, 2)
     E: Array
     """Unit outward edge normals, rows of E y <= b inside the faces, (f, e, 2); a face with fewer
     edges leaves rows unused."""
-    b: Array
-    """Limits of the rows E y <= b, (f, e)."""
-    edges: Indices
-    """Number of edges of each face, (f,)."""
-    corners: Array
-    """Corners in space, (f, e, 3); a face with fewer corners leaves rows unused."""
-    depths: Array
-    """Largest distance of the surface from each plane, (f,)."""
+    b: Array  # limits of the rows E y <= b, (f, e)
+    edges: Indices  # number of edges of each face, (f,)
+    corners: Array  # corners in space, (f, e, 3); a face with fewer corners leaves rows unused
+    depths: Array  # largest distance of the surface from each plane, (f,)
 
 
 class Attempts(NamedTuple):
     """Many attempts, each with four faces in finger order and a force cone for each face."""
 
-    faces: Indices
-    """Indices of the faces, (a, 4)."""
-    axes: Array
-    """Unit cone axes, (a, 4, 3)."""
-    half_angles: Array
-    """Half-angle that the four cones of an attempt share, (a,) [rad]."""
+    faces: Indices  # indices of the faces, (a, 4)
+    axes: Array  # unit cone axes, (a, 4, 3)
+    half_angles: Array  # half-angle that the four cones of an attempt share, (a,) [rad]
 
 
 class Corners(NamedTuple):
     """Corners of faces, in arrays as long as the largest number of corners."""
 
-    points: Array
-    """Corners in space, (f, c, 3); a face with fewer corners leaves rows unused."""
-    counts: Indices
-    """Number of corners of each face, (f,)."""
+    points: Array  # corners in space, (f, c, 3); a face with fewer corners leaves rows unused
+    counts: Indices  # number of corners of each face, (f,)
 
 
 class RegulusTerms(NamedTuple):
     """Settings of `families.regulus`: slopes to try, and which lines count as a regulus."""
 
-    turns: Array
-    """Cosines and sines of the directions in which a pyramid's facets lean, (m, 2)."""
+    turns: Array  # cosines and sines of the directions in which a pyramid's facets lean, (m, 2)
     shares: Array
     """Positions, as shares of each slope's interval of angles, at which slopes are tried, (s,)."""
     depth: float
     """Least height, over their faces, of the points where lines pass the focus line, in object
     radii."""
-    inset: float
-    """Least distance of a contact from the edges of its face, in object radii."""
-    gap: float
-    """Least distance at which a line passes the focus line, in object radii."""
-    tie: float
-    """Difference of merit that counts as none; of equal slopes, those tried first win."""
-    enough: float
-    """Merit above which no better slopes are sought."""
+    inset: float  # least distance of a contact from the edges of its face, in object radii
+    gap: float  # least distance at which a line passes the focus line, in object radii
+    tie: float  # difference of merit that counts as none; of equal slopes, those tried first win
+    enough: float  # merit above which no better slopes are sought
 
 
 def face_table(pieces: Sequence[FacePiece | None]) -> FaceTable:
@@ -104,18 +87,12 @@ def face_table(pieces: Sequence[FacePiece | None]) -> FaceTable:
 class Placed(NamedTuple):
     """Contacts of many attempts, with the letters of `Placement`."""
 
-    ends: Indices
-    """How each attempt ended, (a,): `LEFT`, `NONE` or `PLACED`."""
-    positions: Array
-    """Contact points, (a, 4, 3)."""
-    forces: Array
-    """Balanced forces whose normal parts sum to one, (a, 4, 3)."""
-    foci: Array
-    """Foci, (a, 2, 3); concurrent grasps use the first only."""
-    radii: Array
-    """Radii of the discs, (a, 4)."""
-    merits: Array
-    """The smallest radius that was maximised, (a,)."""
+    ends: Indices  # how each attempt ended, (a,): `LEFT`, `NONE` or `PLACED`
+    positions: Array  # contact points, (a, 4, 3)
+    forces: Array  # balanced forces whose normal parts sum to one, (a, 4, 3)
+    foci: Array  # foci, (a, 2, 3); concurrent grasps use the first only
+    radii: Array  # radii of the discs, (a, 4)
+    merits: Array  # the smallest radius that was maximised, (a,)
 
 
 class Footprints(NamedTuple):
@@ -125,8 +102,7 @@ class Footprints(NamedTuple):
     """Corners in space, (a, 4, c, 3); a region with fewer corners leaves rows unused."""
     counts: Indices
     """Number of corners of each region, (a, 4); zero where it is left to `families.concurrent`."""
-    radii: Array
-    """Radii of the largest discs in the regions, (a, 4)."""
+    radii: Array  # radii of the largest discs in the regions, (a, 4)
 
 
 def room_for(count: int) -> Placed:

@@ -118,15 +118,11 @@ def pencil_radius_bounds(
 class _Discs:
     """Disc centres (1) as functions of the variables v: depths s v + s0, plane points Q v + q."""
 
-    C: Array
-    """Maps from the variables to the focus of each finger, (4, 3, VARIABLES)."""
-    s: Array
-    """Linear part of the depths, (4, VARIABLES); `s0` is the constant part, (4,)."""
+    C: Array  # maps from the variables to the focus of each finger, (4, 3, VARIABLES)
+    s: Array  # linear part of the depths, (4, VARIABLES); `s0` is the constant part, (4,)
     s0: Array
-    Q: Array
-    """Linear part of the centres in their planes, (4, 2, VARIABLES)."""
-    q: Array
-    """Constant part of the centres, (4, 2)."""
+    Q: Array  # linear part of the centres in their planes, (4, 2, VARIABLES)
+    q: Array  # constant part of the centres, (4, 2)
 
 
 def _place_in_cell(

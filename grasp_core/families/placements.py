@@ -42,17 +42,14 @@ form slivers, in which rounding moves the nearest point a thousand times as far.
 class Placement:
     """Four contacts, one on each piece, and the forces that hold them."""
 
-    positions: Array
-    """Contact points, (4, 3)."""
-    forces: Array
-    """Balanced forces along the witness lines, normal parts summing to one, (4, 3)."""
+    positions: Array  # contact points, (4, 3)
+    forces: Array  # balanced forces along the witness lines, normal parts summing to one, (4, 3)
     foci: Array
     """Points where lines of force meet, (k, 3): one for a concurrent grasp, two for a pencil; for a
     regulus the points midway between the two lines of each pair, or none."""
     radii: Array
     """Radius of the independent disc around each contact, (4,); zeros where no disc is claimed."""
-    merit: float
-    """The quantity that the construction maximised, such as the smallest disc radius."""
+    merit: float  # the quantity that the construction maximised, such as the smallest disc radius
     planned: Array | None = None
     """Forces for which the contacts were chosen, (4, 3); None if they are those of `forces`."""
 

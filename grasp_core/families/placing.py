@@ -65,8 +65,7 @@ class Known(NamedTuple):
 class ManyPlacements:
     """Places contacts on convex pieces, one for each face of an object."""
 
-    pieces: Sequence[FacePiece | None]
-    """The piece of each face; None for faces without room."""
+    pieces: Sequence[FacePiece | None]  # the piece of each face; None for faces without room
 
     def of(self, construction: Construction, asked: Sequence[Ask]) -> list[Known | None]:
         """Place contacts for each attempt; None where that is left to the construction itself."""
@@ -160,8 +159,7 @@ def _regions(
 class Attempt:
     """One order of the fingers on four faces, with the force cones to try in a construction."""
 
-    faces: FaceQuadruple
-    """The face that each finger touches."""
+    faces: FaceQuadruple  # the face that each finger touches
     cones: tuple[Cones, ...]
     """Choices of force cones in finger order, the choice with the largest bound first."""
     bounds: tuple[float, ...]
@@ -175,12 +173,9 @@ class End:
 
     least: float
     """The merit to exceed: that of the best contacts so far, at first what was asked for."""
-    planned: Planned | None = None
-    """The best contacts so far, on the planes of the faces."""
-    settled: Settled | None = None
-    """Contacts on the true surface; None where there are none."""
-    solved: int = 0
-    """Number of choices of pieces for which contacts were sought."""
+    planned: Planned | None = None  # the best contacts so far, on the planes of the faces
+    settled: Settled | None = None  # contacts on the true surface; None where there are none
+    solved: int = 0  # number of choices of pieces for which contacts were sought
     failed: bool = False
     """Whether a program was neither solved nor proved infeasible: nothing is known then."""
 

@@ -110,8 +110,7 @@ class Pair(NamedTuple):
     u: Array
     v: Array
     N: Array
-    resultant: float
-    """+1 where the pair pushes along u, -1 where it pushes against u."""
+    resultant: float  # +1 where the pair pushes along u, -1 where it pushes against u
     least_angle: float
     largest_angle: float
 

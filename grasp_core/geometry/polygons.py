@@ -212,12 +212,9 @@ SIDES = 64
 class FlatPolygon:
     """A convex polygon in its plane, by its corners and by its half-planes."""
 
-    corners: Array
-    """Corners, counter-clockwise, (k, 2)."""
-    E: Array
-    """Unit outward edge normals, (k, 2)."""
-    b: Array
-    """Offsets of the edges, (k,): a point y is inside where E y <= b."""
+    corners: Array  # counter-clockwise, (k, 2)
+    E: Array  # unit outward edge normals, (k, 2)
+    b: Array  # offsets of the edges, (k,): a point y is inside where E y <= b
 
     def holds(self, points: Array, slack: float) -> bool:
         """Return whether points (n, 2) are inside, or outside by at most a slack."""

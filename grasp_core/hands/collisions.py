@@ -70,8 +70,7 @@ class Clearances:
     """Least distances of a hand's parts, negative where they overlap, at most `FAR` [m]."""
 
     itself: float  # between links that must not overlap
-    object: float
-    """From the object, of all shapes but those that stand for touching fingertips."""
+    object: float  # from the object, of all shapes but those that stand for touching fingertips
     tips: float  # from the object, of those fingertips: zero where they touch
     table: float  # from the table; `FAR` where there is none
 

@@ -92,15 +92,9 @@ def drives(names: Sequence[str], ranges: Array, couplings: Sequence[Coupling]) -
                 f"{each.driver}, where one of them follows another joint too"
             )
         drivers[k], ratios[k], offsets[k] = names.index(each.driver), each.ratio, each.offset
-    return Drives(drivers, ratios, offsets, _attainable(names, ranges, drivers, ratios, offsets))
-
-
-def _attainable(
-    names: Sequence[str], ranges: Array, drivers: Indices, ratios: Array, offsets: Array
-) -> Array:
     ends = np.sort((ranges - offsets[:, None]) / ratios[:, None], axis=1)
     found = ranges.copy()
-    for k in np.unique(drivers[drivers != np.arange(len(drivers))]).tolist():
+    for k in np.unique(drivers[drivers != np.arange(j)]).tolist():
         own = np.flatnonzero(drivers == k).tolist()
         low, high = float(ends[own, 0].max()), float(ends[own, 1].min())
         if low > high + SAME:
@@ -112,4 +106,4 @@ def _attainable(
         for i in own:
             moved = np.sort(offsets[i] + ratios[i] * kept)
             found[i] = np.clip(moved, *ranges[i]) if i != k else kept
-    return found
+    return Drives(drivers, ratios, offsets, found)

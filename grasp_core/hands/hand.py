@@ -9,10 +9,9 @@ Shapes for collisions are boxes with rounded edges: all points within `radius` o
 zero makes it a box, two half-sizes of zero a capsule, three a ball.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -229,7 +228,7 @@ class Hand(ByValue):
         text(self.torque_source, "torque_source")
         for name, kind in (
             ("palm", LinkShape), ("fingers", HandFinger), ("sources", str),
-            ("couplings", Coupling), ("notes", str),
+            ("couplings", Coupling), ("notes", str), ("ignored_pairs", tuple),
         ):  # fmt: skip
             each: Any = partial(instance, kind=kind, name=name)
             kept = several(getattr(self, name), each, name, f"{kind.__name__} values")
@@ -247,7 +246,9 @@ class Hand(ByValue):
         names = [PALM, *(link.name for link in self.links)]
         if len(set(names)) < len(names):
             raise InputError("names of links must differ from each other and from 'palm'")
-        object.__setattr__(self, "ignored_pairs", _pairs(self.ignored_pairs, set(names)))
+        for pair in self.ignored_pairs:
+            if len(pair) != 2 or not set(pair) <= set(names):  # noqa: PLR2004 - a pair
+                raise InputError(f"ignored_pairs must be pairs of names of links, got {pair}")
         _ = self.drives  # refuses couplings that cannot be
 
     @property
@@ -270,8 +271,7 @@ class Hand(ByValue):
     @property
     def free_joints(self) -> tuple[Joint, ...]:
         """Return the joints that follow no other, in the order of `joints`."""
-        followers = {coupling.joint for coupling in self.couplings}
-        return tuple(joint for joint in self.joints if joint.name not in followers)
+        return tuple(self.joints[int(place)] for place in self.drives.free)
 
     @property
     def ranges(self) -> Array:
@@ -304,12 +304,3 @@ class Hand(ByValue):
     def __repr__(self) -> str:
         parts = counted(len(self.fingers), "finger"), counted(len(self.joints), "joint")
         return summary("Hand", self.name, *parts)
-
-
-def _pairs(given: Iterable[Any], names: set[str]) -> tuple[tuple[str, str], ...]:
-    each: Any = partial(instance, kind=tuple, name="ignored_pairs")
-    listed: tuple[Any, ...] = several(given, each, "ignored_pairs", "pairs of names")
-    for pair in cast("tuple[tuple[str, ...], ...]", listed):
-        if len(pair) != 2 or not set(pair) <= names:  # noqa: PLR2004 - a pair
-            raise InputError(f"ignored_pairs must be pairs of names of links, got {pair}")
-    return cast("tuple[tuple[str, str], ...]", listed)

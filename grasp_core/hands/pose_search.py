@@ -57,6 +57,9 @@ MARGIN, LEAST_MARGIN = 5e-4, 1e-4
 """
 
 
+UPRIGHT = (0.0, 0.0, 1.0)
+
+
 def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: float) -> Targets:
     """Say where fingertips are to touch, finger k at the k-th of the contacts that are used."""
     normals, own = grasp.normals[used], [grasp.regions[int(contact)] for contact in used]
@@ -87,22 +90,16 @@ def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
     return list(zip(starts, inward, strict=True))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ContactChoices:
-    """Which of a grasp's contacts may be used, and proofs about those that may not."""
-
-    closed: tuple[tuple[int, ...], ...]  # indices of contacts, the best choice first
-    open: tuple[ClosureCertificate, ...] = ()  # a refutation for each other choice
-    undecided: int = 0  # choices that are neither proved nor disproved to close
-
-
-def contact_choices(grasp: Grasp, friction: float, fingers: int) -> ContactChoices:
+def contact_choices(
+    grasp: Grasp, friction: float, fingers: int
+) -> tuple[list[tuple[int, ...]], tuple[ClosureCertificate, ...], int]:
     """Choose all contacts, or as many as fingers that alone are closed, the largest margin first.
 
-    Equal margins, by `solvers.ties`, stay in the order of their indices.
+    Also gives a refutation for each choice that is open, and how many choices are undecided. Equal
+    margins, by `solvers.ties`, stay in the order of their indices.
     """
     if fingers >= FINGERS:
-        return ContactChoices((tuple(range(FINGERS)),))
+        return [tuple(range(FINGERS))], (), 0
     closed = list[tuple[int, ...]]()
     margins, refuted, undecided = list[float](), list[ClosureCertificate](), 0
     for chosen in combinations(range(FINGERS), fingers):
@@ -116,7 +113,7 @@ def contact_choices(grasp: Grasp, friction: float, fingers: int) -> ContactChoic
         else:
             refuted.append(proof)
     order = largest_first(margins) if margins else []
-    return ContactChoices(tuple(closed[n] for n in order), tuple(refuted), undecided)
+    return [closed[n] for n in order], tuple(refuted), undecided
 
 
 def proved_closure(points: Array, normals: Array, friction: float) -> ClosureCertificate | None:
@@ -269,3 +266,23 @@ def blocking(asked: Asked, pose: Pose, fingers: Indices | None, clearance: float
 def _why_away(hand: Hand, q: Array) -> str:
     low, high = hand.ranges.T
     return "limit" if (((q <= low) | (q >= high)) & (low < high)).any() else "away"
+
+
+def compile_posing(hand: Hand, body: Polyhedron) -> None:
+    """Compile what moves a hand until its fingertips touch, on a hand that stands nowhere."""
+    arrays, tree = hand_arrays(hand), surface_tree(body)
+    kernel = compiled("grasp_core.hands.pose_kernel")
+    count = min(len(hand.fingers), FINGERS)
+    normals = np.tile(UPRIGHT, (count, 1))
+    aims = Targets(
+        np.arange(count, dtype=np.int64), np.zeros((count, 3)), normals,
+        np.array([plane_tangents(*normal) for normal in normals.tolist()]), np.ones(count),
+        np.full((count, 3), np.nan), SOFT, np.empty(0, np.int64), np.empty((0, 3)),
+        np.empty((0, 3)), np.array(UPRIGHT), -np.inf,
+    )  # fmt: skip
+    wanted = Wanted(0.0, 0.0, 0.0, 0.0, 0.0, overlaps=True, palm_moves=True)
+    pose: Pose = kernel.empty_pose(arrays, count)
+    pose.palm[:], pose.origin[:], pose.q[:] = np.eye(3), 1.0, hand.ranges.mean(axis=1)
+    kernel.settle(arrays, tree, aims, wanted, pose, kernel.empty_sums(arrays, aims), 0, 1.0)
+    kernel.lay(arrays, tree, aims, pose, np.empty((count, 3)))
+    compiled("grasp_core.hands.pose_rows_kernel").place(arrays, aims, pose)

@@ -37,12 +37,7 @@ from grasp_core.frames import POSE
 from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.opening import opened
-from grasp_core.hands.pose_search import (
-    Asked,
-    ContactChoices,
-    contact_choices,
-    find_pose,
-)
+from grasp_core.hands.pose_search import Asked, contact_choices, find_pose
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import FINGERS, Contact, Grasp
@@ -171,10 +166,10 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
         number(clearance_m, "clearance_m", **BOUNDS["hand_clearance_m"]), regions,
         seed_of(seed), whole(starts, "starts", **BOUNDS["starts"]),
     )  # fmt: skip
-    choices = contact_choices(grasp, asked.friction, len(hand.fingers))
-    if not choices.closed:
-        return _unclosed(asked, choices)
-    found = find_pose(asked, choices.closed)
+    closed, refuted, undecided = contact_choices(grasp, asked.friction, len(hand.fingers))
+    if not closed:
+        return _unclosed(asked, refuted, undecided)
+    found = find_pose(asked, closed)
     if isinstance(found, Counter):
         reason, said = _why(found)
         return HandReach(hand.name, grasp.id, reason, said, found.total(), clearance_m)
@@ -203,18 +198,18 @@ def direction(down: ArrayLike, name: str) -> Array:
     return way / length
 
 
-def _unclosed(asked: Asked, choices: ContactChoices) -> HandReach:
+def _unclosed(asked: Asked, refuted: tuple[ClosureCertificate, ...], undecided: int) -> HandReach:
     count, name = len(asked.hand.fingers), asked.hand.name
     fewer = f"{name} has {count} fingers, and no {count} of the grasp's {FINGERS} contacts alone"
     at = f"at friction {asked.friction:g}"
-    if not choices.undecided:
+    if not undecided:
         reason, said = "no closure", f"{fewer} are in force closure {at}, which is proved"
     else:
         reason = "not found"
-        said = f"{fewer} are proved to be in force closure {at}; {choices.undecided} choices of "
+        said = f"{fewer} are proved to be in force closure {at}; {undecided} choices of "
         said += "contacts are undecided"
     return HandReach(
-        name, asked.grasp.id, reason, said, 0, asked.clearance, open_choices=choices.open
+        name, asked.grasp.id, reason, said, 0, asked.clearance, open_choices=refuted
     )  # fmt: skip
 
 

@@ -42,14 +42,6 @@ ROUND = 9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Postures:
-    """Joint angles at which a hand is free of itself."""
-
-    joints: Array  # joint angles, (n, j) [rad]
-    tips: Array  # middles of the fingertips in the palm's frame, (n, f, 3) [m]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Start:
     """Where a search starts."""
 
@@ -60,8 +52,8 @@ class Start:
 
 
 @lru_cache(maxsize=16)
-def postures(hand: Hand, seed: int) -> Postures:
-    """Choose at most `POSTURES` postures at random; equal hands and seeds share them."""
+def postures(hand: Hand, seed: int) -> tuple[Array, Array]:
+    """Choose at most `POSTURES` at random: joint angles, (n, j), and tips' middles, (n, f, 3)."""
     arrays, rng = hand_arrays(hand), np.random.default_rng(seed)
     low, high = arrays.ranges.T
     share = rng.uniform(*INNER, (TRIES, len(low)))
@@ -69,30 +61,30 @@ def postures(hand: Hand, seed: int) -> Postures:
     kept, tips = np.empty(POSTURES, np.int64), np.empty((POSTURES + 1, len(arrays.tip_radii), 3))
     kernel = compiled("grasp_core.hands.collisions_kernel")
     count = kernel.free_postures(arrays, angles, APART, WIDEST, kept, tips)
-    return Postures(angles[kept[:count]], tips[:count])
+    return angles[kept[:count]], tips[:count]
 
 
 def starts(hand: Hand, positions: Array, normals: Array, *, seed: int, count: int) -> list[Start]:
     """Choose where to start from, best first."""
-    found, arrays = postures(hand, seed), hand_arrays(hand)
-    if not len(found.joints):
+    (joints, ends), arrays = postures(hand, seed), hand_arrays(hand)
+    if not len(joints):
         return []
     orders = np.array(list(itertools.permutations(range(len(arrays.tip_radii)), len(normals))))
-    inward = found.tips.mean(axis=1, keepdims=True) - found.tips
+    inward = ends.mean(axis=1, keepdims=True) - ends
     inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), 1e-9)
     i, j = np.triu_indices(len(normals), 1)
     # all tips of a hand are taken to be as thick as the first
     middles = positions - arrays.tip_radii[0] * normals
     apart = np.linalg.norm(middles[i] - middles[j], axis=1)
     angles = np.einsum("pi,pi->p", normals[i], normals[j])
-    between = np.linalg.norm(found.tips[:, :, None] - found.tips[:, None], axis=3)
+    between = np.linalg.norm(ends[:, :, None] - ends[:, None], axis=3)
     ways = np.einsum("nai,nbi->nab", inward, inward)
     one, other = orders[:, i], orders[:, j]
     off = ((between[:, one, other] - apart) ** 2).sum(axis=2) / LENGTH**2
     off += TURN * ((ways[:, one, other] - angles) ** 2).sum(axis=2)
     likely = np.argsort(off.round(ROUND), axis=None, kind="stable")[:KEPT]
     which, order = np.unravel_index(likely, off.shape)
-    tips = found.tips[which[:, None], orders[order]]
+    tips = ends[which[:, None], orders[order]]
     held = tips.mean(axis=1)
     ours = np.concatenate([tips - held[:, None], ARM * inward[which[:, None], orders[order]]], 1)
     center = middles.mean(axis=0)
@@ -104,7 +96,7 @@ def starts(hand: Hand, positions: Array, normals: Array, *, seed: int, count: in
     best = np.argsort((rests / ARM**2).round(ROUND), kind="stable")[:count]
     return [
         Start(
-            orders[order[n]].astype(np.int64), found.joints[which[n]].copy(), turns[n].copy(),
+            orders[order[n]].astype(np.int64), joints[which[n]].copy(), turns[n].copy(),
             center - turns[n] @ held[n],
         )
         for n in best

@@ -36,8 +36,7 @@ class Column(NamedTuple):
     """A property of a PLY table: one number, or one list of numbers, in each row."""
 
     name: str
-    kind: str
-    """The number type as numpy writes it, without the byte order, such as `f4`."""
+    kind: str  # the number type as numpy writes it, without the byte order, such as `f4`
     counted: str | None
     """The number type of a list's length; None if the column holds single numbers."""
 

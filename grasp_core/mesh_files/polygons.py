@@ -42,10 +42,8 @@ def check_corners(corners: Indices, vertices: int) -> None:
 class Polygons:
     """The polygons of a file, by vertex numbers that count from 0, at 8 bytes a corner."""
 
-    most: int
-    """Largest number of triangles allowed."""
-    triangles: int = 0
-    """Number of triangles in the fans of the polygons so far."""
+    most: int  # largest number of triangles allowed
+    triangles: int = 0  # number of triangles in the fans of the polygons so far
     corners: "array[int]" = field(default_factory=lambda: array("q"))
     sizes: "array[int]" = field(default_factory=lambda: array("q"))
     """Number of corners of each polygon."""

@@ -24,10 +24,8 @@ GRID = 4e-8
 class Solid:
     """A closed triangle mesh, wound counter-clockwise seen from outside."""
 
-    vertices: Array
-    """Vertices, (n, 3) [m]."""
-    triangles: Indices
-    """Vertex indices, (t, 3)."""
+    vertices: Array  # (n, 3) [m]
+    triangles: Indices  # vertex indices, (t, 3)
 
     def __add__(self, other: "Solid") -> "Solid":
         return _solid(_manifold(self) + _manifold(other))

@@ -24,6 +24,7 @@ from grasp_core.arrays import Array, Indices, frozen, real_array
 from grasp_core.checked import instance, number, one_of
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.mesh_files.polygons import check_corners, too_many
 from grasp_core.mesh_files.rounding import single_rounding
 from grasp_core.objects.booleans import Solid, hull
 from grasp_core.objects.curved_patches import flat_patches
@@ -213,18 +214,15 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tup
     if corners.shape[1] != 3 or corners.dtype.kind not in "iu":  # noqa: PLR2004
         message = f"triangles must be whole numbers (t, 3), got {corners.dtype} {corners.shape}"
         raise MeshError(MeshRefusal.INDEX, message)
+    corners = corners.astype(np.int64)
     if len(corners) > most:
-        message = f"the mesh has {len(corners)} triangles, expected at most {most}; simplify it"
-        raise MeshError(MeshRefusal.TOO_MANY, message)
+        too_many(len(corners), most)
     if not np.isfinite(points).all():
         bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
         raise MeshError(
             MeshRefusal.NON_FINITE, f"vertex {bad} must have finite coordinates, got {points[bad]}"
         )
-    if corners.min() < 0 or corners.max() >= len(points):
-        wrong = corners.min() if corners.min() < 0 else corners.max()
-        message = f"a triangle names vertex {wrong}; the last vertex is {len(points) - 1}"
-        raise MeshError(MeshRefusal.INDEX, message)
+    check_corners(corners, len(points))
     with np.errstate(over="ignore"):
         extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
     if not SMALLEST_EXTENT_M <= extent <= LARGEST_EXTENT_M:
@@ -238,7 +236,7 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tup
             f"{LARGEST_EXTENT_M} m; its unit makes it too {wrong}"
         )
         raise MeshError(MeshRefusal.SIZE, message)
-    return points, corners.astype(np.int64)
+    return points, corners
 
 
 def content_hash(points: Array, corners: Indices) -> str:

@@ -98,16 +98,11 @@ def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) ->
 class _Surface:
     """A triangle mesh with the areas, normals and neighbours by which groups of triangles grow."""
 
-    corners: Array
-    """Corners of the triangles, (t, 3, 3) [m]."""
-    normals: Array
-    """Outward unit normals, zero for triangles without area, (t, 3)."""
-    areas: Array
-    """Areas, (t,) [m^2]."""
-    across: Indices
-    """The triangle across each edge (k, k+1), (t, 3); -1 where the edge is a border."""
-    extent: float
-    """Largest extent of the object [m]."""
+    corners: Array  # corners of the triangles, (t, 3, 3) [m]
+    normals: Array  # outward unit normals, zero for triangles without area, (t, 3)
+    areas: Array  # (t,) [m^2]
+    across: Indices  # the triangle across each edge (k, k+1), (t, 3); -1 where the edge is a border
+    extent: float  # largest extent of the object [m]
 
     @classmethod
     def of(cls, vertices: Array, triangles: Indices) -> "_Surface":

@@ -42,12 +42,9 @@ LARGEST_INSET = 0.5
 class FacePiece(ByValue):
     """One convex piece of a face: the points origin + frame @ y for all y with E y <= b."""
 
-    face: int
-    """Index in the polyhedron of the face that the piece belongs to."""
-    normal: Array
-    """Unit vector into the object, (3,)."""
-    origin: Array
-    """The point of the plane whose plane coordinates are zero, (3,)."""
+    face: int  # index in the polyhedron of the face that the piece belongs to
+    normal: Array  # unit vector into the object, (3,)
+    origin: Array  # the point of the plane whose plane coordinates are zero, (3,)
     frame: Array
     """Orthonormal columns spanning the plane, the first along an edge, (3, 2).
 
@@ -56,16 +53,12 @@ class FacePiece(ByValue):
     corners: Array
     """Corners in plane coordinates, (k, 2), counter-clockwise in `frame`. For a mirrored piece the
     frame is mirrored too."""
-    E: Array
-    """Unit outward edge normals, (k, 2)."""
+    E: Array  # unit outward edge normals, (k, 2)
     b: Array
     """Distances of the edges from the origin of the plane coordinates: E y <= b inside, (k,)."""
-    inradius: float
-    """Radius of the largest disc in the piece."""
-    spread: float = 0.0
-    """Largest angle between the true surface and the plane [rad]."""
-    depth: float = 0.0
-    """Largest distance of the true surface from the plane."""
+    inradius: float  # radius of the largest disc in the piece
+    spread: float = 0.0  # largest angle between the true surface and the plane [rad]
+    depth: float = 0.0  # largest distance of the true surface from the plane
 
     def sound(self) -> bool:
         """Return whether the fields describe one polygon; spread and depth are not checked."""
@@ -211,11 +204,6 @@ def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
         b=b,
         inradius=inscribed_radius(E, b),
     )
-
-
-def inscribed_disc_radius(polygon: Array, piece: FacePiece) -> float:
-    """Compute the radius of the largest disc in a convex polygon (k, 3) on a piece."""
-    return inscribed_radius(*edge_rows((polygon - piece.origin) @ piece.frame))
 
 
 def inscribed_disc_radius_of(polygon: Array, normal: Array) -> float:

@@ -21,6 +21,16 @@ def check_body(body: Polyhedron) -> None:
     instance(body, Polyhedron, "body", "gc.load_polyhedron reads one from a mesh file")
 
 
+def check_planar(body: Polyhedron, asking: str) -> None:
+    """Refuse a value that is not an object, and an object with curved faces."""
+    check_body(body)
+    if body.patches is not None:
+        raise InputError(
+            f"{asking}: expected an object with planar faces, got {body.name} with curved ones; "
+            "take a mesh with fewer, planar faces"
+        )
+
+
 def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
     """Refuse a grasp whose contacts are not on the faces it names."""
     check_body(body)

@@ -40,8 +40,7 @@ NO_CAPS = np.empty(0, dtype=np.int64)
 class Flatness:
     """Limits within which triangles count as one planar face."""
 
-    distance: float
-    """Largest distance from the plane [m]."""
+    distance: float  # largest distance from the plane [m]
     blur: float = 0.0
     """Largest distance by which rounding may have moved one side of a triangle against the opposite
     corner [m]: a triangle of this height may lean by a radian more."""
@@ -90,10 +89,8 @@ def coplanar_groups(
 class _Triangles:
     """Triangles with what is needed to grow groups of them."""
 
-    corners: Array
-    """Corners, (t, 3, 3) [m]."""
-    crosses: Array
-    """Normals twice as long as the areas, (t, 3)."""
+    corners: Array  # (t, 3, 3) [m]
+    crosses: Array  # normals twice as long as the areas, (t, 3)
     double_areas: Array
     normals: Array
     tilts: Array

@@ -1,6 +1,6 @@
 """Defines the polyhedron, a solid bounded by planar faces, made from a mesh file or triangles.
 
-Meshes of the library trimesh are taken and made. `is_convex` rests on this: a point of the convex
+`is_convex` rests on this: a point of the convex
 hull is at most d from its border iff it is at most d below the plane of some facet. If that holds
 for the centroid of a triangle, each corner is at most 3 d below the same plane, as no corner is
 above it. The whole triangle is then within 3 d of the hull's border.
@@ -163,38 +163,6 @@ class Polyhedron(ByValue, InNotebooks):
         sizes = [(self.vertices, "vertex"), (self.triangles, "triangle"), (self.faces, kind)]
         parts = [counted(len(things), name) for things, name in sizes]
         return summary("Polyhedron", shown(self.name), *parts, radius=self.radius)
-
-
-def from_trimesh(
-    mesh: Any,
-    *,
-    name: str = "object",
-    faces: FaceKind = "auto",
-    patches: PatchLimits | None = None,
-    flatness_m: float | None = None,
-    largest_part: bool = False,
-) -> Polyhedron:
-    """Build a polyhedron from a `trimesh.Trimesh`, with the same checks as for a mesh file.
-
-    Args:
-        mesh: Any value with `vertices`, (n, 3) [m], and triangles `faces`, (t, 3).
-        name: What to call the object.
-        faces: See `load_polyhedron`.
-        patches: See `load_polyhedron`.
-        flatness_m: See `load_polyhedron`.
-        largest_part: See `load_polyhedron`.
-
-    Raises:
-        InputError: The value is not a mesh, or an option is refused.
-        MeshError: The mesh is not a solid; its `reason` says why.
-    """
-    if not (hasattr(mesh, "vertices") and hasattr(mesh, "faces")):
-        raise InputError(
-            f"mesh must be a trimesh.Trimesh, got {type(mesh).__name__}; for a trimesh.Scene, "
-            "pass scene.to_mesh()"
-        )
-    choices = MeshChoices(faces, patches, flatness_m, largest_part)
-    return polyhedron_from_mesh(mesh.vertices, mesh.faces, choices, name=name)
 
 
 AnyPolyhedron = TypeVar("AnyPolyhedron", bound=Polyhedron)

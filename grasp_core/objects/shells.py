@@ -38,16 +38,11 @@ sound unions show some 1e-6."""
 class Shells:
     """The surface of one solid, made of the shells of a mesh."""
 
-    points: Array
-    """Vertices, (n, 3) [m]."""
-    corners: Indices
-    """Vertex indices, (t, 3)."""
-    caps: Indices
-    """Indices of the triangles that are or come from caps, (c,)."""
-    dropped: float
-    """Area of the parts that were left out, as a share of the whole."""
-    said: tuple[str, ...]
-    """What was changed, in words."""
+    points: Array  # vertices, (n, 3) [m]
+    corners: Indices  # vertex indices, (t, 3)
+    caps: Indices  # indices of the triangles that are or come from caps, (c,)
+    dropped: float  # area of the parts that were left out, as a share of the whole
+    said: tuple[str, ...]  # what was changed, in words
 
 
 @dataclass(frozen=True, slots=True, eq=False)

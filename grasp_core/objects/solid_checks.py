@@ -26,7 +26,11 @@ def welded(
     points, corners = points[used], corners.reshape(-1, 3)
     if reach is None:
         reach = WELD * float(np.ptp(points, axis=0).max())
-    label = components(len(points), _links(points, reach))
+    try:
+        links = close_pairs(points, reach) if reach >= 0.0 else np.empty((0, 2), dtype=np.int64)
+    except InputError as error:
+        raise MeshError(MeshRefusal.LIMIT, str(error)) from error
+    label = components(len(points), links)
     _, first, order = np.unique(label, return_index=True, return_inverse=True)
     rank = np.argsort(np.argsort(first))
     points, corners = points[np.sort(first)], rank[order][corners]
@@ -34,15 +38,6 @@ def welded(
     if not whole.any():
         raise MeshError(MeshRefusal.ZERO_VOLUME, "no triangle has an area; export a solid")
     return points, corners[whole], int((~whole).sum())
-
-
-def _links(points: Array, reach: float) -> Indices:
-    if reach < 0.0:
-        return np.empty((0, 2), dtype=np.int64)
-    try:
-        return close_pairs(points, reach)
-    except InputError as error:
-        raise MeshError(MeshRefusal.LIMIT, str(error)) from error
 
 
 def edges_of(corners: Indices) -> tuple[Indices, NDArray[np.bool_]]:

@@ -41,10 +41,8 @@ crack between triangles that meet."""
 class SoundSurface:
     """Welded and consistently wound triangles, with what is known of them."""
 
-    points: Array
-    """Vertices, (n, 3) [m]."""
-    corners: Indices
-    """Vertex indices, (t, 3)."""
+    points: Array  # vertices, (n, 3) [m]
+    corners: Indices  # vertex indices, (t, 3)
     surface: Surface
     fault: MeshError | None
     """Why the triangles do not bound a solid with planar faces; None if they do."""
@@ -179,14 +177,10 @@ def _capped(points: Array, corners: Indices, surface: Surface) -> tuple[Indices,
 class Caps(NamedTuple):
     """Triangles that close all holes of a surface, (c, 3), with the sizes of the holes."""
 
-    triangles: Indices
-    """Vertex indices, wound like the surface around them, (c, 3)."""
-    widths: Array
-    """Largest distance between two corners of each hole, (h,) [m]."""
-    hole_of: Indices
-    """Number of the hole that each triangle closes, (c,)."""
-    hidden: float
-    """Largest volume by which the caps may differ from the true surface [m^3]."""
+    triangles: Indices  # vertex indices, wound like the surface around them, (c, 3)
+    widths: Array  # largest distance between two corners of each hole, (h,) [m]
+    hole_of: Indices  # number of the hole that each triangle closes, (c,)
+    hidden: float  # largest volume by which the caps may differ from the true surface [m^3]
 
 
 def caps_of(points: Array, corners: Indices) -> Caps | None:

@@ -58,11 +58,9 @@ class Standard:
     body: Polyhedron
     """The object with its faces in standard order; it may be the mirror image. Halves of faces,
     for two fingers on one face, come after all whole faces."""
-    faces: tuple[int, ...]
-    """For each whole face of `body`, its number on the object as given."""
+    faces: tuple[int, ...]  # for each whole face of `body`, its number on the object as given
     mirrored: bool
-    owners: tuple[int, ...]
-    """For each face of `body`, the whole face that it is or is a half of."""
+    owners: tuple[int, ...]  # for each face of `body`, the whole face that it is or is a half of
 
     @cached_property
     def shapes(self) -> Shapes:

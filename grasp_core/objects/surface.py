@@ -83,8 +83,6 @@ class PatchLimits:
         whole(self.most, "most", **BOUNDS["patches"])
 
 
-VolumeSource: TypeAlias = Literal["surface", "capped surface", "convex hull"]
-"""What volume, inertia and the centre of mass of uniform density are computed from."""
 MM = 1e3
 
 
@@ -124,7 +122,7 @@ class Surface(ByValue):
         several(self.repairs, partial(text, name="repairs"), "repairs", "texts")
 
     @property
-    def volume_source(self) -> VolumeSource:
+    def volume_source(self) -> Literal["surface", "capped surface", "convex hull"]:
         """What the mass properties are computed from."""
         if not self.closed:
             return "convex hull"

@@ -138,8 +138,7 @@ class _Traits:
     """
 
     family: str
-    vectors: Array
-    """Vectors of each finger, (4, v, 3)."""
+    vectors: Array  # vectors of each finger, (4, v, 3)
     lengths: Array
     """Distances between contacts, and half-angles of cones, in ascending order, (10,)."""
 

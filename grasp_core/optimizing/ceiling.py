@@ -26,11 +26,11 @@ from grasp_core.by_value import ByValue
 from grasp_core.checked import BOUNDS, LARGEST, coefficient, number, several, whole
 from grasp_core.errors import InputError
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
-from grasp_core.objects.on_faces import check_body
+from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.best_grasp import FINER, lowered_twists, refuted_by_one
 from grasp_core.optimizing.best.grounds import Grounds, first_nodes, grounds_on
-from grasp_core.optimizing.best.search import Searching, StopAfter
+from grasp_core.optimizing.best.search import Searching, Stop
 from grasp_core.optimizing.best.support_cuts import LEAST_THRESHOLD, SEARCHED_BELOW, CutTree, Slack
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
@@ -103,12 +103,7 @@ def quality_ceiling(
         InputError: An argument is out of range.
         SolverError: A program's answer failed its check.
     """
-    check_body(body)
-    if body.patches is not None:
-        raise InputError(
-            f"quality_ceiling: expected an object with planar faces, got {body.name} with curved "
-            "ones; take a mesh with fewer, planar faces"
-        )
+    check_planar(body, "quality_ceiling")
     friction = coefficient(friction)
     number(known, "known", least=0.0, most=LARGEST)
     number(gap, "gap", least=SMALLEST_GAP, most=LARGEST_GAP)
@@ -151,7 +146,7 @@ def _lowered(
     alone = np.eye(3)[None]
     proved = Slack.of(friction, len(alone), FERRARI_CANNY)
     searched = Slack.of(friction, len(alone), FERRARI_CANNY, SEARCHED_BELOW)
-    stop = StopAfter(parts)
+    stop = Stop(parts)
     searching = Searching(grounds, friction, 1, stop)
     nodes = first_nodes(grounds, alone, owners)
     twists = lowered_twists(searching, np.random.default_rng(SEED))

@@ -15,7 +15,7 @@ from grasp_core.by_value import kept, trusted
 from grasp_core.closure.contacts import grasp_map, normal_and_tangential
 from grasp_core.closure.critical_friction import critical_friction, critical_frictions
 from grasp_core.closure.force_closure import closing_margins, force_closure
-from grasp_core.closure.lines import classify_each, classify_lines
+from grasp_core.closure.lines import classify_each
 from grasp_core.cones.spanning import span_angles
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.placements import Placement
@@ -59,8 +59,7 @@ class Certified(Candidate):
 
     span_angle: float
     margin: float
-    method: Method
-    """The method whose search found it: `free` may find grasps of any family."""
+    method: Method  # the method whose search found it: `free` may find grasps of any family
     ways_out: Array | None = None
     """Unit vectors along which fingers can leave, (4, 3); None if no free lines were sought."""
 
@@ -75,11 +74,6 @@ def named(letter: str, faces: FaceQuadruple) -> str:
     return f"{letter}-" + "-".join(str(face) for face in faces)
 
 
-def certify(candidate: Candidate, friction: float) -> Certified | None:
-    """Certify placed contacts; None if the witness or the exact closure test rejects them."""
-    return certify_each([candidate], friction)[0]
-
-
 def certify_each(candidates: Sequence[Candidate], friction: float) -> list[Certified | None]:
     """Certify placements together; None for each that the witness or the closure test rejects."""
     if not candidates:
@@ -89,70 +83,62 @@ def certify_each(candidates: Sequence[Candidate], friction: float) -> list[Certi
     forces = np.array([each.placement.forces for each in candidates])
     families: list[Family] = [each.family for each in candidates]
     certified: list[Certified | None] = []
-    all_fit = witnesses_fit(points, normals, forces, friction, families)
+    faults = witness_faults(points, normals, forces, friction, families)
     margins = closing_margins(points, normals, friction).tolist()
     angles = span_angles(normals).tolist()
-    for i, (each, fits, angle) in enumerate(zip(candidates, all_fit, angles, strict=True)):
+    for i, (each, fault, angle) in enumerate(zip(candidates, faults, angles, strict=True)):
         margin = margins[i]
         # where arrays of contacts leave closure open, it is decided for these contacts alone
-        if fits and math.isnan(margin):
-            margin = _closure_margin(points[i], normals[i], friction)
+        if fault is None and math.isnan(margin):
+            try:
+                alone = force_closure(points[i], normals[i], friction)
+                margin = alone.margin if alone.closed else None
+            except UndecidedError:
+                margin = None
         certified.append(
             Certified(
                 each.id, each.faces, each.family, each.pieces, each.cones, each.placement,
                 each.regions, angle, margin, method=each.family,
             )
-            if fits and margin is not None
+            if fault is None and margin is not None
             else None
         )  # fmt: skip
     return certified
 
 
-def _closure_margin(points: Array, normals: Array, friction: float) -> float | None:
-    """Return the margin of the exact force-closure test; None unless it finds closure."""
-    try:
-        certificate = force_closure(points, normals, friction)
-    except UndecidedError:
-        return None
-    return certificate.margin if certificate.closed else None
-
-
-def witness_fault(
-    points: Array, normals: Array, forces: Array, friction: float, family: Family
-) -> str | None:
-    """Return why witness forces are wrong (unbalanced, outside a cone, another family), or None."""
-    along, across = normal_and_tangential(forces, normals)
-    if abs(float(along.sum()) - 1.0) > BALANCED:
-        return "the normal parts of the witness forces do not sum to one"
-    if along.min() <= 0.0 or (across > friction * along + BALANCED).any():
-        return "a witness force is outside its friction cone"
-    if np.linalg.norm(grasp_map(points) @ forces.ravel()) > BALANCED:
-        return "the witness forces do not balance"
-    found = classify_lines(points, forces)
-    return None if found == family else f"the witness lines are {found}, not {family}"
-
-
-def witnesses_fit(
+def witness_faults(
     points: Array, normals: Array, forces: Array, friction: float, families: Sequence[Family]
-) -> list[bool]:
-    """Return for each of many sets of contacts whether `witness_fault` finds no fault."""
+) -> list[str | None]:
+    """Return why the witness forces of each set of contacts are wrong, or None."""
     along, across = normal_and_tangential(forces, normals)
     stacked = forces.reshape(len(forces), -1)
-    missed = np.linalg.norm(np.einsum("gwj,gj->gw", grasp_map(points), stacked), axis=-1)
-    fits = (np.abs(along.sum(axis=-1) - 1.0) <= BALANCED) & (along > 0.0).all(axis=-1)
-    fits &= (across <= friction * along + BALANCED).all(axis=-1) & (missed <= BALANCED)
-    places = np.flatnonzero(fits)
-    classes = classify_each(points[places], forces[places])
-    for place, found in zip(places.tolist(), classes, strict=True):
-        fits[place] = found == families[place]
-    return fits.tolist()
+    wrenches = np.einsum("gwj,gj->gw", grasp_map(points), stacked)
+    missed = np.linalg.norm(wrenches, axis=-1)
+    rules = {
+        "the normal parts of the witness forces do not sum to one": (
+            np.abs(along.sum(axis=-1) - 1.0) <= BALANCED
+        ),
+        "a witness force is outside its friction cone": (
+            (along > 0.0).all(axis=-1) & (across <= friction * along + BALANCED).all(axis=-1)
+        ),
+        "the witness forces do not balance": missed <= BALANCED,
+    }
+    kept = np.stack(list(rules.values()), axis=1).tolist()
+    faults = [next((fault for fault, fits in zip(rules, row, strict=True) if not fits), None)
+              for row in kept]  # fmt: skip
+    sound = [place for place, fault in enumerate(faults) if fault is None]
+    for place, found in zip(sound, classify_each(points[sound], forces[sound]), strict=True):
+        if found != families[place]:
+            faults[place] = f"the witness lines are {found}, not {families[place]}"
+    return faults
 
 
 def check_witness(body: Polyhedron, grasp: Grasp, friction: float) -> None:
     """Refuse a grasp read from elsewhere whose witness does not show what the grasp claims."""
     points = (grasp.witness.points - body.center_of_mass) / body.radius
     contacts = (grasp.positions - body.center_of_mass) / body.radius
-    fault = witness_fault(points, grasp.normals, grasp.witness.forces, friction, grasp.family)
+    witness = points[None], grasp.normals[None], grasp.witness.forces[None]
+    (fault,) = witness_faults(*witness, friction, [grasp.family])
     if np.abs(points - contacts).max() > BALANCED:
         fault = "the witness lines do not pass through the contacts"
     if grasp.family != "regulus" and _beside_foci(body, grasp):
@@ -199,11 +185,6 @@ def find_critical_frictions(grasps: Iterable[Grasp]) -> None:
     every = critical_frictions(np.array(positions), np.array(normals)).tolist()
     for grasp, each, found in zip(late, figures, every, strict=True):
         object.__setattr__(grasp, "critical_friction", min(found, each.friction))
-
-
-def to_grasp(body: Polyhedron, friction: float, found: Certified) -> Grasp:
-    """Convert a certified placement to a grasp in the object's frame, which has late figures."""
-    return to_grasps(body, friction, [found])[0]
 
 
 def to_grasps(body: Polyhedron, friction: float, found: Sequence[Certified]) -> list[Grasp]:

@@ -15,7 +15,7 @@ import math
 from bisect import bisect
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from heapq import heapify, heappop, heappush
 from itertools import chain, islice, takewhile
 from typing import TypeAlias
@@ -85,8 +85,7 @@ class BestFirst:
     construction: Construction
     bounded: AttemptBounds
     """Bounds the disc radii of attempts on the object's faces by small linear programs."""
-    tally: Tally
-    """Counts quadruples whose bounds prove that they have no grasp at all."""
+    tally: Tally  # counts quadruples whose bounds prove that they have no grasp at all
 
     def over(
         self, blocks: Blocks, places: range, least: Callable[[Construction], float]
@@ -174,7 +173,8 @@ class BestFirst:
         # no discs even of the least radius: settled here, whatever was found elsewhere
         none = solved.any(axis=1) & (tight.max(axis=1) <= construction.least)
         choices = int(solved.transpose(0, 2, 1)[none].sum())
-        self.tally.exclude(int(none.sum()), choices)
+        excluded = int(none.sum())
+        self.tally.update(tried=excluded, infeasible=excluded, solved=choices)
         tight[tight <= worth] = -np.inf
         best = coarse(np.asarray(np.max(tight, axis=(1, 2)), dtype=np.float64))
         for each in np.flatnonzero(best > -np.inf).tolist():
@@ -201,12 +201,6 @@ class Gathered:
     )
     undecided: dict[FaceQuadruple, float] = field(default_factory=dict[FaceQuadruple, float])
 
-    def add(self, other: "Gathered") -> None:
-        """Add what the next part of the search gathered."""
-        self.tally.add(other.tally)
-        self.absences.update(other.absences)
-        self.undecided.update(other.undecided)
-
 
 @dataclass(slots=True, eq=False)
 class MethodSearch:
@@ -229,8 +223,8 @@ class MethodSearch:
     @property
     def counts(self) -> MethodCounts:
         """Return the counts so far, with the quadruples that are still undecided."""
-        counts = self.gathered.tally.counts
-        return replace(counts, undecided=counts.undecided + len(self.gathered.undecided))
+        tally, still = self.gathered.tally, len(self.gathered.undecided)
+        return MethodCounts(**{**tally, "undecided": tally["undecided"] + still})
 
     @property
     def full(self) -> bool:
@@ -244,60 +238,40 @@ class MethodSearch:
         worst = self.best[-1].placement.merit if self.full else -math.inf
         return max(worst * (1.0 + SAME_MERIT), construction.least)
 
-    def may_gain(self, construction: Construction, room: float) -> bool:
-        """Return whether a grasp with discs of radius `room` could enter the best ones."""
-        return room > self.least(construction)
-
     def take(self, gathered: Gathered, seconds: float) -> None:
         """Add the proofs and counts of a part, and the time that another process took [s]."""
-        self.gathered.add(gathered)
+        self.gathered.tally.update(gathered.tally)
+        self.gathered.absences.update(gathered.absences)
+        self.gathered.undecided.update(gathered.undecided)
         self.seconds += seconds
 
     def keep_each(self, found: Sequence[Certified]) -> list[Certified]:
-        """Keep grasps on one quadruple; return the ones that fingers reach."""
-        return [one for each in found for one in self.keep(each)]
-
-    def keep(self, found: Certified) -> list[Certified]:
-        """Count a grasp and keep it if fingers reach it; return it in a list, or an empty list."""
-        faces = four(sorted(found.faces))
-        way = self.reach(found)
-        if way.reason:
-            self.gathered.tally.count("unreachable")
-            self.unreached[faces] = way.reason
-            return []
-        if found.method != self.method or way.directions is not None:
-            found = replace(found, method=self.method, ways_out=way.directions)
-        self.gathered.tally.count("found")
-        self.held.add(faces)
-        key = best_first(found)
-        place = bisect(self._keys, key)
-        self._keys.insert(place, key)
-        self.best.insert(place, found)
-        if self.limit is not None:
-            del self.best[self.limit :], self._keys[self.limit :]
-        return [found]
+        """Count grasps on one quadruple, and keep and return the ones that fingers reach."""
+        kept: list[Certified] = []
+        for each in found:
+            faces, way = four(sorted(each.faces)), self.reach(each)
+            if way.reason:
+                self.gathered.tally["unreachable"] += 1
+                self.unreached[faces] = way.reason
+                continue
+            one = each
+            if each.method != self.method or way.directions is not None:
+                one = replace(each, method=self.method, ways_out=way.directions)
+            self.gathered.tally["found"] += 1
+            self.held.add(faces)
+            key = best_first(one)
+            place = bisect(self._keys, key)
+            self._keys.insert(place, key)
+            self.best.insert(place, one)
+            if self.limit is not None:
+                del self.best[self.limit :], self._keys[self.limit :]
+            kept.append(one)
+        return kept
 
 
 def best_first(found: Certified) -> SortKey:
     """Return a sort key: largest merit first, equal merits by faces, then by finger order."""
     return -graded(found.placement.merit), four(sorted(found.faces)), found.faces
-
-
-def search_construction(
-    construction: Construction,
-    shapes: Shapes,
-    friction: float,
-    blocks: Blocks,
-    search: MethodSearch,
-) -> Iterator[list[Certified]]:
-    """Try a construction on blocks of quadruples; yield the grasps kept from each quadruple.
-
-    With a limit the search ends when no upper bound exceeds the worst grasp kept. A construction
-    without bounds ends as soon as the limit is reached.
-    """
-    places = range(len(blocks[0]))
-    for found in found_in(construction, shapes, friction, blocks, places, search):
-        yield search.keep_each(found)
 
 
 def found_in(
@@ -312,20 +286,18 @@ def found_in(
 
     Whoever keeps them in `search` does so before asking for the next: that raises the threshold.
     """
-    tries, tally = Tries(construction, shapes, friction), search.gathered.tally
-    quadruples = _in_order(construction, AttemptBounds(shapes), blocks, places, search)
+    settling, tally = Settling(construction, shapes), search.gathered.tally
+    best_first = BestFirst(construction, AttemptBounds(shapes), tally)
+    quadruples = _in_order(best_first, blocks, places, search)
     while group := _next_few(quadruples, search):
-        # grasps kept meanwhile may have raised the threshold
-        worth = [
-            [each for each in attempts if search.may_gain(construction, each.bounds[0])]
-            for attempts in group
-        ]
+        least = search.least(construction)  # grasps kept meanwhile may have raised it
+        worth = [[each for each in attempts if each.bounds[0] > least] for attempts in group]
         every = list(chain.from_iterable(worth))
-        found = iter(tries.certified(every, search.least(construction), tally))
+        found = iter(certified_attempts(settling, friction, every, least, tally))
         for attempts in worth:
             here = [one for one in islice(found, len(attempts)) if one is not None]
             kept = _without_duplicates(here)
-            tally.count("duplicates", len(here) - len(kept))
+            tally["duplicates"] += len(here) - len(kept)
             yield kept
 
 
@@ -346,20 +318,15 @@ def _next_few(
 
 
 def _in_order(
-    construction: Construction,
-    bounded: AttemptBounds,
-    blocks: Blocks,
-    places: range,
-    search: MethodSearch,
+    best_first: BestFirst, blocks: Blocks, places: range, search: MethodSearch
 ) -> Iterator[tuple[Attempt, ...]]:
     """Yield the attempts on each quadruple: over many blocks with a limit, else block by block."""
-    best_first = BestFirst(construction, bounded, search.gathered.tally)
-    rooms, make = blocks
+    construction, (rooms, make) = best_first.construction, blocks
     if construction.limits is not None:
         size = 1 if search.limit is None else TOGETHER
         for start in range(0, len(places), size):
             some = places[start : start + size]
-            if search.may_gain(construction, float(rooms[some].max())):
+            if float(rooms[some].max()) > search.least(construction):
                 yield from best_first.over(blocks, some, search.least)
         return
     for place in places:
@@ -370,49 +337,30 @@ def _in_order(
         yield from takewhile(lambda _: not search.full, some)
 
 
-@dataclass(frozen=True, eq=False)
-class Tries:
-    """Tries one construction on many quadruples of faces together."""
-
-    construction: Construction
-    shapes: Shapes
-    friction: float
-    """Coulomb coefficient at every contact."""
-
-    def certified(
-        self, attempts: Sequence[Attempt], least: float, tally: Tally
-    ) -> list[Certified | None]:
-        """Construct and certify a grasp for each attempt; None where there is none."""
-        ends = self._settling.of(attempts, least)
-        tally.count("tried", len(attempts))
-        tally.count("solved", sum(end.solved for end in ends))
-        tally.count("undecided", sum(end.failed for end in ends))
-        tally.count("infeasible", sum(not (end.settled or end.failed) for end in ends))
-        family = self.construction.family
-        candidates = [
-            Candidate(named(family[0], attempt.faces), attempt.faces, family, *end.settled)
-            for attempt, end in zip(attempts, ends, strict=True)
-            if end.settled is not None
-        ]
-        certified = iter(self._spanning(certify_each(candidates, self.friction), candidates))
-        found = [None if end.settled is None else next(certified) for end in ends]
-        tally.count("rejected", len(candidates) - sum(one is not None for one in found))
-        return found
-
-    @cached_property
-    def _settling(self) -> Settling:
-        return Settling(self.construction, self.shapes)
-
-    @staticmethod
-    def _spanning(
-        certified: Sequence[Certified | None], candidates: Sequence[Candidate]
-    ) -> list[Certified | None]:
-        if not candidates:
-            return []
+def certified_attempts(
+    settling: Settling, friction: float, attempts: Sequence[Attempt], least: float, tally: Tally
+) -> list[Certified | None]:
+    """Construct and certify a grasp for each attempt; None where there is none."""
+    ends = settling.of(attempts, least)
+    tally["tried"] += len(attempts)
+    tally["solved"] += sum(end.solved for end in ends)
+    tally["undecided"] += sum(end.failed for end in ends)
+    tally["infeasible"] += sum(not (end.settled or end.failed) for end in ends)
+    family = settling.construction.family
+    candidates = [
+        Candidate(named(family[0], attempt.faces), attempt.faces, family, *end.settled)
+        for attempt, end in zip(attempts, ends, strict=True)
+        if end.settled is not None
+    ]
+    certified = certify_each(candidates, friction)
+    if candidates:
         axes = np.array([[cone.axis for cone in each.cones] for each in candidates])
         angles = np.array([[cone.half_angle for cone in each.cones] for each in candidates])
         spans = each_cones_positively_span(axes, angles).tolist()
-        return [one if span else None for one, span in zip(certified, spans, strict=True)]
+        certified = [one if span else None for one, span in zip(certified, spans, strict=True)]
+    tally["rejected"] += len(candidates) - sum(one is not None for one in certified)
+    placed = iter(certified)
+    return [None if end.settled is None else next(placed) for end in ends]
 
 
 def _without_duplicates(found: list[Certified]) -> list[Certified]:

@@ -7,7 +7,8 @@ cones are good axes for tilted force cones, so the constructions are tried once 
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from typing import TypeAlias
 
@@ -24,12 +25,12 @@ from grasp_core.families.constructions import (
 )
 from grasp_core.families.free import RESTARTS, Absence, Undecided, close_patches, place_free
 from grasp_core.families.placements import Placement
-from grasp_core.families.placing import MOST_CHOICES, Attempt, Cones, chosen_shapes
+from grasp_core.families.placing import MOST_CHOICES, Attempt, Cones, Settling, chosen_shapes
 from grasp_core.families.true_surface import on_true_surface
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, choices_near
 from grasp_core.objects.standard_order import Standard
-from grasp_core.planning.certify import Candidate, Certified, certify, named
-from grasp_core.planning.family_search import Gathered, Tries, best_first
+from grasp_core.planning.certify import Candidate, Certified, certify_each, named
+from grasp_core.planning.family_search import Gathered, best_first, certified_attempts
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, cones_around
 from grasp_core.planning.request import COMPLETE_PARTS, FAMILIES, PlanRequest
 from grasp_core.planning.result import Tally
@@ -43,204 +44,184 @@ Placed: TypeAlias = tuple[Pieces, Placement]
 
 
 def found_on(
-    on: Standard, to_try: Sequence[FaceQuadruple], request: PlanRequest, gathered: Gathered
-) -> Iterator[Certified | None]:
-    """Decide quadruples together; yield the grasp found on each, or None."""
-    gathered.tally.count("tried", len(to_try))
-    known = _patches(on, to_try, request)
-    placed = [_decide(on, faces, request, gathered, known[faces]) for faces in to_try]
-    choices = iter(_cone_choices([each for each in placed if each], request))
-    for faces, each in zip(to_try, placed, strict=True):
-        yield _certified(faces, each, next(choices), request, gathered) if each else None
-
-
-def found_with_more_parts(
-    on: Standard, faces: FaceQuadruple, request: PlanRequest, gathered: Gathered
-) -> Certified | None:
-    """Decide a quadruple that was left undecided once more, with more parts."""
-    request = replace(request, max_face_parts=COMPLETE_PARTS)
-    placed = _decide(on, faces, request, gathered)
-    if placed is None:
-        return None
-    (choices,) = _cone_choices([placed], request)
-    return _certified(faces, placed, choices, request, gathered)
-
-
-def _upgrades(request: PlanRequest) -> list[Construction]:
-    """Constructions to try with force cones around the forces of each free grasp."""
-    if request.cones != "tilted":
-        return []
-    asked = [CONSTRUCTIONS[family] for family in FAMILIES if family in request.families]
-    discs = [each for each in asked if each.limits]
-    return discs + [MIXED for each in discs if each.family == MIXED.family]
-
-
-def _patches(
-    on: Standard, quadruples: Sequence[FaceQuadruple], request: PlanRequest
-) -> dict[FaceQuadruple, ClosureCertificate | None]:
-    """Decide closure of contacts at all corners of hulls of faces, where that is known at once."""
-    hulls = {
-        faces: tuple(shape.hull for shape in chosen_shapes(on.shapes, faces))
-        for faces in quadruples
-    }
-    frictions = {faces: _friction(pieces, request) for faces, pieces in hulls.items()}
-    found: dict[FaceQuadruple, ClosureCertificate | None] = {}
-    for friction in sorted(set(frictions.values())):
-        alike = [faces for faces in quadruples if frictions[faces] == friction]
-        known = close_patches([hulls[faces] for faces in alike], friction)
-        found.update(zip(alike, known, strict=True))
-    return found
-
-
-def _decide(
     on: Standard,
-    faces: FaceQuadruple,
+    to_try: Sequence[FaceQuadruple],
     request: PlanRequest,
     gathered: Gathered,
-    known: ClosureCertificate | None = None,
-) -> Placed | None:
-    """Find contacts on four faces; if there are none, record the proof or that it is undecided.
-
-    `known` is the certificate of contacts at all corners of the faces' hulls, if there is one.
-    """
-    chosen = chosen_shapes(on.shapes, faces)
-    answers = _answers(faces, chosen, request, gathered, known)
-    pieces, last = answers[-1]
-    if any(shape.facets is not None for shape in chosen):
-        return _on_triangles(faces, chosen, pieces, last, request, gathered)
-    if isinstance(last, Placement):
-        return pieces, last
-    if any(on.owners[face] != face for face in faces):
-        answers = [_whole(on, faces, request, gathered)]
-    proofs = tuple(proof for _, proof in answers if isinstance(proof, Absence))
-    if len(proofs) == len(answers):
-        gathered.tally.count("infeasible")
-        gathered.absences[faces] = proofs
+    *,
+    again: bool = False,
+) -> Iterator[Certified | None]:
+    """Decide quadruples together, or `again` with more parts; yield the grasp on each, or None."""
+    if again:
+        request = replace(request, max_face_parts=COMPLETE_PARTS)
     else:
-        gathered.undecided[faces] = max(
-            answer.open_share for _, answer in answers if isinstance(answer, Undecided)
-        )
-    return None
+        gathered.tally["tried"] += len(to_try)
+    search = _FreeSearch(on, request, gathered)
+    known = {} if again else search.patches(to_try)
+    placed = [search.placed_on(faces, known.get(faces)) for faces in to_try]
+    tilted = [each for each in placed if each] if search.upgrades else []
+    choices = iter(cones_around(tilted, request.theta) if tilted else ())
+    for faces, each in zip(to_try, placed, strict=True):
+        yield search.certified(faces, each, next(choices, ())) if each else None
 
 
-def _whole(on: Standard, faces: FaceQuadruple, request: PlanRequest, gathered: Gathered) -> Answer:
-    """Ask whether whole faces hold no grasp, where choices of their halves gave none."""
-    whole = four(on.owners[face] for face in faces)
-    hulls = tuple(shape.hull for shape in chosen_shapes(on.shapes, whole))
-    gathered.tally.count("solved")
-    answer = _place(hulls, request, np.random.default_rng([request.seed, *faces]), restarts=0)
-    return hulls, answer if isinstance(answer, Absence) else Undecided(1.0)
+@dataclass(frozen=True, eq=False)
+class _FreeSearch:
+    """The free method on the faces of one object, with what is asked of it and what it gathers."""
 
+    on: Standard
+    request: PlanRequest
+    gathered: Gathered
 
-def _answers(
-    faces: FaceQuadruple,
-    shapes: Sequence[FaceShape],
-    request: PlanRequest,
-    gathered: Gathered,
-    known: ClosureCertificate | None,
-) -> list[Answer]:
-    """Collect answers for the convex pieces of four faces; a placement can only be the last.
+    @cached_property
+    def upgrades(self) -> list[Construction]:
+        """Constructions to try with force cones around the forces of each free grasp."""
+        if self.request.cones != "tilted":
+            return []
+        asked = [CONSTRUCTIONS[family] for family in FAMILIES if family in self.request.families]
+        discs = [each for each in asked if each.limits]
+        return discs + [MIXED for each in discs if each.family == MIXED.family]
 
-    Together the answers decide the faces, unless one is `Undecided`. The convex hulls come first:
-    if they hold no grasp, no pieces do. Choices of one piece per face follow until one holds a
-    grasp, and last the most likely choice with more effort.
-    """
-    rng = np.random.default_rng([request.seed, *faces])
-    hulls = tuple(shape.hull for shape in shapes)
-    gathered.tally.count("solved")
-    whole = _place(hulls, request, rng, known=known)
-    if isinstance(whole, Absence) or all(len(shape.pieces) == 1 for shape in shapes):
-        return [(hulls, whole)]
-    at = whole.positions if isinstance(whole, Placement) else np.array([h.origin for h in hulls])
-    most = MOST_CHOICES * request.max_face_parts
-    answers: list[Answer] = []
-    for pieces in choices_near(shapes, at, most):
-        gathered.tally.count("solved")
-        answers.append((pieces, _place(pieces, request, rng, restarts=0)))
-        if isinstance(answers[-1][1], Placement):
-            return answers
-    if isinstance(answers[0][1], Undecided):
-        pieces, _ = answers.pop(0)
-        answers.append((pieces, _place(pieces, request, rng)))
-        if isinstance(answers[-1][1], Placement):
-            return answers
-    # more choices than were tried: the rest stays undecided
-    if math.prod(len(shape.pieces) for shape in shapes) > most:
-        answers.append((hulls, Undecided(1.0)))
-    return answers
+    def patches(
+        self, quadruples: Sequence[FaceQuadruple]
+    ) -> dict[FaceQuadruple, ClosureCertificate | None]:
+        """Decide closure at all corners of hulls of faces, where that is known at once."""
+        hulls = {
+            faces: tuple(shape.hull for shape in chosen_shapes(self.on.shapes, faces))
+            for faces in quadruples
+        }
+        frictions = {faces: self._friction(pieces) for faces, pieces in hulls.items()}
+        found: dict[FaceQuadruple, ClosureCertificate | None] = {}
+        for friction in sorted(set(frictions.values())):
+            alike = [faces for faces in quadruples if frictions[faces] == friction]
+            known = close_patches([hulls[faces] for faces in alike], friction)
+            found.update(zip(alike, known, strict=True))
+        return found
 
+    def placed_on(self, faces: FaceQuadruple, known: ClosureCertificate | None) -> Placed | None:
+        """Find contacts on four faces; if there are none, record the proof or that it is open.
 
-def _on_triangles(
-    faces: FaceQuadruple,
-    shapes: Sequence[FaceShape],
-    pieces: Pieces,
-    answer: Placement | Absence | Undecided,
-    request: PlanRequest,
-    gathered: Gathered,
-) -> Placed | None:
-    """Contacts on the triangles of curved patches; planes without a grasp prove nothing here."""
-    if isinstance(answer, Placement):
-        cones = [ForceCone(piece.normal, 0.0) for piece in pieces]
-        points = regions_of(point_region, pieces, cones, answer)
-        rng = np.random.default_rng([request.seed, *faces])
+        `known` is the certificate of contacts at all corners of the faces' hulls, if there is one.
+        """
+        on, gathered = self.on, self.gathered
+        chosen = chosen_shapes(on.shapes, faces)
+        answers = self._answers(faces, chosen, known)
+        pieces, last = answers[-1]
+        if any(shape.facets is not None for shape in chosen):
+            return self._on_triangles(faces, chosen, pieces, last)
+        if isinstance(last, Placement):
+            return pieces, last
+        if any(on.owners[face] != face for face in faces):
+            # choices of halves gave none: whole faces may be proved to hold none
+            whole = four(on.owners[face] for face in faces)
+            hulls = tuple(shape.hull for shape in chosen_shapes(on.shapes, whole))
+            gathered.tally["solved"] += 1
+            answer = self._place(hulls, self._rng(faces), restarts=0)
+            answers = [(hulls, answer if isinstance(answer, Absence) else Undecided(1.0))]
+        proofs = tuple(proof for _, proof in answers if isinstance(proof, Absence))
+        if len(proofs) == len(answers):
+            gathered.tally["infeasible"] += 1
+            gathered.absences[faces] = proofs
+        else:
+            gathered.undecided[faces] = max(
+                answer.open_share for _, answer in answers if isinstance(answer, Undecided)
+            )
+        return None
 
-        def place(facets: Pieces) -> Placement | None:
-            found = _place(facets, request, rng, restarts=0)
-            return found if isinstance(found, Placement) else None
+    def _answers(
+        self, faces: FaceQuadruple, shapes: Sequence[FaceShape], known: ClosureCertificate | None
+    ) -> list[Answer]:
+        """Collect answers for the convex pieces of four faces; a placement can only be the last.
 
-        settled = on_true_surface(shapes, pieces, cones, answer, points, place)
-        if settled is not None:
-            return settled
-    gathered.undecided[faces] = 1.0
-    return None
+        Together the answers decide the faces, unless one is `Undecided`. The convex hulls come
+        first: if they hold no grasp, no pieces do. Choices of one piece per face follow until one
+        holds a grasp, and last the most likely choice with more effort.
+        """
+        rng, tally = self._rng(faces), self.gathered.tally
+        hulls = tuple(shape.hull for shape in shapes)
+        tally["solved"] += 1
+        whole = self._place(hulls, rng, known=known)
+        if isinstance(whole, Absence) or all(len(shape.pieces) == 1 for shape in shapes):
+            return [(hulls, whole)]
+        placed = isinstance(whole, Placement)
+        at = whole.positions if placed else np.array([hull.origin for hull in hulls])
+        most = MOST_CHOICES * self.request.max_face_parts
+        answers: list[Answer] = []
+        for pieces in choices_near(shapes, at, most):
+            tally["solved"] += 1
+            answers.append((pieces, self._place(pieces, rng, restarts=0)))
+            if isinstance(answers[-1][1], Placement):
+                return answers
+        if isinstance(answers[0][1], Undecided):
+            pieces, _ = answers.pop(0)
+            answers.append((pieces, self._place(pieces, rng)))
+            if isinstance(answers[-1][1], Placement):
+                return answers
+        # more choices than were tried: the rest stays undecided
+        if math.prod(len(shape.pieces) for shape in shapes) > most:
+            answers.append((hulls, Undecided(1.0)))
+        return answers
 
+    def _on_triangles(
+        self,
+        faces: FaceQuadruple,
+        shapes: Sequence[FaceShape],
+        pieces: Pieces,
+        answer: Placement | Absence | Undecided,
+    ) -> Placed | None:
+        """Contacts on the triangles of curved patches; planes without a grasp prove nothing."""
+        if isinstance(answer, Placement):
+            cones = [ForceCone(piece.normal, 0.0) for piece in pieces]
+            points = regions_of(point_region, pieces, cones, answer)
+            rng = self._rng(faces)
 
-def _friction(pieces: Pieces, request: PlanRequest) -> float:
-    spread = max(piece.spread for piece in pieces)
-    return math.tan(request.theta - spread if spread < request.theta else LEAST_SPAN_ANGLE)
+            def place(facets: Pieces) -> Placement | None:
+                found = self._place(facets, rng, restarts=0)
+                return found if isinstance(found, Placement) else None
 
+            settled = on_true_surface(shapes, pieces, cones, answer, points, place)
+            if settled is not None:
+                return settled
+        self.gathered.undecided[faces] = 1.0
+        return None
 
-def _place(
-    pieces: Pieces,
-    request: PlanRequest,
-    rng: np.random.Generator,
-    restarts: int = RESTARTS,
-    known: ClosureCertificate | None = None,
-) -> Placement | Absence | Undecided:
-    try:
-        return place_free(
-            pieces, _friction(pieces, request), rng=rng, cells=request.max_face_parts,
-            restarts=restarts, whole=known,
-        )  # fmt: skip
-    except SolverError:
-        return Undecided(1.0)
+    def _rng(self, faces: FaceQuadruple) -> np.random.Generator:
+        return np.random.default_rng([self.request.seed, *faces])
 
+    def _friction(self, pieces: Pieces) -> float:
+        theta, spread = self.request.theta, max(piece.spread for piece in pieces)
+        return math.tan(theta - spread if spread < theta else LEAST_SPAN_ANGLE)
 
-def _cone_choices(placed: Sequence[Placed], request: PlanRequest) -> list[tuple[Cones, ...]]:
-    """Choose tilted force cones to try around placed contacts, if they are asked for."""
-    wanted = bool(placed and _upgrades(request))
-    return cones_around(placed, request.theta) if wanted else [()] * len(placed)
+    def _place(
+        self,
+        pieces: Pieces,
+        rng: np.random.Generator,
+        restarts: int = RESTARTS,
+        known: ClosureCertificate | None = None,
+    ) -> Placement | Absence | Undecided:
+        try:
+            return place_free(
+                pieces, self._friction(pieces), rng=rng, cells=self.request.max_face_parts,
+                restarts=restarts, whole=known,
+            )  # fmt: skip
+        except SolverError:
+            return Undecided(1.0)
 
-
-def _certified(
-    faces: FaceQuadruple,
-    placed: Placed,
-    choices: tuple[Cones, ...],
-    request: PlanRequest,
-    gathered: Gathered,
-) -> Certified | None:
-    """Certify contacts, with regions if a construction offers them around these forces."""
-    pieces, placement = placed
-    for construction, cones in product(_upgrades(request), choices):
-        if better := _upgraded(faces, pieces, construction, cones, request.friction):
-            return better
-    cones = four(ForceCone(piece.normal, request.theta) for piece in pieces)
-    points = regions_of(point_region, pieces, cones, placement)
-    candidate = Candidate(named("f", faces), faces, "regulus", pieces, cones, placement, points)
-    certified = certify(candidate, request.friction)
-    if certified is None:
-        gathered.tally.count("rejected")
-    return certified
+    def certified(
+        self, faces: FaceQuadruple, placed: Placed, choices: tuple[Cones, ...]
+    ) -> Certified | None:
+        """Certify contacts, with regions if a construction offers them around these forces."""
+        request, (pieces, placement) = self.request, placed
+        for construction, cones in product(self.upgrades, choices):
+            if better := _upgraded(faces, pieces, construction, cones, request.friction):
+                return better
+        cones = four(ForceCone(piece.normal, request.theta) for piece in pieces)
+        points = regions_of(point_region, pieces, cones, placement)
+        candidate = Candidate(named("f", faces), faces, "regulus", pieces, cones, placement, points)
+        (certified,) = certify_each([candidate], request.friction)
+        if certified is None:
+            self.gathered.tally["rejected"] += 1
+        return certified
 
 
 def _upgraded(
@@ -257,6 +238,6 @@ def _upgraded(
         )
         for order in construction.orders
     ]
-    tries = Tries(construction, shapes, friction)
-    found = tries.certified(attempts, construction.least, Tally())
+    settling = Settling(construction, shapes)
+    found = certified_attempts(settling, friction, attempts, construction.least, Tally())
     return min((one for one in found if one), key=best_first, default=None)

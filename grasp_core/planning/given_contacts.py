@@ -53,12 +53,10 @@ LARGEST_MOVE = 0.02
 class Seated:
     """Four contacts that were moved onto the faces of an object."""
 
-    body: Polyhedron
-    """The object; a curved one with four more faces, one around each contact."""
+    body: Polyhedron  # the object; a curved one with four more faces, one around each contact
     faces: FaceQuadruple
     contacts: tuple[Contact, Contact, Contact, Contact]
-    moved_m: float
-    """Largest distance of a contact from where it was given [m]."""
+    moved_m: float  # largest distance of a contact from where it was given [m]
 
 
 def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
@@ -121,12 +119,9 @@ def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCerti
 class FlatPart:
     """A flat convex part of a surface: a piece of a face, or a triangle of a curved surface."""
 
-    face: int
-    """Index of the face, or of the triangle where the object is curved."""
-    normal: Array
-    """Unit vector into the object, (3,)."""
-    polygon: Array
-    """Corners, counter-clockwise about the normal, (k, 3) [m]."""
+    face: int  # index of the face, or of the triangle where the object is curved
+    normal: Array  # unit vector into the object, (3,)
+    polygon: Array  # counter-clockwise about the normal, (k, 3) [m]
 
 
 def flat_parts(body: Polyhedron) -> tuple[FlatPart, ...]:
@@ -152,8 +147,7 @@ class Nearest:
 
     part: FlatPart
     contact: Contact
-    distance: float
-    """Distance from the given point [m]."""
+    distance: float  # distance from the given point [m]
 
 
 def nearest_like(

@@ -11,16 +11,16 @@ from grasp_core.families.constructions import CONSTRUCTIONS
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Certified
-from grasp_core.planning.family_search import MethodSearch, search_construction
+from grasp_core.planning.family_search import MethodSearch
 from grasp_core.planning.parts import (
+    Block,
     Elsewhere,
     Object,
-    blocks_of,
     each_found,
     in_standard_order,
     search_batches,
     search_blocks,
-    search_free,
+    search_family,
     search_undecided,
 )
 from grasp_core.planning.reach import Finger, Reach, reach
@@ -59,10 +59,7 @@ def run(
 ) -> Iterator[Certified]:
     """Yield each certified grasp in the order of the searches, on the standard object."""
     total, found = len(searches) * on.quadruples, 0
-    work = Object(on, request)
-    everything = request.searched is None
-    steps = _every_step(work, searches, elsewhere) if everything else _limited(work, searches)
-    for done, grasps in steps:
+    for done, grasps in _steps(Object(on, request), searches, elsewhere):
         found += len(grasps)
         if progress is not None:
             progress(done, total, found)
@@ -71,51 +68,42 @@ def run(
         progress(total, total, found)
 
 
-def _every_step(
+def _steps(
     work: Object, searches: Searches, elsewhere: Elsewhere | None
 ) -> Iterator[tuple[int, list[Certified]]]:
-    """Yield, for each quadruple tried, how many are finished at least, and all its grasps."""
-    on, dealt_with = work.on, 0
+    """Yield, for each quadruple tried, how many are finished at least, and its grasps.
+
+    With a limit, only grasps that are among the best when they are found.
+    """
+    on, limit, dealt_with, kept_so_far = work.on, work.request.searched, 0, list[int]()
     families: list[Family] = [family for family in FAMILIES if family in searches]
-    parts = {family: blocks_of(work, family) for family in families}
+    parts = {
+        family: [Block(family, place) for place in range(len(work.blocks(family)[0]))]
+        for family in families
+        if limit is None
+    }
     found = each_found(work, chain.from_iterable(parts.values()), elsewhere)
     for family in families:
         search = searches[family]
-        steps = search_blocks(islice(found, len(parts[family])), search)
+        if limit is None:
+            steps = search_blocks(islice(found, len(parts[family])), search)
+        else:
+            search.limit = _share(limit, kept_so_far)
+            steps = search_family(work, family, search)
         yield from enumerate(_timed(steps, search), start=dealt_with + 1)
         _prune(family, search, on.quadruples)
+        kept_so_far.append(len(search.best))
         dealt_with += on.quadruples
     if "free" in searches:
         search, held = searches["free"], _held(searches)
+        if limit is not None:
+            search.limit = max(limit - sum(kept_so_far), 0)
         steps = search_batches(work, search, held, elsewhere)
         yield from enumerate(_timed(steps, search), start=dealt_with + 1)
         _prune("free", search, on.quadruples)
         if work.request.complete:
             for grasps in _timed(search_undecided(work, search, elsewhere), search):
                 yield dealt_with + on.quadruples, grasps
-
-
-def _limited(work: Object, searches: Searches) -> Iterator[tuple[int, list[Certified]]]:
-    """Yield as `_every_step`, but only grasps that are among the best when they are found."""
-    on, request, limit = work.on, work.request, work.request.searched or 0
-    families: list[Family] = [family for family in FAMILIES if family in searches]
-    dealt_with, kept_so_far = 0, list[int]()
-    for family in families:
-        search = searches[family]
-        search.limit = _share(limit, kept_so_far)
-        steps = search_construction(
-            CONSTRUCTIONS[family], on.shapes, request.friction, work.blocks(family), search
-        )
-        yield from enumerate(_timed(steps, search), start=dealt_with + 1)
-        _prune(family, search, on.quadruples)
-        kept_so_far.append(len(search.best))
-        dealt_with += on.quadruples
-    if "free" in searches:
-        search = searches["free"]
-        search.limit = max(limit - sum(kept_so_far), 0)
-        steps = search_free(on, request, search, _held(searches))
-        yield from enumerate(_timed(steps, search), start=dealt_with + 1)
-        _prune("free", search, on.quadruples)
 
 
 def _held(searches: Searches) -> set[FaceQuadruple]:
@@ -126,7 +114,8 @@ def _held(searches: Searches) -> set[FaceQuadruple]:
 def _prune(method: Method, search: MethodSearch, quadruples: int) -> None:
     """Count what was not tried; each quadruple counts once per order of the fingers."""
     orders = 1 if method == "free" else len(CONSTRUCTIONS[method].orders)
-    search.gathered.tally.prune(quadruples * orders)
+    tally = search.gathered.tally
+    tally["pruned"] = quadruples * orders - tally["tried"]
 
 
 def _share(limit: int, before: Sequence[int]) -> int:

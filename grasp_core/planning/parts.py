@@ -13,7 +13,7 @@ from collections.abc import Set as AbstractSet
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
-from itertools import combinations, islice, tee
+from itertools import chain, combinations, islice, tee
 from typing import TypeAlias
 
 from grasp_core.families.constructions import CONSTRUCTIONS
@@ -22,7 +22,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard, clear_of_edges, standard, with_halves
 from grasp_core.planning.certify import Certified
 from grasp_core.planning.family_search import Gathered, MethodSearch, found_in
-from grasp_core.planning.free_search import found_on, found_with_more_parts
+from grasp_core.planning.free_search import found_on
 from grasp_core.planning.planned_cones import PlannedCones
 from grasp_core.planning.quadruples import Blocks, all_blocks, kept, spanning_blocks
 from grasp_core.planning.reach import Reach
@@ -49,27 +49,20 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Quadruples to be decided together by the free method."""
+    """Quadruples to be decided together by the free method, or again with more parts."""
 
     quadruples: tuple[FaceQuadruple, ...]
+    again: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Completion:
-    """A quadruple to be decided once more by the free method, with more parts."""
-
-    faces: FaceQuadruple
-
-
-Part: TypeAlias = Block | Batch | Completion
+Part: TypeAlias = Block | Batch
 
 
 @dataclass(slots=True, eq=False)
 class Found:
     """What a part of a search holds."""
 
-    gathered: Gathered
-    """Proofs and counts, complete once all grasps were taken."""
+    gathered: Gathered  # proofs and counts, complete once all grasps were taken
     grasps: Iterable[list[Certified]]
     """Grasps on each quadruple, those that were not tried left out; for `Batch` in its order."""
     seconds: float = 0.0
@@ -107,12 +100,9 @@ class Object:
                     construction, self.on.shapes, self.request.friction, self.blocks(family),
                     places, search,
                 )  # fmt: skip
-            case Batch(quadruples):
-                for found in found_on(self.on, quadruples, self.request, gathered):
+            case Batch(quadruples, again):
+                for found in found_on(self.on, quadruples, self.request, gathered, again=again):
                     yield [found] if found else []
-            case Completion(faces):
-                found = found_with_more_parts(self.on, faces, self.request, gathered)
-                yield [found] if found else []
 
     def blocks(self, family: Family) -> Blocks:
         """Return the blocks for a construction; without bounds it uses cones around normals."""
@@ -192,9 +182,17 @@ def each_found(work: Object, parts: Iterable[Part], elsewhere: Elsewhere | None)
     return map(work.found, parts) if elsewhere is None else elsewhere(parts, work.found_at_once)
 
 
-def blocks_of(work: Object, family: Family) -> list[Block]:
-    """List the parts of the search with one construction."""
-    return [Block(family, place) for place in range(len(work.blocks(family)[0]))]
+def search_family(work: Object, family: Family, search: MethodSearch) -> Iterator[list[Certified]]:
+    """Search all blocks until no upper bound exceeds the worst grasp kept; yield those kept.
+
+    A construction without bounds ends as soon as the limit is reached.
+    """
+    blocks = work.blocks(family)
+    for found in found_in(
+        CONSTRUCTIONS[family], work.on.shapes, work.request.friction, blocks,
+        range(len(blocks[0])), search,
+    ):  # fmt: skip
+        yield search.keep_each(found)
 
 
 def search_blocks(found: Iterator[Found], search: MethodSearch) -> Iterator[list[Certified]]:
@@ -211,12 +209,18 @@ def search_batches(
     held: AbstractSet[FaceQuadruple],
     elsewhere: Elsewhere | None,
 ) -> Iterator[list[Certified]]:
-    """Go through the quadruples that no family holds; yield the grasps kept on each."""
-    split = ((batch, without_grasp(work.on, batch, held)) for batch in batches(work.on, BATCH))
+    """Go through the quadruples that no family holds, until the limit; yield the grasps on each."""
+    size = BATCH if search.limit is None else LIMITED_BATCH
+    split = ((batch, without_grasp(work.on, batch, held)) for batch in batches(work.on, size))
     every, ahead = tee(split)
     parts = (Batch(to_try) for _, to_try in ahead)
     for (batch, to_try), each in zip(every, each_found(work, parts, elsewhere), strict=True):
-        yield from kept_on(batch, to_try, each.grasps, search)
+        if search.full:
+            return
+        tried, grasps = set(to_try), iter(each.grasps)
+        for faces in batch:
+            yield search.keep_each(next(grasps)) if faces in tried else []
+        next(grasps, None)  # runs the search to its end, where its counts are complete
         search.take(each.gathered, each.seconds)
 
 
@@ -225,43 +229,18 @@ def search_undecided(
 ) -> Iterator[list[Certified]]:
     """Go once more, with more parts, through the quadruples that were left undecided."""
     open_yet = tuple(search.gathered.undecided)
-    for faces, each in zip(
-        open_yet, each_found(work, map(Completion, open_yet), elsewhere), strict=True
-    ):
+    parts = (Batch((faces,), again=True) for faces in open_yet)
+    for faces, each in zip(open_yet, each_found(work, parts, elsewhere), strict=True):
         del search.gathered.undecided[faces]
         for grasps in each.grasps:
             yield search.keep_each(grasps)
         search.take(each.gathered, each.seconds)
 
 
-def search_free(
-    on: Standard, request: PlanRequest, search: MethodSearch, held: AbstractSet[FaceQuadruple]
-) -> Iterator[list[Certified]]:
-    """Go through the quadruples that no family holds, until the limit is reached."""
-    for batch in batches(on, LIMITED_BATCH):
-        if search.full:
-            return
-        to_try = without_grasp(on, batch, held)
-        found = found_on(on, to_try, request, search.gathered)
-        yield from kept_on(batch, to_try, ([each] if each else [] for each in found), search)
-
-
-def kept_on(
-    batch: Sequence[FaceQuadruple],
-    tried: Sequence[FaceQuadruple],
-    found: Iterable[list[Certified]],
-    search: MethodSearch,
-) -> Iterator[list[Certified]]:
-    """Keep the grasps found on a batch; yield those of each quadruple, tried or not."""
-    these, grasps = set(tried), iter(found)
-    for faces in batch:
-        yield search.keep_each(next(grasps)) if faces in these else []
-    next(grasps, None)  # runs the search to its end, where its counts are complete
-
-
 def batches(on: Standard, size: int) -> Iterator[Sequence[FaceQuadruple]]:
     """Yield all quadruples of faces in batches; the ones with two halves of a face come last."""
-    quadruples = _every_quadruple(on)
+    whole = combinations(range(len(on.faces)), FINGERS)
+    quadruples = chain(whole, map(four, on.shared.tolist()))
     while batch := list(islice(quadruples, size)):
         yield batch
 
@@ -275,10 +254,3 @@ def without_grasp(
         for faces in batch
         if faces not in held and len(chosen_shapes(on.shapes, faces)) == FINGERS
     )
-
-
-def _every_quadruple(on: Standard) -> Iterator[FaceQuadruple]:
-    """Yield all quadruples of faces, in the order of `batches`."""
-    yield from combinations(range(len(on.faces)), FINGERS)
-    for faces in on.shared.tolist():
-        yield four(faces)

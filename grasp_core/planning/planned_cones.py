@@ -52,10 +52,8 @@ class PlannedCones:
 
     body: Polyhedron
     shapes: Shapes
-    theta: float
-    """Half-angle of the friction cones to plan with [rad]."""
-    tilted: bool
-    """Whether cones may also be tilted away from the normals."""
+    theta: float  # half-angle of the friction cones to plan with [rad]
+    tilted: bool  # whether cones may also be tilted away from the normals
 
     @cached_property
     def rooms(self) -> Array:

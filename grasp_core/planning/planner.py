@@ -22,7 +22,7 @@ from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.as_given import absence_as_given, as_given, faces_as_given
-from grasp_core.planning.certify import to_grasp, to_grasps
+from grasp_core.planning.certify import to_grasps
 from grasp_core.planning.methods import Progress, Searches, outcomes, prepared, run, unreached
 from grasp_core.planning.parts import finding_elsewhere
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
@@ -67,11 +67,9 @@ def plan(  # noqa: PLR0913 - the contract's keywords
             discs first. Reguli and free grasps have no discs: the first ones found count, and free
             ones only if the others are too few. By `friction-margin` (the least critical
             friction), `ferrari-canny` (the largest quality), `payload` (the largest mass in any
-            orientation under one squeeze with pushes up to 10 N), `first-slip` (the largest
-            multiple of the weight, at a density of 1,000 kg/m^3, at which that squeeze first slips:
-            the payload over the mass, hence the same order) and `diverse` (each next one is the
-            farthest from those before it) all grasps that are found compete. Grasps that no
-            such squeeze holds come last.
+            orientation under one squeeze with pushes up to 10 N; grasps that no such squeeze holds
+            come last) and `diverse` (each next one is the farthest from those before it) all grasps
+            that are found compete.
         seed: Seed of the free method's restarts.
         max_face_parts: Most parts into which the free method may cut the faces of one quadruple.
         complete: Decide the quadruples that would stay undecided, with up to 20,000 parts each.
@@ -132,7 +130,7 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
     check_request(body, request)
     on, searches = prepared(body, request)
     every = run(on, request, searches, None)
-    return (to_grasp(body, friction, as_given(each, on)) for each in every)
+    return (to_grasps(body, friction, [as_given(each, on)])[0] for each in every)
 
 
 def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:

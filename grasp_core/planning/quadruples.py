@@ -42,12 +42,9 @@ SPANNING_SHARE = 0.125
 class ConedQuadruples:
     """A table of face quadruples with two choices of force cones each, and bounds on discs."""
 
-    faces: Indices
-    """Faces of each quadruple, (q, 4)."""
-    normals: Array
-    """Inward unit normals of the faces, (q, 4, 3)."""
-    axes: Array
-    """Unit cone axes of both choices, around the normals and tilted, (q, 2, 4, 3)."""
+    faces: Indices  # faces of each quadruple, (q, 4)
+    normals: Array  # inward unit normals of the faces, (q, 4, 3)
+    axes: Array  # unit cone axes of both choices, around the normals and tilted, (q, 2, 4, 3)
     half_angles: Array
     """Half-angle of each choice, (q, 2) [rad]; not positive where the choice does not exist."""
     limits: Array
@@ -88,9 +85,10 @@ class ConedQuadruples:
             bounds = np.where(np.isnan(limits), np.inf, limits)
             bounds = np.minimum(bounds, self.rooms[:, None, None])
         for column, order in enumerate(construction.orders):
-            admitted = construction.admits(
-                self.normals[spans][:, order], self.half_angles[spans, NORMAL]
-            )
+            if construction.admits is None:
+                break
+            normals = self.normals[spans][:, order]
+            admitted = construction.admits(normals, self.half_angles[spans, NORMAL])
             kept = np.where(admitted[:, None], bounds[spans, :, column], -np.inf)
             bounds[spans, :, column] = kept
         return np.where(usable[:, :, None] & (bounds >= LEAST_RADIUS), bounds, -np.inf)
@@ -120,10 +118,8 @@ class WideQuadruples:
     """A table of face quadruples with upper bounds on their force cones, not chosen yet."""
 
     cones: PlannedCones
-    faces: Indices
-    """Faces of each quadruple, (q, 4)."""
-    widest: Array
-    """Upper bound on the half-angle of any choice of force cones, (q,) [rad]."""
+    faces: Indices  # faces of each quadruple, (q, 4)
+    widest: Array  # upper bound on the half-angle of any choice of force cones, (q,) [rad]
 
     def __len__(self) -> int:
         return len(self.faces)

@@ -99,12 +99,9 @@ def reach(
 class _Surroundings:
     """Triangles that a finger may collide with, each with a ball around it."""
 
-    corners: Array
-    """Corners, (t, 3, 3) [m]."""
-    middles: Array
-    """Centres of the balls, (t, 3) [m]."""
-    extents: Array
-    """Radii of the balls, (t,) [m]."""
+    corners: Array  # (t, 3, 3) [m]
+    middles: Array  # centres of the balls, (t, 3) [m]
+    extents: Array  # radii of the balls, (t,) [m]
 
     @classmethod
     def of(cls, body: Polyhedron, face: int) -> "_Surroundings":

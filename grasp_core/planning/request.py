@@ -28,9 +28,7 @@ FAMILIES: tuple[Family, ...] = get_args(Family)
 METHODS: tuple[Method, ...] = get_args(Method)
 """Everything that `families` may name: the three constructions and `free`."""
 ConeKind: TypeAlias = Literal["tilted", "normal"]
-RankBy: TypeAlias = Literal[
-    "radius", "friction-margin", "ferrari-canny", "payload", "first-slip", "diverse"
-]
+RankBy: TypeAlias = Literal["radius", "friction-margin", "ferrari-canny", "payload", "diverse"]
 """What makes one grasp better than another (see `plan`)."""
 ITS_RADIUS = ", the object's radius in m"
 FARTHEST_APPROACH = 1e3

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from textwrap import shorten
-from typing import Any, Literal, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.grasp_tables import ById, chosen, data_frame
@@ -58,40 +58,8 @@ class MethodCounts:
     """Placements that the witness or the exact closure test did not confirm: not 0 means a bug."""
 
 
-Counted: TypeAlias = Literal[
-    "tried", "solved", "infeasible", "undecided", "duplicates", "found", "unreachable", "rejected"
-]
-"""The fields of `MethodCounts` that grow during a search."""
-
-
-class Tally:
-    """Counters of candidates, for one method or one attempt on four faces, while it runs."""
-
-    def __init__(self) -> None:
-        self._counts = Counter[str]()
-
-    def count(self, what: Counted, number: int = 1) -> None:
-        """Raise one of the counters by `number`."""
-        self._counts[what] += number
-
-    def exclude(self, candidates: int, choices: int) -> None:
-        """Count candidates whose bounds prove that they have no grasp."""
-        self.count("tried", candidates)
-        self.count("infeasible", candidates)
-        self.count("solved", choices)
-
-    def add(self, other: "Tally") -> None:
-        """Add the counts of another tally, such as one attempt's."""
-        self._counts.update(other._counts)
-
-    def prune(self, every: int) -> None:
-        """Set `pruned` to the number of candidates not tried, out of `every` in all."""
-        self._counts["pruned"] = every - self._counts["tried"]
-
-    @property
-    def counts(self) -> MethodCounts:
-        """Return the counts as a frozen value."""
-        return MethodCounts(**self._counts)
+Tally: TypeAlias = Counter[str]
+"""The counts of `MethodCounts` by their names, while a search runs."""
 
 
 @dataclass(frozen=True, slots=True)

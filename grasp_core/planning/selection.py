@@ -13,7 +13,7 @@ from grasp_core.execution.loads import any_direction
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.certify import Certified
 from grasp_core.planning.reach import Finger
-from grasp_core.planning.request import FAMILIES, PlanRequest, RankBy
+from grasp_core.planning.request import FAMILIES, PlanRequest
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
 from grasp_core.values import Grasp
@@ -22,8 +22,6 @@ PUSH_N = 10.0
 """Largest push of a finger under which payloads and first slips are compared [N]."""
 TIP_RADIUS = 0.1
 """Radius of fingertips whose size is not given, in object radii: that of scenes."""
-DENSITY_KG_PER_M3 = 1000.0
-"""Density of the object whose weight grows until a contact slips."""
 
 
 def chosen(
@@ -59,23 +57,16 @@ def _measure(body: Polyhedron, request: PlanRequest) -> tuple[Callable[[Certifie
 
         return quality, SAME_SHARE
     # the best squeeze is searched to a gap, so equal grasps may come out as far apart
-    return _looseness(body, request, _mass(body, request.rank_by)), 2.0 * GAP
-
-
-def _mass(body: Polyhedron, rank_by: RankBy) -> float:
-    return 1.0 if rank_by == "payload" else DENSITY_KG_PER_M3 * body.volume
+    return _looseness(body, request), 2.0 * GAP
 
 
 def _tip_radius(body: Polyhedron, finger: Finger | None) -> float:
     return TIP_RADIUS * body.radius if finger is None else finger.radius_m
 
 
-def carried(
-    body: Polyhedron, grasp: Grasp, friction: float, rank_by: RankBy, finger: Finger | None = None
-) -> float:
-    """Return the mass [kg] or multiple of the weight that ranks a grasp; 0 if none is held."""
-    loads = any_direction(_mass(body, rank_by))
-    tip = _tip_radius(body, finger)
+def carried(body: Polyhedron, grasp: Grasp, friction: float, finger: Finger | None) -> float:
+    """Return the mass in any orientation that ranks a grasp [kg]; 0 if none is held."""
+    loads, tip = any_direction(1.0), _tip_radius(body, finger)
     try:
         found = best_squeeze(body, grasp, friction, loads, max_push_n=PUSH_N, tip_radius_m=tip)
     except NoForcesError:
@@ -99,15 +90,13 @@ def _in_order(
     return [found[place] for place in np.argsort(ranks(figures, same), kind="stable")]
 
 
-def _looseness(
-    body: Polyhedron, request: PlanRequest, mass_kg: float
-) -> Callable[[Certified], float]:
-    """Return a measure of grasps: minus the multiple of a weight that the best squeeze survives.
+def _looseness(body: Polyhedron, request: PlanRequest) -> Callable[[Certified], float]:
+    """Return a measure of grasps: minus the mass that the best squeeze survives [kg].
 
-    The weight is that of the mass, in any direction, and the multiple is certified in the linear
-    model. A grasp that no squeeze holds stably has the largest value, zero.
+    The mass is certified in any orientation, in the linear model. A grasp that no squeeze holds
+    stably has the largest value, zero.
     """
-    loads, tip = any_direction(mass_kg), _tip_radius(body, request.finger)
+    loads, tip = any_direction(1.0), _tip_radius(body, request.finger)
 
     def measure(found: Certified) -> float:
         count = len(found.normals)

@@ -6,7 +6,7 @@ from grasp_core.checked import instance, path_of
 from grasp_core.errors import about
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.planning.result import Plan
-from grasp_core.records.grasps_json import plan_from_json, plan_to_json
+from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 
 
 def save_grasps(path: str | Path, plan: Plan) -> Path:
@@ -47,4 +47,4 @@ def load_grasps(path: str | Path) -> Plan:
     path = path_of(path, "path")
     text = read_text(path)
     with about(path):
-        return plan_from_json(text)
+        return grasps_from_json(text)

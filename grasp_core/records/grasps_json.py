@@ -6,7 +6,7 @@ imported only where a file is read: plans are written without it.
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,18 +35,6 @@ digits stay within it."""
 
 RECORDED = MeshLimits(max_triangles=2_000_000, max_faces=50_000, max_parts=640)
 """Limits for the meshes in grasps files: ten times the usual, for users who raised a limit."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SavedGrasps:
-    """The contents of a `grasps.json`, read and checked."""
-
-    body: Polyhedron
-    friction: float
-    seed: int
-    grasps: tuple[Grasp, ...]
-    finger: Finger | None = None
-    """The finger whose free paths to the contacts were planned; None if none were planned."""
 
 
 def plan_to_json(body: Polyhedron, plan: Plan) -> str:
@@ -136,13 +124,7 @@ def _grasp_to_record(grasp: Grasp) -> Mapping[str, object]:
     }
 
 
-def grasps_from_json(text: str) -> SavedGrasps:
-    """Read the text of a `grasps.json`."""
-    plan = plan_from_json(text)
-    return SavedGrasps(plan.body, plan.friction, plan.seed, plan.grasps, plan.finger)
-
-
-def plan_from_json(text: str) -> Plan:
+def grasps_from_json(text: str) -> Plan:
     """Read the text of a `grasps.json` as the plan that was written.
 
     A file keeps neither times nor what is known of face quadruples without grasps: `absences`,

@@ -10,11 +10,12 @@ import importlib
 import math
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array
 from grasp_core.errors import SolverError
 
 RESIDUAL = 1e-7
@@ -36,16 +37,11 @@ stops early, and succeeds with other settings."""
 class ConicProgram:
     """The data of one conic program, rows ordered as zero, non-negative, second-order."""
 
-    q: Array
-    """Coefficients of the objective q.x, (n,)."""
-    A: Array
-    """Matrix of the constraints b - A x in K, (rows, n)."""
-    b: Array
-    """Right-hand sides of the constraints, (rows,)."""
-    zeros: int
-    """Number of rows of b - A x that must be zero."""
-    nonnegatives: int
-    """Number of rows of b - A x that must not be negative."""
+    q: Array  # coefficients of the objective q.x, (n,)
+    A: Array  # matrix of the constraints b - A x in K, (rows, n)
+    b: Array  # right-hand sides of the constraints, (rows,)
+    zeros: int  # number of rows of b - A x that must be zero
+    nonnegatives: int  # number of rows of b - A x that must not be negative
     cones: tuple[int, ...] = ()
     """Length of each second-order cone, whose rows satisfy s0 >= |(s1, ...)|."""
 
@@ -55,8 +51,7 @@ class ConicSolution:
     """A primal and a dual solution, both checked against the program's data."""
 
     x: Array
-    z: Array
-    """Dual variable: one multiplier per row of the program, (rows,)."""
+    z: Array  # dual variable: one multiplier per row of the program, (rows,)
     value: float
 
 
@@ -131,32 +126,23 @@ def _outside(program: ConicProgram, rows: Array, *, dual: bool) -> float:
     return float(worst)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Columns:
-    """A matrix in compressed columns, with the attributes that Clarabel reads.
+def _columns(A: Array) -> SimpleNamespace:
+    """Compress a matrix to columns without its zeros, with the attributes that Clarabel reads.
 
     A sparse matrix of scipy has these attributes too, but it checks its data again, and importing
     it takes longer than planning on a small object.
     """
-
-    data: Array
-    indices: Indices
-    indptr: Indices
-    shape: tuple[int, ...]
-    has_canonical_format: bool = True
-
-
-def _columns(A: Array) -> _Columns:
-    """Compress a matrix to columns without its zeros."""
     columns = A.T
     filled = columns != 0.0
     starts = np.concatenate([[0], filled.sum(axis=1).cumsum()])
-    places = filled.nonzero()[1]
-    return _Columns(columns[filled], places, starts, A.shape)
+    return SimpleNamespace(
+        data=columns[filled], indices=filled.nonzero()[1], indptr=starts, shape=A.shape,
+        has_canonical_format=True,
+    )  # fmt: skip
 
 
 @cache
-def _no_squares(n: int) -> _Columns:
+def _no_squares(n: int) -> SimpleNamespace:
     return _columns(np.zeros((n, n)))
 
 

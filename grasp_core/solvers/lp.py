@@ -40,16 +40,11 @@ thousand ends as unknown with one and is solved with the other."""
 class LinearProgram:
     """The data of one linear program; the equalities may be missing."""
 
-    c: Array
-    """Coefficients of the objective c.x, (n,)."""
-    A: Array
-    """Matrix of the inequalities, (rows, n)."""
-    b: Array
-    """Right-hand sides of the inequalities, (rows,)."""
-    A_eq: Array | None = None
-    """Matrix of the equalities, (equalities, n)."""
-    b_eq: Array | None = None
-    """Right-hand sides of the equalities, (equalities,)."""
+    c: Array  # coefficients of the objective c.x, (n,)
+    A: Array  # matrix of the inequalities, (rows, n)
+    b: Array  # right-hand sides of the inequalities, (rows,)
+    A_eq: Array | None = None  # matrix of the equalities, (equalities, n)
+    b_eq: Array | None = None  # right-hand sides of the equalities, (equalities,)
 
     def stacked(self) -> tuple[Array, Array]:
         """Return the rows of inequalities and then of equalities, with right-hand sides."""
@@ -72,16 +67,14 @@ class Optimum:
 class Infeasible:
     """A proof (Farkas), by a combination of the rows, that no |x|_1 <= `FARTHEST` is feasible."""
 
-    multipliers: Array
-    """Multipliers y, then z, of the combination, (rows + equalities,)."""
+    multipliers: Array  # multipliers y, then z, of the combination, (rows + equalities,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Below:
     """A proof, by multipliers as for an optimum, that no feasible value reaches the cutoff."""
 
-    bound: float
-    """Upper bound on all feasible values that the multipliers prove, b.y + b_eq.z."""
+    bound: float  # upper bound on all feasible values that the multipliers prove, b.y + b_eq.z
     multipliers: Array
     """Multipliers y, then z, (rows + equalities,); the first `rows` are non-negative."""
 
@@ -160,39 +153,20 @@ def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible |
         return _checked_ray(program, multipliers[:count])
     multipliers[basis] = np.linalg.solve(vertex.T, program.c)
     if status == kernel.BELOW:
-        return _checked_bound(program, multipliers[:count], cutoff)
+        proof = multipliers[:count]
+        proof[: len(program.b)] = np.maximum(proof[: len(program.b)], 0.0)
+        off, bound = float(np.abs(program.c - G.T @ proof).max()), float(h @ proof)
+        if not (off <= RESIDUAL and bound <= cutoff):  # nor if one is not a number
+            raise SolverError(
+                f"the simplex method put the optimum below {cutoff:.3g}, but proved {bound:.3g}"
+            )
+        return Below(bound, proof)
     if basis[-1] >= count:
         raise SolverError(
             "the simplex method reached its largest numbers; the program may be unbounded"
         )
     x = np.asarray(np.linalg.solve(vertex, h[basis]), dtype=np.float64)
     return _checked_optimum(program, x, multipliers[:count])
-
-
-def _checked_bound(program: LinearProgram, multipliers: Array, cutoff: float) -> Below:
-    G, h = program.stacked()
-    multipliers[: len(program.b)] = np.maximum(multipliers[: len(program.b)], 0.0)
-    off = float(np.abs(program.c - G.T @ multipliers).max())
-    bound = float(h @ multipliers)
-    if not (off <= RESIDUAL and bound <= cutoff):  # nor if one is not a number
-        raise SolverError(
-            f"the simplex method put the optimum below {cutoff:.3g}, but proved {bound:.3g}"
-        )
-    return Below(bound, multipliers)
-
-
-def _solved(program: LinearProgram, strategy: int) -> Optimum | Infeasible:
-    solver, status = _run(program, strategy)
-    kinds = _highspy().HighsModelStatus
-    if status == kinds.kOptimal:
-        solution = solver.getSolution()
-        x, duals = np.array(solution.col_value), np.array(solution.row_dual)
-        return _checked_optimum(program, x, duals)
-    if status == kinds.kInfeasible:
-        return _checked_ray(program, np.array(solver.getDualRay()[2]))
-    raise SolverError(
-        f"HiGHS ended without an optimum or a proof: {solver.modelStatusToString(status)}"
-    )
 
 
 def _checked_optimum(program: LinearProgram, x: Array, duals: Array) -> Optimum:
@@ -228,8 +202,8 @@ def _checked_ray(program: LinearProgram, ray: Array) -> Infeasible:
     raise SolverError("HiGHS called the linear program infeasible, but its proof fails the check")
 
 
-def _run(program: LinearProgram, strategy: int) -> tuple[Any, Any]:
-    highspy = _highspy()
+def _solved(program: LinearProgram, strategy: int) -> Optimum | Infeasible:
+    highspy, solver = _highs()
     G, h = program.stacked()
     lower = np.full(len(h), -np.inf)
     lower[len(program.b) :] = h[len(program.b) :]
@@ -245,22 +219,27 @@ def _run(program: LinearProgram, strategy: int) -> tuple[Any, Any]:
     model.a_matrix_.start_ = np.concatenate([[0], np.cumsum(filled.sum(axis=1))])
     model.a_matrix_.index_ = np.nonzero(filled)[1]
     model.a_matrix_.value_ = G[filled]
-    solver = _solver()
     solver.clearSolver()
     solver.setOptionValue("simplex_strategy", strategy)
     solver.passModel(model)
     solver.run()
-    return solver, solver.getModelStatus()
+    status = solver.getModelStatus()
+    if status == highspy.HighsModelStatus.kOptimal:
+        solution = solver.getSolution()
+        x, duals = np.array(solution.col_value), np.array(solution.row_dual)
+        return _checked_optimum(program, x, duals)
+    if status == highspy.HighsModelStatus.kInfeasible:
+        return _checked_ray(program, np.array(solver.getDualRay()[2]))
+    raise SolverError(
+        f"HiGHS ended without an optimum or a proof: {solver.modelStatusToString(status)}"
+    )
 
 
 @cache
-def _highspy() -> Any:
-    return importlib.import_module("highspy")
-
-
-@cache
-def _solver() -> Any:
-    solver = _highspy().Highs()
+def _highs() -> tuple[Any, Any]:
+    """Return the package of HiGHS, and a solver with the options that proofs need."""
+    highspy: Any = importlib.import_module("highspy")
+    solver = highspy.Highs()
     options = {
         "output_flag": False,
         "threads": 1,
@@ -271,4 +250,4 @@ def _solver() -> Any:
     }
     for name, value in options.items():
         solver.setOptionValue(name, value)
-    return solver
+    return highspy, solver

@@ -41,22 +41,14 @@ objective: a hundred times the accuracy asked of ProxQP."""
 class QuadraticProgram:
     """The data of the quadratic program (1)."""
 
-    P: Array
-    """Matrix of the quadratic term, symmetric and positive definite, (n, n)."""
-    q: Array
-    """Linear term of the objective, (n,)."""
-    G: Array
-    """Matrix of the inequalities, (m, n)."""
-    h: Array
-    """Right-hand sides of the inequalities, (m,)."""
-    A: Array
-    """Matrix of the equalities, (p, n); p may be 0."""
-    b: Array
-    """Right-hand sides of the equalities, (p,)."""
-    lower: Array
-    """Lower bounds of x, (n,); minus infinity where there is no bound."""
-    upper: Array
-    """Upper bounds of x, (n,); infinity where there is no bound."""
+    P: Array  # matrix of the quadratic term, symmetric and positive definite, (n, n)
+    q: Array  # linear term of the objective, (n,)
+    G: Array  # matrix of the inequalities, (m, n)
+    h: Array  # right-hand sides of the inequalities, (m,)
+    A: Array  # matrix of the equalities, (p, n); p may be 0
+    b: Array  # right-hand sides of the equalities, (p,)
+    lower: Array  # lower bounds of x, (n,); minus infinity where there is no bound
+    upper: Array  # upper bounds of x, (n,); infinity where there is no bound
 
 
 def check_solver(name: str) -> None:

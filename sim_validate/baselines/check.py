@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError
+from grasp_core.planning.result import Plan
 from grasp_core.provenance import arithmetic, versions
-from grasp_core.records.grasps_json import SavedGrasps
 from sim_validate.baselines.baseline import Baseline, entry_of
 from sim_validate.baselines.compare import Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.part import Present
@@ -39,7 +39,7 @@ class Measured:
 
 
 def measured(
-    saved: SavedGrasps, about: tuple[str, int | None], how: How, processors: int = 1,
+    saved: Plan, about: tuple[str, int | None], how: How, processors: int = 1,
     report: Report = _silent,
 ) -> Measured:  # fmt: skip
     """Simulate grasps and make a baseline of their verdicts."""
@@ -109,7 +109,7 @@ def complete(found: Measured, now: Present) -> Baseline:
     return replace(found.baseline, part=now.recorded, unit=unit, scale=scale)
 
 
-def with_planned_fingers(how: How, before: Baseline, saved: SavedGrasps) -> How:
+def with_planned_fingers(how: How, before: Baseline, saved: Plan) -> How:
     """Replace the fingertips of the setup by those that the grasps are planned for now."""
     fingers = how.setup.fingers
     if fingers.radius_m != before.planned_radius_m:
@@ -123,7 +123,7 @@ def seen_from(baseline: Path, grasps: Path) -> str:
     return Path(os.path.relpath(grasps.resolve(), baseline.resolve().parent)).as_posix()
 
 
-def _planned_radius(saved: SavedGrasps) -> float | None:
+def _planned_radius(saved: Plan) -> float | None:
     return None if saved.finger is None else saved.finger.radius_m
 
 

@@ -16,7 +16,8 @@ from grasp_core.errors import InputError, MeshError
 from grasp_core.files.text_files import read_bytes
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
-from grasp_core.records.grasps_json import RECORDED, SavedGrasps
+from grasp_core.planning.result import Plan
+from grasp_core.records.grasps_json import RECORDED
 from grasp_core.transferring.changed_part import fitting_lengths, fitting_unit, load_changed_part
 from grasp_core.transferring.face_changes import (
     ANGLE_DEG,
@@ -108,7 +109,7 @@ class Source:
 
 
 def source_of(
-    saved: SavedGrasps,
+    saved: Plan,
     grasps: Path,
     folders: Iterable[Path],
     named: Path | None = None,
@@ -171,7 +172,7 @@ class ChangedPartError(InputError):
 class Present:
     """The grasps of a file on their part as it is now."""
 
-    saved: SavedGrasps
+    saved: Plan
     """The grasps that can be tested: those of the file, or what became of them on the changed part,
     with their old ids."""
     source: Source = field(default_factory=Source)
@@ -312,7 +313,7 @@ class Present:
         return replace(found, since=since)
 
 
-def present(saved: SavedGrasps, path: Path, source: Source, asked: IfChanged = CARRY) -> Present:
+def present(saved: Plan, path: Path, source: Source, asked: IfChanged = CARRY) -> Present:
     """Carry grasps over to their part as it is now; they stay as they are if it has not changed."""
     if source.note and asked.missing == FAIL:
         raise ChangedPartError(
@@ -333,7 +334,7 @@ def present(saved: SavedGrasps, path: Path, source: Source, asked: IfChanged = C
     return Present(_tested(saved, carried), source, carried, unit, asked)
 
 
-def _carried(saved: SavedGrasps, path: Path, file: Path, asked: IfChanged) -> tuple[str, Transfer]:
+def _carried(saved: Plan, path: Path, file: Path, asked: IfChanged) -> tuple[str, Transfer]:
     """Read the changed part, in the unit that is returned, and carry the grasps over to it."""
     try:
         check_planar(saved.body, "the old part")
@@ -352,14 +353,14 @@ def _carried(saved: SavedGrasps, path: Path, file: Path, asked: IfChanged) -> tu
         ) from error
 
 
-def _tested(saved: SavedGrasps, carried: Transfer) -> SavedGrasps:
+def _tested(saved: Plan, carried: Transfer) -> Plan:
     grasps = tuple(
         replace(each.grasp, id=each.old.id) for each in carried.grasps if each.grasp is not None
     )
     return replace(saved, body=carried.new, grasps=grasps)
 
 
-def testable(now: Present, limit: int | None) -> SavedGrasps:
+def testable(now: Present, limit: int | None) -> Plan:
     """Return the grasps that a new baseline is about."""
     first = now.first(limit)
     if first.gone and not first.saved.grasps:

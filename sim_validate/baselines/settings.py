@@ -11,7 +11,7 @@ from pydantic_core import to_jsonable_python
 from grasp_core.checked import MOST_RANDOM_WRENCHES
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import complaint
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface
 from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution, execution_table
@@ -90,7 +90,7 @@ def of_settings(settings: Mapping[str, Any], path: str) -> How:
     return How(setup, agenda, execution)
 
 
-def setup_for(saved: SavedGrasps, path: Path | None) -> Setup:
+def setup_for(saved: Plan, path: Path | None) -> Setup:
     """Build the setup of grasps: with their planned fingertips, then with a settings file."""
     setup = Setup(fingers=with_planned_radius(FingerSettings(), saved.finger))
     return setup if path is None else setup_from_file(path, setup)

@@ -11,7 +11,7 @@ from typing import Any
 
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import named_settings, shown
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from sim_validate.baselines.baseline import Baseline, check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import (
     Checked,
@@ -76,7 +76,7 @@ class Suite:
     changed_part: IfChanged = CARRY
 
     @cached_property
-    def saved(self) -> SavedGrasps:
+    def saved(self) -> Plan:
         """Read the grasps that the suite is about."""
         return read_grasps(self.grasps)
 

@@ -160,13 +160,10 @@ class Planning:
     paper, or tilted ones too, which serve boxes, prisms and any friction."""
     limit: Count | None = None
     """Keep at most this many grasps, the best ones; if not given, `plan` keeps all."""
-    rank_by: Literal[
-        "radius", "friction-margin", "ferrari-canny", "payload", "first-slip", "diverse"
-    ] = "radius"
+    rank_by: Literal["radius", "friction-margin", "ferrari-canny", "payload", "diverse"] = "radius"
     """Which grasps are best: those with the largest discs, of each family in turn; with the least
     critical friction; with the largest quality; that carry the largest mass in any orientation
-    under one squeeze of at most 10 N; whose weight may grow most until that squeeze slips; or each
-    next one the farthest from those before it."""
+    under one squeeze of at most 10 N; or each next one the farthest from those before it."""
     max_face_parts: Count = 1
     """Number of parts into which the family `free` may divide the four faces while it is undecided.
     """

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from sim_validate.baselines.baseline import check_writable, fields_of, read_baseline, write_baseline
 from sim_validate.baselines.check import Checked, check, complete, measured, seen_from
 from sim_validate.baselines.compare import Finding, Status, failing
@@ -72,7 +72,7 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
 
 
 def _present(
-    saved: SavedGrasps,
+    saved: Plan,
     grasps: Path,
     baseline: Path,
     given: baseline_flags.ChangedPart,

@@ -3,7 +3,6 @@
 import math
 import os
 import sys
-from collections.abc import Mapping
 
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
@@ -27,13 +26,9 @@ from sim_validate.validation.validation import validate
 
 LOOPS = {
     "kept": "yes",
-    "not kept": (
-        "yes, but each process spends a minute on compiling them again: make the user's cache "
-        "folder or NUMBA_CACHE_DIR writable"
-    ),
+    "not kept": "yes, but anew in each process: make the cache folder or NUMBA_CACHE_DIR writable",
     "interpreted": "no, NUMBA_DISABLE_JIT says so: unset it, planning is a hundred times slower",
 }
-"""Sentences on whether solver loops are compiled, and whether the compiled code is kept on disk."""
 
 
 def check_installation(command: command_flags.Doctor, reporter: Reporter) -> int:
@@ -54,15 +49,15 @@ def check_installation(command: command_flags.Doctor, reporter: Reporter) -> int
         "simulated grasp holds": bool(verdict and verdict.held),
         "simulated controls do not": bool(verdict and verdict.controls and verdict.controls_let_go),
     }
-    machine, found = _machine(), versions()
-    record = {"versions": found, "machine": machine, "gate": gate_record(gate), "checks": checks}
-    reporter.document(finite(record))
-    reporter.table("versions", ("what", "version"), list(found.items()))
-    rows = [
+    machine = _machine()
+    record = {"versions": versions(), "machine": machine, "gate": gate_record(gate)}
+    reporter.document(finite(record | {"checks": checks}))
+    reporter.table("versions", ("what", "version"), list(versions().items()))
+    cases = [
         (check.name, f"{check.value:.5g}", f"{check.least:.5g} to {check.largest:.5g}")
         for check in gate.checks
     ]
-    reporter.table("the simulator's known cases", ("case", "measured", "must be"), rows)
+    reporter.table("the simulator's known cases", ("case", "measured", "must be"), cases)
     states = [("ok" if passed else "FAILED", name) for name, passed in checks.items()]
     reporter.table("checks", ("state", "what"), states)
     for name, state in machine.items():
@@ -74,26 +69,23 @@ def check_installation(command: command_flags.Doctor, reporter: Reporter) -> int
     reporter.warn(
         f"wrong answers from {', '.join(failed)}: reinstall the package"
         if gate.passed
-        else "the simulator failed its checks: this MuJoCo does not give the answers of statics, "
-        "and `validate` will refuse to certify anything; install the versions of "
-        ".ci/constraints.txt"
+        else "this MuJoCo does not give the answers of statics, so that `validate` certifies "
+        "nothing; install the versions of .ci/constraints.txt"
     )
     return Exit.INTERNAL
 
 
-def _machine() -> Mapping[str, str]:
+def _machine() -> dict[str, str]:
     """Describe what this machine offers, and what to do if something is missing."""
     try:
         graphics = f"MuJoCo draws with {available_graphics() or 'its default'}"
     except GraphicsError as error:
         graphics = f"none ({error}); pictures and reports need none, clips do: {remedy()}"
-    kernel = compiled("grasp_core.solvers.lp_kernel")
+    look = "yes" if has_display() else "no; use `graspproof view` with --picture, --page or --clip"
     return {
         "Python": sys.executable,
         "cores": f"{available_cores()} to use (--jobs), of {os.cpu_count()}",
-        "compiled loops": LOOPS[state_of(kernel.solve)],
+        "compiled loops": LOOPS[state_of(compiled("grasp_core.solvers.lp_kernel").solve)],
         "graphics": graphics,
-        "display for the viewer": (
-            "yes" if has_display() else "no; use `graspproof view` with --picture, --page or --clip"
-        ),
+        "display for the viewer": look,
     }

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut, warn_of
 from sim_validate.cli.exit_codes import Exit
@@ -56,7 +56,9 @@ def execute_file(command: command_flags.Execute, reporter: Reporter) -> int:
     )  # fmt: skip
     if chosen is None:
         return Exit.NONE
-    settings = execution_settings(chosen, command.executing, command.trials, command.down)
+    settings = execution_settings(
+        chosen.body, chosen.seed, chosen.finger, command.executing, command.trials, command.down
+    )
     physics = {} if command.setup is None else physics_from_file(command.setup)
     with alone_in(command.out):
         code, text = execute_grasps(
@@ -68,7 +70,7 @@ def execute_file(command: command_flags.Execute, reporter: Reporter) -> int:
 
 
 def execute_grasps(
-    saved: SavedGrasps, settings: ExecutionSettings, *, jobs: int, folder: Path | None,
+    saved: Plan, settings: ExecutionSettings, *, jobs: int, folder: Path | None,
     reporter: Reporter, physics: Mapping[str, object] | None = None,
 ) -> tuple[Exit, str]:  # fmt: skip
     """Execute grasps; return the exit code and the text of executions.json."""

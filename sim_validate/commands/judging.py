@@ -8,7 +8,7 @@ from pathlib import Path
 
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.files.result_folders import JUDGEMENTS, remove_results
@@ -22,7 +22,7 @@ TOTALS = ("test", "grasps", "theirs passed", "ours held", "predicted", "theirs a
 
 
 def judge_grasps(
-    saved: SavedGrasps, names: Sequence[str], setup: Setup, *, jobs: int, folder: Path | None,
+    saved: Plan, names: Sequence[str], setup: Setup, *, jobs: int, folder: Path | None,
     reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
     """Judge grasps by tests with four fingertips; return exit code and text of judgements.json."""
@@ -35,7 +35,7 @@ def judge_grasps(
 
 
 def judge_hands(
-    saved: SavedGrasps, hand: Hand, found: Sequence[HandReach], names: Sequence[str], *,
+    saved: Plan, hand: Hand, found: Sequence[HandReach], names: Sequence[str], *,
     jobs: int, folder: Path | None, reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
     """Judge the poses of a hand by tests; return the exit code and the text of judgements.json."""
@@ -49,7 +49,7 @@ def judge_hands(
 
 
 def _judged(
-    saved: SavedGrasps, cases: Sequence[Callable[[], Judgement]], jobs: int, folder: Path | None,
+    saved: Plan, cases: Sequence[Callable[[], Judgement]], jobs: int, folder: Path | None,
     reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
     if folder:

@@ -17,7 +17,7 @@ from grasp_core.arrays import Array
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planner import plan
-from grasp_core.planning.request import RankBy, methods_for
+from grasp_core.planning.request import methods_for
 from grasp_core.planning.result import Moved, Plan
 from grasp_core.planning.selection import carried
 from grasp_core.records.grasps_json import plan_to_json
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from sim_validate.parallel.certifying import Found
     from sim_validate.records.best import Rated
 
-CARRIED = {"payload": "payload kg", "first-slip": "first slip"}
 """Column of what grasps carry, by the rank that orders them."""
 
 
@@ -134,7 +133,7 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
     if found.absence:
         reporter.say(found.absence)
         return Exit.NONE
-    columns, rows = _table(body, found, command.planning.rank_by)
+    columns, rows = _table(body, found, carry=command.planning.rank_by == "payload")
     reporter.table(f"{len(found.grasps)} grasps of {body.name}", columns, rows)
     say_cut(len(found.grasps), reporter)
     if found.moves:
@@ -162,7 +161,7 @@ def _task(command: command_flags.Plan) -> Array | None:
 
 
 def _table(
-    body: Polyhedron, found: Plan, rank_by: RankBy
+    body: Polyhedron, found: Plan, *, carry: bool
 ) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return the columns and rows that show the best grasps.
 
@@ -171,13 +170,12 @@ def _table(
     """
     shown = found.grasps[:TABLE_ROWS]
     friction, finger = found.friction, found.finger
-    heading = CARRIED.get(rank_by, "margin")
+    heading = "payload kg" if carry else "margin"
     columns = ("grasp", "family", "radius mm", "mu*", "theta* deg", heading, "quality N")
     figures = [
-        f"{carried(body, g, friction, rank_by, finger):.4g}" if rank_by in CARRIED
-        else f"{g.closure_margin:.4f}"
+        f"{carried(body, g, friction, finger):.4g}" if carry else f"{g.closure_margin:.4f}"
         for g in shown
-    ]  # fmt: skip
+    ]
     rows = [
         (g.id, g.family, f"{1e3 * g.radius:.3g}" if g.radius else "-", f"{g.critical_friction:.4f}",
          f"{math.degrees(g.span_angle):.2f}", figure, f"{g.ferrari_canny[0]:.4f}")

@@ -20,7 +20,7 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_payload
 from grasp_core.hands.reach import HandReach, reach_with, uncoupled
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
@@ -83,7 +83,7 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
 
 
 def _reach(
-    command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, reporter: Reporter
+    command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporter
 ) -> tuple[list[HandReach], HandTrials, str]:
     if command.out is not None:
         remove_results(command.out, "reaches")
@@ -91,10 +91,7 @@ def _reach(
         "regions": not command.contacts_only, "table_down": command.table,
         "clearance_m": command.clearance_m, "starts": command.starts, "seed": command.seed,
     }  # fmt: skip
-    jobs = [
-        partial(reach_with, hand, saved.body, grasp, saved.friction, **asked)
-        for grasp in saved.grasps
-    ]
+    look = partial(reach_with, hand, saved.body, friction=saved.friction, **asked)
     if command.mass_kg is not None:
         asked["execution"] = asdict(hand_execution_settings(command.mass_kg).used)
     found, tried = list[HandReach](), HandTrials()
@@ -102,10 +99,8 @@ def _reach(
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
     try:
-        results = processes.each(call, jobs, jobs=command.jobs)
-        for one in reporter.counted(
-            "reaching", results, len(jobs), "reached", lambda one: one.reached
-        ):
+        results, count = processes.each(look, saved.grasps, jobs=command.jobs), len(saved.grasps)
+        for one in reporter.counted("reaching", results, count, "reached", lambda one: one.reached):
             found.append(one)
         stood = [one for one in found if one.reached]
         tried.payloads.update(carried(hand, saved, stood))
@@ -180,7 +175,7 @@ def _row(hand: Hand, each: HandReach) -> tuple[str, ...]:
     return (each.grasp, "yes", names, str(each.starts), *yes)
 
 
-def carried(hand: Hand, saved: SavedGrasps, found: Sequence[HandReach]) -> dict[str, HandPayload]:
+def carried(hand: Hand, saved: Plan, found: Sequence[HandReach]) -> dict[str, HandPayload]:
     """Find the largest mass in any orientation, by the ids of the grasps that are reached.
 
     There is none for a hand whose motors or links are not known well enough, and for grasps in
@@ -226,7 +221,7 @@ def tries_ours(command: hand_flags.Reach) -> bool:
 
 
 def _try(
-    command: hand_flags.Reach, hand: Hand, saved: SavedGrasps, found: Sequence[HandReach],
+    command: hand_flags.Reach, hand: Hand, saved: Plan, found: Sequence[HandReach],
     tried: HandTrials, reporter: Reporter,
 ) -> None:  # fmt: skip
     """Simulate and execute what the hand reaches; what is entered by then outlasts an interrupt."""

@@ -8,7 +8,7 @@ from grasp_core.errors import GraspError
 from grasp_core.files.json_text import text_of
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.records.grasps_json import SavedGrasps, plan_to_json
+from grasp_core.records.grasps_json import plan_to_json
 from sim_validate.cli import command_flags
 from sim_validate.cli.command_flags import Report
 from sim_validate.cli.console import Reporter
@@ -75,18 +75,17 @@ def _run_in(
         return Exit.NONE
     if found.moves:
         show_gains(found.moves, reporter)
-    saved = SavedGrasps(body, found.friction, found.seed, found.grasps, found.finger)
-    for grasp in saved.grasps:
-        scene = setup.scene(body, grasp, saved.friction)
+    for grasp in found.grasps:
+        scene = setup.scene(body, grasp, found.friction)
         write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
-    code, text = simulate_grasps(saved, setup, agenda, jobs=jobs, folder=folder, reporter=reporter)
+    code, text = simulate_grasps(found, setup, agenda, jobs=jobs, folder=folder, reporter=reporter)
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
     try:
         if execution is None:
             reporter.text(text)
         else:
             survival, more = execute_grasps(
-                saved, execution, jobs=jobs, folder=folder, reporter=reporter
+                found, execution, jobs=jobs, folder=folder, reporter=reporter
             )
             reporter.text(text_of(json.loads(text) | {"executions": json.loads(more)}))
             code = max(code, survival)

@@ -10,8 +10,8 @@ from pathlib import Path
 from grasp_core.by_value import counted
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.files.text_files import write_text
+from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_files import load_grasps
-from grasp_core.records.grasps_json import SavedGrasps
 from grasp_core.values import Grasp
 from scenes import exports
 from scenes.mjcf import build_scene
@@ -90,7 +90,7 @@ def _check(command: command_flags.Scene) -> None:
         )
 
 
-def _scaled(command: command_flags.Scene, saved: SavedGrasps, friction: float) -> TextOf:
+def _scaled(command: command_flags.Scene, saved: Plan, friction: float) -> TextOf:
     fingers = with_planned_radius(finger_settings(command.fingers), saved.finger)
     physics = PhysicsSettings(torsion_m=command.fingers.torsion_m)
     return lambda grasp: (
@@ -100,10 +100,8 @@ def _scaled(command: command_flags.Scene, saved: SavedGrasps, friction: float) -
     )
 
 
-def _held(
-    command: command_flags.Scene, saved: SavedGrasps, friction: float, reporter: Reporter
-) -> TextOf:
-    settings = holding(saved, command.mass, command.tips, command.down)
+def _held(command: command_flags.Scene, saved: Plan, friction: float, reporter: Reporter) -> TextOf:
+    settings = holding(saved.body, saved.finger, command.mass, command.tips, command.down)
 
     def text_of(grasp: Grasp) -> str:
         best = chosen_squeeze(saved.body, grasp, friction, settings)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut, warn_of
@@ -47,7 +47,7 @@ def validate_file(command: command_flags.Validate, reporter: Reporter) -> int:
 
 
 def simulate_grasps(
-    saved: SavedGrasps, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None,
+    saved: Plan, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None,
     reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
     """Simulate grasps; return the exit code and the text of verdicts.json."""

@@ -10,7 +10,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_text
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, has_display, write_clip
 from scenes.drawing.pictures import grasp_sheet
@@ -71,7 +71,7 @@ def view_grasp(command: command_flags.View, reporter: Reporter) -> int:
     return Exit.GOOD
 
 
-def _scene(saved: SavedGrasps, grasp: Grasp, friction: float) -> Scene:
+def _scene(saved: Plan, grasp: Grasp, friction: float) -> Scene:
     fingers = with_planned_radius(FingerSettings(), saved.finger)
     return build_scene(saved.body, grasp, friction, fingers=fingers)
 

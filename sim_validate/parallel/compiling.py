@@ -79,15 +79,18 @@ def _clearance() -> None:
 
 
 def _hand_checks() -> None:
-    from grasp_core.hands.first_use import compile_checks
+    from grasp_core.hands.collisions import clearances
     from grasp_core.hands.named_hands import load_hand
+    from grasp_core.hands.starts import postures
 
-    compile_checks(load_hand("allegro"), example_object("tetrahedron"), 0)
+    hand, body = load_hand("allegro"), example_object("tetrahedron")
+    (joints, *_), _ = postures(hand, 0)
+    clearances(hand, body, joints, np.eye(4), np.arange(len(hand.fingers)))
 
 
 def _hand_posing() -> None:
-    from grasp_core.hands.first_use import compile_posing
     from grasp_core.hands.named_hands import load_hand
+    from grasp_core.hands.pose_search import compile_posing
 
     compile_posing(load_hand("allegro"), example_object("tetrahedron"))
 

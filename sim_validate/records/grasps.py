@@ -6,21 +6,21 @@ from pathlib import Path
 from grasp_core.errors import InputError, about
 from grasp_core.files.text_files import read_text
 from grasp_core.planning.result import Plan
-from grasp_core.records.grasps_json import SavedGrasps, grasps_from_json
+from grasp_core.records.grasps_json import grasps_from_json
 from grasp_core.values import Grasp
 
 NAMED = 5
 """Largest number of names that a message lists."""
 
 
-def read_grasps(path: Path) -> SavedGrasps:
+def read_grasps(path: Path) -> Plan:
     """Read the grasps of a `grasps.json`."""
     text = read_text(path)
     with about(path):
         return grasps_from_json(text)
 
 
-def grasp_with_id(path: Path, saved: SavedGrasps | Plan, wanted: str | None) -> Grasp:
+def grasp_with_id(path: Path, saved: Plan, wanted: str | None) -> Grasp:
     """Find the grasp with an id; the id may be left out if the file has one grasp only."""
     if wanted is None and len(saved.grasps) == 1:
         return saved.grasps[0]

@@ -5,7 +5,7 @@ import math
 from grasp_core.files.json_text import text_of
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.provenance import versions
-from grasp_core.records.grasps_json import SavedGrasps, plan_to_json
+from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.transferring.face_changes import FaceChange
 from grasp_core.transferring.transfer import (
     FRICTION_BAND,
@@ -116,7 +116,7 @@ def _figures_record(found: GraspFigures) -> dict[str, object]:
     }
 
 
-def carried_to_json(found: Transfer, saved: SavedGrasps) -> str:
+def carried_to_json(found: Transfer, saved: Plan) -> str:
     """Write the carried grasps as the text of a `grasps.json` of the changed part."""
     absence = None
     if not found.carried:

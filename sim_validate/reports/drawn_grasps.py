@@ -13,7 +13,7 @@ import numpy as np
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import about
 from grasp_core.files.text_files import write_text
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from grasp_core.values import ContactRegion, Grasp, four
 from scenes.drawing.clips import GraphicsError, write_trial_clip
 from scenes.drawing.hands import PosedHand
@@ -37,7 +37,7 @@ from sim_validate.reports.run_folder import RunFolder
 class Task:
     """A grasp to draw, in a form that can be sent to another process."""
 
-    saved: SavedGrasps
+    saved: Plan
     friction: float
     verdict: Record | None
     regions: Record | None

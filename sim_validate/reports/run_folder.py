@@ -10,7 +10,7 @@ from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import read_text
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.files.result_folders import BEST, JUDGEMENTS, REACHES
 from sim_validate.protocols.judgements_json import JudgementsFile
@@ -33,7 +33,7 @@ class RunFolder:
     """What `plan`, `validate`, `execute`, `regions` and `reach` have written into one folder."""
 
     path: Path
-    saved: SavedGrasps
+    saved: Plan
     friction: float
     """Friction at which the grasps were tested; if they were not, at which they were planned."""
     verdicts: Mapping[str, Record]
@@ -129,7 +129,7 @@ def _run(path: Path) -> RunFolder:
     )
 
 
-def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
+def reaches_beside(grasps: Path, saved: Plan) -> "SavedReaches | None":
     """Read where a hand stands in grasps from the folder of their file."""
     path = grasps.with_name(REACHES)
     if not path.is_file():
@@ -142,12 +142,12 @@ def reaches_beside(grasps: Path, saved: SavedGrasps) -> "SavedReaches | None":
     return found
 
 
-def _by_id(path: Path, records: Sequence[Record], saved: SavedGrasps) -> Mapping[str, Record]:
+def _by_id(path: Path, records: Sequence[Record], saved: Plan) -> Mapping[str, Record]:
     _check_contacts(path, records, saved)
     return {each["id"]: each for each in records}
 
 
-def _check_contacts(path: Path, records: Sequence[Record], saved: SavedGrasps) -> None:
+def _check_contacts(path: Path, records: Sequence[Record], saved: Plan) -> None:
     """Refuse a file that lists a grasp twice, or with other contacts than its own."""
     contacts = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
     for each in records:
@@ -163,7 +163,7 @@ def _check_contacts(path: Path, records: Sequence[Record], saved: SavedGrasps) -
         )
 
 
-def _executions(path: Path, saved: SavedGrasps) -> Executions | None:
+def _executions(path: Path, saved: Plan) -> Executions | None:
     if not path.is_file():
         return None
     found = load_executions(path)
@@ -173,7 +173,7 @@ def _executions(path: Path, saved: SavedGrasps) -> Executions | None:
     return found
 
 
-def _read(path: Path, read: Callable[[str], Read], saved: SavedGrasps) -> Read | None:
+def _read(path: Path, read: Callable[[str], Read], saved: Plan) -> Read | None:
     if not path.is_file():
         return None
     with about(path):
@@ -182,7 +182,7 @@ def _read(path: Path, read: Callable[[str], Read], saved: SavedGrasps) -> Read |
     return found
 
 
-def _check_object(path: Path, sha256: str, saved: SavedGrasps) -> None:
+def _check_object(path: Path, sha256: str, saved: Plan) -> None:
     if sha256 != saved.body.content_sha256:
         raise InputError(
             f"{path}: the file is about another object than {GRASPS} beside it; write it again, "

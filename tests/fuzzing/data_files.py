@@ -11,8 +11,9 @@ from pydantic_core import to_jsonable_python
 import grasp_core as gc
 from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import text_of
+from grasp_core.planning.result import Plan
 from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
-from grasp_core.records.grasps_json import SavedGrasps, grasps_from_json, plan_to_json
+from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
 from sim_validate.baselines.baseline import baseline_from_json, baseline_to_json
 from sim_validate.baselines.settings import of_settings
@@ -51,7 +52,7 @@ def grasps_seed() -> bytes:
     return plan_to_json(body, gc.plan(body, 0.5, limit=1)).encode()
 
 
-def _same_grasps(data: bytes, found: SavedGrasps) -> None:
+def _same_grasps(data: bytes, found: Plan) -> None:
     stated = json.loads(data)
     assert stated["friction"] == found.friction
     assert stated["seed"] == found.seed

@@ -24,7 +24,7 @@ from grasp_core.arrays import Array
 from grasp_core.checked import BOUNDS, coefficient, function, number, seed_of, whole
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
-from grasp_core.objects.on_faces import check_body
+from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.grounds import SEARCH_DIGITS, exact_maps, first_nodes, grounds_of
 from grasp_core.optimizing.best.incumbents import begin, climbed, piece_at
@@ -255,12 +255,7 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
         InputError: An argument is out of range, or no contacts in force closure are found.
         SolverError: A program's answer failed its check.
     """
-    check_body(body)
-    if body.patches is not None:
-        raise InputError(
-            f"best_grasp: expected an object with planar faces, got {body.name} with curved ones; "
-            "take a mesh with fewer, planar faces"
-        )
+    check_planar(body, "best_grasp")
     friction, seed = coefficient(friction), seed_of(seed)
     number(gap, "gap", **BOUNDS["gap"])
     loads = Measure.of(measure, wrenches, body.radius)

@@ -75,8 +75,7 @@ class Grounds(ByValue):
     normals: Array  # inward unit normals, (p, 3)
     origins: Array  # points whose plane coordinates are zero, (p, 3)
     frames: Array  # orthonormal columns that span the planes, (p, 3, 2)
-    corners: Array
-    """Corners in plane coordinates, in order, zero where there are fewer, (p, 24, 2)."""
+    corners: Array  # corners in plane coordinates, in order, zero where there are fewer, (p, 24, 2)
     counts: Indices  # how many corners each has, (p,)
 
     def __post_init__(self) -> None:

@@ -74,10 +74,10 @@ that a search may be asked for."""
 
 
 class Stop:
-    """Tells threads to stop, after a time or when asked."""
+    """Tells threads to stop: when asked, or one thread after some nodes, whatever the clock."""
 
-    def __init__(self) -> None:
-        self._event = threading.Event()
+    def __init__(self, nodes: float = math.inf) -> None:
+        self._event, self._left = threading.Event(), nodes
 
     def __call__(self) -> bool:
         """Return whether to stop."""
@@ -89,17 +89,6 @@ class Stop:
 
     def spend(self, nodes: int) -> None:
         """Take note that a thread has visited so many nodes."""
-
-
-class StopAfter(Stop):
-    """Stops one thread after a number of nodes, which does not depend on the clock."""
-
-    def __init__(self, nodes: int) -> None:
-        super().__init__()
-        self._left = nodes
-
-    def spend(self, nodes: int) -> None:
-        """Count nodes, and stop when there were enough."""
         self._left -= nodes
         if self._left <= 0:
             self.now()
@@ -143,8 +132,7 @@ class Part:
     finished: bool = False
     left: list[Nodes] = field(default_factory=list[Nodes])
     """Nodes that are left to parts of their own, in the order of the tree."""
-    parts: list["Part"] = field(default_factory=list["Part"])
-    """These parts."""
+    parts: list["Part"] = field(default_factory=list["Part"])  # these parts
 
 
 class Steps(NamedTuple):
@@ -254,18 +242,16 @@ class Searching:
     jobs: int
     stop: Stop
     measure: Measure = FERRARI_CANNY
-    spare: float = 0.0
-    """How far below threshold times demand a support still counts as an answer."""
+    spare: float = 0.0  # how far below threshold times demand a support still counts as an answer
     pool: Any = None
     nodes: int = 0  # how many nodes were visited in all levels
 
     def __post_init__(self) -> None:
-        self.pool = self.empty_pool()
-
-    @property
-    def count(self) -> int:
-        """Return the number of pieces."""
-        return len(self.grounds.counts)
+        pieces = len(self.grounds.counts)
+        self.pool = compiled(TWISTS).Pool(
+            np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((pieces, 6, POOL)),
+            np.zeros(POOL, np.int64), np.full(POOL, -1), np.zeros(1, np.int64),
+        )  # fmt: skip
 
     @property
     def pieces(self) -> Any:
@@ -284,14 +270,6 @@ class Searching:
         scale = math.ldexp(1.0, math.frexp(ASIDE * self.measure.size)[1])
         loads = scale * on_grid(self.measure.loads / scale, SEARCH_DIGITS)
         return kernel.Demand(int(kinds[self.measure.name]), loads)
-
-    def empty_pool(self) -> Any:
-        """Return a pool without twists."""
-        return compiled(TWISTS).Pool(
-            np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((self.count, 6, POOL)),
-            np.zeros(POOL, np.int64),
-            np.full(POOL, -1), np.zeros(1, np.int64),
-        )  # fmt: skip
 
     def learn(self, twists: Array, pool: Any = None, now: int = 0) -> None:
         """Add twists, (n, 6), to a pool, the common one by default."""

@@ -110,10 +110,8 @@ KERNEL = "grasp_core.optimizing.best.replay_kernel"
 class Slack(NamedTuple):
     """What a proof leaves for rounding and for errors of symmetries."""
 
-    raised: float
-    """How far its bound is above the threshold that it refutes, by (3)."""
-    lowered: float
-    """How far below threshold times demand supports are answers, by (4)."""
+    raised: float  # how far its bound is above the threshold that it refutes, by (3)
+    lowered: float  # how far below threshold times demand supports are answers, by (4)
 
     @classmethod
     def of(cls, friction: float, maps: int, measure: Measure, more: float = 0.0) -> "Slack":

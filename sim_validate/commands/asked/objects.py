@@ -9,7 +9,7 @@ from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.objects.surface import PatchLimits
 from grasp_core.planning.reach import Finger
-from grasp_core.records.grasps_json import SavedGrasps
+from grasp_core.planning.result import Plan
 from scenes.example_objects import example_object
 from sim_validate.cli import flag_groups
 from sim_validate.cli.console import Reporter
@@ -106,7 +106,7 @@ def asked_finger(planning: flag_groups.Planning) -> Finger | None:
 def asked_grasps(
     path: Path, reporter: Reporter, *, grasp: str | None = None, friction: float | None = None,
     seed: int | None = None, limit: int | None = None,
-) -> SavedGrasps | None:  # fmt: skip
+) -> Plan | None:  # fmt: skip
     """Read the grasps that are asked for, and warn of what was changed in their mesh.
 
     They have another friction or seed where one is given. None, with a word about it, if the file

@@ -6,7 +6,6 @@ from typing import cast
 
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.records.grasps_json import SavedGrasps
 from scenes.execution.held import HeldSettings
 from scenes.fingertips import FingerSettings
 from scenes.physics import PhysicsSettings
@@ -97,11 +96,13 @@ def mass_of(body: Polyhedron, given: Mass) -> float:
     return body.mass_at(DENSITY_KG_M3 if given.density_kg_m3 is None else given.density_kg_m3)
 
 
-def holding(saved: SavedGrasps, mass: Mass, tips: Tips, down: Down) -> ExecutionSettings:
+def holding(
+    body: Polyhedron, finger: Finger | None, mass: Mass, tips: Tips, down: Down
+) -> ExecutionSettings:
     """Build the settings of what holds and is held; trials are the usual ones."""
-    planned = None if saved.finger is None else saved.finger.radius_m
+    planned = None if finger is None else finger.radius_m
     return ExecutionSettings(
-        mass_kg=mass_of(saved.body, mass),
+        mass_kg=mass_of(body, mass),
         push_n=tips.push_n,
         stiffness_n_per_m=tips.tip_stiffness_n_per_m,
         tip_radius_m=planned if tips.tip_radius_m is None else tips.tip_radius_m,
@@ -112,16 +113,21 @@ def holding(saved: SavedGrasps, mass: Mass, tips: Tips, down: Down) -> Execution
 
 
 def execution_settings(
-    saved: SavedGrasps, given: Executing, trials: tuple[str, ...], down: Down
+    body: Polyhedron,
+    seed: int,
+    finger: Finger | None,
+    given: Executing,
+    trials: tuple[str, ...],
+    down: Down,
 ) -> ExecutionSettings:
     """Build the settings of executions; flags of the same names set them."""
     named = {word for text in trials for word in trials_in(text)} or set(TRIALS)
     known = {each.name for each in fields(ExecutionSettings)}
     return replace(
-        holding(saved, given.mass, given.tips, down),
+        holding(body, finger, given.mass, given.tips, down),
         trials=cast("tuple[TrialKind, ...]", tuple(sorted(named))),
         **{each.name: getattr(given, each.name) for each in fields(given) if each.name in known},
-        seed=saved.seed,
+        seed=seed,
         most_mm=given.max_mm,
         most_deg=given.max_deg,
     )
@@ -143,7 +149,7 @@ def execution_of_run(command: Run, body: Polyhedron) -> ExecutionSettings | None
     if not command.execute:
         return None
     planning = command.planning
-    saved = SavedGrasps(body, planning.friction, planning.seed, (), asked_finger(planning))
     return execution_settings(
-        saved, command.executing, command.execute_trials, command.execute_down
-    )
+        body, planning.seed, asked_finger(planning), command.executing, command.execute_trials,
+        command.execute_down,
+    )  # fmt: skip

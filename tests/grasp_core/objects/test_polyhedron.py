@@ -91,7 +91,7 @@ def test_a_polyhedron_comes_back_from_trimesh_as_it_was(name):
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(body.volume, rel=1e-12)
     np.testing.assert_allclose(mesh.center_mass, body.center_of_mass, atol=1e-12)
-    again = gc.from_trimesh(mesh, name=name)
+    again = gc.Polyhedron.from_mesh(mesh.vertices, mesh.faces, name=name)
     assert again.content_sha256 == body.content_sha256
     assert len(again.faces) == len(body.faces)
 

@@ -9,7 +9,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.planning import certify as module
-from grasp_core.planning.certify import Candidate, certify_each, witness_fault
+from grasp_core.planning.certify import Candidate, certify_each, witness_faults
 from grasp_core.planning.methods import prepared, run
 from grasp_core.planning.request import PlanRequest
 from grasp_core.values import PUT_OFF
@@ -86,20 +86,27 @@ def spoilt(one, kind):
     return forces / np.einsum("ki,ki->", forces, normals)
 
 
-def test_many_candidates_are_rejected_for_the_faults_of_one():
+def test_candidates_with_faulty_witnesses_are_rejected():
     """Among them are lines of another family."""
     body = example_object("random-10-1")
     request = PlanRequest(FRICTION, ("concurrent", "pencil"))
     found = list(run(*prepared(body, request)[:1], request, prepared(body, request)[1], None))
-    candidates, faults = [], []
+    candidates, sound = [], []
     for place, one in enumerate(found):
         placement = replace(one.placement, forces=spoilt(one, place % 4))
         family = one.family if place % 7 else "regulus"
         candidates.append(
             Candidate(one.id, one.faces, family, one.pieces, one.cones, placement, one.regions)
         )
-        contacts = placement.positions, one.normals, placement.forces
-        faults.append(witness_fault(*contacts, FRICTION, family))
+        sound.append(place % 4 == 0 and family == one.family)
+    contacts = (
+        [(each.placement.positions, one.normals, each.placement.forces)
+         for one, each in zip(found, candidates, strict=True)]
+    )  # fmt: skip
+    faults = witness_faults(
+        *map(np.array, zip(*contacts, strict=True)), FRICTION, [each.family for each in candidates]
+    )
+    assert [fault is None for fault in faults] == sound
     certified = certify_each(candidates, FRICTION)
     assert [each is None for each in certified] == [fault is not None for fault in faults]
     assert len(set(faults)) >= 6

@@ -52,14 +52,11 @@ def test_the_best_of_all_are_kept_in_order(body, everything, rank_by, measure):
     assert len(everything) > 40
 
 
-def test_the_strongest_of_all_are_kept_in_order(small, payloads, strongest):
+def test_the_strongest_of_all_are_kept_in_order(payloads, strongest):
     """Payloads are searched to a gap of 1e-4, and equal ones keep an order of their own."""
     values = [payloads[grasp.id] for grasp in strongest]
     best = sorted(payloads.values(), reverse=True)[:10]
     np.testing.assert_allclose(values, best, rtol=3e-4, atol=1e-9)
-    # the first slip is the payload over the object's mass, so that the order is the same
-    by_slip = gc.plan(small, 0.5, limit=3, rank_by="first-slip").grasps
-    assert [grasp.id for grasp in by_slip] == [grasp.id for grasp in strongest[:3]]
 
 
 def test_grasps_that_no_squeeze_holds_come_last(small, payloads, strongest, monkeypatch):

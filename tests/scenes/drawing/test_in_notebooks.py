@@ -92,7 +92,8 @@ def test_what_cannot_be_drawn_is_shown_as_text_and_never_raises(plan, monkeypatc
 def test_pictures_come_with_scenes_alone():
     code = """
 import grasp_core as gc
-cube = gc.from_trimesh(__import__("trimesh").creation.box())
+box = __import__("trimesh").creation.box()
+cube = gc.Polyhedron.from_mesh(box.vertices, box.faces)
 print(cube._repr_html_())
 import scenes
 print(cube._repr_html_()[:4])
