@@ -113,7 +113,18 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
     path = source / VERDICTS if source.is_dir() else source
     with about(path):
         record = verdicts_of(read_text(path))
-    saved = _grasps_behind(wanted.grasps or path.parent / GRASPS, record)
+    source = wanted.grasps or path.parent / GRASPS
+    if not source.is_file():
+        raise InputError(
+            f"{source}: this file of grasps is missing; say with --grasps where the file is"
+        )
+    saved = read_grasps(source)
+    if saved.body.content_sha256 != record["object"]["content_sha256"]:
+        raise InputError(
+            f"{source}: these grasps are on another object than the results to replay; give the "
+            "right --grasps"
+        )
+    saved = replace(saved, friction=record["friction"])
     verdicts = {each["id"]: each for each in record["verdicts"]}
     grasp = grasp_with_id(path, saved, wanted.grasp)
     if grasp.id not in verdicts:
@@ -121,21 +132,6 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
             f"{path}: no verdict on the grasp {grasp.id}; the file has verdicts on {some(verdicts)}"
         )
     return of_verdict(path, saved, verdicts[grasp.id], replace(wanted, grasp=grasp.id))
-
-
-def _grasps_behind(path: Path, record: Mapping[str, Any]) -> Plan:
-    """Read the grasps that verdicts are about, at the friction that they were tested at."""
-    if not path.is_file():
-        raise InputError(
-            f"{path}: this file of grasps is missing; say with --grasps where the file is"
-        )
-    saved = read_grasps(path)
-    if saved.body.content_sha256 != record["object"]["content_sha256"]:
-        raise InputError(
-            f"{path}: these grasps are on another object than the results to replay; give the "
-            "right --grasps"
-        )
-    return replace(saved, friction=record["friction"])
 
 
 def of_verdict(path: Path, saved: Plan, verdict: Mapping[str, Any], wanted: Wanted) -> Recorded:

@@ -107,7 +107,8 @@ def _turned(turn: Any, quaternions: Array) -> Array:
 
 
 def _written(path: Path, **job_parts: Any) -> Path:
-    require_clip(path)
+    if path.suffix.lower() not in FORMATS:
+        raise InputError(f"{path}: a clip's name must end in {' or '.join(FORMATS)}")
     if importlib.util.find_spec("PIL") is None:
         raise GraphicsError(
             "clips need Pillow: run pip install 'graspproof[clips]' ('.[clips]' in a checkout)"
@@ -134,12 +135,6 @@ def _reach(scene: Scene, joints: Array) -> float:
     tips = layout.tip_centers + np.einsum("kij,nkj->nki", layout.frames, slides)
     farthest = float(np.linalg.norm(tips, axis=2).max()) + layout.drive.radius_m
     return max(layout.radius_m, NEARER * farthest)
-
-
-def require_clip(path: Path) -> None:
-    """Refuse a file name that does not end like a clip's."""
-    if path.suffix.lower() not in FORMATS:
-        raise InputError(f"{path}: a clip's name must end in {' or '.join(FORMATS)}")
 
 
 def available_graphics() -> str:

@@ -45,7 +45,7 @@ FEWEST_CORNERS = 3
 SAME = 1e-9
 """Distance below which corners of a box of size 1 are one: far above rounding."""
 Truths: TypeAlias = NDArray[np.bool_]
-Ends: TypeAlias = tuple[bool, bool, bool]
+Ends: TypeAlias = tuple[bool, ...]
 """A truth about each axis of a box."""
 LONG, LEAST = 1.2, 2.5
 """Length of a piece of a part in thicknesses of the part, but at least so many radii of the hand's
@@ -78,15 +78,10 @@ def rounded_box(low: Array, high: Array, radius: float, outer: Truths) -> tuple[
     Takes `low`, `high` (3,) [m]; `radius` [m]; `outer` (2, 3). Gives flat sides in the axes of the
     box, (k, 3) each [m], corners counter-clockwise as seen from outside.
     """
-    first, last = _ends(outer[0]), _ends(outer[1])
-    sides = _sides(_ends(high > low), radius > 0.0, first, last)
+    first, last, long = (tuple(each.tolist()) for each in (*outer, high > low))
+    sides = _sides(long, radius > 0.0, first, last)
     corners = _corners(low, high, radius, first, last)
     return tuple(corners[side] for side in sides)
-
-
-def _ends(row: Truths) -> Ends:
-    x, y, z = row.tolist()
-    return x, y, z
 
 
 def _corners(low: Array, high: Array, radius: float, first: Ends, last: Ends) -> Array:

@@ -17,10 +17,6 @@ Role: TypeAlias = Literal[
 ]  # fmt: skip
 SIDES = 20
 """Number of corners of the polygons that replace circles."""
-OF_ROLES: dict[Role, str] = {
-    "object": GLASS, "edge": INK, "focus": FOCUS, "plane": SURFACE, "ruled surface": SURFACE,
-    "contact": INK, "hand": HAND, "fingertip": HAND,
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,25 +94,27 @@ class Look:
     shaded: bool = False
     """Whether polygons are darker where they face away from the light."""
     dashed: bool = False
+    colour: str = INK
+    """Colour of shapes that are no finger's."""
 
 
 LOOKS: dict[Role, Look] = {
-    "object": Look(fill=0.13, shaded=True),
+    "object": Look(fill=0.13, shaded=True, colour=GLASS),
     "edge": Look(line=0.18, opacity=0.75),
     "finger": Look(fill=1.0, shaded=True),
     "friction cone": Look(line=0.16, opacity=0.9),
     "force cone": Look(fill=0.28),
     "region": Look(fill=0.6),
     "line of force": Look(line=0.3, dashed=True),
-    "focus": Look(dot=1.9),
-    "plane": Look(fill=0.16, line=0.3),
-    "ruled surface": Look(fill=0.1, line=0.1, opacity=0.5),
+    "focus": Look(dot=1.9, colour=FOCUS),
+    "plane": Look(fill=0.16, line=0.3, colour=SURFACE),
+    "ruled surface": Look(fill=0.1, line=0.1, opacity=0.5, colour=SURFACE),
     "contact": Look(dot=1.2),
-    "hand": Look(fill=1.0, shaded=True),
-    "fingertip": Look(fill=1.0, shaded=True),
+    "hand": Look(fill=1.0, shaded=True, colour=HAND),
+    "fingertip": Look(fill=1.0, shaded=True, colour=HAND),
 }
 
 
 def colour_of(shape: Shape) -> str:
     """Return the colour of a shape, written as #rrggbb."""
-    return OF_ROLES.get(shape.role, INK) if shape.finger is None else FINGERS[shape.finger]
+    return LOOKS[shape.role].colour if shape.finger is None else FINGERS[shape.finger]

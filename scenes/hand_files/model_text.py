@@ -144,7 +144,11 @@ def _with_files(
                 found = _found(path, given, places)
                 content = _bytes(found, left, path)
                 left -= len(content)
-                names[given] = _named(found, files)
+                # in the compiler's messages it is called as it is, if that name is plain and free
+                free = found.stem.lower() not in {Path(name).stem.lower() for name in files}
+                plain = PLAIN.fullmatch(found.name) is not None
+                own = f"file{len(files)}{found.suffix.lower()}"
+                names[given] = found.name if free and plain else own
                 files[names[given]] = content
             if len(names) > MOST_FILES:
                 raise InputError(f"{path}: names more than {MOST_FILES} files")
@@ -152,13 +156,6 @@ def _with_files(
                 element.attrib.setdefault("name", Path(given).stem)
             element.attrib[key] = names[given]
     return etree.tostring(root, encoding="unicode"), files
-
-
-def _named(found: Path, taken: dict[str, bytes]) -> str:
-    """Name a file in the compiler's messages as it is called, if that name is plain and free."""
-    free = found.stem.lower() not in {Path(name).stem.lower() for name in taken}
-    plain = PLAIN.fullmatch(found.name) is not None
-    return found.name if free and plain else f"file{len(taken)}{found.suffix.lower()}"
 
 
 def _places(path: Path, elements: list[Any]) -> list[Path]:

@@ -29,16 +29,10 @@ def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
         lines.append(f"  first wrench that was not held: {in_words(failed)}")
     lines += [f"  {not_survived(executed)}"] if executed and not_survived(executed) else []
     # `validate` knows no wrenches beside these: the others stand in the baseline's own settings
-    known = (
-        [""]
-        if verdict is not None and failed is None
-        else [
-            each.name
-            for each in (verdict.failures if verdict is not None else ())
-            if each.name in (*AXIS_NAMES, WEAKEST)
-        ]
-    )
-    at = known[0] if known else None
+    at = "" if verdict is not None else None
+    if verdict is not None and failed is not None:
+        names = (each.name for each in verdict.failures)
+        at = next((name for name in names if name in (*AXIS_NAMES, WEAKEST)), None)
     return "\n".join([*lines, *_next_steps(finding.id, at, files, now)])
 
 

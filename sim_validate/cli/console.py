@@ -83,26 +83,19 @@ class Reporter:
             return
         console = self.err if self.json_only else self.out
         for part in _parts(columns, rows, console.width):
-            chosen = [[row[place] for place in part] for row in rows]
-            self._table(console, title, [columns[place] for place in part], chosen)
-
-    def _table(
-        self, console: Console, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]
-    ) -> None:
-        table = Table(
-            title=Text(printable(title)),
-            title_justify="left",
-            box=SIMPLE_HEAD,
-            padding=(0, 1, 0, 0),
-        )
-        for place, column in enumerate(columns):
-            last = place == len(columns) - 1
-            table.add_column(
-                column, justify="left" if place == 0 else "right", overflow="fold", no_wrap=not last
+            table = Table(
+                title=Text(printable(title)),
+                title_justify="left",
+                box=SIMPLE_HEAD,
+                padding=(0, 1, 0, 0),
             )
-        for row in rows:
-            table.add_row(*(Text(printable(cell)) for cell in row))
-        console.print(table)
+            for place in part:
+                side = "left" if place == part[0] else "right"
+                last = place == part[-1]
+                table.add_column(columns[place], justify=side, overflow="fold", no_wrap=not last)
+            for row in rows:
+                table.add_row(*(Text(printable(row[place])) for place in part))
+            console.print(table)
 
     def counted(
         self, title: str, results: Iterable[Result], total: int, word: str,

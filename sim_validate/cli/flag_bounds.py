@@ -1,7 +1,7 @@
 """Bounds on the values of command-line flags, written into their types, and checks of them."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, is_dataclass
 from itertools import repeat
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
@@ -44,7 +44,15 @@ def within(name: str) -> Bound:
     ends = BOUNDS[name]
     words = {"above": "more than", "least": "at least", "below": "less than", "most": "at most"}
     says = ", ".join(f"{words[end]} {value:g}" for end, value in ends.items())
-    return Bound(f"must be {says}", lambda value: _inside(value, ends))
+
+    def holds(value: Any) -> bool:
+        try:
+            number(value, "", **ends)
+        except InputError:
+            return False
+        return True
+
+    return Bound(f"must be {says}", holds)
 
 
 def ends_in(*endings: str) -> Bound:
@@ -57,14 +65,6 @@ def not_zero(least: float, most: float) -> Bound:
     """Make a bound for vectors: the largest component in size is from `least` to `most`."""
     says = f"must not be zero: the largest part is from {least:g} to {most:g}"
     return Bound(says, lambda vector: least <= max(abs(part) for part in vector) <= most)
-
-
-def _inside(value: Any, ends: Mapping[str, Any]) -> bool:
-    try:
-        number(value, "", **ends)
-    except InputError:
-        return False
-    return True
 
 
 def _end(up_to: float) -> str:

@@ -8,7 +8,7 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, cast
@@ -92,11 +92,6 @@ class Learning:
         least = "least_squeeze" in self.figures
         used = {"mass_near": self.mass_near, "seeds": self.seeds, "figures": least}
         return next((name for name, value in used.items() if value), "")
-
-
-def learning_table(asked: Learning) -> dict[str, Any]:
-    """Return every setting as the table that gives the same settings when it is read."""
-    return {each.name: getattr(asked, each.name) for each in fields(asked)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +225,7 @@ def config_to_toml(config: DatasetConfig) -> str:
         hand = table.pop("hand")
         parts += [f"[{TABLE}]\n{_lines(table)}", f"[{TABLE}.hand]\n{_lines(hand)}"]
     if config.learning is not None:
-        parts += [f"[{LEARNING}]\n{_lines(learning_table(config.learning))}"]
+        parts += [f"[{LEARNING}]\n{_lines(asdict(config.learning))}"]
     return "\n".join(parts)
 
 

@@ -8,7 +8,7 @@ of an earlier run count exactly if they would come out the same.
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
@@ -20,7 +20,7 @@ from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.provenance import versions
 from scenes.example_objects import example_object
-from sim_validate.datasets.config import CREDITS, LEARNING, DatasetConfig, learning_table
+from sim_validate.datasets.config import CREDITS, LEARNING, DatasetConfig
 from sim_validate.datasets.given_contacts import GivenGrasp, given_sha256, read_given
 from sim_validate.execution.settings import TABLE, execution_table
 
@@ -91,7 +91,7 @@ def shared_settings(config: DatasetConfig) -> dict[str, object]:
     if executed is not None:
         settings[TABLE] = execution_table(executed)
     if learning is not None:
-        settings[LEARNING] = learning_table(learning)
+        settings[LEARNING] = asdict(learning)
     return settings
 
 

@@ -7,7 +7,7 @@ touch the object at the stated contacts, the hand overlaps neither the object no
 contacts are proved to be in force closure at the row's friction.
 """
 
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -103,10 +103,12 @@ def _row_faults(rows: ObjectRows, frictions: Sequence[float]) -> Iterator[str]:
     )
     for row in rows["grasps"]:
         name = row["grasp_id"]
-        faults = [
-            *_reference_faults(row, splits, names),
-            *_outcome_faults(row, ended.get(name, [])),
-        ]
+        faults = list[str]()
+        if splits.get(row["object_id"]) != row["split"]:
+            faults.append("the row's object is missing, or in another split")
+        if row["control_of"] is not None and row["control_of"] not in names:
+            faults.append(f"{row['control_of']}, named in control_of, has no row")
+        faults += _outcome_faults(row, ended.get(name, []))
         own = row["control_of"] is None and row["label"] != VARIED
         if own and row["friction"] not in frictions:
             faults.append(f"friction {row['friction']} is not among those of {CONFIG}")
@@ -161,15 +163,6 @@ def _mesh_faults(folder: Path, rows: ObjectRows) -> Iterator[str]:
             )
 
 
-def _reference_faults(
-    row: Mapping[str, Any], splits: Mapping[str, str], names: Set[str]
-) -> Iterator[str]:
-    if splits.get(row["object_id"]) != row["split"]:
-        yield "the row's object is missing, or in another split"
-    if row["control_of"] is not None and row["control_of"] not in names:
-        yield f"{row['control_of']}, named in control_of, has no row"
-
-
 def _contact_faults(row: Mapping[str, Any]) -> Iterator[str]:
     """Check the normals of a contact set, and compute its closure from the contacts alone."""
     count = row["contacts"]
@@ -222,22 +215,20 @@ def _requested_faults(folder: Path, config: DatasetConfig, rows: ObjectRows) -> 
                 continue
             found, own = list[str](), trials.get(row["grasp_id"], [])
             if config.execution is not None:
-                found += _execution_faults(row, own, body, config.execution)
+                found += _trial_faults(row, own)
+                if row["executed"] and not found:
+                    found += _squeeze_faults(row, body, config.execution)
             if config.learning is not None:
-                found += _kind_faults(row, by_name, is_curved=bool(of_object["curved"]))
+                if row["label"] == VARIED:
+                    found += _varied_faults(row, by_name, is_curved=bool(of_object["curved"]))
+                elif row["kind"] != (wanted := LABELS.get(row["label"], row["label"])):
+                    found.append(f"kind is {row['kind']}, but {wanted} by label")
                 figures = Figures(config.learning, config.execution)
                 found += _closure_faults(row, body, figures)
                 found += _margin_faults(row, own)
                 if config.learning.hand:
                     found += _hand_faults(row, hand_named(config.learning.hand), body)
             yield from (f"grasps: {row['grasp_id']}: {fault}" for fault in found)
-
-
-def _kind_faults(row: Row, by_name: Mapping[str, Row], *, is_curved: bool) -> Iterator[str]:
-    if row["label"] == VARIED:
-        yield from _varied_faults(row, by_name, is_curved=is_curved)
-    elif row["kind"] != (wanted := LABELS.get(row["label"], row["label"])):
-        yield f"kind is {row['kind']}, but {wanted} by label"
 
 
 def _varied_faults(row: Row, by_name: Mapping[str, Row], *, is_curved: bool) -> Iterator[str]:
@@ -278,15 +269,6 @@ def _ratio_faults(row: Row) -> Iterator[str]:
         ratio = row["mass_ratio"] if row["kind"] == "mass_near" else known
         if ratio is None or not least * (1.0 - BAND) <= ratio <= most * (1.0 + BAND):
             yield f"the ratio {ratio} is none of the kind {row['kind']}"
-
-
-def _execution_faults(
-    row: Row, trials: Sequence[Row], body: Polyhedron, asked: AskedExecution
-) -> Iterator[str]:
-    found = list(_trial_faults(row, trials))
-    yield from found
-    if row["executed"] and not found:
-        yield from _squeeze_faults(row, body, asked)
 
 
 def _trial_faults(row: Row, trials: Sequence[Row]) -> Iterator[str]:
@@ -444,13 +426,10 @@ def _place_faults(row: Row, hand: Hand, body: Polyhedron) -> Iterator[str]:
     # a link whose tip touches the object may come as near to it as it likes
     if found.itself < APART_M or found.object < -ROUNDED or found.tips < -TOUCHES_M:
         yield "the hand of hand_joints_rad overlaps the object or itself"
-    if not _closed(points, normals, row["friction"]):
-        yield "hand_points_m are not proved to be in force closure"
-
-
-def _closed(points: Array, normals: Array, friction: float) -> bool:
     try:
-        certificate = force_closure(points, normals, friction)
+        certificate = force_closure(points, normals, row["friction"])
+        proved = certificate.closed and certificate.verify()
     except GraspError:
-        return False
-    return certificate.closed and certificate.verify()
+        proved = False
+    if not proved:
+        yield "hand_points_m are not proved to be in force closure"

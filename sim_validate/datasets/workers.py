@@ -68,18 +68,6 @@ class Task:
 
 def do_task(task: Task) -> None:
     """Compute a unit in a worker process, and keep its rows."""
-    _check_worker(task)
-    if task.timeout_s is None:
-        task.work(task.unit, task.staging)
-        return
-    signal.setitimer(signal.ITIMER_REAL, task.timeout_s)
-    try:
-        task.work(task.unit, task.staging)
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-
-
-def _check_worker(task: Task) -> None:
     own = provenance()
     for name, wanted in task.provenance.items():
         if own.get(name) != wanted:
@@ -92,6 +80,14 @@ def _check_worker(task: Task) -> None:
             f"{task.staging.folder}: a worker process cannot see this folder; --out must be on a "
             "file system that all processes share"
         )
+    if task.timeout_s is None:
+        task.work(task.unit, task.staging)
+        return
+    signal.setitimer(signal.ITIMER_REAL, task.timeout_s)
+    try:
+        task.work(task.unit, task.staging)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 class Engine(Protocol):

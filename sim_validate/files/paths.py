@@ -14,7 +14,8 @@ def require_inside(name: object, field: str) -> str:
     if not isinstance(name, str) or not name or len(name) > LONGEST:
         raise InputError(f"{field}: expected the path of a file, got {shown(name)}")
     parts = PurePosixPath(name).parts
-    if name.startswith("/") or ".." in parts or not parts or not _plain(name):
+    plain = name.isprintable() and "\\" not in name and ":" not in name
+    if name.startswith("/") or ".." in parts or not parts or not plain:
         raise InputError(
             f"{field}: expected a relative path that stays in the file's folder, got {shown(name)}"
         )
@@ -27,7 +28,3 @@ def path_inside(folder: Path, name: str) -> Path:
     if not path.resolve().is_relative_to(folder.resolve()):
         raise InputError(f"{path}: this link leads out of {folder}; copy the file into the folder")
     return path
-
-
-def _plain(name: str) -> bool:
-    return name.isprintable() and "\\" not in name and ":" not in name

@@ -187,21 +187,16 @@ def _taken(folder: Path) -> tuple[int, list[Path]]:
         except FileNotFoundError:  # the command that had made it has just removed it
             continue
         try:
-            _lock(handle, folder)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:  # a file system may have no locks: then its users take care
+                if error.errno == errno.EWOULDBLOCK:
+                    raise InputError(
+                        f"{folder}: another command is writing to it; wait, or give another --out"
+                    ) from error
             if folder.exists() and os.path.samestat(os.fstat(handle), folder.stat()):
                 return handle, made
         except BaseException:
             os.close(handle)
             raise
         os.close(handle)
-
-
-def _lock(handle: int, folder: Path) -> None:
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        if error.errno == errno.EWOULDBLOCK:
-            raise InputError(
-                f"{folder}: another command is writing to it; wait, or give another --out"
-            ) from error
-        # otherwise the file system has no locks, and its users must take care

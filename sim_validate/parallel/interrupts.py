@@ -7,10 +7,9 @@ are not their own, and the program would run on. A request to end (SIGTERM) coun
 import signal
 import sys
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -25,7 +24,9 @@ def noted() -> Generator[None, None, None]:
         return
     _noted.clear()
     before = {number: signal.signal(number, _note) for number in SIGNALS}
-    told, sys.unraisablehook = sys.unraisablehook, _but_interrupts(sys.unraisablehook)
+    told = sys.unraisablehook
+    # reports errors that cannot be raised where they occur, but interrupts, which are recorded
+    sys.unraisablehook = lambda e: None if e.exc_type is KeyboardInterrupt else told(e)
     try:
         yield
     except Exception as error:
@@ -36,11 +37,6 @@ def noted() -> Generator[None, None, None]:
         sys.unraisablehook = told
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def _but_interrupts(tell: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Report errors that cannot be raised where they occur, and record interrupts instead."""
-    return lambda error: None if error.exc_type is KeyboardInterrupt else tell(error)
 
 
 def _note(_: int, __: FrameType | None) -> None:

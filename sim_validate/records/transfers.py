@@ -53,10 +53,7 @@ def _summary(found: Transfer) -> dict[str, int]:
     placed = [each for each in contacts if each.contact is not None]
     return {
         "grasps": len(found.grasps),
-        "same": found.count("same"),
-        "better": found.count("better"),
-        "worse": found.count("worse"),
-        "gone": found.count("gone"),
+        **{status: found.count(status) for status in ("same", "better", "worse", "gone")},
         "contacts_moved": sum(each.distance > rounding for each in placed),
         "contacts_lost": len(contacts) - len(placed),
     }

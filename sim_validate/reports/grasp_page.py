@@ -126,7 +126,14 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[Fac
         name = "Point between the lines of pair" if grasp.family == "regulus" else "Focus"
         yield f"{name} {place}", f"({millimetres(focus)}) mm", FOCUS if place == 0 else ""
     if verdict is not None:
-        yield from _measured(verdict)
+        for name, field, meaning in MOTIONS:
+            moved = [trial.get(field) for trial in verdict["wrenches"]]
+            known = [MICRO * each for each in moved if each is not None]
+            yield name, f"{number(max(known, default=None), 2)} µm", meaning
+        if (repeats := verdict.get("robustness")) is not None:
+            low, high = repeats["pass_rate_interval"]
+            said = f"held {repeats['held']} of {repeats['trials']} times"
+            yield "With noise", said, f"95 % interval of the share held: {low:.2f} to {high:.2f}"
 
 
 def possible_facts(best: BestFile | None, grasp: str) -> Iterable[Fact]:
@@ -141,17 +148,6 @@ def possible_facts(best: BestFile | None, grasp: str) -> Iterable[Fact]:
         f"at least {number(MILLI * best['clearance_m'])} mm from edges; grasps nearer to edges "
         "may exceed it",
     )  # fmt: skip
-
-
-def _measured(verdict: Record) -> Iterable[Fact]:
-    for name, field, meaning in MOTIONS:
-        moved = [trial.get(field) for trial in verdict["wrenches"]]
-        known = [MICRO * each for each in moved if each is not None]
-        yield name, f"{number(max(known, default=None), 2)} µm", meaning
-    if (repeats := verdict.get("robustness")) is not None:
-        low, high = repeats["pass_rate_interval"]
-        said = f"held {repeats['held']} of {repeats['trials']} times"
-        yield "With noise", said, f"95 % interval of the share held: {low:.2f} to {high:.2f}"
 
 
 def _contacts(grasp: Grasp) -> Iterable[Record]:
