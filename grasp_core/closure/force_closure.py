@@ -58,7 +58,7 @@ from grasp_core.closure.contacts import (
     to_origin,
     unit_size,
 )
-from grasp_core.closure.decision import DECIDED, FAR, PRECISE, decide, deepest_forces
+from grasp_core.closure.decision import decide, decided_at_once
 from grasp_core.closure.soft_contacts import SoftContacts, are_torsions, contact_torsions
 from grasp_core.errors import UndecidedError
 from grasp_core.values import Contact, Grasp
@@ -171,7 +171,7 @@ class ClosureCertificate(ByValue):
         if soft is not None:
             ceiling = soft_contacts.margin_ceiling(soft, twist, caution)
         else:
-            ceiling = proofs.margin_ceiling(twist, arms, normals, self.friction, caution)
+            ceiling = float(proofs.margin_ceiling(twist, arms, normals, self.friction, caution))
         return -math.inf if ceiling <= FAR_BELOW else ceiling
 
     def _proved_by(self, forces: Array, arms: Array, normals: Array, caution: float) -> float:
@@ -183,7 +183,7 @@ class ClosureCertificate(ByValue):
         # without friction `proved_margin` sees only normal parts, so slides are checked here
         if (normal_and_tangential(forces, normals)[1][self.friction == 0.0] > SUMMED).any():
             return -math.inf
-        return proofs.proved_margin(forces, arms, normals, self.friction, caution)
+        return float(proofs.proved_margin(forces, arms, normals, self.friction, caution))
 
     def _proved_with_torques(self, contacts: SoftContacts, forces: Array, caution: float) -> float:
         torques = self.torques
@@ -300,32 +300,24 @@ def _decided(
         never, nothing = np.zeros(count, dtype=bool), np.full(count, math.nan)
         return never, nothing, np.zeros_like(positions), np.zeros((count, 6))
     arms, centers, sizes = unit_size(positions)
-    every = np.full(count, friction)
-    forces, twists, margins = deepest_forces(arms, normals, every, PRECISE)
-    forces, twists = proofs.without_giants(forces, 2), proofs.without_giants(twists, 1)
-    lower, upper = margins.T
-    with np.errstate(invalid="ignore"):  # a search that broke down ends with NaN
-        close = np.abs(upper - lower) <= DECIDED * np.maximum(friction, np.abs(lower))
-        close &= np.abs(lower) <= FAR * friction
-        close &= (np.abs(np.linalg.norm(normals, axis=-1) - 1.0) <= UNIT_SLACK).all(axis=-1)
-        closed, separated = close & (lower > DECIDED), close & (upper < -DECIDED)
-    closed &= proofs.proves_closure(forces, arms, normals, every[:, None])
-    separated &= proofs.refutes_closure(twists, arms, normals, every[:, None])
-    found = np.full(count, math.nan)
+    closed, separated, _, forces, twists = decided_at_once(arms, normals, friction)
+    lengths = np.linalg.norm(normals, axis=-1, keepdims=True)
+    straight = (np.abs(lengths - 1.0) <= UNIT_SLACK).all(axis=(1, 2))
+    closed, separated, units = closed & straight, separated & straight, normals / lengths
     pushes = np.einsum("gki,gki->g", forces, normals)
     forces = forces / np.where(closed, pushes, 1.0)[:, None, None]
     wrenches = to_origin(twists, centers, sizes)
-    units = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
-    found[closed] = _verified_closed(forces[closed], arms[closed], units[closed], friction)
+    found, mu = np.full(count, math.nan), np.array([friction])
+    found[closed] = _verified_closed(forces[closed], arms[closed], units[closed], mu)
     back = to_center(wrenches, centers, sizes)  # as `verify` does
-    found[separated] = _verified_open(back[separated], arms[separated], units[separated], friction)
+    found[separated] = _verified_open(back[separated], arms[separated], units[separated], mu)
     return closed & ~np.isnan(found), found, forces, wrenches
 
 
-def _verified_closed(forces: Array, arms: Array, normals: Array, friction: float) -> Array:
+def _verified_closed(forces: Array, arms: Array, normals: Array, mu: Array) -> Array:
     """Return the margins that forces prove, (g,); NaN where `verify` would not accept them."""
-    found = proofs.proved_margins(forces, arms, normals, friction, CAUTION)
-    verified = (found > 0.0) & (found <= proofs.proved_margins(forces, arms, normals, friction))
+    found = proofs.proved_margin(forces, arms, normals, mu, CAUTION)
+    verified = (found > 0.0) & (found <= proofs.proved_margin(forces, arms, normals, mu))
     wrenches = np.concatenate([forces.sum(axis=1), cross(arms, forces).sum(axis=1)], axis=1)
     pushes = np.einsum("gki,gki->g", forces, normals)
     verified &= np.abs(wrenches).max(axis=1, initial=0.0) <= SUMMED
@@ -333,13 +325,12 @@ def _verified_closed(forces: Array, arms: Array, normals: Array, friction: float
     return np.where(verified, found, math.nan)
 
 
-def _verified_open(twists: Array, arms: Array, normals: Array, friction: float) -> Array:
+def _verified_open(twists: Array, arms: Array, normals: Array, mu: Array) -> Array:
     """Return the margins that twists prove, (g,); NaN where `verify` would not accept them."""
     found, bound = (
         np.where(ceilings <= FAR_BELOW, -math.inf, ceilings)
         for ceilings in (
-            proofs.margin_ceilings(twists, arms, normals, friction, caution)
-            for caution in (CAUTION, 1.0)
+            proofs.margin_ceiling(twists, arms, normals, mu, caution) for caution in (CAUTION, 1.0)
         )
     )
     return np.where((found <= 0.0) & (found >= bound), found, math.nan)

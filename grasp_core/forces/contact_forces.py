@@ -98,10 +98,14 @@ def contact_forces(
     for place, balance in enumerate(balances(arms, units, loads, normal_force, by_load=True)):
         f = _found(balance, mu, objective, solver)
         if f is None:
+            # without limits on the forces, the size of the load does not matter
+            remedy = "use more friction or move the contacts"
+            if math.isfinite(normal_force[1]):
+                remedy = "lower the load or raise the limits"
             which = "this wrench" if single else f"wrench {place}, counting from 0"
             raise NoForcesError(
                 f"no forces were found with friction {_text(mu)} and normal forces in "
-                f"{normal_force} N that balance {which}; {_remedy(normal_force)}"
+                f"{normal_force} N that balance {which}; {remedy}"
             )
         found.append(balance.in_space(f))
     return found[0] if single else np.array(found).reshape(len(loads), len(points), 3)
@@ -233,16 +237,6 @@ def _rows(wrench: ArrayLike) -> tuple[Array, bool]:
             f"{float(sizes[sizes > 0.0].min()):.3g}"
         )
     return loads, single
-
-
-def _remedy(normal_force: tuple[float, float]) -> str:
-    """Return advice for a wrench that no forces balance.
-
-    Without limits on the forces, the size of the load does not matter.
-    """
-    if math.isfinite(normal_force[1]):
-        return "lower the load or raise the limits"
-    return "use more friction or move the contacts"
 
 
 def _text(friction: Array) -> str:

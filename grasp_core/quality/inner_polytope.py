@@ -84,13 +84,6 @@ class InnerPolytope(ByValue):
             and are_units(self.normals, count, WRENCH)
         )
 
-    def radius(self, wrenches: WrenchSet) -> float:
-        """Return the least height of a corner along the normal of its simplex."""
-        if len(self.normals) != len(self.corners):
-            return -np.inf
-        lowest, _ = self._heights(self.forces @ wrenches.G.T)
-        return float(lowest.min())
-
     def proved_radius(self, wrenches: WrenchSet) -> float:
         """Return the radius if the simplices enclose zero, and minus infinity otherwise."""
         if not 0 < len(self.normals) == len(self.corners) or not self._even():

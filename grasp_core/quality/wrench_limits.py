@@ -269,22 +269,23 @@ class WrenchLimit(ByValue):
         about = frozen(center, (3,), "center")
         body = body_of(points - about, units, friction, max_normal_force, motors, torsion_m)
         with np.errstate(all="ignore"):
-            soft = body.lengths is not None
-            known = self.has_numbers(len(points), len(body.levers), soft=soft)
-            return known and attains(body, self) and bounds(body, self)
+            return self.holds_for(body)
 
-    def has_numbers(self, count: int, joints: int = 0, *, soft: bool = False) -> bool:
-        """Return whether fields are numbers of the right shapes, for `count` contacts."""
+    def holds_for(self, body: WrenchBody) -> bool:
+        """Return whether the fields prove both bounds for the contacts of a body."""
+        soft = body.lengths is not None
         return (
             is_array(self.wrench, WRENCH)
             and bool(self.wrench.any())
             and is_array(self.facet, WRENCH)
-            and is_array(self.forces, count, 3)
-            and is_array(self.motor_multipliers, joints)
-            and (is_array(self.torques, count) if soft else self.torques is None)
+            and is_array(self.forces, body.count, 3)
+            and is_array(self.motor_multipliers, len(body.levers))
+            and (is_array(self.torques, body.count) if soft else self.torques is None)
             and is_number(self.limit, least=0.0)
             and is_number(self.upper)
             and self.limit <= self.upper
+            and attains(body, self)
+            and bounds(body, self)
         )
 
 

@@ -152,10 +152,15 @@ def plan_from_json(text: str) -> Plan:
     from grasp_core.records.grasps_schema import GraspsRecord
 
     record = record_of(GraspsRecord, text, "grasps.json", schema=SCHEMA)
-    body, counts = _body_of(record), record.counts
+    body, counts, grasps = _body_of(record), record.counts, list[Grasp]()
+    for place, each in enumerate(record.grasps):
+        with about(f"grasps[{place}]"):
+            grasps.append(_grasp_from_record(body, each, record.friction))
+    if len({grasp.id for grasp in grasps}) < len(grasps):
+        raise InputError("grasps: two grasps have the same id; ids must differ")
     return Plan(
         body=body,
-        grasps=_grasps_of(body, record),
+        grasps=tuple(grasps),
         friction=record.friction,
         theta=radians_of(record.theta_deg),
         seed=record.seed,
@@ -194,16 +199,6 @@ def _body_of(record: "GraspsRecord") -> Polyhedron:
             "object.content_sha256: the hash does not fit the mesh in the file; plan again"
         )
     return body
-
-
-def _grasps_of(body: Polyhedron, record: "GraspsRecord") -> tuple[Grasp, ...]:
-    grasps = list[Grasp]()
-    for place, each in enumerate(record.grasps):
-        with about(f"grasps[{place}]"):
-            grasps.append(_grasp_from_record(body, each, record.friction))
-    if len({grasp.id for grasp in grasps}) < len(grasps):
-        raise InputError("grasps: two grasps have the same id; ids must differ")
-    return tuple(grasps)
 
 
 def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float) -> Grasp:
