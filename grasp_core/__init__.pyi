@@ -60,7 +60,6 @@ from grasp_core.quality.metrics import min_weight as min_weight
 from grasp_core.quality.metrics import smallest_singular_value as smallest_singular_value
 from grasp_core.quality.motors import Motors as Motors
 from grasp_core.quality.wrench_limits import WrenchLimit as WrenchLimit
-from grasp_core.quality.wrench_limits import max_resisted_wrench as max_resisted_wrench
 from grasp_core.quality.wrench_limits import wrench_limits as wrench_limits
 from grasp_core.records.grasps_files import load_grasps as load_grasps
 from grasp_core.records.grasps_files import save_grasps as save_grasps

@@ -133,25 +133,19 @@ def _found(balance: Balance, mu: Array, objective: Objective, solver: str) -> Ar
 def least_friction_forces(
     positions: Array, normals: Array, friction: float, wrench: Array, *,
     normal_force: tuple[float, float], center: Array,
-) -> tuple[Array, float] | None:  # fmt: skip
+) -> tuple[Array, float | None]:  # fmt: skip
     """Find balancing forces (k, 3) [N] of least friction, with that coefficient.
 
-    The search starts at `friction`, but the forces may need more than that. None where the limits
-    on the normal forces leave no balance.
+    The search starts at `friction`, but the forces may need more than that. Where the limits on the
+    normal forces leave no balance, those in the cones come nearest to it, and no coefficient is
+    given.
     """
     (balance,) = balances(positions - center, normals, wrench[None], normal_force, by_load=False)
     alike = np.ones(len(positions))
     f = least_friction(balance, friction, alike)
-    return None if f is None else (balance.in_space(f), needed_friction(f, alike))
-
-
-def closest_forces(
-    positions: Array, normals: Array, friction: float, wrench: Array, *,
-    normal_force: tuple[float, float], center: Array,
-) -> Array:  # fmt: skip
-    """Find forces in the friction cones that leave the least imbalance, (k, 3) [N]."""
-    (balance,) = balances(positions - center, normals, wrench[None], normal_force, by_load=False)
-    return balance.in_space(least_imbalance(balance, np.full(len(positions), friction)))
+    if f is None:
+        return balance.in_space(least_imbalance(balance, friction * alike)), None
+    return balance.in_space(f), needed_friction(f, alike)
 
 
 def even_forces(

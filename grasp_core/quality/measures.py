@@ -50,7 +50,7 @@ always has an answer; its multipliers are a twist of length up to `STEEP` that b
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple, TypeAlias, get_args
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -273,9 +273,9 @@ def resisted_loads(wrenches: WrenchSet, measure: Measure, gap: float = GAP) -> R
         limiting = [_limiting_twist(wrenches, load) for load in measure.loads]
         direction, upper = _least(wrenches, measure, [closed.direction, *limiting])
         return ResistedLoads(NONE_SHOWN, upper, measure, wrenches, direction, None, None)
-    each = task_limits(wrenches, measure)
-    direction, upper = _least(wrenches, measure, [limit.twist for limit in each])
-    forces = np.array([into_cones(limit.forces, wrenches.friction) for limit in each])
+    most, twists = zip(*task_limits(wrenches, measure), strict=True)
+    direction, upper = _least(wrenches, measure, list(twists))
+    forces = np.array([into_cones(each, wrenches.friction) for each in most])
     shown = _without_rests(wrenches, measure.loads, forces, closed)
     lower = min(float(shown.min()), upper)
     return ResistedLoads(lower, upper, measure, wrenches, direction, closed, forces)
@@ -328,36 +328,27 @@ def _units(rows: Array) -> Array:
     return rows / np.linalg.norm(rows, axis=1)[:, None]
 
 
-class TaskLimit(NamedTuple):
-    """The multiple of a load that contacts in closure resist, by local forces (3k,), at most.
+def task_limits(wrenches: WrenchSet, measure: Measure) -> list[tuple[Array, Array]]:
+    """Find local forces (3k,) for the largest multiple of each load that closed contacts resist.
 
-    The limiting twist, (6,), has demand one.
+    Each comes with the twist, (6,), that limits it and has demand one.
     """
-
-    multiple: float
-    forces: Array
-    twist: Array
-
-
-def task_limits(wrenches: WrenchSet, measure: Measure) -> list[TaskLimit]:
-    """Find the largest multiple of each load of a task that contacts in force closure resist."""
     k, n = len(wrenches.friction), wrenches.G.shape[1]
     parts, sides = force_rows(wrenches.friction, 3)
     rows = np.vstack([wrenches.G, parts.sum(axis=0), -parts, sides])
     q, b = np.append(np.zeros(n), -1.0), np.zeros(len(rows))
     b[WRENCH] = 1.0
-    found = list[TaskLimit]()
+    found = list[tuple[Array, Array]]()
     for load in measure.loads:
         size = float(np.linalg.norm(load))
         A = np.column_stack([rows, np.append(load / size, np.zeros(1 + k + n))])
         answer = minimize(ConicProgram(q, A, b, WRENCH + 1, k, (3,) * k))
-        multiple = float(answer.x[-1]) / size
-        if not multiple > 0.0:
+        if not float(answer.x[-1]) / size > 0.0:
             raise SolverError(
                 "a load of a task has no resisted multiple although contacts are closed"
             )
         # the multipliers have z.load = |load|, so that their demand is positive the other way
-        found.append(TaskLimit(multiple, answer.x[:-1], -answer.z[:WRENCH] / size))
+        found.append((answer.x[:-1], -answer.z[:WRENCH] / size))
     return found
 
 

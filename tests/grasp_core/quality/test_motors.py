@@ -146,14 +146,14 @@ def test_limits_rise_with_torque_in_proportion_and_a_dead_joint_only_lowers_them
         levers, wrench = hand_of(rng, 4).levers, rng.normal(size=6)
 
         def limit(torques, positions=positions, normals=normals, levers=levers, wrench=wrench):
-            return gc.max_resisted_wrench(
+            return gc.wrench_limits(
                 positions,
                 normals,
                 0.6,
-                wrench,
+                [wrench],
                 max_normal_force=1e3,
                 motors=gc.Motors.of(levers, torques),
-            )
+            )[0].limit
 
         dead = np.ones(len(levers))
         dead[0] = 1e-6
@@ -190,7 +190,7 @@ def test_motors_are_refused_where_they_cannot_carry_the_links_or_belong_to_other
     positions, normals = random_contacts(np.random.default_rng(0))
     given = {"max_normal_force": 1.0, "motors": gc.Motors.of(np.eye(2, 6), 1.0)}
     with pytest.raises(gc.InputError, match="columns for each of 4 contacts, 12 in all"):
-        gc.max_resisted_wrench(positions, normals, 0.5, np.eye(6)[0], **given)
+        gc.wrench_limits(positions, normals, 0.5, [np.eye(6)[0]], **given)
 
 
 def test_motors_in_any_orientation_give_up_what_their_links_ask_in_the_worst():
