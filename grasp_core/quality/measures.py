@@ -50,7 +50,7 @@ always has an answer; its multipliers are a twist of length up to `STEEP` that b
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -273,9 +273,9 @@ def resisted_loads(wrenches: WrenchSet, measure: Measure, gap: float = GAP) -> R
         limiting = [_limiting_twist(wrenches, load) for load in measure.loads]
         direction, upper = _least(wrenches, measure, [closed.direction, *limiting])
         return ResistedLoads(NONE_SHOWN, upper, measure, wrenches, direction, None, None)
-    most, twists = zip(*task_limits(wrenches, measure), strict=True)
-    direction, upper = _least(wrenches, measure, list(twists))
-    forces = np.array([into_cones(each, wrenches.friction) for each in most])
+    each = task_limits(wrenches, measure)
+    direction, upper = _least(wrenches, measure, [limit.twist for limit in each])
+    forces = np.array([into_cones(limit.forces, wrenches.friction) for limit in each])
     shown = _without_rests(wrenches, measure.loads, forces, closed)
     lower = min(float(shown.min()), upper)
     return ResistedLoads(lower, upper, measure, wrenches, direction, closed, forces)
@@ -310,7 +310,8 @@ def _least(wrenches: WrenchSet, measure: Measure, twists: list[Array]) -> tuple[
     Forces along the axes make it finite. Of multiples that programs find equal the first counts.
     """
     axes = np.eye(WRENCH)[:3]
-    every = _units(np.array([*twists, *axes, *-axes]))
+    every = np.array([*twists, *axes, *-axes])
+    every = every / np.linalg.norm(every, axis=1)[:, None]
     # a twist that asks for next to nothing bounds nothing: rounding in its support counts in full
     supports = wrenches.supports(every) + _rounding(wrenches)
     allowed = measure.multiples(supports, measure.demands(every))
@@ -324,31 +325,36 @@ def _rounding(wrenches: WrenchSet) -> float:
     return CHECK_SLACK * wrenches.size
 
 
-def _units(rows: Array) -> Array:
-    return rows / np.linalg.norm(rows, axis=1)[:, None]
+class TaskLimit(NamedTuple):
+    """The multiple of a load that contacts in closure resist, by local forces (3k,), at most.
 
-
-def task_limits(wrenches: WrenchSet, measure: Measure) -> list[tuple[Array, Array]]:
-    """Find local forces (3k,) for the largest multiple of each load that closed contacts resist.
-
-    Each comes with the twist, (6,), that limits it and has demand one.
+    The limiting twist, (6,), has demand one.
     """
+
+    multiple: float
+    forces: Array
+    twist: Array
+
+
+def task_limits(wrenches: WrenchSet, measure: Measure) -> list[TaskLimit]:
+    """Find the largest multiple of each load of a task that contacts in force closure resist."""
     k, n = len(wrenches.friction), wrenches.G.shape[1]
     parts, sides = force_rows(wrenches.friction, 3)
     rows = np.vstack([wrenches.G, parts.sum(axis=0), -parts, sides])
     q, b = np.append(np.zeros(n), -1.0), np.zeros(len(rows))
     b[WRENCH] = 1.0
-    found = list[tuple[Array, Array]]()
+    found = list[TaskLimit]()
     for load in measure.loads:
         size = float(np.linalg.norm(load))
         A = np.column_stack([rows, np.append(load / size, np.zeros(1 + k + n))])
         answer = minimize(ConicProgram(q, A, b, WRENCH + 1, k, (3,) * k))
-        if not float(answer.x[-1]) / size > 0.0:
+        multiple = float(answer.x[-1]) / size
+        if not multiple > 0.0:
             raise SolverError(
                 "a load of a task has no resisted multiple although contacts are closed"
             )
         # the multipliers have z.load = |load|, so that their demand is positive the other way
-        found.append((answer.x[:-1], -answer.z[:WRENCH] / size))
+        found.append(TaskLimit(multiple, answer.x[:-1], -answer.z[:WRENCH] / size))
     return found
 
 

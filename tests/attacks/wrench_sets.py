@@ -79,8 +79,8 @@ def along_ray(seed, place):
     """Forces whose wrench is far out along a ray on which simplices are counted, and the ray."""
     w, _ = closed_set(seed)
     u = RAYS[place] / np.linalg.norm(RAYS[place])
-    ((most, _),) = task_limits(w, Measure("task", -u[None]))
-    f = into_cones(0.95 * into_cones(most, w.friction) + 0.05 * balance(seed), w.friction)
+    (limit,) = task_limits(w, Measure("task", -u[None]))
+    f = into_cones(0.95 * into_cones(limit.forces, w.friction) + 0.05 * balance(seed), w.friction)
     p = w.G @ f
     return f - np.linalg.pinv(w.G) @ (p - u * (p @ u)), u
 
