@@ -98,13 +98,14 @@ def contact_forces(
     for place, balance in enumerate(balances(arms, units, loads, normal_force, by_load=True)):
         f = _found(balance, mu, objective, solver)
         if f is None:
+            shared = f"{mu[0]:.6g}" if np.ptp(mu) == 0.0 else str(mu)
             # without limits on the forces, the size of the load does not matter
             remedy = "use more friction or move the contacts"
             if math.isfinite(normal_force[1]):
                 remedy = "lower the load or raise the limits"
             which = "this wrench" if single else f"wrench {place}, counting from 0"
             raise NoForcesError(
-                f"no forces were found with friction {_text(mu)} and normal forces in "
+                f"no forces were found with friction {shared} and normal forces in "
                 f"{normal_force} N that balance {which}; {remedy}"
             )
         found.append(balance.in_space(f))
@@ -231,7 +232,3 @@ def _rows(wrench: ArrayLike) -> tuple[Array, bool]:
             f"{float(sizes[sizes > 0.0].min()):.3g}"
         )
     return loads, single
-
-
-def _text(friction: Array) -> str:
-    return f"{friction[0]:.6g}" if np.ptp(friction) == 0.0 else str(friction)
