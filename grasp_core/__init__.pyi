@@ -59,10 +59,9 @@ from grasp_core.quality.metrics import min_weight as min_weight
 from grasp_core.quality.metrics import smallest_singular_value as smallest_singular_value
 from grasp_core.quality.motors import Motors as Motors
 from grasp_core.quality.wrench_limits import WrenchLimit as WrenchLimit
-from grasp_core.quality.wrench_limits import max_resisted_wrench as max_resisted_wrench
 from grasp_core.quality.wrench_limits import wrench_limits as wrench_limits
-from grasp_core.records.grasps_files import load_grasps as load_grasps
-from grasp_core.records.grasps_files import save_grasps as save_grasps
+from grasp_core.records.grasps_json import load_grasps as load_grasps
+from grasp_core.records.grasps_json import save_grasps as save_grasps
 from grasp_core.regions.certificates import CertifiedRegions as CertifiedRegions
 from grasp_core.regions.certify_regions import certify_regions as certify_regions
 from grasp_core.transferring.face_changes import FaceChange as FaceChange

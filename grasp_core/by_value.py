@@ -6,7 +6,7 @@ that a copy equals its original. Fields that are declared with `compare=False` d
 """
 
 from collections.abc import Mapping, Sized
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, fields
 from textwrap import shorten
 from typing import Any, TypeVar, cast
 
@@ -52,7 +52,10 @@ def _same(one: Any, other: Any) -> bool:
     if one is other:
         return True
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
-        return _same_arrays(one, other)
+        if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
+            return False
+        mine, its = cast("NDArray[Any]", one), cast("NDArray[Any]", other)
+        return np.array_equal(mine, its, equal_nan="f" in mine.dtype.kind + its.dtype.kind)
     if isinstance(one, tuple | list) and isinstance(other, tuple | list):
         ours, theirs = cast("tuple[Any, ...]", one), cast("tuple[Any, ...]", other)
         return len(ours) == len(theirs) and all(map(_same, ours, theirs))
@@ -60,13 +63,6 @@ def _same(one: Any, other: Any) -> bool:
         mine, its = cast("Mapping[Any, Any]", one), cast("Mapping[Any, Any]", other)
         return mine.keys() == its.keys() and all(_same(mine[key], its[key]) for key in mine)
     return bool(one == other) or (_is_nan(one) and _is_nan(other))
-
-
-def _same_arrays(one: Any, other: Any) -> bool:
-    if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
-        return False
-    ours, theirs = cast("NDArray[Any]", one), cast("NDArray[Any]", other)
-    return np.array_equal(ours, theirs, equal_nan="f" in ours.dtype.kind + theirs.dtype.kind)
 
 
 def _is_nan(value: Any) -> bool:
@@ -123,14 +119,10 @@ def changed(settings: Any) -> str:
     parts = [
         f"{field.name}={value!r}"
         for field in fields(settings)
-        if (value := getattr(settings, field.name)) != _usual(field)
+        if (value := getattr(settings, field.name))
+        != (field.default if field.default_factory is MISSING else field.default_factory())
     ]
     return shorten(f"{type(settings).__name__}({', '.join(parts)})", MOST, placeholder=" ...)")
-
-
-def _usual(field: Field[Any]) -> object:
-    made = field.default_factory
-    return field.default if made is MISSING else made()
 
 
 def _size(value: object) -> str:

@@ -48,9 +48,6 @@ class ForceCone(ByValue):
         object.__setattr__(self, "axis", frozen_units(self.axis, (3,), "axis"))
         number(self.half_angle, "half_angle", least=0.0, below=RIGHT_ANGLE)
 
-    def __repr__(self) -> str:
-        return summary("ForceCone", axis=self.axis, half_angle=self.half_angle)
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Contact(ByValue):
@@ -64,9 +61,6 @@ class Contact(ByValue):
     def __post_init__(self) -> None:
         object.__setattr__(self, "position", frozen(self.position, (3,), "position"))
         object.__setattr__(self, "normal", frozen_units(self.normal, (3,), "normal"))
-
-    def __repr__(self) -> str:
-        return summary("Contact", position=self.position, normal=self.normal)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

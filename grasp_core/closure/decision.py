@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, cross
 from grasp_core.closure.contacts import (
@@ -190,18 +191,36 @@ def _decided_quickly(arms: Array, normals: Array, friction: Array) -> Answer | N
     """Return compiled code's answer if it is proved; it needs one positive friction for all."""
     if not (friction[0] > 0.0 and (friction == friction[0]).all()):
         return None
-    forces, twists, margins = deepest_forces(arms[None], normals[None], friction[:1], PRECISE)
-    forces, twists = without_giants(forces, 2), without_giants(twists, 1)
-    lower, upper = (float(each) for each in margins[0])
-    scale = float(friction[0])
-    close = abs(upper - lower) <= DECIDED * max(scale, abs(lower)) and abs(lower) <= FAR * scale
-    if not close:  # nor if one is not a number
+    closed, separated, margins, forces, twists = decided_at_once(
+        arms[None], normals[None], float(friction[0])
+    )
+    if not (closed[0] or separated[0]):
         return None
-    if lower > DECIDED and proves_closure(forces[0], arms, normals, friction):
-        return Answer(lower, forces[0], twists[0], closed=True)
-    if upper < -DECIDED and refutes_closure(twists[0], arms, normals, friction):
-        return Answer(lower, forces[0], twists[0], closed=False)
-    return None
+    return Answer(float(margins[0]), forces[0], twists[0], closed=bool(closed[0]))
+
+
+def decided_at_once(
+    arms: Array, normals: Array, friction: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Array, Array, Array]:
+    """Decide what compiled code can prove of many sets of contacts with one positive friction.
+
+    Gives which sets are proved closed, and which separated; the margins, and the forces (g, k, 3)
+    and twists (g, 6) that prove it.
+    """
+    every = np.full(len(arms), friction)
+    forces, twists, margins = deepest_forces(arms, normals, every, PRECISE)
+    forces, twists = without_giants(forces, 2), without_giants(twists, 1)
+    lower, upper = margins.T
+    with np.errstate(invalid="ignore"):  # a search that broke down ends with NaN
+        close = np.abs(upper - lower) <= DECIDED * np.maximum(friction, np.abs(lower))
+        close &= np.abs(lower) <= FAR * friction
+        closed, separated = close & (lower > DECIDED), close & (upper < -DECIDED)
+    every = every[:, None]
+    closed[closed] = proves_closure(forces[closed], arms[closed], normals[closed], every[closed])
+    separated[separated] = refutes_closure(
+        twists[separated], arms[separated], normals[separated], every[separated]
+    )
+    return closed, separated, lower, forces, twists
 
 
 def touching_twist(twist: Array, pushed: Callable[[Array], tuple[Array, Array]]) -> Array:

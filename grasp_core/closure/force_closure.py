@@ -58,7 +58,7 @@ from grasp_core.closure.contacts import (
     to_origin,
     unit_size,
 )
-from grasp_core.closure.decision import DECIDED, FAR, PRECISE, decide, deepest_forces
+from grasp_core.closure.decision import decide, decided_at_once
 from grasp_core.closure.soft_contacts import SoftContacts, are_torsions, contact_torsions
 from grasp_core.errors import UndecidedError
 from grasp_core.values import Contact, Grasp
@@ -163,27 +163,15 @@ class ClosureCertificate(ByValue):
                 return -math.inf
             if soft is not None:
                 return self._proved_with_torques(soft, self.forces, caution)
-            return self._proved_by(self.forces, arms, normals, caution)
+            return float(_lower_bound(self.forces, arms, normals, self.friction, caution))
         if not is_array(self.separating_wrench, 6):
             return math.inf
         # the twist of (4), whose length means nothing
         twist = to_center(of_order_one(self.separating_wrench)[0], center, size)
         if soft is not None:
             ceiling = soft_contacts.margin_ceiling(soft, twist, caution)
-        else:
-            ceiling = proofs.margin_ceiling(twist, arms, normals, self.friction, caution)
-        return -math.inf if ceiling <= FAR_BELOW else ceiling
-
-    def _proved_by(self, forces: Array, arms: Array, normals: Array, caution: float) -> float:
-        wrench = np.concatenate([forces.sum(axis=0), cross(arms, forces).sum(axis=0)])
-        pushes = float(np.einsum("ki,ki->", forces, normals))
-        # what (1) and (2) ask of them
-        if not (float(np.abs(wrench).max()) <= SUMMED and abs(pushes - 1.0) <= SUMMED):
-            return -math.inf
-        # without friction `proved_margin` sees only normal parts, so slides are checked here
-        if (normal_and_tangential(forces, normals)[1][self.friction == 0.0] > SUMMED).any():
-            return -math.inf
-        return proofs.proved_margin(forces, arms, normals, self.friction, caution)
+            return -math.inf if ceiling <= FAR_BELOW else ceiling
+        return float(_upper_bound(twist, arms, normals, self.friction, caution))
 
     def _proved_with_torques(self, contacts: SoftContacts, forces: Array, caution: float) -> float:
         torques = self.torques
@@ -300,46 +288,45 @@ def _decided(
         never, nothing = np.zeros(count, dtype=bool), np.full(count, math.nan)
         return never, nothing, np.zeros_like(positions), np.zeros((count, 6))
     arms, centers, sizes = unit_size(positions)
-    every = np.full(count, friction)
-    forces, twists, margins = deepest_forces(arms, normals, every, PRECISE)
-    forces, twists = proofs.without_giants(forces, 2), proofs.without_giants(twists, 1)
-    lower, upper = margins.T
-    with np.errstate(invalid="ignore"):  # a search that broke down ends with NaN
-        close = np.abs(upper - lower) <= DECIDED * np.maximum(friction, np.abs(lower))
-        close &= np.abs(lower) <= FAR * friction
-        close &= (np.abs(np.linalg.norm(normals, axis=-1) - 1.0) <= UNIT_SLACK).all(axis=-1)
-        closed, separated = close & (lower > DECIDED), close & (upper < -DECIDED)
-    closed &= proofs.proves_closure(forces, arms, normals, every[:, None])
-    separated &= proofs.refutes_closure(twists, arms, normals, every[:, None])
-    found = np.full(count, math.nan)
+    closed, separated, _, forces, twists = decided_at_once(arms, normals, friction)
+    lengths = np.linalg.norm(normals, axis=-1, keepdims=True)
+    straight = (np.abs(lengths - 1.0) <= UNIT_SLACK).all(axis=(1, 2))
+    closed, separated, units = closed & straight, separated & straight, normals / lengths
     pushes = np.einsum("gki,gki->g", forces, normals)
     forces = forces / np.where(closed, pushes, 1.0)[:, None, None]
     wrenches = to_origin(twists, centers, sizes)
-    units = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
-    found[closed] = _verified_closed(forces[closed], arms[closed], units[closed], friction)
-    back = to_center(wrenches, centers, sizes)  # as `verify` does
-    found[separated] = _verified_open(back[separated], arms[separated], units[separated], friction)
+    found, mu = np.full(count, math.nan), np.array([friction])
+    proved, lower = (
+        _lower_bound(forces[closed], arms[closed], units[closed], mu, caution)
+        for caution in (CAUTION, 1.0)
+    )
+    found[closed] = np.where((proved > 0.0) & (proved <= lower), proved, math.nan)
+    back = to_center(wrenches, centers, sizes)[separated]  # as `verify` does
+    proved, upper = (
+        _upper_bound(back, arms[separated], units[separated], mu, caution)
+        for caution in (CAUTION, 1.0)
+    )
+    found[separated] = np.where((proved <= 0.0) & (proved >= upper), proved, math.nan)
     return closed & ~np.isnan(found), found, forces, wrenches
 
 
-def _verified_closed(forces: Array, arms: Array, normals: Array, friction: float) -> Array:
-    """Return the margins that forces prove, (g,); NaN where `verify` would not accept them."""
-    found = proofs.proved_margins(forces, arms, normals, friction, CAUTION)
-    verified = (found > 0.0) & (found <= proofs.proved_margins(forces, arms, normals, friction))
-    wrenches = np.concatenate([forces.sum(axis=1), cross(arms, forces).sum(axis=1)], axis=1)
-    pushes = np.einsum("gki,gki->g", forces, normals)
-    verified &= np.abs(wrenches).max(axis=1, initial=0.0) <= SUMMED
-    verified &= np.abs(pushes - 1.0) <= SUMMED
-    return np.where(verified, found, math.nan)
+def _lower_bound(
+    forces: Array, arms: Array, normals: Array, friction: Array, caution: float
+) -> Array:
+    """Compute the margins that forces prove; minus infinity where they miss (1) or (2)."""
+    wrenches = np.concatenate([forces.sum(axis=-2), cross(arms, forces).sum(axis=-2)], axis=-1)
+    along, across = normal_and_tangential(forces, normals)
+    met = np.abs(wrenches).max(axis=-1) <= SUMMED
+    met &= np.abs(along.sum(axis=-1) - 1.0) <= SUMMED
+    # without friction `proved_margin` sees only normal parts, so slides are checked here
+    met &= (np.where(friction == 0.0, across, 0.0) <= SUMMED).all(axis=-1)
+    margins = proofs.proved_margin(forces, arms, normals, friction, caution)
+    return np.where(met, margins, -math.inf)
 
 
-def _verified_open(twists: Array, arms: Array, normals: Array, friction: float) -> Array:
-    """Return the margins that twists prove, (g,); NaN where `verify` would not accept them."""
-    found, bound = (
-        np.where(ceilings <= FAR_BELOW, -math.inf, ceilings)
-        for ceilings in (
-            proofs.margin_ceilings(twists, arms, normals, friction, caution)
-            for caution in (CAUTION, 1.0)
-        )
-    )
-    return np.where((found <= 0.0) & (found >= bound), found, math.nan)
+def _upper_bound(
+    twist: Array, arms: Array, normals: Array, friction: Array, caution: float
+) -> Array:
+    """Bound margins by twists; minus infinity is reported far below zero."""
+    ceilings = proofs.margin_ceiling(twist, arms, normals, friction, caution)
+    return np.where(ceilings <= FAR_BELOW, -math.inf, ceilings)

@@ -91,8 +91,12 @@ def closing_forces(
         return None
     whole, unit = balanced
     directions, _ = _whole(normals)
-    if not all(_inside(f, n, friction) for f, n in zip(whole, directions, strict=True)):
-        return None
+    above, below = friction.as_integer_ratio()
+    for force, normal in zip(whole, directions, strict=True):
+        along_squared, across_squared = _squares(force, normal)
+        inside = across_squared * below**2 < above**2 * along_squared
+        if not (inside and _dot(force, normal) > 0):
+            return None
     return np.array([[x / unit for x in force] for force in whole])
 
 
@@ -247,12 +251,6 @@ def _solution(rows: list[Exact], right: Exact) -> Exact | None:
     for pivot, row in zip(pivots, table, strict=True):
         x[pivot] = row[WRENCH]
     return x
-
-
-def _inside(force: list[int], normal: list[int], friction: float) -> bool:
-    above, below = friction.as_integer_ratio()
-    along, across = _squares(force, normal)
-    return _dot(force, normal) > 0 and across * below**2 < above**2 * along
 
 
 def _departs(velocity: Exact, normal: Exact, slope: Fraction | None, rest: Fraction) -> bool:

@@ -109,50 +109,53 @@ def proves_closure(
 
 def proved_margin(
     forces: Array, arms: Array, normals: Array, friction: Array, caution: float = 1.0
-) -> float:
-    """Compute the margin (1) that forces (k, 3) prove; minus infinity if they prove none.
+) -> Array:
+    """Compute the margins (1) that forces prove, (...); minus infinity where they prove none.
 
-    It bounds the optimum of the margin program from below: the forces' depth, less the cost of
-    balancing them.
+    They bound the optimum of the margin program from below: the forces' depth, less the cost of
+    balancing them. Many sets at once must all have friction.
     """
     along, _ = normal_and_tangential(forces, normals)
-    depth = depths_in_cones(forces, normals, friction)
-    frictionless = friction[:, None] == 0.0
+    depths = depths_in_cones(forces, normals, friction)
     # without friction only the normal parts act, so only they have to balance
-    balanced = np.where(frictionless, along[:, None] * normals, forces)
-    imbalance = float(np.linalg.norm(grasp_map(arms) @ balanced.ravel()))
-    generators = generators_of(arms, normals, friction)
-    if generators.shape[1] < WRENCH or not np.isfinite(generators).all():
-        return -math.inf
-    least = float(np.linalg.svd(generators, compute_uv=False)[WRENCH - 1])
-    if least <= RANK:
-        return -math.inf
+    balanced = np.where(friction[..., None] == 0.0, along[..., None] * normals, forces)
+    maps, generators = grasp_map(arms), generators_of(arms, normals, friction)
+    if generators.shape[-1] < WRENCH or not np.isfinite(generators).all():
+        return np.full(along.shape[:-1], -math.inf)
+    stacked = balanced.reshape(*maps.shape[:-2], maps.shape[-1])
+    # many are summed one by one, and one alone by BLAS: margins keep the last digits of either
+    wrenches = maps @ stacked if stacked.ndim == 1 else np.einsum("gwj,gj->gw", maps, stacked)
+    least = np.linalg.svd(generators, compute_uv=False)[..., WRENCH - 1]
+    full = least > RANK
     # c of (1); its normal parts sum to at most sqrt(k) c
-    corrected = caution * (imbalance + CHECK_SLACK) / least
-    pushes = float(along.sum()) + math.sqrt(len(arms)) * corrected
-    left = float((depth - np.sqrt(1.0 + friction**2) * corrected).min())
-    return left / pushes if pushes > 0.0 else -math.inf
+    imbalance = np.linalg.norm(wrenches, axis=-1)
+    corrected = caution * (imbalance + CHECK_SLACK) / np.where(full, least, 1.0)
+    pushes = along.sum(axis=-1) + math.sqrt(arms.shape[-2]) * corrected
+    left = (depths - np.sqrt(1.0 + friction**2) * corrected[..., None]).min(axis=-1)
+    usable = full & (pushes > 0.0)
+    return np.where(usable, left / np.where(usable, pushes, 1.0), -math.inf)
 
 
 def margin_ceiling(
     twist: Array, arms: Array, normals: Array, friction: Array, caution: float = 1.0
-) -> float:
-    """Bound the margin of closure from above by (3), with a twist (6,) that separates the contacts.
+) -> Array:
+    """Bound margins of closure from above by (3), with twists (..., 6) that separate the contacts.
 
-    The bound is negative; zero where M is zero to within rounding; infinity where M is more, and
-    the twist proves nothing.
+    A bound is negative; zero where M is zero to within rounding; infinity where M is more, and the
+    twist proves nothing.
     """
-    if not refutes_closure(twist, arms, normals, friction):
-        return math.inf
-    along, _ = normal_and_tangential(twist[:3] + cross(twist[3:], arms), normals)
-    rounding = caution * CHECK_SLACK * float(np.linalg.norm(twist)) * np.sqrt(1.0 + friction**2)
+    velocities = twist[..., None, :3] + cross(twist[..., None, 3:], arms)
+    along, _ = normal_and_tangential(velocities, normals)
+    sizes = np.linalg.norm(twist, axis=-1)[..., None]
+    rounding = caution * CHECK_SLACK * sizes * np.sqrt(1.0 + friction**2)
     # M of (3), which rounding may raise
-    largest = float((supports(twist, arms, normals, friction) + rounding).max())
-    if largest >= 0.0:
-        return 0.0
+    largest = (supports(twist, arms, normals, friction) + rounding).max(axis=-1)
+    below = largest < 0.0
     # r_i of (3); each term of the sum is raised by rounding, so that the bound is no less
     shares = np.where(friction == 0.0, 1.0, 1.0 / np.maximum(friction, SMALLEST_NORMAL))
-    return largest / float((shares * (largest - along + rounding)).sum())
+    sums = (shares * (largest[..., None] - along + rounding)).sum(axis=-1)
+    bounds = np.where(below, largest / np.where(below, sums, 1.0), 0.0)
+    return np.where(refutes_closure(twist, arms, normals, friction), bounds, math.inf)
 
 
 def without_giants(vectors: Array, axes: int) -> Array:
@@ -166,42 +169,3 @@ def depths_in_cones(forces: Array, normals: Array, friction: Array) -> Array:
     """Compute the depth d_i of each force in its cone, (..., k)."""
     along, across = normal_and_tangential(forces, normals)
     return np.where(friction == 0.0, along, friction * along - across)
-
-
-def proved_margins(
-    forces: Array, arms: Array, normals: Array, friction: float, caution: float = 1.0
-) -> Array:
-    """Compute `proved_margin` of many sets of contacts, (g,), with one positive friction."""
-    maps = grasp_map(arms)
-    if not maps.size:
-        return np.full(len(arms), -math.inf)
-    along, across = normal_and_tangential(forces, normals)
-    stacked = forces.reshape(len(forces), maps.shape[-1])
-    imbalance = np.linalg.norm(np.einsum("gwj,gj->gw", maps, stacked), axis=-1)
-    least = np.linalg.svd(maps, compute_uv=False)[..., WRENCH - 1]
-    full = least > RANK
-    # c of (1); its normal parts sum to at most sqrt(k) c
-    corrected = caution * (imbalance + CHECK_SLACK) / np.where(full, least, 1.0)
-    pushes = along.sum(axis=-1) + math.sqrt(arms.shape[-2]) * corrected
-    depths = friction * along - across
-    left = depths.min(axis=-1) - math.sqrt(1.0 + friction**2) * corrected
-    usable = full & (pushes > 0.0)
-    return np.where(usable, left / np.where(usable, pushes, 1.0), -math.inf)
-
-
-def margin_ceilings(
-    twists: Array, arms: Array, normals: Array, friction: float, caution: float = 1.0
-) -> Array:
-    """Compute `margin_ceiling` of many sets of contacts, (g,), with one friction for all."""
-    every = np.full((len(twists), 1), friction)
-    velocities = twists[:, None, :3] + cross(twists[:, None, 3:], arms)
-    along, _ = normal_and_tangential(velocities, normals)
-    sizes = np.linalg.norm(twists, axis=-1)[:, None]
-    rounding = caution * CHECK_SLACK * sizes * math.sqrt(1.0 + friction**2)
-    # M of (3), which rounding may raise
-    largest = (supports(twists, arms, normals, every) + rounding).max(axis=-1)
-    below = largest < 0.0
-    # each term of the sum is raised by rounding, so that the bound is no less
-    sums = ((largest[:, None] - along + rounding) / friction).sum(axis=-1)
-    bounds = np.where(below, largest / np.where(below, sums, 1.0), 0.0)
-    return np.where(refutes_closure(twists, arms, normals, every), bounds, math.inf)

@@ -205,11 +205,6 @@ class SpanningQuadruples:
     """theta* of each quadruple, (q,) [rad]."""
 
 
-def spanning_quadruples(normals: Array, least_angle: float) -> SpanningQuadruples:
-    """List all quadruples of directions that positively span at a larger angle than given."""
-    return SpanningTable(normals, least_angle).quadruples(0, len(normals))
-
-
 class SpanningTable:
     """Spanning quadruples of directions, listed by the last of their directions."""
 
@@ -221,7 +216,10 @@ class SpanningTable:
     def quadruples(self, start: int, end: int) -> SpanningQuadruples:
         """List the quadruples whose last direction is one of start .. end - 1."""
         self._extend(end)
-        indices = _sorted([self._ending_in(newest) for newest in range(start, end)], end)
+        listed = np.concatenate([self._ending_in(newest) for newest in range(start, end)])
+        # in lexicographic order
+        places = end ** np.arange(3, -1, -1)
+        indices = np.sort(listed @ places)[:, None] // places % end
         sines = np.empty(len(indices))
         self.kernel.least_sines(self.units, indices, sines)
         return SpanningQuadruples(indices, np.arcsin(sines))
@@ -244,12 +242,6 @@ class SpanningTable:
             found = np.empty((count, 4), dtype=np.int64)
             self.kernel.quadruples(self.bits, newest, found)
         return found[:count].copy()
-
-
-def _sorted(parts: Sequence[Indices], count: int) -> Indices:
-    places = count ** np.arange(3, -1, -1)
-    keys = np.sort(np.concatenate(parts) @ places)
-    return keys[:, None] // places % count
 
 
 def span_angles(normals: Array) -> Array:

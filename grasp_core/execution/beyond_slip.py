@@ -71,25 +71,25 @@ def loss_multiples(grip: Grip, loads: Array, most_m: float, most_rad: float) -> 
     if not grip.stable or not len(loads):
         return np.zeros(len(loads))
     change = np.einsum("kij,mj->mki", grip.response, loads)
-    count = len(loads)
+    count, reach = len(loads), np.repeat([most_m, most_rad], 3)
     slips = slip_steps(
         np.tile(grip.local_squeeze, (count, 1)), change.reshape(-1, 3),
         np.tile(grip.friction, count),
     ).reshape(count, -1).min(axis=1)  # fmt: skip
     with np.errstate(divide="ignore"):
-        sticking = 1.0 / _moved(loads @ grip.compliance.T, most_m, most_rad)
+        sticking = 1.0 / _moved(loads @ grip.compliance.T, reach)
     found = sticking.copy()
     beyond = slips < sticking
     if beyond.any():
         begun = np.maximum(slips, sticking / FARTHEST)[beyond]
-        found[beyond] = _followed(grip, loads[beyond], begun, sticking[beyond], most_m, most_rad)
+        found[beyond] = _followed(grip, loads[beyond], begun, sticking[beyond], reach)
     return found
 
 
-def _moved(motion: Array, most_m: float, most_rad: float) -> Array:
+def _moved(motion: Array, reach: Array) -> Array:
     """Return small motions, (m, 6), as parts of what is allowed, (m,)."""
     moved, turned = (np.linalg.norm(motion[:, part], axis=1) for part in (slice(3), slice(3, 6)))
-    return np.maximum(moved / most_m, turned / most_rad)
+    return np.maximum(moved / reach[0], turned / reach[3])
 
 
 @dataclass(slots=True, eq=False)
@@ -106,9 +106,7 @@ class _Followed:
     """Motion there as a part of what is allowed, (m,); infinite where nothing balances."""
 
 
-def _followed(
-    grip: Grip, loads: Array, begun: Array, last: Array, most_m: float, most_rad: float
-) -> Array:
+def _followed(grip: Grip, loads: Array, begun: Array, last: Array, reach: Array) -> Array:
     """Follow loads past their first slips; return where each is lost, at most at the last, (m,)."""
     count = len(loads)
     rest = np.tile(grip.local_squeeze, (count, 1, 1))
@@ -118,24 +116,21 @@ def _followed(
     )  # fmt: skip
     first = BEFORE * begun
     for part in np.linspace(0.0, 1.0, RATIOS + 1):
-        _try(grip, way, loads, first * (last / first) ** part, most_m, most_rad)
+        _try(grip, way, loads, first * (last / first) ** part, reach)
     for _ in range(HALVINGS):
-        _try(grip, way, loads, 0.5 * (way.multiples + way.lost), most_m, most_rad)
+        _try(grip, way, loads, 0.5 * (way.multiples + way.lost), reach)
     between = np.full(count, 0.5)
     np.divide(1.0 - way.share, way.beyond - way.share, out=between, where=np.isfinite(way.beyond))
     lost = np.where(np.isinf(way.lost), last, way.lost)
     return np.minimum(way.multiples + between * (lost - way.multiples), last)
 
 
-def _try(
-    grip: Grip, way: _Followed, loads: Array, multiples: Array, most_m: float, most_rad: float
-) -> None:
+def _try(grip: Grip, way: _Followed, loads: Array, multiples: Array, reach: Array) -> None:
     """Raise loads to multiples, (m,), where they are below those at which the object is lost."""
     own = np.flatnonzero(multiples < way.lost)
     if not len(own):
         return
     tried = multiples[own]
-    reach = np.array([most_m, most_m, most_m, most_rad, most_rad, most_rad])
     begun = way.forces[own], way.motion[own]
     forces, motion, met = _balanced(grip, *begun, tried[:, None] * loads[own], reach)
     again = np.flatnonzero(~met)
@@ -144,7 +139,7 @@ def _try(
         forces[again], motion[again], met[again] = _in_parts(
             grip, begun[0][again], begun[1][again], ends * loads[own[again]], reach
         )
-    share = np.where(met, _moved(motion, most_m, most_rad), np.inf)
+    share = np.where(met, _moved(motion, reach), np.inf)
     kept = share < 1.0
     held, gone = own[kept], own[~kept]
     way.multiples[held], way.share[held] = tried[kept], share[kept]

@@ -39,7 +39,7 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, cross, frozen
 from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, number, one_of
-from grasp_core.closure.contacts import WRENCH, grasp_map
+from grasp_core.closure.contacts import WRENCH, cross_matrix, grasp_map
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.grips import Grip, check_grip
 from grasp_core.quality.motors import Motors, motors_for
@@ -127,8 +127,7 @@ def stepped(held: Held, start: Grip, step: Array) -> Held:
 def rotation(turn: Array) -> Array:
     """Compute the rotation by a vector, (3,) [rad], as a matrix (3, 3)."""
     angle = float(np.linalg.norm(turn))
-    x, y, z = turn
-    C = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    C = cross_matrix(turn)
     # sin(a) / a and (1 - cos(a)) / a^2, the second without cancellation
     return np.eye(3) + np.sinc(angle / np.pi) * C + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * C @ C
 
@@ -214,9 +213,17 @@ def first_slip(
     _check_torques(grip, limits.motors)
     if not grip.stable:
         return _ended(at_rest(grip), 0.0, "unstable", -1)
-    if model == "linear":
-        return _linear(grip, load, limits)
-    return _finite(grip, load, limits)
+    if model == "finite":
+        return _finite(grip, load, limits)
+    rest = at_rest(grip)
+    multiple, event, place = _next_event(rest, load, limits)
+    if event == "none":
+        return _ended(rest, multiple, event, place)
+    motion = multiple * grip.compliance @ load
+    local = grip.local_squeeze + multiple * (grip.response @ load)
+    forces = np.einsum("kij,kj->ki", grip.frames, local)
+    moved = Held(grip.squeezed(forces), motion[:3], rotation(motion[3:]), rest.tips, rest.load)
+    return _ended(moved, multiple, event, place)
 
 
 def _check_torques(grip: Grip, motors: Motors) -> None:
@@ -281,18 +288,6 @@ def _next_event(held: Held, load: Array, most: _Limits) -> tuple[float, Event, i
     if math.isinf(slips.min()):
         return math.inf, "none", -1
     return float(slips.min()), "slip", int(np.argmin(slips))
-
-
-def _linear(grip: Grip, load: Array, most: _Limits) -> FirstSlip:
-    rest = at_rest(grip)
-    multiple, event, place = _next_event(rest, load, most)
-    if event == "none":
-        return _ended(rest, multiple, event, place)
-    motion = multiple * grip.compliance @ load
-    local = grip.local_squeeze + multiple * (grip.response @ load)
-    forces = np.einsum("kij,kj->ki", grip.frames, local)
-    moved = Held(grip.squeezed(forces), motion[:3], rotation(motion[3:]), rest.tips, rest.load)
-    return _ended(moved, multiple, event, place)
 
 
 def _finite(start: Grip, load: Array, most: _Limits) -> FirstSlip:

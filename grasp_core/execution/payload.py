@@ -47,7 +47,7 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors, motors_for
-from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit, attains, bounds, limit_of
+from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit, limit_of
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
 
@@ -130,11 +130,9 @@ class Payload(ByValue):
     def _are_rays(self) -> bool:
         body = _body(self.fixed.grip, self.fixed.max_push_n, self.fixed.motors)
         return all(
-            ray.has_numbers(body.count, len(body.levers))
+            ray.holds_for(body)
             and not ray.wrench[3:].any()
             and abs(np.linalg.norm(ray.wrench) / GRAVITY_M_PER_S2 - 1.0) <= ROUNDING
-            and attains(body, ray)
-            and bounds(body, ray)
             for ray in self.free.rays
         )
 

@@ -102,9 +102,7 @@ class BestSqueeze(ByValue):
         grip, motors = self.grip, self.motors
         if not (grip.sound() and grip.stable):
             return False
-        if motors is not None and not is_a(motors, Motors):
-            return False
-        if motors is not None and not motors.sound(len(grip.friction)):
+        if not (motors is None or (is_a(motors, Motors) and motors.sound(len(grip.friction)))):
             return False
         survival = Survival.of(grip, self.loads, motors)
         return (

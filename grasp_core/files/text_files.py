@@ -11,7 +11,7 @@ from collections.abc import Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 
 UNFINISHED = ".unfinished-"
 """Part of the name of a file that is still being written, or whose writing process was killed."""
@@ -78,10 +78,6 @@ MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
 """Byte order marks of UTF-8 and UTF-16."""
 
 
-class NotTextError(InputError):
-    """Error for a file whose bytes are not UTF-8 text."""
-
-
 def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
     """Read a regular file; pipes and devices are refused, because they may never end."""
     try:
@@ -97,20 +93,19 @@ def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
 
 def read_text(path: Path, most: int = MAX_TEXT_BYTES) -> str:
     """Read the text of a file."""
-    try:
-        return text_of(read_bytes(path, most))
-    except NotTextError as error:
-        raise InputError(f"{path}: {error}") from error
+    data = read_bytes(path, most)
+    with about(path):
+        return text_of(data)
 
 
 def text_of(data: bytes) -> str:
     """Decode the bytes of a file; line ends of Windows become plain ones."""
     if data.startswith(MARKS):
-        raise NotTextError("the text begins with a byte order mark; save it as UTF-8 without one")
+        raise InputError("the text begins with a byte order mark; save it as UTF-8 without one")
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise NotTextError(
+        raise InputError(
             f"the file is not UTF-8 text ({error.reason} at byte {error.start}); save it as UTF-8"
         ) from error
     return text.replace("\r\n", "\n")

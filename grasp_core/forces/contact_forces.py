@@ -98,10 +98,15 @@ def contact_forces(
     for place, balance in enumerate(balances(arms, units, loads, normal_force, by_load=True)):
         f = _found(balance, mu, objective, solver)
         if f is None:
+            shared = f"{mu[0]:.6g}" if np.ptp(mu) == 0.0 else str(mu)
+            # without limits on the forces, the size of the load does not matter
+            remedy = "use more friction or move the contacts"
+            if math.isfinite(normal_force[1]):
+                remedy = "lower the load or raise the limits"
             which = "this wrench" if single else f"wrench {place}, counting from 0"
             raise NoForcesError(
-                f"no forces were found with friction {_text(mu)} and normal forces in "
-                f"{normal_force} N that balance {which}; {_remedy(normal_force)}"
+                f"no forces were found with friction {shared} and normal forces in "
+                f"{normal_force} N that balance {which}; {remedy}"
             )
         found.append(balance.in_space(f))
     return found[0] if single else np.array(found).reshape(len(loads), len(points), 3)
@@ -129,25 +134,19 @@ def _found(balance: Balance, mu: Array, objective: Objective, solver: str) -> Ar
 def least_friction_forces(
     positions: Array, normals: Array, friction: float, wrench: Array, *,
     normal_force: tuple[float, float], center: Array,
-) -> tuple[Array, float] | None:  # fmt: skip
+) -> tuple[Array, float | None]:  # fmt: skip
     """Find balancing forces (k, 3) [N] of least friction, with that coefficient.
 
-    The search starts at `friction`, but the forces may need more than that. None where the limits
-    on the normal forces leave no balance.
+    The search starts at `friction`, but the forces may need more than that. Where the limits on the
+    normal forces leave no balance, those in the cones come nearest to it, and no coefficient is
+    given.
     """
     (balance,) = balances(positions - center, normals, wrench[None], normal_force, by_load=False)
     alike = np.ones(len(positions))
     f = least_friction(balance, friction, alike)
-    return None if f is None else (balance.in_space(f), needed_friction(f, alike))
-
-
-def closest_forces(
-    positions: Array, normals: Array, friction: float, wrench: Array, *,
-    normal_force: tuple[float, float], center: Array,
-) -> Array:  # fmt: skip
-    """Find forces in the friction cones that leave the least imbalance, (k, 3) [N]."""
-    (balance,) = balances(positions - center, normals, wrench[None], normal_force, by_load=False)
-    return balance.in_space(least_imbalance(balance, np.full(len(positions), friction)))
+    if f is None:
+        return balance.in_space(least_imbalance(balance, friction * alike)), None
+    return balance.in_space(f), needed_friction(f, alike)
 
 
 def even_forces(
@@ -233,17 +232,3 @@ def _rows(wrench: ArrayLike) -> tuple[Array, bool]:
             f"{float(sizes[sizes > 0.0].min()):.3g}"
         )
     return loads, single
-
-
-def _remedy(normal_force: tuple[float, float]) -> str:
-    """Return advice for a wrench that no forces balance.
-
-    Without limits on the forces, the size of the load does not matter.
-    """
-    if math.isfinite(normal_force[1]):
-        return "lower the load or raise the limits"
-    return "use more friction or move the contacts"
-
-
-def _text(friction: Array) -> str:
-    return f"{friction[0]:.6g}" if np.ptp(friction) == 0.0 else str(friction)

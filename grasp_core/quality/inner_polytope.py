@@ -84,13 +84,6 @@ class InnerPolytope(ByValue):
             and are_units(self.normals, count, WRENCH)
         )
 
-    def radius(self, wrenches: WrenchSet) -> float:
-        """Return the least height of a corner along the normal of its simplex."""
-        if len(self.normals) != len(self.corners):
-            return -np.inf
-        lowest, _ = self._heights(self.forces @ wrenches.G.T)
-        return float(lowest.min())
-
     def proved_radius(self, wrenches: WrenchSet) -> float:
         """Return the radius if the simplices enclose zero, and minus infinity otherwise."""
         if not 0 < len(self.normals) == len(self.corners) or not self._even():
@@ -144,20 +137,16 @@ class InnerPolytope(ByValue):
         end = float(ends.min(initial=farthest))
         near = lowest <= end * along + 4.0 * lost  # (1): both sides are off by two at most
         cells = points[self.corners[near]].transpose(0, 2, 1)
-        inverses = _inverses(cells)
+        # X near the inverses, (m, 6, 6); of flat cells, something as large
+        left, sizes, right = np.linalg.svd(cells)
+        sizes = np.maximum(sizes, FLATTEST * np.maximum(sizes[:, :1], TINY))
+        inverses = np.asarray(right.transpose(0, 2, 1) / sizes[:, None] @ left.transpose(0, 2, 1))
         shares = inverses @ ray
         # the most that shares can sum to, in (2)
         most = (along[near] + LOST) / np.maximum(lowest[near] - lost, TINY)
         missed = _miss(cells, inverses, shares, most)
         crossed = _cross(cells, inverses, shares)
         return int(crossed.sum()) if (missed | crossed).all() else None
-
-
-def _inverses(cells: Array) -> Array:
-    """Return matrices X near the inverses, (m, 6, 6); of flat cells, something as large."""
-    left, sizes, right = np.linalg.svd(cells)
-    sizes = np.maximum(sizes, FLATTEST * np.maximum(sizes[:, :1], TINY))
-    return np.asarray(right.transpose(0, 2, 1) / sizes[:, None] @ left.transpose(0, 2, 1))
 
 
 def _miss(cells: Array, inverses: Array, shares: Array, most: Array) -> NDArray[np.bool_]:

@@ -310,7 +310,8 @@ def _least(wrenches: WrenchSet, measure: Measure, twists: list[Array]) -> tuple[
     Forces along the axes make it finite. Of multiples that programs find equal the first counts.
     """
     axes = np.eye(WRENCH)[:3]
-    every = _units(np.array([*twists, *axes, *-axes]))
+    every = np.array([*twists, *axes, *-axes])
+    every = every / np.linalg.norm(every, axis=1)[:, None]
     # a twist that asks for next to nothing bounds nothing: rounding in its support counts in full
     supports = wrenches.supports(every) + _rounding(wrenches)
     allowed = measure.multiples(supports, measure.demands(every))
@@ -322,10 +323,6 @@ def _least(wrenches: WrenchSet, measure: Measure, twists: list[Array]) -> tuple[
 def _rounding(wrenches: WrenchSet) -> float:
     """Return by how much supports of unit twists may be rounded."""
     return CHECK_SLACK * wrenches.size
-
-
-def _units(rows: Array) -> Array:
-    return rows / np.linalg.norm(rows, axis=1)[:, None]
 
 
 class TaskLimit(NamedTuple):

@@ -269,22 +269,23 @@ class WrenchLimit(ByValue):
         about = frozen(center, (3,), "center")
         body = body_of(points - about, units, friction, max_normal_force, motors, torsion_m)
         with np.errstate(all="ignore"):
-            soft = body.lengths is not None
-            known = self.has_numbers(len(points), len(body.levers), soft=soft)
-            return known and attains(body, self) and bounds(body, self)
+            return self.holds_for(body)
 
-    def has_numbers(self, count: int, joints: int = 0, *, soft: bool = False) -> bool:
-        """Return whether fields are numbers of the right shapes, for `count` contacts."""
+    def holds_for(self, body: WrenchBody) -> bool:
+        """Return whether the fields prove both bounds for the contacts of a body."""
+        soft = body.lengths is not None
         return (
             is_array(self.wrench, WRENCH)
             and bool(self.wrench.any())
             and is_array(self.facet, WRENCH)
-            and is_array(self.forces, count, 3)
-            and is_array(self.motor_multipliers, joints)
-            and (is_array(self.torques, count) if soft else self.torques is None)
+            and is_array(self.forces, body.count, 3)
+            and is_array(self.motor_multipliers, len(body.levers))
+            and (is_array(self.torques, body.count) if soft else self.torques is None)
             and is_number(self.limit, least=0.0)
             and is_number(self.upper)
             and self.limit <= self.upper
+            and attains(body, self)
+            and bounds(body, self)
         )
 
 
@@ -353,42 +354,6 @@ def bounds(body: WrenchBody, found: WrenchLimit) -> bool:
     return bound <= found.upper * min(1.0, -power) * (1.0 + FACET_SLACK) + slack
 
 
-def max_resisted_wrench(
-    positions: ArrayLike | Grasp | Sequence[Contact],
-    normals: ArrayLike | None,
-    friction: ArrayLike,
-    wrench: ArrayLike,
-    *,
-    max_normal_force: float,
-    center: ArrayLike = (0.0, 0.0, 0.0),
-    motors: Motors | None = None,
-    torsion_m: ArrayLike = 0.0,
-) -> float:
-    """Find the largest multiple of an external wrench that the contacts can resist.
-
-    Args:
-        positions: Contact points, (k, 3) [m]; or a Grasp or Contacts, with `normals` None.
-        normals: Unit vectors into the object, (k, 3).
-        friction: Coulomb coefficient, one for all contacts or one each.
-        wrench: External (force, torque), (6,) [N, N m], torque about `center`.
-        max_normal_force: Largest normal force of each contact [N].
-        center: Point about which torques are taken, (3,) [m].
-        motors: Joints that the contact forces load, with the torques of their motors; None for
-            fingers that are as strong as `max_normal_force` says.
-        torsion_m: Torsional coefficient, one for all contacts or one each, (k,) [m]; zero is a hard
-            finger. With motors it must be zero.
-
-    Raises:
-        InputError: Shapes or limits are wrong, or the wrench is zero.
-    """
-    loads = frozen(wrench, (6,), "wrench")[None]
-    _check_sizes(loads, "wrench")
-    return wrench_limits(
-        positions, normals, friction, loads, max_normal_force=max_normal_force, center=center,
-        motors=motors, torsion_m=torsion_m,
-    )[0].limit  # fmt: skip
-
-
 def wrench_limits(
     positions: ArrayLike | Grasp | Sequence[Contact],
     normals: ArrayLike | None,
@@ -422,21 +387,17 @@ def wrench_limits(
     """
     points, units = contact_arrays(positions, normals)
     loads = frozen(wrenches, (None, 6), "wrenches")
-    _check_sizes(loads, "wrenches")
-    about = frozen(center, (3,), "center")
-    body = body_of(points - about, units, friction, max_normal_force, motors, torsion_m)
-    return tuple(limit_of(body, load) for load in loads)
-
-
-def _check_sizes(loads: Array, name: str) -> None:
-    """Refuse wrenches (n, 6) that are zero, because every multiple of zero is resisted."""
     sizes = np.abs(loads).max(axis=1)
+    # every multiple of zero is resisted
     if len(loads) and not SMALLEST <= float(sizes.min()) <= float(sizes.max()) <= LARGEST:
         wrong = sizes[(sizes < SMALLEST) | (sizes > LARGEST)][0]
         raise InputError(
-            f"{name} must not be zero nor huge: its largest component must be from {SMALLEST:g} to "
-            f"{LARGEST:g}, got {float(wrong):.6g}"
+            f"wrenches must not be zero nor huge: each needs a largest component from {SMALLEST:g} "
+            f"to {LARGEST:g}, got {float(wrong):.6g}"
         )
+    about = frozen(center, (3,), "center")
+    body = body_of(points - about, units, friction, max_normal_force, motors, torsion_m)
+    return tuple(limit_of(body, load) for load in loads)
 
 
 def axis_wrenches(torque_scale: float) -> Array:

@@ -7,12 +7,15 @@ imported only where a file is read: plans are written without it.
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from grasp_core.checked import instance, path_of
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import text_of
+from grasp_core.files.text_files import read_text, write_text
 from grasp_core.frames import radians_of
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.objects.build import MeshChoices
@@ -134,10 +137,15 @@ def grasps_from_json(text: str) -> Plan:
     from grasp_core.records.grasps_schema import GraspsRecord
 
     record = record_of(GraspsRecord, text, "grasps.json", schema=SCHEMA)
-    body, counts = _body_of(record), record.counts
+    body, counts, grasps = _body_of(record), record.counts, list[Grasp]()
+    for place, each in enumerate(record.grasps):
+        with about(f"grasps[{place}]"):
+            grasps.append(_grasp_from_record(body, each, record.friction))
+    if len({grasp.id for grasp in grasps}) < len(grasps):
+        raise InputError("grasps: two grasps have the same id; ids must differ")
     return Plan(
         body=body,
-        grasps=_grasps_of(body, record),
+        grasps=tuple(grasps),
         friction=record.friction,
         theta=radians_of(record.theta_deg),
         seed=record.seed,
@@ -178,16 +186,6 @@ def _body_of(record: "GraspsRecord") -> Polyhedron:
     return body
 
 
-def _grasps_of(body: Polyhedron, record: "GraspsRecord") -> tuple[Grasp, ...]:
-    grasps = list[Grasp]()
-    for place, each in enumerate(record.grasps):
-        with about(f"grasps[{place}]"):
-            grasps.append(_grasp_from_record(body, each, record.friction))
-    if len({grasp.id for grasp in grasps}) < len(grasps):
-        raise InputError("grasps: two grasps have the same id; ids must differ")
-    return tuple(grasps)
-
-
 def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float) -> Grasp:
     grasp = Grasp(
         id=record.id,
@@ -224,3 +222,44 @@ def _grasp_from_record(body: Polyhedron, record: "GraspRecord", friction: float)
             f"grasp {grasp.id}: a witness line does not run along its force; plan again"
         )
     return grasp
+
+
+def save_grasps(path: str | Path, plan: Plan) -> Path:
+    """Write a plan as a `grasps.json`, which `graspproof validate` and all other commands read.
+
+    A slice of a plan, such as `plan[:5]`, what `plan.filter` gives, and grasps of one's own choice,
+    `dataclasses.replace(plan, grasps=...)`, can be written as well.
+
+    Args:
+        path: Path of the file; missing folders are made.
+        plan: A plan, as `gc.plan` or `gc.load_grasps` returns it.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: The value is not a plan.
+        OSError: The file cannot be written.
+    """
+    path = path_of(path, "path")
+    instance(plan, Plan, "plan", "gc.plan makes plans")
+    return write_text(path, plan_to_json(plan.body, plan))
+
+
+def load_grasps(path: str | Path) -> Plan:
+    """Read a `grasps.json` as a plan, with every grasp checked against the object in the file.
+
+    Each grasp equals the one that was saved. A file keeps neither times nor what is known of face
+    quadruples without grasps: `absences`, `undecided` and `unreached` are empty. A plan that is
+    loaded and saved again gives the same bytes.
+
+    Args:
+        path: A `grasps.json`, as `save_grasps` and `graspproof plan` write it.
+
+    Raises:
+        InputError: The file is missing or invalid; the message names the file and the field.
+    """
+    path = path_of(path, "path")
+    text = read_text(path)
+    with about(path):
+        return grasps_from_json(text)

@@ -47,14 +47,7 @@ class Sites(NamedTuple):
     def on_grid(self) -> "Sites":
         """Round to a grid, so that last digits do not matter to a search; friction never rises."""
         friction = -coarse(-self.friction, GRID_DIGITS)
-        return Sites(
-            on_grid(self.points),
-            on_grid(self.frames),
-            np.clip(friction, 0.0, self.friction),
-            on_grid(self.corners),
-            on_grid(self.radii),
-            on_grid(self.depths),
-        )
+        return Sites(*map(on_grid, self))._replace(friction=np.clip(friction, 0.0, self.friction))
 
     def clear(self) -> Array:
         """Return the power per unit of force and twist that rounding to the grid may take, (k,)."""

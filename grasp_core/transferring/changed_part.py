@@ -39,14 +39,13 @@ def load_changed_part(
     A centre of mass that was given for the old part is kept; otherwise it is that of uniform
     density.
     """
-    center = given_center(old)
     return load_polyhedron(
         path,
         unit=unit,
         scale=scale,
         faces="planar",
         largest_part=old.surface.dropped > SMALL,
-        center_of_mass=center,
+        center_of_mass=given_center(old),
         limits=limits,
     )
 

@@ -41,6 +41,7 @@ from grasp_core.planning.given_contacts import Seated, grasp_of
 from grasp_core.planning.reach import Finger, reach
 from grasp_core.transferring.face_changes import (
     ANGLE_DEG,
+    MM,
     FaceChange,
     Likeness,
     added_faces,
@@ -55,7 +56,6 @@ from grasp_core.values import FINGERS, Contact, Grasp, Witness, four
 
 BY_FACES = re.compile(r"([a-z](?:-[a-z])*)((?:-\d+[ab]?){4})")
 """Ids that plans make: letters of methods, then the faces by finger, perhaps halves of faces."""
-MM = 1e3
 Change: TypeAlias = Literal["same", "better", "worse", "gone"]
 """How a grasp of the changed part compares with that of the old part."""
 CHANGES: tuple[Change, ...] = get_args(Change)
@@ -240,7 +240,11 @@ class _Judge:
             lost.append(f"finger {each.finger} has lost face {each.old_face}: {near}")
         if lost:
             return CarriedGrasp(grasp, "gone", "; ".join(lost), contacts, before, None, None)
-        name = _free_id(_id_on(grasp, contacts), taken)
+        wanted, number = _id_on(grasp, contacts), 1
+        name = wanted
+        while name in taken:
+            number += 1
+            name = f"{wanted}-{number}"
         try:
             seated = Seated(
                 self.new, four(each.new_face for each in contacts if each.new_face is not None),
@@ -348,12 +352,3 @@ def _id_on(grasp: Grasp, contacts: Iterable[CarriedContact]) -> str:
     now = (f"{each.new_face}{half[len(half.rstrip('ab')):]}"
            for each, half in zip(contacts, named, strict=True))  # fmt: skip
     return "-".join([parts[1], *now])
-
-
-def _free_id(wanted: str, taken: set[str]) -> str:
-    """Return an id that no other grasp has: the wanted one, or with a number behind it."""
-    name, number = wanted, 1
-    while name in taken:
-        number += 1
-        name = f"{wanted}-{number}"
-    return name

@@ -11,7 +11,7 @@ from grasp_core.by_value import counted
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.files.text_files import write_text
 from grasp_core.planning.result import Plan
-from grasp_core.records.grasps_files import load_grasps
+from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Grasp
 from scenes import exports
 from scenes.mjcf import build_scene

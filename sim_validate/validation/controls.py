@@ -22,7 +22,7 @@ from grasp_core.closure.contacts import stacked
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.errors import SolverError, UndecidedError
-from grasp_core.forces.contact_forces import closest_forces, least_friction_forces
+from grasp_core.forces.contact_forces import least_friction_forces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from sim_validate.simulation.bench import Bench
@@ -220,11 +220,10 @@ def _planned(
     """Plan forces for a wrench: of least friction, or nearest to balance where none balance it."""
     largest = setup.fingers.max_normal_force_n
     limits = (setup.hold.least_normal_share * largest, largest)
-    given, center = (*stacked(control.contacts), control.friction, wrench), body.center_of_mass
-    balanced = least_friction_forces(*given, normal_force=limits, center=center)
-    if balanced is None:
-        needed, forces = None, closest_forces(*given, normal_force=limits, center=center)
-    else:
-        needed, forces = rounded(balanced[1]), balanced[0]
+    forces, needed = least_friction_forces(
+        *stacked(control.contacts), control.friction, wrench,
+        normal_force=limits, center=body.center_of_mass,
+    )  # fmt: skip
+    needed = None if needed is None else rounded(needed)
     settling = setup.hold.settling_friction * max(control.friction, needed or 0.0)
     return ControlLoad(name, Load(wrench, to_digits(forces)), settling, needed)

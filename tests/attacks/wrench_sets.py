@@ -98,7 +98,7 @@ def slivers(w, f, eps, rng, count):
 def claimed(w, seed, polytope, rng):
     """A quality above the truth, as far as the polytope's simplices are away."""
     most = most_quality(seed)
-    radius = polytope.radius(w)
+    radius = float(polytope._heights(polytope.forces @ w.G.T)[0].min())
     if not radius > most * (1.0 + 1e-6):
         return None
     lower = rng.uniform(most * (1.0 + 1e-6), radius)

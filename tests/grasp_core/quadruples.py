@@ -4,11 +4,16 @@ import math
 
 import numpy as np
 
-from grasp_core.cones.spanning import spanning_quadruples
+from grasp_core.cones.spanning import SpanningTable
 from grasp_core.families.constructions import PAIRINGS
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
+
+
+def spanning_quadruples(normals, least_angle):
+    """All quadruples of directions that positively span at a larger angle than given."""
+    return SpanningTable(normals, least_angle).quadruples(0, len(normals))
 
 
 def paired_quadruples(name, theta, limit=None):

@@ -111,14 +111,6 @@ CALLS = [
         "gap": POSITIVE | {"one": 1.0},
         "parts": AT_LEAST_ONE,
     }),
-    Call("gc.max_resisted_wrench", two_arrays(friction=0.5, wrench=WRENCH, max_normal_force=1.0),
-         contacts() | {
-        "friction": each_of(FRICTION, "zero"),
-        "wrench": array(WRENCH) | {"zero": 0.0 * WRENCH, "tiny": 1e-300 * WRENCH},
-        "center": array(CENTER),
-        "motors": MOTORS,
-        "torsion_m": TORSION,
-    }),
     Call("gc.wrench_limits", two_arrays(friction=0.5, wrenches=WRENCH[None], max_normal_force=1.0),
          contacts() | {
         "friction": each_of(FRICTION, "zero"),

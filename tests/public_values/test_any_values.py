@@ -87,8 +87,8 @@ def test_closure_of_a_tetrahedron_is_answered_at_any_size(size, friction):
 def test_any_wrench_center_and_limit_is_answered_or_refused(wrench, center, most):
     contacts = TETRA_CENTERS, TETRA_NORMALS, 0.5
     answered(lambda: gc.contact_forces(*contacts, wrench, center=center, normal_force=(0.0, most)))
-    answered(lambda: gc.max_resisted_wrench(*contacts, wrench, max_normal_force=most,
-                                            center=center))  # fmt: skip
+    answered(lambda: gc.wrench_limits(*contacts, [wrench], max_normal_force=most,
+                                      center=center))  # fmt: skip
     answered(lambda: gc.ferrari_canny(*contacts, center=center, torque_scale=most, gap=0.1))
 
 

@@ -24,7 +24,7 @@ LOAD = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
                 given, friction=0.5, center=BODY.center_of_mass, torque_scale=BODY.radius
             ).lower
         ),
-        lambda given: gc.max_resisted_wrench(given, None, 0.5, LOAD, max_normal_force=10.0),
+        lambda given: gc.wrench_limits(given, None, 0.5, [LOAD], max_normal_force=10.0)[0].limit,
         lambda given: gc.contact_forces(given, None, 0.5, LOAD).tolist(),
         lambda given: gc.smallest_singular_value(given, torque_scale=BODY.radius),
     ],

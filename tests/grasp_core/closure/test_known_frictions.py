@@ -137,7 +137,7 @@ def test_the_largest_normal_force_under_a_weight_on_a_paraboloid(count, largest)
     positions = np.column_stack([x, y, x * x + y * y])
     normals = units(np.column_stack([-2.0 * x, -2.0 * y, np.ones(count)]))
     weight = [0.0, 0.0, -1.0, 0.0, 0.0, 0.0]
-    resisted = gc.max_resisted_wrench(positions, normals, 0.3, weight, max_normal_force=1.0)
+    resisted = gc.wrench_limits(positions, normals, 0.3, [weight], max_normal_force=1.0)[0].limit
     assert 1.0 / resisted == pytest.approx(largest, abs=5e-9)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from grasp_core.closure.contacts import unit_size
 from grasp_core.closure.force_closure import certificates, closing_margins, force_closure
-from grasp_core.closure.proofs import margin_ceiling, margin_ceilings, proved_margin, proved_margins
+from grasp_core.closure.proofs import margin_ceiling, proved_margin
 from grasp_core.errors import UndecidedError
 
 SETS = 300
@@ -86,9 +86,9 @@ def test_margins_are_those_of_one_set_whatever_forces_and_twists_are_given():
     forces += 1e-5 * rng.normal(size=forces.shape) * (rng.uniform(size=(SETS, 1, 1)) < 0.5)
     twists = rng.normal(size=(SETS, 6))
     for caution in (1.0, 1.01):
-        lower = proved_margins(forces, arms, normals, 0.6, caution)
-        upper = margin_ceilings(twists, arms, normals, 0.6, caution)
         mu = np.full(4, 0.6)
+        lower = proved_margin(forces, arms, normals, mu, caution)
+        upper = margin_ceiling(twists, arms, normals, mu, caution)
         for i in range(SETS):
             one = proved_margin(forces[i], arms[i], normals[i], mu, caution)
             other = margin_ceiling(twists[i], arms[i], normals[i], mu, caution)

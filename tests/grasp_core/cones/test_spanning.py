@@ -12,9 +12,9 @@ from grasp_core.cones.spanning import (
     positively_span,
     span_angle,
     span_angles,
-    spanning_quadruples,
 )
 from scenes.example_objects import example_object
+from tests.grasp_core.quadruples import spanning_quadruples
 from tests.grasp_core.regular_solids import SOLIDS, quadruples, units
 from tests.judges import TETRA_NORMALS, picks_positively_span
 

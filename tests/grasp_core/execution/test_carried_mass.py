@@ -31,10 +31,10 @@ def carrying(body, contacts, motors, weights, mu=0.5, push=10.0):
 def held(hand, way):
     """The largest mass under gravity along a unit vector, by the definition."""
     turned = gc.Motors(hand.motors.levers, hand.motors.limits, hand.weights @ way)
-    return gc.max_resisted_wrench(
-        hand.arms, hand.normals, hand.friction, np.append(G * way, np.zeros(3)),
+    return gc.wrench_limits(
+        hand.arms, hand.normals, hand.friction, [np.append(G * way, np.zeros(3))],
         max_normal_force=hand.max_push_n, motors=turned,
-    )  # fmt: skip
+    )[0].limit  # fmt: skip
 
 
 def hands(share=0.25):

@@ -82,9 +82,9 @@ def test_no_first_slip_is_above_the_closure_limit(most):
                 assert along.max() <= most + 1e-7
                 left = grasp_map(found.arms) @ found.forces.ravel() + found.multiple * load
                 assert np.abs(left).max() < 1e-8 * np.abs(found.forces).sum()
-                limit = gc.max_resisted_wrench(
-                    found.arms, found.normals, 0.5, load, max_normal_force=min(most, along.max())
-                )
+                limit = gc.wrench_limits(
+                    found.arms, found.normals, 0.5, [load], max_normal_force=min(most, along.max())
+                )[0].limit
                 assert found.multiple <= limit * (1.0 + 1e-6)
                 tested += 1
     assert tested >= 30
@@ -97,10 +97,8 @@ def test_linear_forces_balance_at_rest_where_tips_do_not_roll():
             found = gc.first_slip(grip, load, model="linear", max_push_n=20.0)
             left = grasp_map(grip.arms) @ found.forces.ravel() + found.multiple * load
             assert np.abs(left).max() < 1e-9 * np.abs(found.forces).sum()
-            limit = gc.max_resisted_wrench(
-                grip.arms, grip.normals, 0.5, load, max_normal_force=20.0
-            )
-            assert found.multiple <= limit * (1.0 + 1e-6)
+            (held,) = gc.wrench_limits(grip.arms, grip.normals, 0.5, [load], max_normal_force=20.0)
+            assert found.multiple <= held.limit * (1.0 + 1e-6)
 
 
 def test_a_grip_that_was_not_made_as_one_is_refused():

@@ -114,7 +114,7 @@ def test_motors_in_any_orientation_carry_object_and_links_in_every_one():
             turned = gc.Motors(hand.levers, hand.limits, weights @ way)
             load = np.append(G * way, np.zeros(3))
             held, sure = (
-                gc.max_resisted_wrench(grasp, None, 0.5, load, motors=each, **given)
+                gc.wrench_limits(grasp, None, 0.5, [load], motors=each, **given)[0].limit
                 for each in (turned, motors)
             )
             assert found.free.lower <= held * (1.0 + 1e-6)

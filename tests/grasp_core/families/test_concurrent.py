@@ -5,7 +5,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.cones.pyramids import inscribed_facets
-from grasp_core.cones.spanning import balancing_weights, spanning_quadruples
+from grasp_core.cones.spanning import balancing_weights
 from grasp_core.families.concurrent import (
     concurrent_radius_bounds,
     cone_footprint,
@@ -16,6 +16,7 @@ from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
 from tests.grasp_core.families.disc_borders import on_borders
+from tests.grasp_core.quadruples import spanning_quadruples
 
 TOLERANCE = 1e-7
 """Ten times the residual at which a program's answer is accepted, in object radii."""

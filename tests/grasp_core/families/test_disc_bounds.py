@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.cones.spanning import span_sines, spanning_quadruples
+from grasp_core.cones.spanning import span_sines
 from grasp_core.families.constructions import CONSTRUCTIONS, PAIRINGS
 from grasp_core.families.disc_bounds import KERNELS, AttemptBounds, corners_of, disc_limits
 from grasp_core.families.kernel_tables import Attempts
@@ -19,6 +19,7 @@ from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
 from tests.grasp_core.curved import curved_body
 from tests.grasp_core.families import reference_corner_bounds as reference
+from tests.grasp_core.quadruples import spanning_quadruples
 
 BODIES = ("random-14-1", "chamfered-box", "double-wedge-bar")
 

@@ -6,7 +6,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.contacts import grasp_map, normal_and_tangential
 from grasp_core.errors import NoForcesError
-from grasp_core.forces.contact_forces import closest_forces, contact_forces, least_friction_forces
+from grasp_core.forces.contact_forces import contact_forces, least_friction_forces
 from scenes.example_objects import example_object
 from tests.grasp_core.forces.loads import (
     LIMITS,
@@ -59,8 +59,8 @@ def test_a_wrench_beyond_the_limit_has_no_forces():
 def test_closest_forces_stay_in_their_cones():
     tested = 0
     for body, grasp, wrench in cases(per_object=1):
-        forces = closest_forces(
-            grasp.positions, grasp.normals, 0.2, 5.0 * wrench,
+        forces = contact_forces(
+            grasp, None, 0.2, 5.0 * wrench, objective="closest",
             normal_force=LIMITS, center=body.center_of_mass,
         )  # fmt: skip
         along, across = normal_and_tangential(forces, grasp.normals)

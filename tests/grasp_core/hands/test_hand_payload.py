@@ -32,10 +32,10 @@ def carried(hand, body, reach, **more):
 
 def held(hand, body, reach, way):
     """The largest mass where gravity points along a unit vector and pulls at the links."""
-    return gc.max_resisted_wrench(
-        reach.contacts, None, FRICTION, np.append(G * way, np.zeros(3)), max_normal_force=PUSH_N,
+    return gc.wrench_limits(
+        reach.contacts, None, FRICTION, [np.append(G * way, np.zeros(3))], max_normal_force=PUSH_N,
         center=body.center_of_mass, motors=gc.hand_motors(hand, reach, down=way),
-    )  # fmt: skip
+    )[0].limit  # fmt: skip
 
 
 def test_the_mass_is_the_least_of_all_orientations_and_found_within_the_gap():

@@ -119,10 +119,10 @@ def cross_polytope():
 
 def test_what_a_cross_polytope_proves_and_what_its_spoiled_forms_do_not():
     polytope, wrenches = cross_polytope()
-    assert polytope.radius(wrenches) == pytest.approx(1.0 / np.sqrt(6.0), rel=1e-12)
-    assert polytope.proved_radius(wrenches) == polytope.radius(wrenches)
+    radius = pytest.approx(1.0 / np.sqrt(6.0), rel=1e-12)
+    assert polytope.proved_radius(wrenches) == radius
     scaled = replace(polytope, normals=3.0 * polytope.normals)
-    assert scaled.proved_radius(wrenches) == pytest.approx(polytope.radius(wrenches), rel=1e-12)
+    assert scaled.proved_radius(wrenches) == radius
     corners, normals = polytope.corners, polytope.normals
     beside = replace(polytope, forces=polytope.forces + 2.0)
     spoiled_forms = [
@@ -148,5 +148,5 @@ def test_simplices_before_zero_do_not_hide_that_it_is_outside():
     points = away.forces[away.corners]
     signs = np.sign(np.einsum("mcj,mj->mc", points, away.normals).mean(axis=1))
     turned = replace(away, normals=signs[:, None] * away.normals)
-    assert turned.radius(wrenches) > 0.0
+    assert turned._heights(turned.forces @ wrenches.G.T)[0].min() > 0.0
     assert turned.proved_radius(wrenches) == -np.inf

@@ -134,10 +134,14 @@ def test_limits_rise_with_torque_in_proportion_and_a_dead_joint_only_lowers_them
         levers, wrench = hand_of(rng, 4, 1.0, joints=4, lever_m=1.0).levers, rng.normal(size=6)
 
         def limit(torques, positions=positions, normals=normals, levers=levers, wrench=wrench):
-            motors = gc.Motors.of(levers, torques)
-            return gc.max_resisted_wrench(
-                positions, normals, 0.6, wrench, max_normal_force=1e3, motors=motors
-            )
+            return gc.wrench_limits(
+                positions,
+                normals,
+                0.6,
+                [wrench],
+                max_normal_force=1e3,
+                motors=gc.Motors.of(levers, torques),
+            )[0].limit
 
         dead = np.ones(len(levers))
         dead[0] = 1e-6

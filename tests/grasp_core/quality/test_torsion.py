@@ -69,7 +69,7 @@ def test_limits_lie_between_those_of_pyramids_inside_and_around_the_cones(count)
         upper = limit_by_program(x, n, mu, mu_t, load, inside / inradius(SIDES))
         # conic and linear programs are good to some 1e-7 of the largest force
         assert lower - 1e-6 * LARGEST <= found.limit <= found.upper <= upper + 1e-6 * LARGEST
-        hard = gc.max_resisted_wrench(x, n, mu, load, max_normal_force=LARGEST)
+        hard = gc.wrench_limits(x, n, mu, [load], max_normal_force=LARGEST)[0].limit
         assert found.limit >= hard - 1e-6 * LARGEST
         more += found.limit > 1.01 * hard
     assert more >= CASES // 4

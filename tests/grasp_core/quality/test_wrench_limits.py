@@ -10,21 +10,25 @@ from grasp_core.quality.wrench_limits import (
     WrenchBody,
     axis_wrenches,
     limit_of,
-    max_resisted_wrench,
     weakest_from,
 )
 from scenes.example_objects import example_object
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
 
 
+def limit(positions, normals, friction, wrench, most):
+    (found,) = gc.wrench_limits(positions, normals, friction, [wrench], max_normal_force=most)
+    return found.limit
+
+
 def test_a_pair_of_opposite_fingers_resists_friction_times_force():
     """Two contacts at +-x: across the line, twice mu f; along it, f."""
     positions = np.array([[-1.0, 0, 0], [1, 0, 0]])
     normals = -positions
-    along = max_resisted_wrench(positions, normals, 0.3, [1, 0, 0, 0, 0, 0], max_normal_force=5.0)
-    across = max_resisted_wrench(positions, normals, 0.3, [0, 0, 2, 0, 0, 0], max_normal_force=5.0)
-    about = max_resisted_wrench(positions, normals, 0.3, [0, 0, 0, 1, 0, 0], max_normal_force=5.0)
-    turning = max_resisted_wrench(positions, normals, 0.3, [0, 0, 0, 0, 0, 1], max_normal_force=5.0)
+    along = limit(positions, normals, 0.3, [1, 0, 0, 0, 0, 0], 5.0)
+    across = limit(positions, normals, 0.3, [0, 0, 2, 0, 0, 0], 5.0)
+    about = limit(positions, normals, 0.3, [0, 0, 0, 1, 0, 0], 5.0)
+    turning = limit(positions, normals, 0.3, [0, 0, 0, 0, 0, 1], 5.0)
     assert along == pytest.approx(5.0, rel=1e-6)
     assert across == pytest.approx(0.3 * 5.0 * 2 / 2, rel=1e-6)
     assert about == pytest.approx(0.0, abs=1e-6)
@@ -84,8 +88,8 @@ def test_the_weakest_wrench_is_weaker_than_axes_and_random_wrenches():
 
 def test_limits_scale_with_force_and_inversely_with_the_wrench():
     wrench = np.array([1.0, 2, 3, 0.1, 0.2, 0.3])
-    one = max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench, max_normal_force=1.0)
-    ten = max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench / 2, max_normal_force=5.0)
+    one = limit(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench, 1.0)
+    ten = limit(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench / 2, 5.0)
     assert ten == pytest.approx(10 * one, rel=1e-6)
 
 
@@ -117,7 +121,7 @@ def test_friction_may_differ_between_contacts():
 def test_the_centre_of_torques_may_be_far_away(far):
     """The same force and turn, with its torque about another point."""
     wrench = np.array([0.3, -0.2, 0.5, 0.1, 0.2, -0.1])
-    here = max_resisted_wrench(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench, max_normal_force=2.0)
+    here = limit(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench, 2.0)
     center = far * np.array([0.6, 0.0, 0.8])
     moved = np.append(wrench[:3], wrench[3:] - np.cross(center, wrench[:3]))
     there = gc.wrench_limits(

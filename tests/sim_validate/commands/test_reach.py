@@ -174,10 +174,10 @@ def test_a_hand_of_known_motors_and_links_says_what_it_carries(bracket_plan, tmp
         closed = gc.force_closure(kept.contacts, friction=record["friction"])
         reach = dataclasses.replace(kept, certificate=closed)
         motors = gc.hand_motors(hand, reach, down=found["weakest_gravity"])
-        held = gc.max_resisted_wrench(
-            reach.contacts, None, record["friction"], load, max_normal_force=MOST_PUSH_N,
+        held = gc.wrench_limits(
+            reach.contacts, None, record["friction"], [load], max_normal_force=MOST_PUSH_N,
             center=plan.body.center_of_mass, motors=motors,
-        )  # fmt: skip
+        )[0].limit  # fmt: skip
         assert held == pytest.approx(found["upper_kg"], rel=2e-3)  # twice the gap of the bounds
     assert main(["report", str(tmp_path), "-q"]) == Exit.GOOD
     page = (tmp_path / "report" / "grasps" / f"{reached[0]['id']}.html").read_text()

@@ -107,10 +107,10 @@ def test_the_map_shows_what_is_resisted(wedge):
         for kind, lever, unit in ((0, 1.0, 1.0), (3, body.radius, 1e3)):
             wrench = np.zeros(6)
             wrench[kind : kind + 3] = lever * ways[place]
-            limit = gc.max_resisted_wrench(
-                grasp, None, FRICTION, wrench, max_normal_force=7.0,
+            limit = gc.wrench_limits(
+                grasp, None, FRICTION, [wrench], max_normal_force=7.0,
                 center=body.center_of_mass,
-            )  # fmt: skip
+            )[0].limit  # fmt: skip
             value = np.ravel(shown[kind // 3])[place]
             assert value == pytest.approx(unit * lever * limit, rel=1e-6)
 
