@@ -128,9 +128,7 @@ def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> Ti
 def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
     best, half_angles = normals.copy(), half_angle(normals, normals, thetas)
     for cap in CAPS:
-        axes, caps = np.array(normals, order="C"), np.ascontiguousarray(cap * thetas)
-        # each unit vector against the sum of the others, within a cap around its normal
-        compiled(KERNEL).balance(axes, axes.copy(), caps, SWEEPS, SLIGHT)
+        axes = _balanced(normals, cap * thetas)
         reached = half_angle(axes, normals, thetas)
         better = reached > half_angles + SLIGHT
         best[better], half_angles[better] = axes[better], reached[better]
@@ -164,6 +162,13 @@ def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
     reached = np.empty(len(axes))
     compiled(KERNEL).half_angles(*map(np.ascontiguousarray, (axes, normals, thetas)), reached)
     return reached
+
+
+def _balanced(normals: Array, caps: Array) -> Array:
+    """Point each unit vector against the sum of the others, within caps around normals."""
+    axes = np.array(normals, order="C")
+    compiled(KERNEL).balance(axes, axes.copy(), np.ascontiguousarray(caps), SWEEPS, SLIGHT)
+    return axes
 
 
 def _into_cap(vectors: Array, centers: Array, angles: Array) -> Array:
