@@ -12,16 +12,14 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 67_344,
-    "modules of packages": 372,
-    "lines of tests": 52_871,
-    "lines of docs": 6_561,
+    "lines of packages": 65_686,
+    "modules of packages": 369,
+    "lines of tests": 47_930,
+    "lines of docs": 6_508,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
 only with a line below that says why."""
-RISES = (
-    "lines of packages, 67,341 to 67,344: the shapes of fingertips have a function of their own",
-)
+RISES = ()
 """Sentences such as "lines of tests, 50,000 to 50,400: the oracle of a new theorem"."""
 
 

@@ -54,7 +54,6 @@ CALLS = [
         "faces": WORD,
         "center_of_mass": unless(array(CENTER), "none") | {"far away": [1.0, 0.0, 0.0]},
     }),
-    Call("gc.from_trimesh", lambda: {"mesh": body().to_trimesh()}, {"mesh": VALUE, "faces": WORD}),
     Call("gc.Contact", lambda: {"position": CENTER, "normal": [0.0, 0.0, 1.0]}, {
         "position": array(CENTER), "normal": units([0.0, 0.0, 1.0]),
     }),

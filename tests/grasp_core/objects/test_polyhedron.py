@@ -96,14 +96,6 @@ def test_a_polyhedron_comes_back_from_trimesh_as_it_was(name):
     assert len(again.faces) == len(body.faces)
 
 
-def test_meshes_of_trimesh_are_checked_like_files():
-    box = trimesh.creation.box((0.1, 0.2, 0.3))
-    assert len(gc.from_trimesh(box).faces) == 6
-    box.faces = box.faces[:-1]
-    with pytest.raises(gc.MeshError, match="OPEN"):
-        gc.from_trimesh(box)
-
-
 @pytest.mark.parametrize("subdivisions", [1, 2, 3])
 def test_a_ball_is_convex_however_fine(subdivisions):
     """The finer ones are planned on patches, whose planes cut through the ball."""

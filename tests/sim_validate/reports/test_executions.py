@@ -254,5 +254,6 @@ def test_the_command_executes_a_grasp_with_the_same_settings(run, settings, monk
     assert main(shlex.split(line)[1:]) == Exit.GOOD
     (flags,) = asked
     assert (flags.friction, flags.grasp) == (0.35, "c-0-1-2-7")
-    saved = replace(read_grasps(flags.grasps), seed=flags.seed)
-    assert execution_settings(saved, flags.executing, flags.trials, flags.down) == settings
+    of = read_grasps(flags.grasps)
+    asked = of.body, flags.seed, of.finger, flags.executing, flags.trials, flags.down
+    assert execution_settings(*asked) == settings
