@@ -14,7 +14,7 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 65_686,
     "modules of packages": 369,
-    "lines of tests": 47_930,
+    "lines of tests": 47_928,
     "lines of docs": 6_508,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
