@@ -17,15 +17,15 @@ OBJECT, FRICTION, GRASPS, BLOCKS = "random-20-7", 0.5, 6, 4
 WRENCHES = (0, 13, 39, 91)
 """Random ones beside the thirteen of every agenda."""
 KINDS = {
-    "stepping": [("simulate.py", "run")],
-    "building": [("mjcf.py", "build_scene"), ("engine.py", "compiled")],
+    "stepping": [("bench.py", "run")],
+    "building": [("mjcf.py", "build_scene"), ("bench.py", "compiled")],
     "analysis": [
         ("controls.py", "negative_controls"),
         ("loads.py", "planned_loads"),
         ("contact_forces.py", "least_friction_forces"),
-        ("critical_friction.py", "forces_just_above"),
+        ("limits.py", "forces_just_above"),
     ],
-    "reading motions": [("traces.py", "traces"), ("hold_verdict.py", "judge")],
+    "reading motions": [("traces.py", "traces"), ("traces.py", "judge")],
 }
 
 
