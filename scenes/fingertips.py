@@ -11,16 +11,15 @@ too large a sphere gives a smaller sphere, until no surface point is inside.
 import math
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Literal, TypeAlias, get_args
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, frozen
-from grasp_core.checked import LARGEST, SMALLEST, number, one_of, positive
-from grasp_core.errors import InputError
+from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.nearest_points import nearest_on_surface
 from grasp_core.objects.on_faces import ON_FACE, face_under
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.settings import CHOSEN, Direction, Quantity, Range, Settings
 from grasp_core.values import Contact
 
 Drive: TypeAlias = Literal["servo", "rigid"]
@@ -40,40 +39,28 @@ opposite."""
 
 
 @dataclass(frozen=True, slots=True)
-class FingerSettings:
+class FingerSettings(Settings):
     """How fingertips are built and driven; a setting that is None is chosen to suit the grasp.
 
     Raises:
         InputError: A number is out of range (1e-9 to 1e9), or a choice is unknown.
     """
 
-    max_normal_force_n: float = 10.0
+    max_normal_force_n: Quantity = 10.0
     """Largest normal force of each finger [N]."""
-    radius_m: float | None = None
+    radius_m: Quantity | None = None
     """Radius of the fingertips [m]; if None, a tenth of the object's radius, or less where that
     would overlap something."""
-    mass_kg: float | None = None
-    stiffness_n_per_m: float | None = None
+    mass_kg: Quantity | None = None
+    stiffness_n_per_m: Quantity | None = None
     """Stiffness of the fingertips' servos [N/m]; None chooses it by the grasp size."""
-    approach: tuple[float, float, float] | None = None
+    approach: Direction | None = None
     """Direction in which all fingers move towards the object. If None, each finger takes the
     direction that was planned for it, or its contact normal."""
-    drive: Drive = "servo"
+    drive: Annotated[Drive, CHOSEN] = "servo"
     """How fingertips are held: pushed by servos, or rigidly fixed in place."""
-    indentation: float = 0.0
+    indentation: Annotated[float, Range(least=0.0, below=1.0), CHOSEN] = 0.0
     """Depth of each fingertip in its face at the start, in grasp sizes; 0 means just touching."""
-
-    def __post_init__(self) -> None:
-        positive(self.max_normal_force_n, "max_normal_force_n")
-        for name in ("radius_m", "mass_kg", "stiffness_n_per_m"):
-            if getattr(self, name) is not None:
-                positive(getattr(self, name), name)
-        if self.approach is not None:
-            way = frozen(self.approach, (3,), "approach")
-            if not SMALLEST <= float(np.linalg.norm(way)) <= LARGEST:
-                raise InputError(f"approach must not be the zero vector, got {self.approach}")
-        one_of(self.drive, get_args(Drive), "drive")
-        number(self.indentation, "indentation", least=0.0, below=1.0)
 
 
 def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:

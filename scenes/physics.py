@@ -9,59 +9,66 @@ solver of MuJoCo 4.0.0 has a bug).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from grasp_core.arrays import Array, Indices, frozen
-from grasp_core.by_value import changed
-from grasp_core.checked import BOUNDS, LARGEST, SMALLEST, number, one_of, switch, whole
+from grasp_core.arrays import Array, Indices
+from grasp_core.checked import LARGEST
 from grasp_core.errors import InputError
+from grasp_core.settings import NotNegative, Quantity, Range, Settings
 from scenes.mjcf_text import COMPILER, Element, add_comment, add_element, element, printable
+
+MOST_ITERATIONS = 10_000
+Iterations = Annotated[int, Range(least=1, most=MOST_ITERATIONS)]
+Share = Annotated[float, Range(least=0.0, most=1.0)]
+Number = Annotated[float, Range(least=-LARGEST, most=LARGEST)]
+Component = Annotated[float, Range(least=-1e4, most=1e4)]
+Field = tuple[Component, Component, Component]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class PhysicsSettings:
+class PhysicsSettings(Settings):
     """Options of the simulation, named as in MJCF.
 
     Raises:
         InputError: A number is out of its range, or MuJoCo does not know a word.
     """
 
-    timestep: float = 0.002
+    timestep: Annotated[float, Range(least=1e-5, most=0.005)] = 0.002
     """Length of a step, from 1e-5 to 0.005 [s]. With steps twice as long, objects let go at
     frictions 40 % above the critical friction, and few of the cases with known answers reveal it.
     """
-    integrator: str = "discrete"
-    cone: str = "elliptic"
-    solver: str = "Newton"
-    jacobian: str = "dense"
-    impratio: float = 1000.0
-    tolerance: float = 1e-16
+    integrator: Literal["Euler", "RK4", "implicit", "implicitfast", "discrete"] = "discrete"
+    cone: Literal["pyramidal", "elliptic"] = "elliptic"
+    solver: Literal["PGS", "CG", "Newton"] = "Newton"
+    jacobian: Literal["dense", "sparse", "auto"] = "dense"
+    impratio: Quantity = 1000.0
+    tolerance: Share = 1e-16
     """Tolerance of MuJoCo's solver, an absolute one on squared accelerations. An object a
     thousandth as large has squared accelerations a millionth as large: with 1e-12, contacts of
     millimetre-sized objects slip when they should hold."""
-    iterations: int = 100
-    ls_iterations: int = 50
-    ls_tolerance: float = 0.01
-    noslip_iterations: int = 0
-    noslip_tolerance: float = 1e-6
-    ccd_iterations: int = 35
-    ccd_tolerance: float = 1e-6
-    sdf_iterations: int = 10
-    sdf_initpoints: int = 40
-    sleep_tolerance: float = 0.001
-    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    iterations: Iterations = 100
+    ls_iterations: Iterations = 50
+    ls_tolerance: Share = 0.01
+    noslip_iterations: Annotated[int, Range(least=0, most=MOST_ITERATIONS)] = 0
+    noslip_tolerance: Share = 1e-6
+    ccd_iterations: Iterations = 35
+    ccd_tolerance: Share = 1e-6
+    sdf_iterations: Iterations = 10
+    sdf_initpoints: Iterations = 40
+    sleep_tolerance: Share = 0.001
+    gravity: Field = (0.0, 0.0, 0.0)
     """Acceleration of gravity in the world frame [m/s^2]."""
-    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    magnetic: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    density: float = 0.0
-    viscosity: float = 0.0
-    solref: tuple[float, float] = (0.004, 1.0)
-    solimp: tuple[float, float, float, float, float] = (0.99, 0.99, 0.001, 0.5, 2.0)
-    condim: int = 3
+    wind: Field = (0.0, 0.0, 0.0)
+    magnetic: Field = (0.0, 0.0, 0.0)
+    density: NotNegative = 0.0
+    viscosity: NotNegative = 0.0
+    solref: tuple[Number, Number] = (0.004, 1.0)
+    solimp: tuple[Number, Number, Number, Number, Number] = (0.99, 0.99, 0.001, 0.5, 2.0)
+    condim: Literal[1, 3, 4, 6] = 3
     """Contact dimension of MuJoCo; 3 is a hard fingertip, which transmits no torsional friction,
     unless `torsion_m` makes it 4."""
-    margin: float = 0.0
-    gap: float = 0.0
+    margin: Share = 0.0
+    gap: Share = 0.0
     autoreset: bool = False
     """Whether MuJoCo resets the state when the simulation diverges: the object then silently
     returns to its start, which looks perfectly stable."""
@@ -69,28 +76,12 @@ class PhysicsSettings:
     """Whether contact impedances use the exact inertia at each contact."""
     multiccd: bool = True
     """Whether flat shapes touch at several points, which MuJoCo 3.3 does only where asked."""
-    torsion_m: float = 0.0
+    torsion_m: Share = 0.0
     """Torsional coefficient of every contact [m]: the largest torque about the normal over the
     normal force, where the contact does not slide; zero is a hard fingertip. Above zero contacts
     have the dimension 4, and this is the second number of their `friction`."""
 
-    def __repr__(self) -> str:
-        """Return the settings that differ from the usual ones."""
-        return changed(self)
-
-    def __post_init__(self) -> None:
-        for name, words in WORDS.items():
-            one_of(getattr(self, name), words, name)
-        for name, (least, most) in COUNTS.items():
-            whole(getattr(self, name), name, least=least, most=most)
-        for name, (least, most) in RANGES.items():
-            number(getattr(self, name), name, least=least, most=most)
-        for name, (count, most) in VECTORS.items():
-            frozen(getattr(self, name), (count,), name, most=most)
-        for name in CHOSEN_FLAGS:
-            switch(getattr(self, name), name)
-        if self.condim not in CONTACT_DIMENSIONS:
-            raise InputError(f"condim must be one of {CONTACT_DIMENSIONS}, got {self.condim}")
+    def _check_together(self) -> None:
         if 0.0 < self.torsion_m < LEAST_TORSION_M:
             raise InputError(
                 f"torsion_m must be 0 or at least {LEAST_TORSION_M:g} m, the smallest friction of "
@@ -126,37 +117,9 @@ class PhysicsSettings:
                 "margin": self.margin, "gap": self.gap}  # fmt: skip
 
 
-WORDS = {
-    "integrator": ("Euler", "RK4", "implicit", "implicitfast", "discrete"),
-    "cone": ("pyramidal", "elliptic"),
-    "solver": ("PGS", "CG", "Newton"),
-    "jacobian": ("dense", "sparse", "auto"),
-}
-CONTACT_DIMENSIONS = (1, 3, 4, 6)
 WITHOUT_TORSION, WITH_TORSION = 3, 4
 LEAST_TORSION_M = 1e-5
 """Smallest torsional coefficient above zero: MuJoCo raises smaller ones to this value."""
-MOST_ITERATIONS = 10_000
-COUNTS = {
-    "iterations": (1, MOST_ITERATIONS), "ls_iterations": (1, MOST_ITERATIONS),
-    "noslip_iterations": (0, MOST_ITERATIONS), "ccd_iterations": (1, MOST_ITERATIONS),
-    "sdf_iterations": (1, MOST_ITERATIONS), "sdf_initpoints": (1, MOST_ITERATIONS),
-    "condim": (1, 6),
-}  # fmt: skip
-RANGES = {
-    "timestep": (1e-5, 0.005), "impratio": (SMALLEST, LARGEST), "tolerance": (0.0, 1.0),
-    "ls_tolerance": (0.0, 1.0), "noslip_tolerance": (0.0, 1.0), "ccd_tolerance": (0.0, 1.0),
-    "sleep_tolerance": (0.0, 1.0), "density": (0.0, LARGEST), "viscosity": (0.0, LARGEST),
-    "margin": (0.0, 1.0), "gap": (0.0, 1.0),
-    "torsion_m": (BOUNDS["torsion_m"]["least"], BOUNDS["torsion_m"]["most"]),
-}  # fmt: skip
-"""Least and largest value of each number. Shorter time steps take hours; with longer ones the
-phases of a trial would be shorter than a step."""
-VECTORS = {
-    "gravity": (3, 1e4), "wind": (3, 1e4), "magnetic": (3, 1e4), "solref": (2, LARGEST),
-    "solimp": (5, LARGEST),
-}  # fmt: skip
-"""Number of components of each vector, and the largest size of a component."""
 CONTACT_SETTINGS = ("solref", "solimp", "condim", "margin", "gap", "torsion_m")
 CHOSEN_FLAGS = ("autoreset", "diagexact", "multiccd")
 ENABLED_FLAGS = (

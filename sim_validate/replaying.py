@@ -19,6 +19,7 @@ from grasp_core.files.text_files import read_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import seat
 from grasp_core.planning.result import Plan
+from grasp_core.settings import for_users
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene
@@ -27,9 +28,8 @@ from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
 from sim_validate.datasets.varied import VARIED
-from sim_validate.files.toml_tables import settings_in
 from sim_validate.records.grasps import NAMED, grasp_with_id, read_grasps, some
-from sim_validate.records.setup_toml import OF_USERS, setup_from_tables
+from sim_validate.records.setup_toml import setup_from_tables
 from sim_validate.records.verdicts import verdicts_of
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.loads import PlannedLoad, planned_loads
@@ -159,7 +159,7 @@ def of_verdict(path: Path, saved: Plan, verdict: Mapping[str, Any], wanted: Want
 def _asked(path: Path, verdict: Mapping[str, Any]) -> tuple[Setup, Agenda]:
     """Rebuild the settings and the choice of trials that a verdict was made with."""
     settings = verdict["settings"]
-    tables = {name: settings[name] for name in OF_USERS}
+    tables = {name: settings[name] for name in for_users(Setup)}
     setup = setup_from_tables(tables, Setup(surface=settings["surface"]), str(path))
     ours = drawn_names(settings["random_wrenches"])
     repeats = verdict.get("robustness")
@@ -170,7 +170,7 @@ def _asked(path: Path, verdict: Mapping[str, Any]) -> tuple[Setup, Agenda]:
             for each in verdict["wrenches"]
             if each["name"] not in ours
         ),
-        noise=Noise() if repeats is None else settings_in(Noise, repeats["noise"], "noise"),
+        noise=Noise() if repeats is None else Noise.of_table(repeats["noise"], "noise"),
         seed=settings["seed"],
     )
     return setup, agenda

@@ -9,7 +9,6 @@ import json
 import math
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
 
 from grasp_core.errors import InputError, about
@@ -232,20 +231,6 @@ def record_of(
         return TypeAdapter(kind).validate_json(text)
     except ValidationError as error:
         raise InputError(complaint(error, kind)) from error
-
-
-def named_settings(given: object, known: type[Any] | Collection[str], where: str) -> dict[str, Any]:
-    """Return a table of settings, by name, if it is one and each setting in it exists."""
-    if not isinstance(given, Mapping):
-        raise InputError(f"{where}: expected a table of settings, got {shown(given)}")
-    names = [each.name for each in fields(known)] if isinstance(known, type) else known
-    table = {**cast("Mapping[str, Any]", given)}
-    for name in table:
-        if name not in names:
-            raise InputError(
-                f"{where}: no setting is named {shown(name)}; choose from {', '.join(names)}"
-            )
-    return table
 
 
 def settings_of(

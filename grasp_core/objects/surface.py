@@ -7,13 +7,14 @@ no field, because such meshes are refused.
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices, frozen_units
 from grasp_core.by_value import ByValue, counted, summary
-from grasp_core.checked import BOUNDS, LARGEST, number, several, switch, text, whole
+from grasp_core.checked import LARGEST, number, several, switch, text, whole
+from grasp_core.settings import Range, Settings
 from grasp_core.values import RIGHT_ANGLE
 
 FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
@@ -62,25 +63,20 @@ class Face(ByValue):
 
 
 @dataclass(frozen=True, slots=True)
-class PatchLimits:
+class PatchLimits(Settings):
     """How flat a patch of a curved surface must be, and how many patches are kept.
 
     Raises:
         InputError: A limit is out of range.
     """
 
-    spread_deg: float = 10.0
+    spread_deg: Annotated[float, Range(above=0.0, most=45.0)] = 10.0
     """Largest angle between the surface and the patch's plane [deg]; the friction angle available
     to the planner shrinks by it."""
-    depth: float = 0.01
+    depth: Annotated[float, Range(above=0.0, most=0.1)] = 0.01
     """Largest distance of the surface from the plane, relative to the object's largest extent."""
-    most: int = 20
+    most: Annotated[int, Range(least=4, most=200)] = 20
     """Keep at most this many patches: those with the largest inscribed discs."""
-
-    def __post_init__(self) -> None:
-        number(self.spread_deg, "spread_deg", **BOUNDS["patch_spread_deg"])
-        number(self.depth, "depth", **BOUNDS["patch_depth"])
-        whole(self.most, "most", **BOUNDS["patches"])
 
 
 MM = 1e3

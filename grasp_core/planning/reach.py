@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
-from grasp_core.checked import positive
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.settings import Quantity, Settings
 from grasp_core.values import FaceQuadruple
 
 TOUCHING = 1e-6
@@ -36,21 +36,17 @@ RING_DIRECTIONS = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Finger:
+class Finger(Settings):
     """A finger's radius and the length of its straight way to a contact.
 
     Raises:
         InputError: A length is not positive.
     """
 
-    radius_m: float
+    radius_m: Quantity
     """Radius of the spherical tip and of the rod behind it [m]."""
-    approach_m: float
+    approach_m: Quantity
     """Length of the free line on which the finger comes [m]."""
-
-    def __post_init__(self) -> None:
-        positive(self.radius_m, "radius_m")
-        positive(self.approach_m, "approach_m")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

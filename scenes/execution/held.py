@@ -13,17 +13,19 @@ with the damping ratio zeta and the tip's mass m_t. The springs' bases are fixed
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, frozen, to_digits
-from grasp_core.checked import BOUNDS, LARGEST, SMALLEST, instance, number, positive
+from grasp_core.arrays import Array, Indices, to_digits
+from grasp_core.checked import instance, positive
 from grasp_core.closure.contacts import WRENCH, contact_frames, grasp_map
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip, check_grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.settings import Direction, Quantity, Range, Settings
 from scenes.execution.surface import touched_solids
 
 
@@ -65,22 +67,13 @@ ISOTROPIC = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class HeldSettings:
+class HeldSettings(Settings):
     """Masses and damping of what holds and is held, and the direction of gravity."""
 
-    tip_mass_kg: float = TIP_MASS_KG
-    damping_ratio: float = DAMPING_RATIO
-    down: tuple[float, float, float] = UPRIGHT
+    tip_mass_kg: Quantity = TIP_MASS_KG
+    damping_ratio: Annotated[float, Range(least=0.01, most=10.0)] = DAMPING_RATIO
+    down: Direction = UPRIGHT
     """Direction of gravity in the object's frame; its length does not matter."""
-
-    def __post_init__(self) -> None:
-        positive(self.tip_mass_kg, "tip_mass_kg")
-        number(self.damping_ratio, "damping_ratio", **BOUNDS["damping_ratio"])
-        down = frozen(self.down, (3,), "down")
-        if not SMALLEST <= float(np.linalg.norm(down)) <= LARGEST:
-            raise InputError(
-                f"down must be a direction, of length {SMALLEST:g} to {LARGEST:g}, got {self.down}"
-            )
 
     @property
     def gravity(self) -> Array:

@@ -1,15 +1,15 @@
 """Reads or plans the grasps of a pytest test, and checks that they are as stable as it demands."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.errors import InputError
-from grasp_core.files.json_text import named_settings
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
+from grasp_core.settings import named
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines.explain import not_survived, unstable
@@ -17,7 +17,6 @@ from sim_validate.baselines.part import TABLE, IfChanged, Source, present, sourc
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.files.toml_tables import settings_in
 from sim_validate.records.grasps import read_grasps
 from sim_validate.simulation.setup import Agenda, NamedWrench, Noise, Setup
 from sim_validate.validation.validation import validate
@@ -67,7 +66,7 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
             f"@pytest.mark.grasp takes the path of one file of grasps, got {list(args)}"
         )
     known = ("friction", TABLE) if args else SETTINGS
-    named_settings(settings, known, "@pytest.mark.grasp")
+    named(settings, known, "@pytest.mark.grasp")
     friction = _number(settings.get("friction", FRICTION))
     if args:
         return _cases_of_file(folder, folder / args[0], settings)
@@ -90,7 +89,7 @@ def _cases_of_file(folder: Path, path: Path, settings: Mapping[str, Any]) -> lis
     saved = read_grasps(path)
     friction = _number(settings.get("friction", saved.friction))
     _check_any(saved.grasps, saved.body, friction)
-    asked = settings_in(IfChanged, settings.get(TABLE, {}), TABLE)
+    asked = IfChanged.of_table(settings.get(TABLE, {}), TABLE)
     source = source_of(saved, path, [folder], scale=asked.scale)
     now = present(replace(saved, friction=friction), path, source, asked)
     tested = {grasp.id: grasp for grasp in now.saved.grasps}
@@ -152,7 +151,7 @@ class Demands:
 
 def demands_of(asked: Mapping[str, Any]) -> Demands:
     """Build the demands from the arguments of a test."""
-    return Demands(**named_settings(asked, Demands, "assert_stable"))
+    return Demands(**named(asked, [each.name for each in fields(Demands)], "assert_stable"))
 
 
 def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:

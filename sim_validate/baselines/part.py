@@ -10,17 +10,19 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Annotated, Literal
 
-from grasp_core.checked import BOUNDS, number, one_of, positive, switch
 from grasp_core.errors import InputError, MeshError
 from grasp_core.files.text_files import read_bytes
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import RECORDED
+from grasp_core.settings import NotNegative, Quantity, Range, Settings
 from grasp_core.transferring.changed_part import fitting_lengths, fitting_unit, load_changed_part
 from grasp_core.transferring.face_changes import (
     ANGLE_DEG,
+    WIDEST_DEG,
     FaceChange,
     added_faces,
     changes_in_words,
@@ -36,7 +38,7 @@ TABLE = "changed_part"
 
 
 @dataclass(frozen=True, slots=True)
-class IfChanged:
+class IfChanged(Settings):
     """What to do if a part has changed since its grasps were planned.
 
     Raises:
@@ -45,31 +47,20 @@ class IfChanged:
 
     refuse: bool = False
     """Whether a changed part is refused; otherwise grasps are carried over to it."""
-    missing: str = NOTE
+    missing: Literal["note", "fail"] = NOTE
     """What a missing mesh file means: `note` tests the mesh in the file of grasps and says so,
     `fail` refuses that."""
-    unit: str | None = None
+    unit: Literal["m", "cm", "mm", "in"] | None = None
     """Unit of length of the mesh file; None for the one in which the part is about as large as it
     was."""
-    scale: float | None = None
+    scale: Quantity | None = None
     """Factor on the coordinates of the mesh file, besides its unit; None for that of the baseline,
     or 1 without one."""
-    distance_m: float | None = None
+    distance_m: NotNegative | None = None
     """Largest distance by which a contact may move [m]; None for a twentieth of the part's radius.
     """
-    angle_deg: float = ANGLE_DEG
+    angle_deg: Annotated[float, Range(least=0.0, most=WIDEST_DEG)] = ANGLE_DEG
     """Largest angle between the normals of a face before and after [deg]."""
-
-    def __post_init__(self) -> None:
-        switch(self.refuse, "refuse")
-        one_of(self.missing, (NOTE, FAIL), "missing")
-        if self.unit is not None:
-            one_of(self.unit, UNITS_M, "unit")
-        if self.scale is not None:
-            positive(self.scale, "scale")
-        if self.distance_m is not None:
-            number(self.distance_m, "distance_m", least=0.0)
-        number(self.angle_deg, "angle_deg", **BOUNDS["changed_by_deg"])
 
     def with_scale(self, recorded: float | None) -> "IfChanged":
         """Return these settings with the scale that a baseline holds, if none is given."""

@@ -14,8 +14,7 @@ from grasp_core.files.json_text import complaint
 from grasp_core.planning.result import Plan
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface
-from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution, execution_table
-from sim_validate.files.toml_tables import settings_in
+from sim_validate.execution.settings import TABLE, AskedExecution, execution_table
 from sim_validate.records.setup_toml import setup_from_file, setup_from_tables, tables_of
 from sim_validate.simulation.setup import (
     Agenda,
@@ -83,10 +82,10 @@ def of_settings(settings: Mapping[str, Any], path: str) -> How:
             wrenches=tuple(NamedWrench(name, w) for name, w in given.wrenches.items()),  # pyright: ignore[reportArgumentType] - an array is made of it
             limits=given.limits,
             trials=given.trials,
-            noise=settings_in(Noise, given.noise, "noise"),
+            noise=Noise.of_table(given.noise, "noise"),
             seed=given.seed,
         )
-        execution = None if given.execution is None else asked_execution(given.execution)
+        execution = None if given.execution is None else AskedExecution.of_table(given.execution)
     return How(setup, agenda, execution)
 
 

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import named_settings, shown
+from grasp_core.files.json_text import shown
 from grasp_core.planning.result import Plan
+from grasp_core.settings import named
 from sim_validate.baselines.baseline import Baseline, check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import (
     Checked,
@@ -33,8 +34,8 @@ from sim_validate.baselines.part import (
 )
 from sim_validate.baselines.part import TABLE as CHANGED
 from sim_validate.baselines.settings import How, of_settings, setup_for
-from sim_validate.execution.settings import TABLE, AskedExecution, asked_execution
-from sim_validate.files.toml_tables import read_tables, settings_in
+from sim_validate.execution.settings import TABLE, AskedExecution
+from sim_validate.files.toml_tables import read_tables
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.wrenches import wrenches_from_file
 from sim_validate.simulation.setup import Agenda, Noise
@@ -190,14 +191,14 @@ def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
         settings |= {name: path.parent / settings[name] for name in PATHS if name in settings}
         for name, kind in (("noise", Noise), (CHANGED, IfChanged)):
             if name in given:
-                settings[name] = settings_in(kind, given[name], name)
+                settings[name] = kind.of_table(given[name], name)
         if TABLE in given:
-            settings[TABLE] = asked_execution(given[TABLE])
+            settings[TABLE] = AskedExecution.of_table(given[TABLE])
     return Suite(path=path, **settings)
 
 
 def _check(given: Mapping[str, Any]) -> None:
-    for name, value in named_settings(given, KINDS, "the file").items():
+    for name, value in named(given, KINDS, "the file").items():
         kind = KINDS[name]
         if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
             raise InputError(f"{name}: expected {WORDS[kind]}, got {shown(value)}")

@@ -5,38 +5,32 @@ the meshes and the versions, identifies what a dataset can hold.
 """
 
 import hashlib
-import json
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, cast
 
-from pydantic import Field, TypeAdapter, ValidationError
-
 from grasp_core.checked import (
-    LARGEST,
-    LARGEST_FRICTION,
     MOST_COUNT,
     MOST_RANDOM_WRENCHES,
-    SMALLEST,
     one_of,
 )
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import complaint, named_settings, shown
+from grasp_core.files.json_text import shown
 from grasp_core.hands.named_hands import hand_names, load_hand
 from grasp_core.objects.surface import FaceKind
 from grasp_core.planning.request import METHODS, ConeKind
+from grasp_core.settings import Count, Friction, Quantity, Range, Settings
 from grasp_core.values import Method
 from sim_validate.datasets.tables import Tables, dataset_tables
 from sim_validate.execution.settings import (
     TABLE,
     AskedExecution,
-    asked_execution,
     execution_table,
 )
-from sim_validate.files.toml_tables import read_tables, settings_in
+from sim_validate.files.toml_tables import read_tables
 
 LEARNING = "learning"
 """Name of the table in a settings file."""
@@ -46,12 +40,12 @@ CONTROLS = 5
 """Number of kinds of synthetic negative controls that a grasp has at most."""
 CREDITS = ("title", "license", "creator", "url", "published")
 """Settings that only inform people; no row depends on them."""
-Varied: TypeAlias = Annotated[int, Field(ge=0, le=100)]
+Varied = Annotated[int, Range(least=0, most=100)]
 """A number of rows of one kind that are made from a grasp."""
 
 
 @dataclass(frozen=True, slots=True)
-class Learning:
+class Learning(Settings):
     """What is added to the tables, and how many rows of each kind are made from a grasp."""
 
     friction_below: Varied = 0
@@ -66,14 +60,14 @@ class Learning:
     """Rows per grasp that is executed with a mass near the one at which it is predicted to fail."""
     figures: tuple[Figure, ...] = ()
     """Groups of figures of each grasp; what each takes is in docs/datasets.md."""
-    seeds: tuple[Annotated[int, Field(ge=0, le=MOST_COUNT)], ...] = ()
+    seeds: tuple[Annotated[int, Range(least=0, most=MOST_COUNT)], ...] = ()
     """Seeds by which objects are misplaced once more in executions, besides the execution's own."""
-    synthetic: Annotated[int, Field(ge=0, le=CONTROLS)] = CONTROLS
+    synthetic: Annotated[int, Range(least=0, most=CONTROLS)] = CONTROLS
     """Largest number of synthetic negative controls of each grasp, drawn from all that exist."""
     hand: str = ""
     """Built-in hand whose pose is looked for in each grasp in force closure; empty for none."""
 
-    def __post_init__(self) -> None:
+    def _check_together(self) -> None:
         one_of(self.hand, ("", *hand_names()), "hand")
         for name in ("figures", "seeds"):
             if len(set(getattr(self, name))) < len(getattr(self, name)):
@@ -95,27 +89,27 @@ class Learning:
 
 
 @dataclass(frozen=True, slots=True)
-class DatasetConfig:
+class DatasetConfig(Settings):
     """Settings of a dataset: objects, frictions, families, and how grasps are planned and tried."""
 
     objects: tuple[str, ...]
     """Mesh files, or names of built-in objects."""
-    frictions: tuple[Annotated[float, Field(gt=0.0, le=LARGEST_FRICTION)], ...] = (0.5,)
+    frictions: tuple[Friction, ...] = (0.5,)
     """Coulomb coefficients; grasps of each object are planned and simulated at each of them."""
     families: tuple[Method, ...] = METHODS
-    limit: Annotated[int, Field(ge=1, le=MOST_COUNT)] = 20
+    limit: Count = 20
     """Largest number of grasps for each object, friction and family."""
     cones: ConeKind = "tilted"
     unit: Literal["m", "cm", "mm", "in"] = "m"
     """Unit of length in mesh files."""
-    scale: Annotated[float, Field(ge=SMALLEST, le=LARGEST)] = 1.0
+    scale: Quantity = 1.0
     """Factor on the coordinates of mesh files, besides their unit."""
     faces: FaceKind = "auto"
     limits: Literal["none", "ramp", "bisection"] = "none"
     """How the largest multiples of wrenches are found in simulation."""
-    random_wrenches: Annotated[int, Field(ge=0, le=MOST_RANDOM_WRENCHES)] = 0
+    random_wrenches: Annotated[int, Range(least=0, most=MOST_RANDOM_WRENCHES)] = 0
     """Number of random wrenches to hold besides the usual ones."""
-    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    seed: Annotated[int, Range(least=0, most=2**63 - 1)] = 0
     """Seed of all random choices."""
     contacts: str = ""
     """Path of a file of contacts on the one object, which are judged instead of planned ones; empty
@@ -141,7 +135,7 @@ class DatasetConfig:
     learning: Learning | None = None
     """What the tables hold besides for learners; None for nothing."""
 
-    def __post_init__(self) -> None:
+    def _check_together(self) -> None:
         for name in ("objects", "frictions", "families"):
             values: tuple[object, ...] = getattr(self, name)
             twice = [value for value, count in Counter(values).items() if count > 1]
@@ -192,17 +186,7 @@ def config_from_toml(path: Path) -> DatasetConfig:
 
 def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
     """Build a configuration from named settings with the types that TOML has."""
-    given = named_settings(given, DatasetConfig, "the settings")
-    own = {name: value for name, value in given.items() if name not in (TABLE, LEARNING)}
-    try:
-        config = TypeAdapter(DatasetConfig).validate_json(json.dumps(own), strict=True)
-    except ValidationError as error:
-        raise InputError(complaint(error, DatasetConfig)) from error
-    if TABLE in given:
-        config = replace(config, execution=asked_execution(given[TABLE]))
-    if LEARNING in given:
-        config = replace(config, learning=settings_in(Learning, given[LEARNING], LEARNING))
-    return config
+    return DatasetConfig.of_table(given)
 
 
 def _is_date(text: str) -> bool:

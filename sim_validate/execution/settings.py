@@ -1,26 +1,22 @@
 """What users choose for executions: mass, springs, trials, and what counts as survival."""
 
 import math
-from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, Literal, TypeAlias, get_args
+from dataclasses import asdict, dataclass, field, replace
+from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 
-from grasp_core.by_value import changed
-from grasp_core.checked import (
-    BOUNDS,
-    LARGEST,
-    SMALLEST,
-    instance,
-    number,
-    one_of,
-    positive,
-    seed_of,
-    several,
-    whole,
-)
 from grasp_core.errors import InputError, about
 from grasp_core.execution.grips import STIFFNESS_N_PER_M
-from grasp_core.files.json_text import named_settings, settings_of
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.settings import (
+    NotNegative,
+    Quantity,
+    Range,
+    Seed,
+    SettingError,
+    Settings,
+    named,
+    types,
+)
 from scenes.execution.held import HeldSettings
 
 TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misplaced"]
@@ -37,77 +33,63 @@ LONGEST_S = 100.0
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class ExecutionSettings:
+class ExecutionSettings(Settings):
     """How grasps are executed, and how far an object may move and still count as held.
 
     Raises:
         InputError: A number is out of its range, or a trial is unknown.
     """
 
-    mass_kg: float
+    mass_kg: Quantity
     """Mass of the object [kg]; `body.mass_at(density_kg_m3)` gives it from a density."""
-    push_n: float = 10.0
+    push_n: Quantity = 10.0
     """Largest normal force of a finger, at rest and under the loads that are planned for [N]."""
-    stiffness_n_per_m: float = STIFFNESS_N_PER_M
+    stiffness_n_per_m: Quantity = STIFFNESS_N_PER_M
     """Stiffness of the fingertips' springs [N/m]."""
-    tip_radius_m: float | None = None
+    tip_radius_m: Quantity | None = None
     """Radius of the fingertips; None for a tenth of the object's radius, or less where that would
     overlap something [m]."""
     hand: HeldSettings = field(default_factory=HeldSettings)
     """Masses and damping of the fingers, and the direction of gravity."""
     trials: tuple[TrialKind, ...] = KINDS
-    lift_m: float = 0.2
+    lift_m: Quantity = 0.2
     """Height that the object is lifted by [m]."""
-    lift_s: float = 0.6
+    lift_s: Annotated[float, Range(least=0.05, most=LONGEST_S)] = 0.6
     """Duration of the lift, from 0.05 to 100 [s]."""
-    shake_g: float = 1.0
+    shake_g: NotNegative = 1.0
     """Largest acceleration of a shake [9.80665 m/s^2]; a shake about an axis gives it to points at
     the object's radius."""
-    shake_hz: float = 5.0
+    shake_hz: Annotated[float, Range(least=0.1, most=25.0)] = 5.0
     """Frequency of a shake, from 0.1 to 25 [Hz]."""
-    stop_m_per_s2: float = 10.0
+    stop_m_per_s2: Quantity = 10.0
     """Deceleration of a stop [m/s^2]."""
-    stop_from_m_per_s: float = 0.5
+    stop_from_m_per_s: Quantity = 0.5
     """Speed before a stop [m/s]."""
-    knock_n_s: float | None = None
+    knock_n_s: NotNegative | None = None
     """Impulse of a knock [N s]; None for the mass times a sixth of a metre per second."""
-    off_mm: float = 2.0
+    off_mm: NotNegative = 2.0
     """Distance of a misplaced object from where the fingers expect it [mm]."""
-    off_deg: float = 2.0
+    off_deg: Annotated[float, Range(least=0.0, most=180.0)] = 2.0
     """Angle by which a misplaced object is turned [degrees]."""
-    misplacements: int = 5
+    misplacements: Annotated[int, Range(least=1, most=1000)] = 5
     """How many times the object is misplaced, each in a direction of its own."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of these directions."""
-    most_mm: float = 5.0
+    most_mm: Quantity = 5.0
     """Displacement against the palm up to which an object counts as held [mm]."""
-    most_deg: float = 5.0
+    most_deg: Quantity = 5.0
     """Turn against the palm up to which an object counts as held [degrees]."""
 
-    def __repr__(self) -> str:
-        """Return the settings that differ from the usual ones."""
-        return changed(self)
-
-    def __post_init__(self) -> None:
-        for name, ends in RANGES.items():
-            value = getattr(self, name)
-            if value is not None or name not in ("tip_radius_m", "knock_n_s"):
-                number(value, name, **ends)
-        instance(self.hand, HeldSettings, "hand")
-        kinds = several(self.trials, lambda kind: kind, "trials", "names of trials")
-        for kind in kinds:
-            one_of(kind, KINDS, "trials")
-        if not kinds:
-            raise InputError(f"trials must name at least one of {', '.join(KINDS)}, got none")
-        object.__setattr__(self, "trials", tuple(kind for kind in KINDS if kind in kinds))
+    def _check_together(self) -> None:
+        if not self.trials:
+            raise SettingError("trials", f"must name at least one of {', '.join(KINDS)}, got none")
+        object.__setattr__(self, "trials", tuple(kind for kind in KINDS if kind in self.trials))
         stopping = self.stop_from_m_per_s / self.stop_m_per_s2
         if stopping > LONGEST_S:
             raise InputError(
                 f"stop_from_m_per_s over stop_m_per_s2 is the duration of a stop, at most "
                 f"{LONGEST_S:g} s, got {stopping:.3g} s; start slower, or stop harder"
             )
-        whole(self.misplacements, "misplacements", **BOUNDS["misplacements"])
-        seed_of(self.seed)
 
     @property
     def impulse_n_s(self) -> float:
@@ -132,18 +114,6 @@ class ExecutionSettings:
         return math.radians(self.most_deg)
 
 
-QUANTITIES = (
-    "mass_kg", "push_n", "stiffness_n_per_m", "lift_m", "stop_m_per_s2", "stop_from_m_per_s",
-    "most_mm", "most_deg", "tip_radius_m",
-)  # fmt: skip
-NOT_NEGATIVE = ("shake_g", "off_mm", "knock_n_s")
-RANGES = {
-    **{key: {"least": SMALLEST, "most": LARGEST} for key in QUANTITIES},
-    **{key: {"least": 0.0, "most": LARGEST} for key in NOT_NEGATIVE},
-    **{name: BOUNDS[name] for name in ("lift_s", "shake_hz", "off_deg")},
-}
-"""Least and largest value of each number."""
-
 TABLE = "execution"
 """Name of the table in a settings file."""
 MASS, DENSITY = "mass_kg", "density_kg_m3"
@@ -153,16 +123,12 @@ ANY_MASS_KG = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class AskedExecution:
+class AskedExecution(Settings):
     """How the grasps of all objects of a file are executed."""
 
     settings: ExecutionSettings
-    density_kg_m3: float | None = None
+    density_kg_m3: Quantity | None = None
     """Density of every object; None where all objects have the mass of the settings [kg/m^3]."""
-
-    def __post_init__(self) -> None:
-        if self.density_kg_m3 is not None:
-            positive(self.density_kg_m3, DENSITY)
 
     def settings_for(self, body: Polyhedron) -> ExecutionSettings:
         """Return the settings with the mass of an object."""
@@ -170,20 +136,18 @@ class AskedExecution:
             return self.settings
         return replace(self.settings, mass_kg=body.mass_at(self.density_kg_m3))
 
-
-def asked_execution(table: object) -> AskedExecution:
-    """Read the table `[execution]` of a settings file."""
-    known = (*(each.name for each in fields(ExecutionSettings)), DENSITY)
-    given = named_settings(table, known, TABLE)
-    if isinstance(given.get("hand"), dict):
-        named_settings(given["hand"], HeldSettings, f"{TABLE}.hand")
-    if (MASS in given) == (DENSITY in given):
-        got = "both" if MASS in given else "neither"
-        raise InputError(f"{TABLE}: expected one of {MASS} and {DENSITY}, got {got}")
-    density = given.pop(DENSITY, None)
-    settings = settings_of(ExecutionSettings, {MASS: ANY_MASS_KG, **given}, [TABLE])
-    with about(TABLE):
-        return AskedExecution(settings, None if density is None else positive(density, DENSITY))
+    @classmethod
+    def of_table(cls, table: object, where: str = TABLE, usual: Any = None) -> Self:
+        """Read the table `[execution]` of a file: settings, with a density in place of the mass."""
+        del usual  # a table says all that differs from the usual settings
+        given = named(table, (*types(ExecutionSettings), DENSITY), where)
+        if (MASS in given) == (DENSITY in given):
+            got = "both" if MASS in given else "neither"
+            raise InputError(f"{where}: expected one of {MASS} and {DENSITY}, got {got}")
+        density = given.pop(DENSITY, None)
+        settings = ExecutionSettings.of_table({MASS: ANY_MASS_KG, **given}, where)
+        with about(where):
+            return cls(settings, density)
 
 
 def execution_table(asked: AskedExecution) -> dict[str, Any]:

@@ -3,13 +3,12 @@
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import DEEPEST, check_values, named_settings, settings_of
+from grasp_core.files.json_text import DEEPEST, check_values
 from grasp_core.files.text_files import read_text
 
-Settings = TypeVar("Settings")
 MOST_LETTERS = 2**20
 """Largest number of characters of a settings file, which is usually short."""
 ASIDE = re.compile(
@@ -46,11 +45,6 @@ def tables_of_toml(text: str) -> dict[str, Any]:
         raise InputError(f"the text is not TOML: {_printable(str(error))}") from error
     check_values(found)
     return found
-
-
-def settings_in(kind: type[Settings], table: object, where: str) -> Settings:
-    """Make settings of a class from a table with some of them, each checked."""
-    return settings_of(kind, named_settings(table, kind, where), [where])
 
 
 def _printable(text: str) -> str:

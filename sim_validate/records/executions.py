@@ -17,7 +17,7 @@ from grasp_core.arrays import frozen
 from grasp_core.by_value import ByValue
 from grasp_core.checked import path_of
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import place, record_of, settings_of, text_of
+from grasp_core.files.json_text import place, record_of, text_of
 from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.objects.polyhedron import Polyhedron
@@ -46,7 +46,7 @@ RESULTS = {
 """Fields that say nothing about a grasp that was not executed."""
 Where = tuple[str | int, ...]
 """Keys that lead to a record in its file."""
-Settings = TypeVar("Settings", ExecutionSettings, PhysicsSettings)
+Filled = TypeVar("Filled", ExecutionSettings, PhysicsSettings)
 Value = TypeVar("Value", ExecutionTrial, ExecutionControl, Skipped)
 
 
@@ -285,14 +285,9 @@ def executions_from_json(text: str) -> Executions:
     )
 
 
-def _filled(kind: type[Settings], given: dict[str, Any], where: Where) -> Settings:
-    """Make settings of a class from their record, with every field checked."""
-    known = [each.name for each in fields(kind)]
-    for name in given:
-        if name not in known:
-            said = f"unknown key; known keys are {', '.join(known)}"
-            raise InputError(f"{place([*where, name])}: {said}")
-    found = settings_of(kind, given, where)
+def _filled(kind: type[Filled], given: dict[str, Any], where: Where) -> Filled:
+    """Make settings of a class from their record, in which none may be missing."""
+    found = kind.of_table(given, place(where))
     written = found.record() if isinstance(found, PhysicsSettings) else asdict(found)
     _require_all(written, given, where)
     return found

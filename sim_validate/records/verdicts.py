@@ -24,6 +24,8 @@ from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
+from grasp_core.settings import for_users
+from scenes.fingertips import FingerSettings
 from scenes.mjcf import Surface
 from sim_validate.records.fields import (
     Count,
@@ -34,7 +36,6 @@ from sim_validate.records.fields import (
     finite,
     object_record,
 )
-from sim_validate.records.setup_toml import OF_USERS
 from sim_validate.simulation.gate import Gate
 from sim_validate.simulation.traces import LET_GO, HoldVerdict, Outcome
 from sim_validate.validation.controls import ControlVerdict
@@ -361,7 +362,7 @@ def _robustness_record(found: Robustness | None) -> RobustnessRecord | None:
 
 def _settings(verdict: Verdict) -> SettingsRecord:
     layout, setup = verdict.scene.layout, verdict.setup
-    fingers = {name: getattr(setup.fingers, name) for name in OF_USERS["fingers"]}
+    fingers = {name: getattr(setup.fingers, name) for name in for_users(FingerSettings)}
     return {
         "physics": setup.physics.record(),
         "fingers": cast("FingersRecord", fingers),

@@ -3,33 +3,19 @@
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
-from functools import partial
-from typing import Literal, TypeAlias, get_args
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array, frozen, to_digits
-from grasp_core.by_value import ByValue, changed
-from grasp_core.checked import (
-    BOUNDS,
-    LARGEST,
-    MOST_RANDOM_WRENCHES,
-    MOST_TRIALS,
-    SMALLEST,
-    instance,
-    number,
-    one_of,
-    seed_of,
-    several,
-    switch,
-    text,
-    whole,
-)
+from grasp_core.by_value import ByValue
+from grasp_core.checked import LARGEST, MOST_RANDOM_WRENCHES, MOST_TRIALS, SMALLEST, text
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import shown
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
+from grasp_core.settings import CHOSEN, Range, Seed, Settings
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, Surface, build_scene
@@ -45,11 +31,13 @@ RANDOM = "random_{}"
 MOST_THREADS = 1024
 HARD_FINGER = 3
 """MuJoCo's `condim` of a contact whose force has a normal and two tangential parts."""
+Share = Annotated[float, Range(least=0.0, most=1.0)]
+Tilt = Annotated[float, Range(least=0.0, most=45.0)]
 LimitSearch: TypeAlias = Literal["none", "ramp", "bisection"]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Setup:
+class Setup(Settings):
     """How trials are simulated: physics, fingertips, surface, durations and thresholds.
 
     Raises:
@@ -59,27 +47,19 @@ class Setup:
 
     fingers: FingerSettings = field(default_factory=FingerSettings)
     physics: PhysicsSettings = field(default_factory=PhysicsSettings)
-    surface: Surface = "pads"
+    surface: Annotated[Surface, CHOSEN] = "pads"
     """What fingertips touch: flat pads at the contacts, which are exact on any object, or the mesh
     of a convex object."""
     hold: HoldProtocol = field(default_factory=HoldProtocol)
     limit: LimitProtocol = field(default_factory=LimitProtocol)
     friction: FrictionProtocol = field(default_factory=FrictionProtocol)
-    threads: int = 1
+    threads: Annotated[int, Range(least=1, most=MOST_THREADS), CHOSEN] = 1
     """Number of threads that the simulator uses; results do not depend on it."""
-    timeout_s: float = math.inf
+    timeout_s: Annotated[float, Range(above=0.0, most=math.inf), CHOSEN] = math.inf
     """Time after which the trials of one contact set are stopped [s]."""
 
-    def __repr__(self) -> str:
-        """Return the settings that differ from the usual ones."""
-        return changed(self)
-
-    def __post_init__(self) -> None:
-        instance(self.fingers, FingerSettings, "fingers")
-        physics = instance(self.physics, PhysicsSettings, "physics")
-        instance(self.hold, HoldProtocol, "hold")
-        instance(self.limit, LimitProtocol, "limit")
-        instance(self.friction, FrictionProtocol, "friction")
+    def _check_together(self) -> None:
+        physics = self.physics
         # forces that the analysis does not model
         if any(physics.gravity):
             raise InputError(
@@ -93,9 +73,6 @@ class Setup:
                 "hard fingers, whose contacts have friction and no torsion; for soft ones give "
                 "physics.torsion_m"
             )
-        one_of(self.surface, get_args(Surface), "surface")
-        whole(self.threads, "threads", least=1, most=MOST_THREADS)
-        number(self.timeout_s, "timeout_s", above=0.0, most=math.inf)
 
     @property
     def torsion_m(self) -> float:
@@ -135,31 +112,27 @@ class NamedWrench(ByValue):
 
 
 @dataclass(frozen=True, slots=True)
-class Noise:
+class Noise(Settings):
     """How uncertain the pose, surface, friction and mass are, as standard deviations.
 
     Raises:
         InputError: A number is negative or out of its range.
     """
 
-    shift: float = 0.01
+    shift: Share = 0.01
     """Deviation of the object's position along each axis, in object radii."""
-    turn_deg: float = 1.0
+    turn_deg: Tilt = 1.0
     """Deviation of the object's orientation about each axis through its centre of mass [deg]."""
-    normal_deg: float = 1.0
+    normal_deg: Tilt = 1.0
     """Deviation of the surface normal at each contact, about two axes in the surface [deg]."""
-    friction: float = 0.05
+    friction: Share = 0.05
     """Deviation of the friction coefficient, relative to the coefficient."""
-    mass: float = 0.05
+    mass: Share = 0.05
     """Deviation of the mass and of every load, relative to the planned values."""
-
-    def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            number(value, name, **BOUNDS[f"noise_{name}"])
 
 
 @dataclass(frozen=True, slots=True)
-class Agenda:
+class Agenda(Settings):
     """Which trials a grasp goes through.
 
     The twelve axis wrenches and the weakest one are always held, at a share of what the analysis
@@ -167,31 +140,22 @@ class Agenda:
     are.
     """
 
-    random_wrenches: int = 0
+    random_wrenches: Annotated[int, Range(least=0, most=MOST_RANDOM_WRENCHES)] = 0
     wrenches: tuple[NamedWrench, ...] = ()
     critical_friction: bool = True
     """Whether to find the critical friction in simulation."""
     limits: LimitSearch = "none"
     """How the largest multiple of each wrench is found in simulation, if at all."""
     controls: bool = True
-    trials: int = 0
+    trials: Annotated[int, Range(least=0, most=MOST_TRIALS)] = 0
     """How many times all trials that hold a wrench are repeated with noise."""
     noise: Noise = field(default_factory=Noise)
     keep_traces: bool = False
-    seed: int = 0
+    seed: Seed = 0
     """Seed of the random wrenches, of noise, and of how contacts are moved to make a negative
     control (contacts that must fail)."""
 
-    def __post_init__(self) -> None:
-        one_of(self.limits, get_args(LimitSearch), "limits")
-        whole(self.random_wrenches, "random_wrenches", most=MOST_RANDOM_WRENCHES)
-        whole(self.trials, "trials", most=MOST_TRIALS)
-        seed_of(self.seed)
-        for name in ("critical_friction", "controls", "keep_traces"):
-            switch(getattr(self, name), name)
-        instance(self.noise, Noise, "noise")
-        each = partial(instance, kind=NamedWrench, name="wrenches")
-        several(self.wrenches, each, "wrenches", "NamedWrench values")
+    def _check_together(self) -> None:
         taken = drawn_names(self.random_wrenches)
         for each in self.wrenches:
             if each.name in taken:
