@@ -3,6 +3,7 @@
 Hands and objects keep their arrays by identity: equal ones that are other objects share them too.
 """
 
+import math
 from collections.abc import Callable
 from functools import lru_cache, wraps
 from itertools import pairwise
@@ -230,7 +231,7 @@ def _tip_shape(finger: HandFinger) -> LinkShape:
 
 
 def _reach(shape: LinkShape) -> float:
-    return float(np.linalg.norm(shape.half_sizes)) + shape.radius
+    return math.hypot(*shape.half_sizes) + shape.radius
 
 
 def _link_ball(parts: list[_Part], link: int) -> tuple[int, float]:
@@ -239,8 +240,7 @@ def _link_ball(parts: list[_Part], link: int) -> tuple[int, float]:
     own = [(number, shape) for number, (of, shape) in enumerate(parts) if of == link]
     for number, middle in own:
         reach = SAME + max(
-            float(np.linalg.norm(shape.position - middle.position)) + _reach(shape)
-            for _, shape in own
+            math.hypot(*(shape.position - middle.position)) + _reach(shape) for _, shape in own
         )
         if best[0] < 0 or reach < best[1]:
             best = (number, reach)

@@ -16,7 +16,7 @@ from itertools import combinations
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, cross
+from grasp_core.arrays import Array, Indices, cross, to_digits
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.compiled import compiled
 from grasp_core.errors import SolverError, UndecidedError
@@ -71,7 +71,7 @@ def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: fl
         for row in _edges(region.polygon, normals[finger])
     ]
     return Targets(
-        np.arange(len(used), dtype=np.int64), grasp.positions[used], normals,
+        np.arange(len(used), dtype=np.int64), to_digits(grasp.positions[used]), normals,
         np.array([plane_tangents(*normal) for normal in normals.tolist()]),
         np.where(aimed, 0.0, 1.0), np.full((len(used), 3), np.nan), SOFT,
         np.array([row[0] for row in rows], np.int64),
@@ -82,6 +82,7 @@ def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: fl
 
 def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
     """Return a point of each edge and the unit vector from it into the convex polygon."""
+    polygon = to_digits(polygon)
     along = np.roll(polygon, -1, axis=0) - polygon
     kept = np.linalg.norm(along, axis=1) > SHORT
     starts, inward = polygon[kept], cross(normal, along[kept])

@@ -13,6 +13,7 @@ from grasp_core.hands.collisions import FAR, clearances, tip_distances, tip_gaps
 from grasp_core.hands.hand import Hand, HandFinger
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.pose_search import TOUCHING
+from grasp_core.hands.starts import starts
 from tests.grasp_core.hands.gripping import FRICTION, finger, grasps, plain_hand, reaches, scaled
 from tests.hand_models import hand_mjcf, numbers
 
@@ -313,3 +314,18 @@ def test_fingers_of_one_hand_that_overlap_are_told():
         (a.name, b.name) for a, b in combinations(leaning.links, 2)
     ))  # fmt: skip
     assert clearances(free, body, np.zeros(8), pose, none).itself > 0.005
+
+
+@pytest.mark.parametrize("name", ["allegro", "leap"])
+def test_a_search_starts_alike_where_contacts_differ_by_rounding(name):
+    """Linear algebra of another processor moves contacts by their last digits."""
+    hand, rng = gc.load_hand(name), np.random.default_rng(0)
+    for grasp in grasps("dodecahedron", 0.035):
+        moved = grasp.positions * (1.0 + 1e-15 * rng.standard_normal((4, 3)))
+        ways = [starts(hand, points, grasp.normals, seed=0, count=20)
+                for points in (grasp.positions, moved)]  # fmt: skip
+        for one, other in zip(*ways, strict=True):
+            for part in ("fingers", "joints", "rotation", "position"):
+                np.testing.assert_array_equal(getattr(one, part), getattr(other, part))
+            np.testing.assert_allclose(one.rotation @ one.rotation.T, np.eye(3), atol=1e-15)
+            assert np.linalg.det(one.rotation) > 0.0
