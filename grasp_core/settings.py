@@ -191,7 +191,8 @@ def check(settings: object) -> None:
         try:
             plain = taken(value, kind)
         except ValueError:
-            said = f"must be {words(kind)}, got {shown(value)}"
+            came = str(value) if isinstance(value, Path) else value
+            said = f"must be {words(kind)}, got {shown(came)}"
             raise SettingError(name, said) from None
         if plain is not value:
             object.__setattr__(settings, name, plain)
@@ -279,11 +280,12 @@ def words(kind: Any) -> str:
             [words(parts[0]), *(str(part) for part in parts[1:] if hasattr(part, "holds"))]
         )
     if get_origin(kind) in (Union, UnionType):
-        return " or ".join(map(words, parts))
+        return " or ".join(words(part) for part in parts if part is not type(None))
     if get_origin(kind) is tuple and parts[-1] is Ellipsis:
         return f"a sequence, each item {words(parts[0])}"
     if get_origin(kind) is tuple:
-        return f"{len(parts)} values, each {words(parts[0])}"
+        each = "" if parts[0] is float else f", each {words(parts[0])}"
+        return f"{len(parts)} numbers{each}"
     if get_origin(kind) is Literal:
         return f"one of {', '.join(map(str, parts))}"
     plain = {float: "a number", int: "a whole number", bool: "True or False", str: "text",

@@ -14,14 +14,14 @@ import tyro
 from tyro.conf import FlagCreatePairsOff
 
 from grasp_core.errors import GraspError, InputError
+from grasp_core.settings import SettingError
 from sim_validate.cli import baseline_flags, command_flags, dataset_flags, hand_flags
 from sim_validate.cli.baseline_flags import Baseline
 from sim_validate.cli.command_flags import COMMANDS, Command
 from sim_validate.cli.config_file import with_config
 from sim_validate.cli.dataset_flags import Dataset
 from sim_validate.cli.examples import examples_for
-from sim_validate.cli.exit_codes import Exit, exit_code, reason_of
-from sim_validate.cli.flag_bounds import FlagsError, check
+from sim_validate.cli.exit_codes import Exit, FlagsError, exit_code, reason_of
 from sim_validate.cli.flag_groups import Spoken
 
 ACTIONS: dict[type[Any], str] = {
@@ -80,12 +80,11 @@ def main(argv: Sequence[str] | None = None) -> int:
             ),
             args=flags,
         )
-        check(command)
     except SystemExit as stop:
         sys.stdout.write(examples_for(arguments))
         return stop.code if isinstance(stop.code, int) else Exit.USAGE
-    except InputError as error:
-        return _complain(str(error), Exit.USAGE)
+    except SettingError as error:
+        return _complain(f"--{error.name.replace('_', '-')} {error.fault}", Exit.USAGE)
     except KeyboardInterrupt:
         return _complain("interrupted", Exit.INTERRUPTED)
     return _dispatch(command.action if isinstance(command, Dataset | Baseline) else command)

@@ -7,22 +7,22 @@ from typing import Annotated, Literal
 from tyro.conf import OmitArgPrefixes, Positional, arg, subcommand
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
-from sim_validate.cli.flag_bounds import at_least
+from grasp_core.settings import Range, Settings
 from sim_validate.cli.flag_groups import (
     Carrying,
     Count,
     Jobs,
+    Quantity,
     Repeats,
     Seed,
     Spoken,
     UnitName,
-    Usual,
 )
 from sim_validate.parallel.processes import available_cores
 
 
 @dataclass(frozen=True, slots=True)
-class ChangedPart:
+class ChangedPart(Settings):
     """Where the mesh file is, and what to do if it has changed since the grasps were planned."""
 
     object: Path | None = None
@@ -34,7 +34,7 @@ class ChangedPart:
     unit: UnitName | None = None
     """Unit of length in a mesh file that has changed; if not given, the one in which the part is
     about as large as it was."""
-    scale: Usual | None = None
+    scale: Quantity | None = None
     """Factor on the coordinates of a mesh file, besides its unit; if not given, that of the
     baseline."""
 
@@ -53,7 +53,7 @@ class Record(Spoken):
     """TOML file of simulation settings (see docs/files.md)."""
     wrenches: Path | None = None
     """JSON file of wrenches that each grasp must hold in full (see docs/files.md)."""
-    random_wrenches: Annotated[int, at_least(0, up_to=MOST_RANDOM_WRENCHES)] = 0
+    random_wrenches: Annotated[int, Range(least=0, most=MOST_RANDOM_WRENCHES)] = 0
     """Number of random wrenches that each grasp must hold as well."""
     limits: Literal["none", "ramp", "bisection"] = "none"
     """Also find the largest multiple of each wrench in simulation."""
@@ -83,7 +83,7 @@ class Check(Spoken):
 
 
 @dataclass(frozen=True, slots=True)
-class Baseline:
+class Baseline(Settings):
     """Record simulation results of grasps, and notice later when their stability changes."""
 
     action: OmitArgPrefixes[

@@ -7,10 +7,10 @@ from typing import Annotated, Literal, get_args
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
-from grasp_core.checked import MOST_COUNT
+from grasp_core.checked import BOUNDS, MOST_COUNT
+from grasp_core.settings import Ending, Range
 from sim_validate.cli.baseline_flags import Baseline
 from sim_validate.cli.dataset_flags import Dataset
-from sim_validate.cli.flag_bounds import at_least, ends_in, within
 from sim_validate.cli.flag_groups import (
     UPRIGHT,
     Carrying,
@@ -31,12 +31,12 @@ from sim_validate.cli.flag_groups import (
     Planning,
     Point,
     ProtocolName,
+    Quantity,
     Seed,
     Spoken,
     Testing,
     Tips,
     Trials,
-    Usual,
     Wrench,
 )
 from sim_validate.cli.hand_flags import Hand, Reach
@@ -83,7 +83,7 @@ class Plan(Spoken):
     where that is less; a twentieth of the object's radius if not given."""
     gap: Gap = 0.05
     """With --best: share of the proved bound that the quality may be below it."""
-    time_limit_s: Annotated[float, within("time_limit_s")] | None = None
+    time_limit_s: Annotated[float, Range(**BOUNDS["time_limit_s"])] | None = None
     """With --best: time after which the search ends with the gap reached [s]."""
     measure: Literal["ferrari-canny", "weight", "task"] = "ferrari-canny"
     """With --best: what is largest. The Ferrari-Canny quality; the weight that is held in every
@@ -185,7 +185,7 @@ class Export(Spoken):
     """Id of the grasp to write; if not given, all grasps are written."""
     limit: Count | None = None
     """Write only this many grasps, from the first."""
-    fingertip_radius_m: Usual | None = None
+    fingertip_radius_m: Quantity | None = None
     """Radius of the fingertips [m]; if not given, the one planned for, or a tenth of the object's
     radius, or less if that does not fit."""
 
@@ -200,11 +200,11 @@ class View(Spoken):
     """Id of the grasp to show; if not given, the first one."""
     friction: Friction | None = None
     """Coulomb coefficient; if not given, the one planned for."""
-    picture: Annotated[Path, ends_in(*PICTURES)] | None = None
+    picture: Annotated[Path, Ending(PICTURES)] | None = None
     """Write the grasp as a picture like the paper's (svg, png)."""
-    page: Annotated[Path, ends_in(*PAGES)] | None = None
+    page: Annotated[Path, Ending(PAGES)] | None = None
     """Write a page (html) on which the grasp can be turned."""
-    clip: Annotated[Path, ends_in(*CLIPS)] | None = None
+    clip: Annotated[Path, Ending(CLIPS)] | None = None
     """Write a clip (webp, gif) of the fingers closing, which MuJoCo renders where there are
     graphics."""
     hand: bool = True
@@ -220,7 +220,7 @@ class Report(Spoken):
     """Folder of a run, with its grasps.json; or a folder of such folders."""
     limit: Count | None = None
     """Draw only this many grasps per run, those with problems before others; if not given, all."""
-    clips: Annotated[int, at_least(0, up_to=MOST_COUNT)] = 0
+    clips: Annotated[int, Range(least=0, most=MOST_COUNT)] = 0
     """Number of grasps per run of which clips of trials are made, those with problems first, if
     graphics are available."""
     jobs: Count = field(default_factory=available_cores)
@@ -241,14 +241,14 @@ class Regions(Spoken):
     """Compute regions for only this many grasps, from the first."""
     friction: Friction | None = None
     """Coulomb coefficient of the proof; if not given, the one planned for."""
-    reserve: Annotated[float, within("reserve")] = 0.0
+    reserve: Annotated[float, Range(**BOUNDS["reserve"])] = 0.0
     """Share of the friction that the proof does not count on."""
     recenter: bool = False
     """Move the regions to where discs inside the faces can be largest; contacts may then lie
     outside their regions."""
     edge_clearance_m: NotNegative = 0.0
     """How far regions stay from the edges of their faces [m]."""
-    max_cones: Annotated[int, within("max_cones")] = 10_000
+    max_cones: Annotated[int, Range(**BOUNDS["max_cones"])] = 10_000
     """Number of cones that one attempt at a proof may use. More cones take longer and enlarge radii
     by some hundredths, or not at all where they are as large as possible."""
     jobs: Jobs = field(default_factory=available_cores)
@@ -270,7 +270,7 @@ class Replay(Spoken):
     control: str | None = None
     """Name of a negative control (contacts made from the grasp that must fail) to replay instead of
     the grasp."""
-    trial: Annotated[int, at_least(0, up_to=MOST_COUNT)] | None = None
+    trial: Annotated[int, Range(least=0, most=MOST_COUNT)] | None = None
     """Number of a repeat with noise to replay instead of the trial without noise."""
     grasps: Path | None = None
     """The grasps.json that the verdicts are about, if it is not beside them."""
@@ -284,13 +284,13 @@ class Analyze(Spoken):
 
     contacts: Positional[Path]
     """A contacts file (see docs/files.md), or a grasps.json."""
-    friction: Annotated[float, within("friction_or_zero")] | None = None
+    friction: Annotated[float, Range(**BOUNDS["friction_or_zero"])] | None = None
     """Coulomb coefficient of contacts that have none of their own; if not given, the one in the
     file."""
-    torque_scale_m: Usual | None = None
+    torque_scale_m: Quantity | None = None
     """Length by which torques are divided to compare them with forces [m]; if not given, the one in
     the file."""
-    max_normal_force: Usual = 10.0
+    max_normal_force: Quantity = 10.0
     """Largest normal force of each contact [N]."""
     wrench: Annotated[UseAppendAction[tuple[Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")] = ()
     """An external wrench whose largest resisted multiple is wanted [N, N m], torque about the
@@ -330,7 +330,7 @@ class Inspect(Spoken):
     """Show a mesh as a polyhedron: faces, mass properties, face quadruples to grasp by."""
 
     object: Positional[ObjectName]
-    picture: Annotated[Path, ends_in(*PICTURES)] | None = None
+    picture: Annotated[Path, Ending(PICTURES)] | None = None
     """Write the object as a picture (svg, png)."""
     mesh: OmitArgPrefixes[Mesh] = field(default_factory=Mesh)
 

@@ -7,7 +7,7 @@ from typing import Any, cast, get_args, get_type_hints
 
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import place
-from sim_validate.cli.flag_bounds import FlagsError
+from sim_validate.cli.exit_codes import FlagsError
 
 COMMAND_WORDS = {"dataset": 2, "baseline": 2}
 """Number of words in those command names that have more than one."""

@@ -7,16 +7,16 @@ from typing import Annotated, Any, Literal
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, subcommand
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
-from sim_validate.cli.flag_bounds import FINITE, at_least
+from grasp_core.settings import Range, Settings
 from sim_validate.cli.flag_groups import Count, Friction, Lengths, Positive, Seed, Spoken
 from sim_validate.datasets.tables import SplitName
 from sim_validate.parallel.processes import available_cores
 
-Varied = Annotated[int, at_least(0, up_to=100)]
+Varied = Annotated[int, Range(least=0, most=100)]
 
 
 @dataclass(frozen=True, slots=True)
-class Learned:
+class Learned(Settings):
     """What a dataset holds besides for learners; a TOML file can ask for more."""
 
     friction_below: Varied = 0
@@ -29,7 +29,7 @@ class Learned:
     """Rows per grasp with contacts moved on their faces, each out of its region."""
     figures: UseAppendAction[tuple[Literal["closure", "least_squeeze"], ...]] = ()
     """Figures that each grasp has; may be repeated (see docs/datasets.md for what each costs)."""
-    synthetic: Annotated[int, at_least(0, up_to=5)] = 5
+    synthetic: Annotated[int, Range(least=0, most=5)] = 5
     """Largest number of synthetic negative controls of each grasp."""
     hand: Literal["", "allegro", "allegro-urdf", "leap"] = ""
     """Hand whose pose is looked for in each grasp in force closure."""
@@ -40,7 +40,7 @@ class Learned:
 
 
 @dataclass(frozen=True, slots=True)
-class Planning:
+class Planning(Settings):
     """Which grasps of each object a dataset holds."""
 
     family: UseAppendAction[tuple[Literal["concurrent", "pencil", "regulus", "free"], ...]] = ()
@@ -53,7 +53,7 @@ class Planning:
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
+class Work(Settings):
     """Where a dataset is computed, and how much time; no row depends on these."""
 
     engine: Literal["local", "ray", "dask"] = "local"
@@ -68,7 +68,7 @@ class Work:
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class Content(Settings):
     """What a dataset is made of, whether its grasps are planned or given."""
 
     friction: UseAppendAction[tuple[Friction, ...]] = ()
@@ -79,9 +79,9 @@ class Settings:
     """
     limits: Literal["none", "ramp", "bisection"] = "none"
     """Also find the largest multiple of each wrench in simulation."""
-    random_wrenches: Annotated[int, at_least(0, up_to=MOST_RANDOM_WRENCHES)] = 0
+    random_wrenches: Annotated[int, Range(least=0, most=MOST_RANDOM_WRENCHES)] = 0
     """Number of random wrenches that each grasp must hold as well."""
-    seed: Annotated[int, at_least(0, up_to=2**63 - 1)] = 0
+    seed: Annotated[int, Range(least=0, most=2**63 - 1)] = 0
     """Seed of all random choices."""
     scenes: bool = False
     """Also write each grasp as a MuJoCo scene."""
@@ -108,7 +108,7 @@ class Build(Spoken):
     """Folder of the dataset."""
     planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
     learned: OmitArgPrefixes[Learned] = field(default_factory=Learned)
-    settings: OmitArgPrefixes[Settings] = field(default_factory=Settings)
+    settings: OmitArgPrefixes[Content] = field(default_factory=Content)
     work: OmitArgPrefixes[Work] = field(default_factory=Work)
 
 
@@ -124,7 +124,7 @@ class Import(Spoken):
     """Folder of the dataset."""
     outward: bool = False
     """Read the file's normals as pointing out of the object, not into it."""
-    settings: OmitArgPrefixes[Settings] = field(default_factory=Settings)
+    settings: OmitArgPrefixes[Content] = field(default_factory=Content)
     work: OmitArgPrefixes[Work] = field(default_factory=Work)
 
 
@@ -134,7 +134,7 @@ class Verify(Spoken):
 
     dataset: Positional[Path]
     """Folder of the dataset."""
-    share: Annotated[float, FINITE, at_least(0.0, up_to=1.0)] = 0.01
+    share: Annotated[float, Range(least=0.0, most=1.0)] = 0.01
     """Share of all objects and frictions that is computed again, at least one; 0 for none."""
     seed: Seed = 0
     """Seed of the random choice of the sample that is computed again."""
@@ -155,7 +155,7 @@ class Export(Spoken):
 
 
 @dataclass(frozen=True, slots=True)
-class Dataset:
+class Dataset(Settings):
     """Build a dataset of grasps of many objects; check or export datasets."""
 
     action: OmitArgPrefixes[

@@ -2,8 +2,17 @@
 
 from enum import IntEnum
 
-from grasp_core.errors import GraspError, SolverError, UndecidedError, UnfaithfulError
-from sim_validate.cli.flag_bounds import FlagsError
+from grasp_core.errors import (
+    GraspError,
+    InputError,
+    SolverError,
+    UndecidedError,
+    UnfaithfulError,
+)
+
+
+class FlagsError(InputError):
+    """Error for flags that contradict each other, or an unknown flag in a config file."""
 
 
 class Exit(IntEnum):

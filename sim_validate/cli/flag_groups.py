@@ -10,29 +10,21 @@ from typing import Annotated, Literal
 from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 
 from grasp_core.checked import (
+    BOUNDS,
     LARGEST,
-    LARGEST_FRICTION,
-    MOST_COUNT,
     MOST_EDGES,
     MOST_RANDOM_WRENCHES,
-    MOST_SEED,
     MOST_TRIALS,
-    SMALLEST,
 )
 from grasp_core.mesh_files import limits as mesh_limits
-from sim_validate.cli.flag_bounds import FINITE, Bound, at_least, more_than, not_zero, within
+from grasp_core.settings import Count, Friction, Quantity, Range, Seed, Settings, Size
 from sim_validate.parallel.processes import available_cores
 
 USUAL_MESH = mesh_limits.MeshLimits()
-Finite = Annotated[float, FINITE]
-Positive = Annotated[float, FINITE, more_than(0.0)]
-NotNegative = Annotated[float, FINITE, at_least(0.0)]
-Usual = Annotated[float, at_least(SMALLEST, up_to=LARGEST)]
-Gap = Annotated[float, within("gap")]
-Friction = Annotated[float, at_least(SMALLEST, up_to=LARGEST_FRICTION)]
-Count = Annotated[int, at_least(1, up_to=MOST_COUNT)]
-Seed = Annotated[int, at_least(0, up_to=MOST_SEED)]
-Edges = Annotated[int, at_least(3, up_to=MOST_EDGES)]
+Positive = Annotated[float, Range(above=0.0)]
+NotNegative = Annotated[float, Range(least=0.0)]
+Gap = Annotated[float, Range(**BOUNDS["gap"])]
+Edges = Annotated[int, Range(least=3, most=MOST_EDGES)]
 Jobs = Annotated[
     Count, arg(help="Largest number of processes; results do not depend on it.")
 ]  # fmt: skip
@@ -40,11 +32,9 @@ ObjectName = Annotated[
     str, arg(help="A mesh file (obj, stl, ply, off, glb) or the name of a built-in object.")
 ]
 UnitName = Literal["m", "cm", "mm", "in"]
-Point = tuple[Finite, Finite, Finite]
-Direction = Annotated[Point, not_zero(SMALLEST, LARGEST)]
-Wrench = Annotated[
-    tuple[Finite, Finite, Finite, Finite, Finite, Finite], not_zero(SMALLEST, LARGEST)
-]
+Point = tuple[float, float, float]
+Direction = Annotated[Point, Size()]
+Wrench = Annotated[tuple[float, float, float, float, float, float], Size()]
 ProtocolName = Literal[
     "dexgraspbench",
     "dexgraspbench-paper",
@@ -64,16 +54,25 @@ def trials_in(text: str) -> tuple[str, ...]:
     return tuple(word.strip() for word in text.split(","))
 
 
-KNOWN_TRIALS = Bound(
-    f"must be names among {', '.join(TRIALS)}, separated by commas",
-    lambda text: set(trials_in(text)) <= set(TRIALS),
-)
-Trials = UseAppendAction[tuple[Annotated[str, KNOWN_TRIALS], ...]]
-Length = Annotated[float, at_least(0.0, up_to=LARGEST)]
+@dataclass(frozen=True, slots=True)
+class KnownTrials:
+    """The condition that a text holds names of trials, separated by commas."""
+
+    def holds(self, value: str) -> bool:
+        """Return whether each name is that of a trial."""
+        return set(trials_in(value)) <= set(TRIALS)
+
+    def __str__(self) -> str:
+        """Return the condition in words."""
+        return f"with names among {', '.join(TRIALS)}, separated by commas"
+
+
+Trials = UseAppendAction[tuple[Annotated[str, KnownTrials()], ...]]
+Length = Annotated[float, Range(least=0.0, most=LARGEST)]
 
 
 @dataclass(frozen=True, slots=True)
-class Speech:
+class Speech(Settings):
     """How much a command prints, and in which form."""
 
     json: bool = False
@@ -85,14 +84,14 @@ class Speech:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Spoken:
+class Spoken(Settings):
     """The flags that every command has."""
 
     speech: OmitArgPrefixes[Speech] = field(default_factory=Speech)
 
 
 @dataclass(frozen=True, slots=True)
-class MeshLimits:
+class MeshLimits(Settings):
     """How large a mesh file and its contents may be."""
 
     max_mesh_bytes: Count = USUAL_MESH.max_bytes
@@ -106,29 +105,29 @@ class MeshLimits:
 
 
 @dataclass(frozen=True, slots=True)
-class Lengths:
+class Lengths(Settings):
     """What lengths the numbers of a mesh file mean."""
 
     unit: UnitName = "m"
     """Unit of length in a mesh file."""
-    scale: Usual = 1.0
+    scale: Quantity = 1.0
     """Factor on the coordinates of a mesh file, besides its unit."""
 
 
 @dataclass(frozen=True, slots=True)
-class Mesh:
+class Mesh(Settings):
     """How a mesh file is read."""
 
     lengths: OmitArgPrefixes[Lengths] = Lengths()
     faces: Literal["auto", "planar", "patches"] = "auto"
     """Faces to plan on: exact planar faces, or nearly flat patches of a curved or scanned surface,
     which may have holes; auto takes patches where there are more than 200 planar faces."""
-    patches: Annotated[int, within("patches")] = 20
+    patches: Annotated[int, Range(**BOUNDS["patches"])] = 20
     """Keep at most this many patches, those with the largest inscribed discs."""
-    patch_spread_deg: Annotated[float, within("patch_spread_deg")] = 10.0
+    patch_spread_deg: Annotated[float, Range(**BOUNDS["patch_spread_deg"])] = 10.0
     """Largest angle between the surface and a patch's plane [deg]; the friction angle to plan with
     shrinks by as much."""
-    patch_depth: Annotated[float, within("patch_depth")] = 0.01
+    patch_depth: Annotated[float, Range(**BOUNDS["patch_depth"])] = 0.01
     """Largest distance of the surface from a patch's plane, relative to the object's extent."""
     center_of_mass_m: Annotated[Point | None, arg(metavar="X Y Z")] = None
     """Centre of mass in the file's frame, in metres. If not given, it is that of uniform density,
@@ -142,7 +141,7 @@ class Mesh:
 
 
 @dataclass(frozen=True, slots=True)
-class Planning:
+class Planning(Settings):
     """Which grasps to plan."""
 
     mesh: OmitArgPrefixes[Mesh] = Mesh()
@@ -191,7 +190,7 @@ class Planning:
     contacts stay this far from edges, or half the radius of the largest disc in a face if that is
     less. If not given, they stay a twentieth of the object's radius from edges, or as far as
     planned."""
-    ceiling: Annotated[int, within("ceiling")] | None = None
+    ceiling: Annotated[int, Range(**BOUNDS["ceiling"])] | None = None
     """With --optimize: also prove an upper bound of the quality that contacts on the same faces can
     reach, as far from edges, within 5 % of what they are known to reach if that takes no more cases
     than this number; 100000 are enough for most grasps."""
@@ -200,20 +199,20 @@ class Planning:
 
 
 @dataclass(frozen=True, slots=True)
-class Fingers:
+class Fingers(Settings):
     """How fingertips are built; values that are not given are chosen to suit the grasp."""
 
-    max_normal_force: Usual = 10.0
+    max_normal_force: Quantity = 10.0
     """Largest normal force of each finger [N]."""
-    fingertip_radius_m: Usual | None = None
+    fingertip_radius_m: Quantity | None = None
     """Radius of the fingertips in trials of closure [m]; if not given, --finger-radius-m of the
     plan, or a tenth of the object's radius, or less if that does not fit."""
-    fingertip_mass_kg: Usual | None = None
+    fingertip_mass_kg: Quantity | None = None
     """Mass of a fingertip [kg]; if not given, it is chosen so that similar grasps behave alike."""
-    stiffness_n_per_m: Usual | None = None
+    stiffness_n_per_m: Quantity | None = None
     """Stiffness of the servos that drive a fingertip [N/m]; if not given, it is chosen so that
     similar grasps behave alike."""
-    torsion_m: Annotated[float, within("torsion_m")] = 0.0
+    torsion_m: Annotated[float, Range(**BOUNDS["torsion_m"])] = 0.0
     """Torsional coefficient of the fingertips [m]: the largest torque about the normal of a contact
     over its normal force. Zero is a hard fingertip; a soft one has a fraction of the size of the
     area that it touches."""
@@ -223,34 +222,34 @@ class Fingers:
 
 
 @dataclass(frozen=True, slots=True)
-class Repeats:
+class Repeats(Settings):
     """Whether to repeat trials with noise, and the standard deviations of the noise."""
 
-    trials: Annotated[int, at_least(0, up_to=MOST_TRIALS)] = 0
+    trials: Annotated[int, Range(least=0, most=MOST_TRIALS)] = 0
     """Number of times to repeat all holds with noise, to see how often the grasp holds."""
-    noise_shift: Annotated[float, within("noise_shift")] = 0.01
+    noise_shift: Annotated[float, Range(**BOUNDS["noise_shift"])] = 0.01
     """Standard deviation of the object's position along each axis, in object radii."""
-    noise_turn_deg: Annotated[float, within("noise_turn_deg")] = 1.0
+    noise_turn_deg: Annotated[float, Range(**BOUNDS["noise_turn_deg"])] = 1.0
     """Standard deviation of the object's orientation about each axis [deg]."""
-    noise_normal_deg: Annotated[float, within("noise_normal_deg")] = 1.0
+    noise_normal_deg: Annotated[float, Range(**BOUNDS["noise_normal_deg"])] = 1.0
     """Standard deviation of the direction of the surface normal at each contact [deg]."""
-    noise_friction: Annotated[float, within("noise_friction")] = 0.05
+    noise_friction: Annotated[float, Range(**BOUNDS["noise_friction"])] = 0.05
     """Standard deviation of the friction coefficient, relative to the coefficient."""
-    noise_mass: Annotated[float, within("noise_mass")] = 0.05
+    noise_mass: Annotated[float, Range(**BOUNDS["noise_mass"])] = 0.05
     """Standard deviation of the mass and of every load, relative to the planned values."""
 
 
 @dataclass(frozen=True, slots=True)
-class Testing:
+class Testing(Settings):
     """Which trials to simulate, and how they are simulated."""
 
     fingers: OmitArgPrefixes[Fingers] = Fingers()
-    random_wrenches: Annotated[int, at_least(0, up_to=MOST_RANDOM_WRENCHES)] = 0
+    random_wrenches: Annotated[int, Range(least=0, most=MOST_RANDOM_WRENCHES)] = 0
     """Number of random wrenches to hold as well, each at a share of the largest multiple that is
     resisted according to the analysis."""
     wrenches: Path | None = None
     """A file of wrenches that each grasp must hold in full (see docs/files.md)."""
-    weight_n: Usual | None = None
+    weight_n: Quantity | None = None
     """Also hold the object's weight [N], along and against each axis or in the directions given."""
     down: Annotated[UseAppendAction[tuple[Direction, ...]], arg(metavar="X Y Z")] = ()
     """With --weight-n: a direction in which the weight acts; may be repeated."""
@@ -270,72 +269,72 @@ class Testing:
 
 
 @dataclass(frozen=True, slots=True)
-class Mass:
+class Mass(Settings):
     """How heavy the object is: its mass or its density."""
 
-    mass_kg: Usual | None = None
+    mass_kg: Quantity | None = None
     """Mass of the object [kg]."""
-    density_kg_m3: Usual | None = None
+    density_kg_m3: Quantity | None = None
     """Density of the object, in place of --mass-kg [kg/m^3]. If neither is given, executions take
     1000 kg/m^3, and `scene` writes a scene with scaled masses."""
 
 
 @dataclass(frozen=True, slots=True)
-class Tips:
+class Tips(Settings):
     """The springy fingertips that hold the object."""
 
-    push_n: Usual = 10.0
+    push_n: Quantity = 10.0
     """Largest normal force of a finger, at rest and under the loads that are planned for [N]."""
-    tip_stiffness_n_per_m: Usual = 2000.0
+    tip_stiffness_n_per_m: Quantity = 2000.0
     """Stiffness of the springs on which fingertips slide [N/m]."""
-    tip_radius_m: Usual | None = None
+    tip_radius_m: Quantity | None = None
     """Radius of the springy fingertips in executions [m]; if not given, --finger-radius-m of the
     plan, or a tenth of the object's radius, or less where that would overlap something."""
-    tip_mass_kg: Usual = 0.05
+    tip_mass_kg: Quantity = 0.05
     """Mass of a fingertip with the part of its finger that moves with it [kg]."""
-    damping_ratio: Annotated[float, within("damping_ratio")] = 0.5
+    damping_ratio: Annotated[float, Range(**BOUNDS["damping_ratio"])] = 0.5
     """Damping ratio of the object between the springs."""
 
 
 @dataclass(frozen=True, slots=True)
-class Executing:
+class Executing(Settings):
     """How hard the trials are, and how far an object may move and still count as held."""
 
     mass: OmitArgPrefixes[Mass] = Mass()
     tips: OmitArgPrefixes[Tips] = Tips()
-    lift_m: Usual = 0.2
+    lift_m: Quantity = 0.2
     """Height by which the object is lifted off its table [m]."""
-    lift_s: Annotated[float, within("lift_s")] = 0.6
+    lift_s: Annotated[float, Range(**BOUNDS["lift_s"])] = 0.6
     """Duration of the lift [s]."""
     shake_g: Length = 1.0
     """Largest acceleration of a shake [9.80665 m/s^2]; 0 for no shakes."""
-    shake_hz: Annotated[float, within("shake_hz")] = 5.0
+    shake_hz: Annotated[float, Range(**BOUNDS["shake_hz"])] = 5.0
     """Frequency of a shake [Hz]."""
-    stop_m_per_s2: Usual = 10.0
+    stop_m_per_s2: Quantity = 10.0
     """Deceleration of a stop [m/s^2]."""
-    stop_from_m_per_s: Usual = 0.5
+    stop_from_m_per_s: Quantity = 0.5
     """Speed before a stop [m/s]."""
     knock_n_s: Length | None = None
     """Impulse of a knock [N s], 0 for no knocks. If not given, the one that gives a free object of
     that mass 1/6 m/s: 0.05 N s for 0.3 kg."""
     off_mm: Length = 2.0
     """Distance of a misplaced object from where the fingers expect it [mm]."""
-    off_deg: Annotated[float, within("off_deg")] = 2.0
+    off_deg: Annotated[float, Range(**BOUNDS["off_deg"])] = 2.0
     """Angle by which a misplaced object is turned [deg]."""
-    misplacements: Annotated[int, within("misplacements")] = 5
+    misplacements: Annotated[int, Range(**BOUNDS["misplacements"])] = 5
     """Number of times that the object is misplaced, each time in a random direction."""
-    max_mm: Usual = 5.0
+    max_mm: Quantity = 5.0
     """Displacement against the palm up to which an object counts as held [mm]."""
-    max_deg: Usual = 5.0
+    max_deg: Quantity = 5.0
     """Turn against the palm up to which an object counts as held [deg]."""
 
 
 @dataclass(frozen=True, slots=True)
-class Carrying:
+class Carrying(Settings):
     """How far a face may have moved or turned."""
 
     distance_m: NotNegative | None = None
     """Largest distance by which a contact may move to the surface of the changed part [m]; if not
     given, a twentieth of the old part's radius."""
-    angle_deg: Annotated[float, within("changed_by_deg")] = 5.0
+    angle_deg: Annotated[float, Range(**BOUNDS["changed_by_deg"])] = 5.0
     """Largest angle between the normals of a face before and after [deg]."""

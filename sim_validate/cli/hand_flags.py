@@ -9,16 +9,17 @@ from typing import Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from sim_validate.cli.flag_bounds import within
+from grasp_core.checked import BOUNDS
+from grasp_core.settings import Range
 from sim_validate.cli.flag_groups import (
     Count,
     Direction,
     Friction,
     Jobs,
     ProtocolName,
+    Quantity,
     Seed,
     Spoken,
-    Usual,
 )
 from sim_validate.parallel.processes import available_cores
 
@@ -54,16 +55,16 @@ class Reach(Spoken):
     stays above the table."""
     contacts_only: bool = False
     """Touch the planned contacts themselves, not anywhere in the grasps' regions."""
-    clearance_m: Annotated[float, within("hand_clearance_m")] = 5e-4
+    clearance_m: Annotated[float, Range(**BOUNDS["hand_clearance_m"])] = 5e-4
     """Least distance between all that must not touch [m]."""
-    starts: Annotated[int, within("starts")] = 100
+    starts: Annotated[int, Range(**BOUNDS["starts"])] = 100
     """Largest number of starts for each grasp."""
-    torque_limit_n_m: Annotated[float | None, within("torque_limit_n_m")] = None
+    torque_limit_n_m: Annotated[float | None, Range(**BOUNDS["torque_limit_n_m"])] = None
     """Torque limit of every joint [N m], instead of those of the hand."""
     simulate: bool = False
     """Hold test wrenches in simulation with the hand's links and motors, and try negative controls;
     every joint needs a torque limit."""
-    mass_kg: Usual | None = None
+    mass_kg: Quantity | None = None
     """Mass of the object [kg], with which the hand also executes each grasp that it reaches, as
     `execute` does with fingertips on springs; every joint needs a torque limit."""
     protocol: UseAppendAction[tuple[ProtocolName, ...]] = ()

@@ -114,7 +114,7 @@ def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
 def _asked(command: dataset_flags.Build) -> DatasetConfig:
     first = Path(command.objects[0]) if command.objects else Path()
     if first.suffix == ".toml":
-        unsaid = (dataset_flags.Planning(), dataset_flags.Settings(), dataset_flags.Learned())
+        unsaid = (dataset_flags.Planning(), dataset_flags.Content(), dataset_flags.Learned())
         if len(command.objects) > 1 or (
             (command.planning, command.settings, command.learned) != unsaid
         ):
@@ -134,7 +134,7 @@ def _asked(command: dataset_flags.Build) -> DatasetConfig:
     )
 
 
-def _settings(settings: dataset_flags.Settings) -> dict[str, Any]:
+def _settings(settings: dataset_flags.Content) -> dict[str, Any]:
     given = {each.name: getattr(settings, each.name) for each in fields(settings)}
     lengths = asdict(given.pop("lengths"))
     return {"frictions": given.pop("friction") or (FRICTION,), **lengths, **given}

@@ -24,8 +24,7 @@ from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.values import Grasp
 from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
-from sim_validate.cli.exit_codes import Exit
-from sim_validate.cli.flag_bounds import FlagsError
+from sim_validate.cli.exit_codes import Exit, FlagsError
 from sim_validate.commands.asked.objects import asked_finger, object_to_plan
 from sim_validate.files.result_folders import alone_in, remove_results
 from sim_validate.parallel.compiling import PLANNING, compile_loops, must_compile

@@ -23,8 +23,7 @@ from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.planning.result import Plan
 from sim_validate.cli import hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
-from sim_validate.cli.exit_codes import Exit
-from sim_validate.cli.flag_bounds import FlagsError
+from sim_validate.cli.exit_codes import Exit, FlagsError
 from sim_validate.commands.asked.objects import asked_grasps
 from sim_validate.commands.hand import asked_hand
 from sim_validate.commands.judging import judge_hands

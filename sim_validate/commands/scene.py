@@ -18,8 +18,7 @@ from scenes.mjcf import build_scene
 from scenes.physics import PhysicsSettings
 from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import Reporter
-from sim_validate.cli.exit_codes import Exit
-from sim_validate.cli.flag_bounds import FlagsError
+from sim_validate.cli.exit_codes import Exit, FlagsError
 from sim_validate.cli.flag_groups import UPRIGHT, Mass, Tips
 from sim_validate.commands.asked.trials import check_mass, finger_settings, holding
 from sim_validate.execution.execute import chosen_squeeze, held_scene

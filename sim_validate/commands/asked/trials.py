@@ -11,7 +11,7 @@ from scenes.fingertips import FingerSettings
 from scenes.physics import PhysicsSettings
 from sim_validate.cli import flag_groups
 from sim_validate.cli.command_flags import Run
-from sim_validate.cli.flag_bounds import FlagsError
+from sim_validate.cli.exit_codes import FlagsError
 from sim_validate.cli.flag_groups import (
     DENSITY_KG_M3,
     TRIALS,
