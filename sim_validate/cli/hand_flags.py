@@ -59,7 +59,7 @@ class Reach(Spoken):
     """Least distance between all that must not touch [m]."""
     starts: Annotated[int, Range(**BOUNDS["starts"])] = 100
     """Largest number of starts for each grasp."""
-    torque_limit_n_m: Annotated[float | None, Range(**BOUNDS["torque_limit_n_m"])] = None
+    torque_limit_n_m: Annotated[float, Range(**BOUNDS["torque_limit_n_m"])] | None = None
     """Torque limit of every joint [N m], instead of those of the hand."""
     simulate: bool = False
     """Hold test wrenches in simulation with the hand's links and motors, and try negative controls;

@@ -7,7 +7,7 @@ import grasp_core as gc
 import sim_validate as sv
 from scenes.example_objects import example_object
 from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
-from sim_validate.execution.settings import AskedExecution, asked_execution, execution_table
+from sim_validate.execution.settings import AskedExecution, execution_table
 
 TABLE = {
     "density_kg_m3": 700, "trials": ["lift", "weight"], "tip_radius_m": 0.004,
@@ -16,19 +16,19 @@ TABLE = {
 
 
 def test_a_table_says_how_objects_are_executed():
-    asked = asked_execution(TABLE)
+    asked = AskedExecution.of_table(TABLE)
     assert asked.settings.trials == ("weight", "lift")
     assert asked.settings.hand.down == (1.0, 0.0, 0.0)
     wedge = example_object("wedge")
     settings = asked.settings_for(wedge)
     assert settings == dataclasses.replace(asked.settings, mass_kg=wedge.mass_at(700.0))
-    assert asked_execution({"mass_kg": 2}).settings_for(wedge) == sv.ExecutionSettings(mass_kg=2.0)
+    assert AskedExecution.of_table({"mass_kg": 2}).settings_for(wedge) == sv.ExecutionSettings(mass_kg=2.0)
 
 
 @pytest.mark.parametrize("table", [TABLE, {"mass_kg": 0.3}])
 def test_a_configuration_is_the_same_when_it_is_written_and_read_again(tmp_path, table):
-    asked = asked_execution(table)
-    assert asked_execution(execution_table(asked)) == asked
+    asked = AskedExecution.of_table(table)
+    assert AskedExecution.of_table(execution_table(asked)) == asked
     config = DatasetConfig(objects=("wedge",), execution=asked)
     path = tmp_path / "dataset.toml"
     path.write_text(config_to_toml(config))
@@ -38,7 +38,7 @@ def test_a_configuration_is_the_same_when_it_is_written_and_read_again(tmp_path,
 def test_a_configuration_without_executions_does_not_mention_them():
     plain, executed = (
         config_to_toml(DatasetConfig(objects=("wedge",), execution=asked))
-        for asked in (None, asked_execution(TABLE))
+        for asked in (None, AskedExecution.of_table(TABLE))
     )
     assert "execution" not in plain
     assert executed.startswith(plain)
@@ -57,7 +57,7 @@ def test_a_configuration_without_executions_does_not_mention_them():
 )
 def test_what_is_refused_names_the_setting(table, message):
     with pytest.raises(gc.InputError) as raised:
-        asked_execution(table)
+        AskedExecution.of_table(table)
     assert message in str(raised.value)
 
 
