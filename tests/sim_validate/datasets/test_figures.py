@@ -122,7 +122,7 @@ def test_a_hand_stands_where_its_joints_say(grasps):
 )
 def test_forged_figures_are_named(spoiled, cells, message):
     def change(rows):
-        next(row for row in rows if row["kind"] == "planned" and row["hand_reached"]).update(cells)
+        next(row for row in rows if row["executed"] and row["hand_reached"]).update(cells)
 
     forged(spoiled, "grasps", change)
     assert any(message in fault for fault in verify(spoiled))
