@@ -106,7 +106,7 @@ class Size:
 
     def __str__(self) -> str:
         """Return the range in words."""
-        return f"whose largest part is from {self.least:g} to {self.most:g}"
+        return f"that are not all zero: the largest is from {self.least:g} to {self.most:g} in size"
 
 
 Quantity = Annotated[float, Range(least=SMALLEST, most=LARGEST)]
@@ -263,7 +263,8 @@ def _number(value: Any) -> float:
 
 
 def _tuple(value: Any, parts: tuple[Any, ...]) -> tuple[Any, ...]:
-    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+    entries = getattr(getattr(value, "dtype", None), "kind", "f")  # those of numpy's arrays
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable) or entries not in "iuf":
         raise ValueError
     items = tuple(cast("Iterable[Any]", value))
     kinds = parts[:1] * len(items) if parts[-1] is Ellipsis else parts

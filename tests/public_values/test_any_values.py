@@ -13,6 +13,7 @@ from hypothesis.extra.numpy import arrays
 import grasp_core as gc
 import scenes
 import sim_validate as sv
+from grasp_core.settings import SettingError
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 
 WEIRD = [
@@ -106,13 +107,16 @@ def test_a_setting_is_refused_or_finite_and_kept(kind, name, number):
         assert getattr(kind(**{name: number}), name) == number
 
 
+GIVEN = {gc.MeshError: (gc.MeshRefusal.OPEN, "mended so"), SettingError: ("size_m", "is wrong")}
+
+
 def test_errors_are_the_same_after_pickling():
     kinds, left = list[type[gc.GraspError]](), [gc.GraspError]
     while left:
         kinds.append(left[-1])
         left += left.pop().__subclasses__()
     for kind in kinds:
-        given = ("mended so",) if kind is not gc.MeshError else (gc.MeshRefusal.OPEN, "mended so")
+        given = GIVEN.get(kind, ("mended so",))
         error = kind(*given)
         again = pickle.loads(pickle.dumps(error))  # noqa: S301 - our own
         assert type(again) is kind

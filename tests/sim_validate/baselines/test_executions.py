@@ -137,8 +137,8 @@ def test_what_must_survive_fails_although_the_baseline_did_not_survive_either():
         ({"survives": "yes"}, "survives: expected true or false"),
         ({"strict": 1}, "strict: expected true or false"),
         ({"taste": 1}, "no setting is named"),
-        ({"changed_part": {"refuse": 1}}, "changed_part.refuse: expected true or false"),
-        ({"execution": {"mass_kg": -1.0}}, "execution: mass_kg must be"),
+        ({"changed_part": {"refuse": 1}}, "changed_part.refuse must be True or False"),
+        ({"execution": {"mass_kg": -1.0}}, "execution.mass_kg must be"),
     ],
 )
 def test_settings_of_a_suite_are_checked(tmp_path, settings, message):

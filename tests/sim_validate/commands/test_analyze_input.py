@@ -108,7 +108,7 @@ def test_a_file_that_is_missing_or_asks_too_much_is_refused(tmp_path, monkeypatc
     assert main(["analyze", "contacts.json", "--edges", "2501"]) == Exit.INPUT
     assert "--edges 2500 or less" in capsys.readouterr().err
     assert main(["analyze", "contacts.json", "--friction", "1001"]) == Exit.USAGE
-    assert "--friction must be at least 0, at most 1000" in capsys.readouterr().err
+    assert "--friction must be a number from 0 up to 1000" in capsys.readouterr().err
 
 
 def test_a_config_file_gives_wrenches(analyze):

@@ -196,9 +196,12 @@ def test_a_file_of_flags_and_a_file_of_physics(here):
 
 REFUSED = {
     "--mass-kg 1 --density-kg-m3 1000": (Exit.USAGE, "exclude each other"),
-    "--setup fingers.toml": (Exit.INPUT, "fingers.toml: expected the table physics"),
+    "--setup fingers.toml": (
+        Exit.INPUT,
+        "fingers.toml: no setting is named 'fingers'; choose from physics",
+    ),
     "--setup gravity.toml": (Exit.INPUT, "give its direction with --down"),
-    "--setup unknown.toml": (Exit.INPUT, 'no setting is named "speed"'),
+    "--setup unknown.toml": (Exit.INPUT, "no setting is named 'speed'"),
 }
 
 

@@ -78,8 +78,11 @@ def test_the_viewer_runs_no_modules_of_the_working_folder(wedge_plan, tmp_path, 
 @pytest.mark.parametrize(
     ("flags", "says"),
     [
-        (["--picture", "a.png", "--clip", "a.mp4"], "--clip must end in"),
-        (["--picture", "a.png", "--page", "a.png"], "--page must end in .html or .htm"),
+        (["--picture", "a.png", "--clip", "a.mp4"], "--clip must be a path that ends in"),
+        (
+            ["--picture", "a.png", "--page", "a.png"],
+            "--page must be a path that ends in .html or .htm",
+        ),
     ],
 )
 def test_what_cannot_be_shown_is_refused(wedge_plan, tmp_path, monkeypatch, capsys, flags, says):

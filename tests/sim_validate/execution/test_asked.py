@@ -22,7 +22,8 @@ def test_a_table_says_how_objects_are_executed():
     wedge = example_object("wedge")
     settings = asked.settings_for(wedge)
     assert settings == dataclasses.replace(asked.settings, mass_kg=wedge.mass_at(700.0))
-    assert AskedExecution.of_table({"mass_kg": 2}).settings_for(wedge) == sv.ExecutionSettings(mass_kg=2.0)
+    heavy = AskedExecution.of_table({"mass_kg": 2})
+    assert heavy.settings_for(wedge) == sv.ExecutionSettings(mass_kg=2.0)
 
 
 @pytest.mark.parametrize("table", [TABLE, {"mass_kg": 0.3}])
@@ -48,10 +49,10 @@ def test_a_configuration_without_executions_does_not_mention_them():
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ("soft", 'execution: expected a table of settings, got "soft"'),
+        ("soft", "execution: expected a table of settings, got 'soft'"),
         ({}, "execution: expected one of mass_kg and density_kg_m3, got neither"),
         ({"mass_kg": 1.0, "density_kg_m3": 1.0}, "got both"),
-        ({"mass_kg": 1.0, "hand": {"left": 1}}, 'execution.hand: no setting is named "left"'),
+        ({"mass_kg": 1.0, "hand": {"left": 1}}, "execution.hand: no setting is named 'left'"),
         ({"density_kg_m3": True}, "execution: density_kg_m3 must be a number"),
     ],
 )

@@ -70,8 +70,8 @@ def answers(said, heading):
 
 WRONG_MARKERS = [
     ("", "needs the path of a grasps.json, or object="),
-    ("object='wedge', taste=1", 'no setting is named "taste"'),
-    ("'grasps.json', limit=1", 'no setting is named "limit"; choose from friction'),
+    ("object='wedge', taste=1", "no setting is named 'taste'"),
+    ("'grasps.json', limit=1", "no setting is named 'limit'; choose from friction"),
     ("3", "takes the path of one file of grasps"),
     ("object='wedge', friction='0.5'", "friction must be a number, got '0.5'"),
     ("object='box', cones='normal', families=('pencil',)", "no grasp of box was found"),
@@ -118,7 +118,7 @@ BAD_DEMANDS = [
     ("assert_stable(grasp_case, min_pass_rate=0.9)", "as `trials`, too"),
     ("assert_stable(grasp_case, trials=2, min_pass_rate=80)", "from 0 to 1, got 80"),
     ("assert_stable(grasp_case, min_margin=float('nan'))", "min_margin must be from 0"),
-    ("assert_stable(grasp_case, trial=2)", 'no setting is named "trial"; choose from wrenches'),
+    ("assert_stable(grasp_case, trial=2)", "no setting is named 'trial'; choose from wrenches"),
     ("assert_stable(grasp_case, wrenches=[[1, 2]])", "must be NamedWrench values"),
     ("assert_stable(grasp_case.grasp)", "expected a grasp_case"),
 ]

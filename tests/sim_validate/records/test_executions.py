@@ -117,10 +117,10 @@ BAD = {
     ),
     "hand": (
         lambda d: d["settings"]["hand"].update(down=[0, 0, 0]),
-        "settings: down must be a direction",
+        r"settings\.hand\.down must be",
     ),
     "schema": (lambda d: d.update(schema=2), "schema: expected 1, got 2: a newer graspproof"),
-    "physics": (of_first(physics={"timestep": 1}), r"executions\[0\]\.physics: timestep must be"),
+    "physics": (of_first(physics={"timestep": 1}), r"executions\[0\]\.physics\.timestep must be"),
     "reason": (of_first(reason="heavy"), r"executions\[0\]\.load_multiple: expected nothing"),
     "radii": (of_first(tip_radius_m=[0.004] * 3), r"executions\[0\]\.tip_radius_m must have"),
     "half": (

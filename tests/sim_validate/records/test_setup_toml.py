@@ -30,10 +30,10 @@ def test_a_file_changes_what_it_names_and_nothing_else(tmp_path):
     ("text", "words"),
     [
         ("[physics]\ntimestp = 0.001\n", r"physics: no setting is named .timestp.*timestep"),
-        ("timestep = 0.001\n", "expected tables physics.* got .timestep."),
+        ("timestep = 0.001\n", "no setting is named .timestep.; choose from fingers, physics"),
         ("[hold]\nload_share = 2.0\n", "load_share must be a number from 0.1 up to 0.999"),
         ("[physics]\ngravity = [0.0, 0.0, -9.81]\n", r"gravity must be zero.*--weight-n"),
-        ("[physics]\ncondim = 4\n", r"setup.toml: physics: physics.condim must be 3"),
+        ("[physics]\ncondim = 4\n", r"setup.toml: physics.condim must be 3"),
         ("[physics\n", "not TOML"),
     ],
 )
