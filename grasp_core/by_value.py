@@ -6,7 +6,7 @@ that a copy equals its original. Fields that are declared with `compare=False` d
 """
 
 from collections.abc import Mapping, Sized
-from dataclasses import MISSING, fields
+from dataclasses import fields
 from textwrap import shorten
 from typing import Any, TypeVar, cast
 
@@ -112,17 +112,6 @@ def short(kind: str, figures: Mapping[str, object]) -> str:
     """Write `Kind(name=figure, ..)` in at most `MOST` characters, longer things by their size."""
     parts = [f"{name}={_size(value)}" for name, value in figures.items()]
     return shorten(f"{kind}({', '.join(parts)})", MOST, placeholder=" ...)")
-
-
-def changed(settings: Any) -> str:
-    """Write settings by those that differ from the usual ones, in at most `MOST` characters."""
-    parts = [
-        f"{field.name}={value!r}"
-        for field in fields(settings)
-        if (value := getattr(settings, field.name))
-        != (field.default if field.default_factory is MISSING else field.default_factory())
-    ]
-    return shorten(f"{type(settings).__name__}({', '.join(parts)})", MOST, placeholder=" ...)")
 
 
 def _size(value: object) -> str:

@@ -12,9 +12,9 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 65_711,
+    "lines of packages": 65_663,
     "modules of packages": 369,
-    "lines of tests": 47_947,
+    "lines of tests": 48_006,
     "lines of docs": 6_508,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
@@ -22,6 +22,7 @@ only with a line below that says why."""
 RISES = (
     "lines of packages, 65,686 to 65,711: searches for poses of hands start from rounded places",
     "lines of tests, 47,928 to 47,947: they start alike where contacts differ by rounding",
+    "lines of tests, 47,947 to 48,006: settings are one mechanism with a test of its own",
 )
 """Sentences such as "lines of tests, 50,000 to 50,400: the oracle of a new theorem"."""
 

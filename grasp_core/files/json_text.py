@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
 
-from grasp_core.errors import InputError, about
+from grasp_core.errors import InputError
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -231,19 +231,6 @@ def record_of(
         return TypeAdapter(kind).validate_json(text)
     except ValidationError as error:
         raise InputError(complaint(error, kind)) from error
-
-
-def settings_of(
-    kind: type[Record], given: Mapping[str, Any], inside: Sequence[str | int]
-) -> Record:
-    """Make settings of a class from a part of a file, with every field checked."""
-    from pydantic import TypeAdapter, ValidationError
-
-    try:
-        with about(place(inside)):  # for the settings' own checks
-            return TypeAdapter(kind).validate_json(json.dumps(given), strict=True)
-    except ValidationError as error:
-        raise InputError(complaint(error, kind, inside)) from error
 
 
 def complaint(error: "ValidationError", kind: Any, inside: Sequence[str | int] = ()) -> str:
