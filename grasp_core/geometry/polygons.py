@@ -238,13 +238,15 @@ def convex_polygon(corners: Array, slack: float) -> FlatPolygon | None:
         return None
     E, b = edge_rows(corners)
     found = FlatPolygon(corners, E, b)
-    if not (np.isfinite(E).all() and signed_area(corners) > 0.0):
-        return None
-    # the normals turn around once, not more often
+    turning = np.isfinite(E).all() and signed_area(corners) > 0.0 and _turns_once(E)
+    return found if turning and found.holds(corners, slack) else None
+
+
+def _turns_once(E: Array) -> bool:
+    """Return whether normals of a polygon's edges, (k, 2), turn around once, not more often."""
     following = np.roll(E, -1, axis=0)
     turns = E[:, 0] * following[:, 1] - E[:, 1] * following[:, 0]
-    once = abs(float(np.arctan2(turns, (E * following).sum(axis=1)).sum())) < 3.0 * np.pi
-    return found if once and found.holds(corners, slack) else None
+    return abs(float(np.arctan2(turns, (E * following).sum(axis=1)).sum())) < 3.0 * np.pi
 
 
 def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:

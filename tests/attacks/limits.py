@@ -10,7 +10,6 @@ from functools import cache
 import numpy as np
 
 import grasp_core as gc
-import grasp_core.execution.payload as payloads
 import grasp_core.quality.wrench_limits as checked
 from grasp_core.execution import carried_mass, squeeze_certificate, squeeze_rows
 from grasp_core.execution.payload import Payload
@@ -288,7 +287,7 @@ def more_mass(rng):
 
 PAYLOAD = Attack(
     lambda rng: cycled(rng, [less_mass, more_mass]),
-    (lambda monkeypatch: monkeypatch.setattr(payloads, "bounds", always(True)),), 1500,
+    (lambda monkeypatch: monkeypatch.setattr(checked, "bounds", always(True)),), 1500,
 )  # fmt: skip
 
 
