@@ -238,7 +238,7 @@ def taken(value: Any, kind: Any) -> Any:
         value = _number(value)
         allowed = math.isfinite(value)
     elif kind is Path:
-        allowed = isinstance(value, str | Path) and str(value).isprintable() and str(value) != ""
+        allowed = isinstance(value, str | Path) and value != "" and "\0" not in str(value)
         value = Path(value) if allowed else value
     elif kind is int:
         allowed = not isinstance(value, bool) and isinstance(value, Integral)

@@ -66,7 +66,7 @@ WRONG = [
     ("point_m", (0.0, 0.0)), ("point_m", (0.0, math.nan, 0.0)), ("point_m", "abc"),
     ("down", ((0.0, 0.0, 0.0),)), ("down", ((0.0, 0.0, 2e9),)), ("down", 3), ("time_s", 0.0),
     ("time_s", math.nan), ("kind", True), ("kind", "one"), ("kind", 2), ("quick", 1),
-    ("path", "a.txt"), ("path", ""), ("path", "a\nb.svg"), ("inner", None), ("inner", "share"),
+    ("path", "a.txt"), ("path", ""), ("path", "a\0.svg"), ("inner", None), ("inner", "share"),
 ]  # fmt: skip
 
 
