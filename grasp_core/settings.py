@@ -289,7 +289,7 @@ def words(kind: Any) -> str:
         return f"{len(parts)} numbers{each}"
     if get_origin(kind) is Literal:
         return f"one of {', '.join(map(str, parts))}"
-    plain = {float: "a number", int: "a whole number", bool: "True or False", str: "text",
+    plain = {float: "a number", int: "a whole number", bool: "true or false", str: "text",
              Path: "a path", type(None): "None"}  # fmt: skip
     return plain.get(kind) or f"a {kind.__name__}"
 

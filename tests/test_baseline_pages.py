@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from grasp_core.settings import for_users
 from sim_validate.baselines.baseline import Entry, ExecutionEntry
 from sim_validate.baselines.compare import Status
-from sim_validate.baselines.suite import KINDS, suite_from_toml
+from sim_validate.baselines.suite import Suite, suite_from_toml
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.simulation.setup import Noise
@@ -68,7 +69,7 @@ def test_all_settings_are_shown(tmp_path):
     path = tmp_path / "wedge.grasps.toml"
     path.write_text(block(PAGE, "toml"))
     suite = suite_from_toml(path)
-    assert set(re.findall(r"^\[?(\w+)", block(PAGE, "toml"), re.MULTILINE)) >= set(KINDS)
+    assert set(re.findall(r"^\[?(\w+)", block(PAGE, "toml"), re.MULTILINE)) >= set(for_users(Suite))
     assert suite.baseline == tmp_path / "wedge.baseline.json"
     assert suite.noise == dataclasses.replace(Noise(), friction=0.1)
     assert suite.survives

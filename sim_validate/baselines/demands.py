@@ -1,15 +1,15 @@
 """Reads or plans the grasps of a pytest test, and checks that they are as stable as it demands."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.checked import LARGEST_FRICTION, MOST_RANDOM_WRENCHES, MOST_TRIALS
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
-from grasp_core.settings import named
+from grasp_core.settings import Range, Seed, Settings, for_users, named
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines.explain import not_survived, unstable
@@ -117,41 +117,34 @@ def _number(value: Any) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Demands:
+class Demands(Settings):
     """What a test demands of a grasp, beside holding the usual wrenches.
 
     Raises:
         InputError: A number is missing or out of range, or a pass rate is given without repeats.
     """
 
-    wrenches: Sequence[NamedWrench] = ()
-    trials: int = 0
+    wrenches: tuple[NamedWrench, ...] = ()
+    trials: Annotated[int, Range(least=0, most=MOST_TRIALS)] = 0
     noise: Noise = field(default_factory=Noise)
-    min_pass_rate: float = 0.0
+    min_pass_rate: Annotated[float, Range(least=0.0, most=1.0)] = 0.0
     """Least share of the repeats with noise in which the grasp must hold."""
-    min_margin: float = 0.0
+    min_margin: Annotated[float, Range(least=0.0, most=LARGEST_FRICTION)] = 0.0
     """Least difference between the friction and the critical one, both predicted and simulated."""
-    random_wrenches: int = 0
-    seed: int = 0
+    random_wrenches: Annotated[int, Range(least=0, most=MOST_RANDOM_WRENCHES)] = 0
+    seed: Seed = 0
     setup: Setup = field(default_factory=Setup)
 
-    def __post_init__(self) -> None:
-        for name, most in (("min_pass_rate", 1.0), ("min_margin", LARGEST_FRICTION)):
-            value = getattr(self, name)
-            if not (isinstance(value, int | float) and 0.0 <= value <= most):
-                raise InputError(f"{name} must be from 0 to {most:g}, got {value!r}")
+    def _check_together(self) -> None:
         if self.min_pass_rate > 0.0 and not self.trials:
             raise InputError(
                 "min_pass_rate is a share of repeats with noise: give their number as `trials`, too"
             )
-        for each in self.wrenches:
-            if not isinstance(each, NamedWrench):  # pyright: ignore[reportUnnecessaryIsInstance]
-                raise InputError(f"wrenches must be NamedWrench values, got {each!r}")
 
 
 def demands_of(asked: Mapping[str, Any]) -> Demands:
     """Build the demands from the arguments of a test."""
-    return Demands(**named(asked, [each.name for each in fields(Demands)], "assert_stable"))
+    return Demands(**named(asked, for_users(Demands), "assert_stable"))
 
 
 def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from grasp_core.checked import MOST_RANDOM_WRENCHES, MOST_TRIALS
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import shown
 from grasp_core.planning.result import Plan
-from grasp_core.settings import named
+from grasp_core.settings import CHOSEN, Range, Seed, Settings
 from sim_validate.baselines.baseline import Baseline, check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import (
     Checked,
@@ -32,31 +32,22 @@ from sim_validate.baselines.part import (
     source_of,
     testable,
 )
-from sim_validate.baselines.part import TABLE as CHANGED
 from sim_validate.baselines.settings import How, of_settings, setup_for
 from sim_validate.execution.settings import TABLE, AskedExecution
 from sim_validate.files.toml_tables import read_tables
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.wrenches import wrenches_from_file
-from sim_validate.simulation.setup import Agenda, Noise
+from sim_validate.simulation.setup import Agenda, LimitSearch, Noise
 
 ENDING = ".grasps.toml"
-KINDS: Mapping[str, type] = {
-    "grasps": str, "object": str, "baseline": str, "strict": bool, "setup": str, "wrenches": str,
-    "limits": str, "random_wrenches": int, "trials": int, "noise": dict, "seed": int,
-    "survives": bool, "execution": dict, "changed_part": dict,
-}  # fmt: skip
-WORDS = {str: "text", bool: "true or false", int: "a whole number", dict: "a table"}
-PATHS = ("grasps", "object", "baseline", "setup", "wrenches")
 DIRECT = ("limits", "random_wrenches", "trials", "seed")
 """Settings of trials that the file gives by the same name as an agenda has."""
 
 
-@dataclass(frozen=True)
-class Suite:
+@dataclass(frozen=True, repr=False)
+class Suite(Settings):
     """Grasps that must stay as stable as they were; a setting of None is the baseline's."""
 
-    path: Path
     grasps: Path
     baseline: Path
     object: Path | None = None
@@ -65,16 +56,18 @@ class Suite:
     strict: bool = False
     setup: Path | None = None
     wrenches: Path | None = None
-    limits: str | None = None
+    limits: LimitSearch | None = None
     """How the largest multiple of each wrench is found in simulation."""
-    random_wrenches: int | None = None
-    trials: int | None = None
+    random_wrenches: Annotated[int, Range(least=0, most=MOST_RANDOM_WRENCHES)] | None = None
+    trials: Annotated[int, Range(least=0, most=MOST_TRIALS)] | None = None
     """Number of repeats with noise."""
     noise: Noise | None = None
-    seed: int | None = None
+    seed: Seed | None = None
     survives: bool = False
     execution: AskedExecution | None = None
     changed_part: IfChanged = CARRY
+    path: Annotated[Path, CHOSEN] = Path(ENDING)
+    """The file itself."""
 
     @cached_property
     def saved(self) -> Plan:
@@ -186,25 +179,9 @@ def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
     """Build a suite from the settings of a `*.grasps.toml` file."""
     usual = path.name.removesuffix(ENDING) + ".baseline.json"
     with about(path):
-        _check(given)
-        settings: dict[str, Any] = {"baseline": usual, **given}
-        settings |= {name: path.parent / settings[name] for name in PATHS if name in settings}
-        for name, kind in (("noise", Noise), (CHANGED, IfChanged)):
-            if name in given:
-                settings[name] = kind.of_table(given[name], name)
-        if TABLE in given:
-            settings[TABLE] = AskedExecution.of_table(given[TABLE])
-    return Suite(path=path, **settings)
-
-
-def _check(given: Mapping[str, Any]) -> None:
-    for name, value in named(given, KINDS, "the file").items():
-        kind = KINDS[name]
-        if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-            raise InputError(f"{name}: expected {WORDS[kind]}, got {shown(value)}")
-        if name in PATHS and not value.isprintable():
-            raise InputError(f"{name}: expected the path of a file, got {shown(value)}")
-        if kind is int and value < 0:
-            raise InputError(f"{name}: expected 0 or more, got {value}")
-    if "grasps" not in given:
-        raise InputError("grasps: expected the path of a grasps.json")
+        suite = Suite.of_table({"baseline": usual, **given})
+    paths = {
+        name: getattr(suite, name) for name in ("grasps", "object", "baseline", "setup", "wrenches")
+    }
+    found = {name: path.parent / value for name, value in paths.items() if value is not None}
+    return replace(suite, path=path, **found)

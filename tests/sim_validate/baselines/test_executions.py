@@ -134,10 +134,10 @@ def test_what_must_survive_fails_although_the_baseline_did_not_survive_either():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"survives": "yes"}, "survives: expected true or false"),
-        ({"strict": 1}, "strict: expected true or false"),
+        ({"survives": "yes"}, "survives must be true or false"),
+        ({"strict": 1}, "strict must be true or false"),
         ({"taste": 1}, "no setting is named"),
-        ({"changed_part": {"refuse": 1}}, "changed_part.refuse must be True or False"),
+        ({"changed_part": {"refuse": 1}}, "changed_part.refuse must be true or false"),
         ({"execution": {"mass_kg": -1.0}}, "execution.mass_kg must be"),
     ],
 )

@@ -89,7 +89,7 @@ def test_a_bad_file_is_named(tmp_path):
     write_text(tmp_path / "x.grasps.toml", "")
     code, said = run_pytest(tmp_path)
     assert code != 0
-    assert "grasps: expected the path" in said
+    assert "grasps: missing; add it" in said
 
 
 def test_it_is_silent_where_it_is_not_used(tmp_path):

@@ -116,8 +116,8 @@ def test_assert_stable_in_code(tmp_path):
 
 BAD_DEMANDS = [
     ("assert_stable(grasp_case, min_pass_rate=0.9)", "as `trials`, too"),
-    ("assert_stable(grasp_case, trials=2, min_pass_rate=80)", "from 0 to 1, got 80"),
-    ("assert_stable(grasp_case, min_margin=float('nan'))", "min_margin must be from 0"),
+    ("assert_stable(grasp_case, trials=2, min_pass_rate=80)", "from 0 up to 1, got 80"),
+    ("assert_stable(grasp_case, min_margin=float('nan'))", "min_margin must be a number from 0"),
     ("assert_stable(grasp_case, trial=2)", "no setting is named 'trial'; choose from wrenches"),
     ("assert_stable(grasp_case, wrenches=[[1, 2]])", "must be NamedWrench values"),
     ("assert_stable(grasp_case.grasp)", "expected a grasp_case"),
