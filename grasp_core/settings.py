@@ -5,10 +5,11 @@
         shift: Annotated[float, Range(least=0.0, most=1.0)] = 0.01
         \"\"\"Deviation of the object's position along each axis, in object radii.\"\"\"
 
-The class is what functions take, the group of flags of a command and the table of a file: all are
-checked here, against the same types, with the same words. Types are float, int, bool, str, Path,
-`Literal`, tuples, other settings, and each of them or None; `Annotated` narrows them by rules such
-as `Range`. Nothing slow to import is imported here, since command-line help waits for it.
+What functions take, tables of files and flags of commands are such classes, and all are checked
+here, against their types and in the same words. Types are float, int, bool, str, Path, `Literal`,
+tuples, other settings, and each of them or None. `Annotated` narrows them by rules such as `Range`,
+which tell whether a value `holds` and, as text, what they ask for. Nothing that is slow to import
+is imported here, since command-line help waits for it.
 """
 
 import math
@@ -23,7 +24,6 @@ from typing import (
     Annotated,
     Any,
     Literal,
-    Protocol,
     Self,
     Union,
     cast,
@@ -37,18 +37,6 @@ from grasp_core.errors import InputError
 
 LONGEST_LINE = 200
 """Largest number of characters of the text that shows settings."""
-
-
-class Rule(Protocol):
-    """A condition on a value, written into its type."""
-
-    def holds(self, value: Any) -> bool:
-        """Return whether a value of the right type meets the condition."""
-        ...
-
-    def __str__(self) -> str:
-        """Return the condition in words that follow the type's: 'from 0 to 1'."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +155,8 @@ class Settings:
             return cls(**given) if usual is None else replace(usual, **given)
         except SettingError as error:
             raise SettingError(_at(where, error.name), error.fault) from None
+        except InputError as error:  # settings that do not fit each other
+            raise InputError(f"{where}: {error}" if where else str(error)) from None
 
     def __repr__(self) -> str:
         """Return the settings that differ from the usual ones, in a line."""

@@ -12,9 +12,9 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 65_635,
+    "lines of packages": 65_625,
     "modules of packages": 369,
-    "lines of tests": 48_008,
+    "lines of tests": 48_022,
     "lines of docs": 6_530,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
@@ -22,7 +22,7 @@ only with a line below that says why."""
 RISES = (
     "lines of packages, 65,686 to 65,711: searches for poses of hands start from rounded places",
     "lines of tests, 47,928 to 47,947: they start alike where contacts differ by rounding",
-    "lines of tests, 47,947 to 48,008: settings are one mechanism with a test of its own",
+    "lines of tests, 47,947 to 48,022: a test of settings, and each flag's number tried",
     "lines of docs, 6,508 to 6,530: how a setting is declared, what each required package does",
 )
 """Sentences such as "lines of tests, 50,000 to 50,400: the oracle of a new theorem"."""

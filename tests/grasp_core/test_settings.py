@@ -43,19 +43,21 @@ class Outer(Settings):
     def _check_together(self) -> None:
         if self.quick and self.count is None:
             raise SettingError("quick", "needs a count")
+        if self.count is not None and self.count > self.size_m:
+            raise InputError("count times size_m is too much")
 
 
 def test_values_are_kept_in_plain_form():
     kept = Outer(
-        np.float32(0.5), np.int64(3), [1, 2, 3], [np.array([0.0, 0.0, -1e-9])], path="a.SVG"
+        np.float32(4.5), np.int64(3), [1, 2, 3], [np.array([0.0, 0.0, -1e-9])], path="a.SVG"
     )
-    assert kept == Outer(0.5, 3, (1.0, 2.0, 3.0), ((0.0, 0.0, -1e-9),), path=Path("a.SVG"))
+    assert kept == Outer(4.5, 3, (1.0, 2.0, 3.0), ((0.0, 0.0, -1e-9),), path=Path("a.SVG"))
     assert [type(each) for each in (kept.size_m, kept.count, kept.point_m[0])] == [
         float,
         int,
         float,
     ]
-    assert repr(kept).startswith("Outer(size_m=0.5, count=3, point_m=(1.0, 2.0, 3.0), down=")
+    assert repr(kept).startswith("Outer(size_m=4.5, count=3, point_m=(1.0, 2.0, 3.0), down=")
     assert repr(Outer(1.0)) == "Outer(size_m=1.0)"
 
 
@@ -92,6 +94,7 @@ def test_a_wrong_value_is_refused_by_its_name_in_python_and_in_a_table(name, val
         ),
         ({"size_m": 1.0, "inner": {"drive": "rigid"}}, r"part\.inner: no setting .* from share$"),
         ({"size_m": 1.0, "quick": True}, r"part\.quick needs a count"),
+        ({"size_m": 1.0, "count": 3}, "^part: count times size_m is too much"),
         ([], "part: expected a table of settings"),
     ],
 )
@@ -101,9 +104,9 @@ def test_a_wrong_table_is_refused_by_where_it_is_wrong(table, said):
 
 
 def test_a_table_changes_what_it_names_and_nothing_else():
-    usual = Outer(1.0, 3, inner=Inner(0.25, "rigid"))
+    usual = Outer(9.0, 3, inner=Inner(0.25, "rigid"))
     assert Outer.of_table({}, usual=usual) == usual
     changed = Outer.of_table({"count": 4, "inner": {"share": 1.0}}, usual=usual)
-    assert changed == Outer(1.0, 4, inner=Inner(1.0, "rigid"))
+    assert changed == Outer(9.0, 4, inner=Inner(1.0, "rigid"))
     assert Outer.of_table({"size_m": 2, "inner": {}}) == Outer(2.0)
     assert for_users(Inner) == ("share",)

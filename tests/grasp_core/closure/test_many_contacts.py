@@ -11,7 +11,7 @@ from tests.grasp_core.bodies import BODIES, holds, moved
 from tests.judges import pyramids_say
 
 SETS = 50
-"""Of each body."""
+"""Number of contact sets on each body."""
 SIDES = 64
 """Pyramids inside and around the cones then differ by 0.12 % in friction."""
 NEAR = 0.02
