@@ -25,6 +25,8 @@ from typing import (
     Any,
     Literal,
     Self,
+    TypeAlias,
+    TypeVar,
     Union,
     cast,
     get_args,
@@ -32,9 +34,18 @@ from typing import (
     get_type_hints,
 )
 
-from grasp_core.checked import LARGEST, LARGEST_FRICTION, MOST_COUNT, MOST_SEED, SMALLEST, shown
+from grasp_core.checked import (
+    LARGEST,
+    LARGEST_FRICTION,
+    MOST_COUNT,
+    MOST_EDGES,
+    MOST_SEED,
+    SMALLEST,
+    shown,
+)
 from grasp_core.errors import InputError
 
+Given = TypeVar("Given", bound="Settings")
 LONGEST_LINE = 200
 """Largest number of characters of the text that shows settings."""
 
@@ -114,6 +125,9 @@ CHOSEN = "chosen by the program"
 class SettingError(InputError):
     """Error for a setting of the wrong type or size; `name` is that of its field."""
 
+    owner: type | None = None
+    """Class of the settings."""
+
     def __init__(self, name: str, fault: str) -> None:
         super().__init__(name, fault)
         self.name, self.fault = name, fault
@@ -129,7 +143,11 @@ class Settings:
     __slots__ = ()
 
     def __post_init__(self) -> None:
-        check(self)
+        try:
+            check(self)
+        except SettingError as error:
+            error.owner = type(self)
+            raise
         self._check_together()
 
     def _check_together(self) -> None:
@@ -306,3 +324,67 @@ def _settings_in(kind: Any) -> type[Settings] | None:
     """Return the class of settings that a type names, alone or beside None."""
     parts = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
     return next((p for p in parts if isinstance(p, type) and issubclass(p, Settings)), None)
+
+
+AnyFriction = Annotated[float, Range(least=0.0, most=LARGEST_FRICTION)]
+Share = Annotated[float, Range(least=0.0, most=1.0)]
+Gap = Annotated[float, Range(least=1e-4, most=0.9)]
+"""A gap of a proof: less is left to rounding, and more the first twist proves."""
+TimeLimit = Annotated[float, Range(least=0.0, most=1e7)]
+Cases = Annotated[int, Range(least=1, most=10**8)]
+Reserve = Annotated[float, Range(least=0.0, below=1.0)]
+MaxCones = Annotated[int, Range(least=64, most=1_000_000)]
+"""Number of cones of a proof of regions, which begins with the 64 orthants."""
+FaceTurn = Annotated[float, Range(least=0.0, most=45.0)]
+"""An angle between normals of like faces [deg]: beyond it, a face of a box and its chamfer would be
+like each other."""
+TorqueLimit = Annotated[float, Range(above=0.0, most=1e6)]
+HandClearance = Annotated[float, Range(least=0.0, most=0.02)]
+Starts = Annotated[int, Range(least=1, most=10_000)]
+Edges = Annotated[int, Range(least=3, most=MOST_EDGES)]
+RandomWrenches = Annotated[int, Range(least=0, most=10_000)]
+Repeats = Annotated[int, Range(least=0, most=100_000)]
+
+Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
+"""The family of a grasp, by how its four lines of force meet: concurrent, pencil or regulus among
+others."""
+Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
+"""How grasps are searched for: by one of the paper's three constructions, or free of any family."""
+METHODS: tuple[Method, ...] = get_args(Method)
+ConeKind: TypeAlias = Literal["tilted", "normal"]
+RankBy: TypeAlias = Literal["radius", "friction-margin", "ferrari-canny", "payload", "diverse"]
+"""What makes one grasp better than another (see `plan`)."""
+
+
+def extended(kind: type[Given], part: Settings, **more: Any) -> Given:
+    """Make settings of a class from those of a class that it extends, and from `more`.
+
+    Settings inside them are extended in the same way.
+    """
+    given: dict[str, Any] = {name: getattr(part, name) for name in types(type(part))} | more
+    for name, value in given.items():
+        inner = _settings_in(types(kind)[name])
+        if inner is not None and isinstance(value, Settings) and not isinstance(value, inner):
+            given[name] = extended(inner, value)
+    return kind(**given)
+
+
+def value_of(kind: Any, value: Any, name: str) -> Any:
+    """Return a single value in the plain form of a type; one that it does not allow is an error."""
+    try:
+        return taken(value, kind)
+    except ValueError:
+        raise SettingError(name, f"must be {words(kind)}, got {shown(value)}") from None
+
+
+def as_table(settings: Settings) -> dict[str, Any]:
+    """Return the settings of users as the table of a file that gives them when it is read.
+
+    What is None is left out, as TOML has no word for it.
+    """
+    given = {name: getattr(settings, name) for name in for_users(type(settings))}
+    return {
+        name: as_table(value) if isinstance(value, Settings) else value
+        for name, value in given.items()
+        if value is not None
+    }

@@ -16,12 +16,8 @@ from grasp_core.by_value import ByValue, counted, summary, vector
 from grasp_core.checked import LARGEST, instance, number, one_of, several, shown, text, whole
 from grasp_core.errors import InputError
 from grasp_core.frames import poses_along
+from grasp_core.settings import Family
 
-Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
-"""The family of a grasp, by how its four lines of force meet: concurrent, pencil or regulus among
-others."""
-Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
-"""How grasps are searched for: by one of the paper's three constructions, or free of any family."""
 RegionKind: TypeAlias = Literal["cone", "disc", "point", "certified"]
 FaceQuadruple: TypeAlias = tuple[int, int, int, int]
 """Indices of four faces, in finger order."""

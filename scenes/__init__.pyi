@@ -5,11 +5,9 @@ from scenes.drawing.turntable import Turntable as Turntable
 from scenes.drawing.turntable import show as show
 from scenes.example_objects import example_names as example_names
 from scenes.example_objects import example_object as example_object
-from scenes.execution.held import HeldSettings as HeldSettings
 from scenes.execution.held_mjcf import HeldScene as HeldScene
 from scenes.execution.held_mjcf import build_held_scene as build_held_scene
 from scenes.exports import export_grasps as export_grasps
-from scenes.fingertips import FingerSettings as FingerSettings
 from scenes.hand_files.loading import load_hand as load_hand
 from scenes.hands.hand_scene import HandScene as HandScene
 from scenes.hands.hand_scene import build_hand_scene as build_hand_scene
@@ -17,4 +15,6 @@ from scenes.layout import Layout as Layout
 from scenes.mjcf import Scene as Scene
 from scenes.mjcf import build_scene as build_scene
 from scenes.mjcf import write_scene as write_scene
-from scenes.physics import PhysicsSettings as PhysicsSettings
+from scenes.settings import FingerSettings as FingerSettings
+from scenes.settings import HeldSettings as HeldSettings
+from scenes.settings import PhysicsSettings as PhysicsSettings

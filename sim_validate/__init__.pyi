@@ -29,10 +29,10 @@ from sim_validate.records.verdicts import load_verdicts as load_verdicts
 from sim_validate.reports.charts.margin_charts import margin_figure as margin_figure
 from sim_validate.reports.charts.wrench_charts import wrench_figure as wrench_figure
 from sim_validate.reports.report import write_report as write_report
-from sim_validate.simulation.schedules import HoldProtocol as HoldProtocol
+from sim_validate.simulation.settings import HoldProtocol as HoldProtocol
+from sim_validate.simulation.settings import Noise as Noise
 from sim_validate.simulation.setup import Agenda as Agenda
 from sim_validate.simulation.setup import NamedWrench as NamedWrench
-from sim_validate.simulation.setup import Noise as Noise
 from sim_validate.simulation.setup import Setup as Setup
 from sim_validate.simulation.traces import Outcome as Outcome
 from sim_validate.validation.validation import (

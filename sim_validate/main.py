@@ -23,6 +23,7 @@ from sim_validate.cli.dataset_flags import Dataset
 from sim_validate.cli.examples import examples_for
 from sim_validate.cli.exit_codes import Exit, FlagsError, exit_code, reason_of
 from sim_validate.cli.flag_groups import Spoken
+from sim_validate.cli.flag_values import REGISTRY, flags_of
 
 ACTIONS: dict[type[Any], str] = {
     command_flags.Run: "run:run_object",
@@ -79,15 +80,24 @@ def main(argv: Sequence[str] | None = None) -> int:
                 "--config FILE.toml, whose keys are flags; flags given override it."
             ),
             args=flags,
+            registry=REGISTRY,
         )
     except SystemExit as stop:
         sys.stdout.write(examples_for(arguments))
         return stop.code if isinstance(stop.code, int) else Exit.USAGE
     except SettingError as error:
-        return _complain(f"--{error.name.replace('_', '-')} {error.fault}", Exit.USAGE)
+        return _complain(f"{_flag_of(error)} {error.fault}", Exit.USAGE)
+    except InputError as error:  # settings that do not fit each other
+        return _complain(str(error), Exit.USAGE)
     except KeyboardInterrupt:
         return _complain("interrupted", Exit.INTERRUPTED)
     return _dispatch(command.action if isinstance(command, Dataset | Baseline) else command)
+
+
+def _flag_of(error: SettingError) -> str:
+    found = (each.name for each in flags_of(Command)
+             if (each.owner, each.field) == (error.owner, error.name))  # fmt: skip
+    return "--" + next(found, error.name).replace("_", "-")
 
 
 def execute(command: Spoken) -> int:

@@ -12,8 +12,6 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from grasp_core.closure.contacts import contacts_sha256, stacked
-from grasp_core.closure.critical_friction import critical_friction
-from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, about
 from grasp_core.files.text_files import read_text
 from grasp_core.objects.polyhedron import Polyhedron
@@ -35,7 +33,8 @@ from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.loads import PlannedLoad, planned_loads
 from sim_validate.simulation.rig import Rig, Watched, squeezed
 from sim_validate.simulation.schedules import Load
-from sim_validate.simulation.setup import WEAKEST, Agenda, NamedWrench, Noise, Setup, drawn_names
+from sim_validate.simulation.settings import Noise
+from sim_validate.simulation.setup import WEAKEST, Agenda, NamedWrench, Setup, drawn_names
 from sim_validate.simulation.traces import HoldVerdict, Outcome, judge
 from sim_validate.validation.controls import (
     Control,
@@ -182,7 +181,7 @@ def _in_trial(path: Path, found: Recorded, verdict: Mapping[str, Any], trial: in
     nothing: Mapping[str, Any] = {"trials": 0, "not_held": []}
     repeats: Mapping[str, Any] = verdict.get("robustness") or nothing
     if trial >= (trials := repeats["trials"]):
-        said = f"choose from 0 to {trials - 1}" if trials else "it was recorded without --trials"
+        said = f"choose from 0 to {trials - 1}" if trials else "it was recorded without --repeats"
         raise InputError(f"{path}: the file has no repeat with noise numbered {trial}; {said}")
     for each in repeats["not_held"]:
         if each["trial"] == trial:
@@ -193,8 +192,8 @@ def _in_trial(path: Path, found: Recorded, verdict: Mapping[str, Any], trial: in
 def _with_control(path: Path, found: Recorded, grasp: Grasp, name: str) -> Recorded:
     """Make a negative control of a grasp again."""
     setup, body = found.setup, found.body
-    exact = replace(grasp, critical_friction=critical_friction(grasp, torsion_m=setup.torsion_m))
-    made = negative_controls(body, exact, found.friction, found.agenda.seed, setup.torsion_m)
+    exact = replace(grasp, critical_friction=setup.critical_friction(grasp))
+    made = negative_controls(body, exact, found.friction, found.agenda.seed, setup)
     control = next((each for each in made if each.name == name), None)
     if control is None:
         raise InputError(
@@ -308,7 +307,7 @@ def _case(recorded: Recorded) -> tuple[Rig, Loads, tuple[Contact, ...]]:
             f"{recorded.name}: this repeat has no trial to simulate, because noise made finger "
             f"{case.missed[0]} miss its face"
         )
-    if not force_closure(*stacked(case.contacts), case.friction, torsion_m=setup.torsion_m).closed:
+    if not setup.closure(case.contacts, case.friction).closed:
         return _opened(body, OPEN, case.contacts, case.friction, setup)
     rig, heavy = noisy_case(body, case, [(each.name, each.load.wrench) for each in planned], setup)
     return rig, heavy, case.landed
@@ -318,7 +317,7 @@ def _opened(
     body: Polyhedron, name: str, contacts: tuple[Contact, ...], friction: float, setup: Setup
 ) -> tuple[Rig, Loads, tuple[Contact, ...]]:
     """Prepare contacts without force closure as a negative control."""
-    certificate = force_closure(*stacked(contacts), friction, torsion_m=setup.torsion_m)
+    certificate = setup.closure(contacts, friction)
     if certificate.closed:
         raise InputError(
             f"{name}: expected contacts without force closure, but these are force-closed at "

@@ -16,9 +16,9 @@ import grasp_core as gc
 from grasp_core import errors
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.cli.flag_groups import TRIALS, Executing
 from sim_validate.datasets.config import DatasetConfig, Learning, config_from_toml
 from sim_validate.datasets.given_contacts import read_given
+from sim_validate.execution.settings import KINDS, ChosenExecution
 from sim_validate.execution.verdict import Fate
 from sim_validate.main import main
 from sim_validate.records.setup_toml import setup_from_file
@@ -146,7 +146,7 @@ def listed(page, heading):
 def run_files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     asked = ["run", "wedge", "--limit", "1", "--no-report", "--out", str(folder), "-q"]
-    assert main([*asked, "--execute", "--execute-trials", "lift,knock"]) == Exit.GOOD
+    assert main([*asked, "--execute", "--trials", "lift,knock"]) == Exit.GOOD
     return tuple(
         json.loads((folder / f"{name}.json").read_text())
         for name in ("grasps", "verdicts", "executions")
@@ -178,11 +178,9 @@ def test_the_fields_of_files_are_those_of_the_page(run_files):
 
 def test_the_page_of_executions_names_every_trial_fate_and_flag():
     page = PAGES["execution"]
-    assert listed("execution", "### The trials") == list(TRIALS)
+    assert listed("execution", "### The trials") == list(KINDS)
     assert all(f"`{fate}`" in page for fate in get_args(Fate))
-    groups = (Executing(), Executing().mass, Executing().tips)
-    names = [field.name for group in groups for field in fields(group)]
-    for name in set(names) - {"mass", "tips"}:
+    for name in (field.name for field in fields(ChosenExecution) if field.name != "trials"):
         assert f"`--{name.replace('_', '-')}" in page, name
 
 
@@ -225,7 +223,7 @@ def test_the_settings_of_a_dataset_are_all_shown(tmp_path):
     config = config_from_toml(path)
     shown = set(tomllib.loads(text))
     assert set(DatasetConfig.__dataclass_fields__) - shown == {"contacts", "outward", "learning"}
-    assert config.execution.settings.mass_kg == 0.3
+    assert config.execution.mass_kg == 0.3
     plain = DatasetConfig(objects=config.objects)
     told = {"objects", "frictions", "title", "license", "creator", "url", "published", "execution"}
     for name in shown - told:

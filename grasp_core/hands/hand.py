@@ -18,9 +18,10 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen, frozen_each, frozen_units
 from grasp_core.by_value import ByValue, counted, summary
-from grasp_core.checked import BOUNDS, instance, number, several, text
+from grasp_core.checked import instance, number, several, text
 from grasp_core.errors import InputError
 from grasp_core.hands.couplings import Coupling, Drives, drives
+from grasp_core.settings import TorqueLimit, value_of
 
 LARGEST_SIZE = 2.0
 """Largest length of a hand [m]: a larger one is in other units."""
@@ -111,7 +112,7 @@ class Joint(ByValue):
         number(self.lowest, "lowest", least=-MOST_TURN, most=MOST_TURN)
         number(self.highest, "highest", least=self.lowest, most=MOST_TURN)
         if self.torque_limit_n_m is not None:
-            number(self.torque_limit_n_m, "torque_limit_n_m", **BOUNDS["torque_limit_n_m"])
+            value_of(TorqueLimit, self.torque_limit_n_m, "torque_limit_n_m")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

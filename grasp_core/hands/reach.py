@@ -21,10 +21,8 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices
 from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import (
-    BOUNDS,
     coefficient,
     instance,
-    number,
     one_of,
     seed_of,
     switch,
@@ -40,6 +38,7 @@ from grasp_core.hands.opening import opened
 from grasp_core.hands.pose_search import Asked, contact_choices, find_pose
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.settings import HandClearance, Starts, value_of
 from grasp_core.values import FINGERS, Contact, Grasp
 
 ReachReason: TypeAlias = Literal["", "limit", "collision", "not found", "no closure"]
@@ -99,7 +98,7 @@ class HandReach(ByValue):
             text(getattr(self, name), name)
         one_of(self.reason, get_args(ReachReason), "reason")
         whole(self.starts, "starts")
-        number(self.clearance_m, "clearance_m", **BOUNDS["hand_clearance_m"])
+        value_of(HandClearance, self.clearance_m, "clearance_m")
         if self.fingers is not None:
             used = range(FINGERS) if self.used is None else self.used
             kept = frozen_indices(used, (None,), "used")
@@ -163,8 +162,8 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
     switch(regions, "regions")
     asked = Asked(
         hand, body, grasp, coefficient(friction), up, height,
-        number(clearance_m, "clearance_m", **BOUNDS["hand_clearance_m"]), regions,
-        seed_of(seed), whole(starts, "starts", **BOUNDS["starts"]),
+        value_of(HandClearance, clearance_m, "clearance_m"), regions,
+        seed_of(seed), value_of(Starts, starts, "starts"),
     )  # fmt: skip
     closed, refuted, undecided = contact_choices(grasp, asked.friction, len(hand.fingers))
     if not closed:

@@ -30,11 +30,12 @@ from grasp_core.checked import (
     text,
 )
 from grasp_core.errors import InputError, about
-from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.mesh_files.limits import FaceKind, MeshChoices, MeshLimits, PatchLimits
 from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.notebooks import InNotebooks
-from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, MeshChoices, build
-from grasp_core.objects.surface import Face, FaceKind, PatchLimits, Surface
+from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, build
+from grasp_core.objects.surface import Face, Surface
+from grasp_core.settings import extended
 
 UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 SHAPES = {"vertices": (None, 3), "center_of_mass": (3,), "inertia": (3, 3)}
@@ -120,7 +121,10 @@ class Polyhedron(ByValue, InNotebooks):
         Raises:
             MeshError: The mesh is not a solid; its `reason` says why.
         """
-        choices = MeshChoices(faces, patches, flatness_m, largest_part)
+        choices = MeshChoices(
+            faces=faces, patches=patches or PatchLimits(), flatness_m=flatness_m,
+            largest_part=largest_part,
+        )  # fmt: skip
         return polyhedron_from_mesh(
             vertices, triangles, choices, name=name, center_of_mass=center_of_mass, kind=cls
         )
@@ -205,7 +209,10 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
         MeshError: The file is not a solid; its `reason` says why.
     """
     one_of(unit, UNITS_M, "unit")
-    choices = MeshChoices(faces, patches, flatness_m, largest_part, limits)
+    choices = extended(
+        MeshChoices, instance(limits, MeshLimits, "limits"), faces=faces,
+        patches=patches or PatchLimits(), flatness_m=flatness_m, largest_part=largest_part,
+    )  # fmt: skip
     size = UNITS_M[unit] * positive(scale, "scale")
     path = path_of(path, "path")
     mesh = read_triangles(path, limits)

@@ -7,18 +7,14 @@ no field, because such meshes are refused.
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Annotated, Literal, TypeAlias
+from typing import Literal
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices, frozen_units
 from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import LARGEST, number, several, switch, text, whole
-from grasp_core.settings import Range, Settings
 from grasp_core.values import RIGHT_ANGLE
-
-FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
-"""Which faces to use: exactly planar ones, nearly flat patches, or whichever suits the surface."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -60,23 +56,6 @@ class Face(ByValue):
     def __repr__(self) -> str:
         parts = [counted(len(self.polygon), "corner"), counted(len(self.holes), "hole")]
         return summary("Face", *parts, area=self.area, centroid=self.centroid, normal=self.normal)
-
-
-@dataclass(frozen=True, slots=True)
-class PatchLimits(Settings):
-    """How flat a patch of a curved surface must be, and how many patches are kept.
-
-    Raises:
-        InputError: A limit is out of range.
-    """
-
-    spread_deg: Annotated[float, Range(above=0.0, most=45.0)] = 10.0
-    """Largest angle between the surface and the patch's plane [deg]; the friction angle available
-    to the planner shrinks by it."""
-    depth: Annotated[float, Range(above=0.0, most=0.1)] = 0.01
-    """Largest distance of the surface from the plane, relative to the object's largest extent."""
-    most: Annotated[int, Range(least=4, most=200)] = 20
-    """Keep at most this many patches: those with the largest inscribed discs."""
 
 
 MM = 1e3

@@ -23,17 +23,8 @@ from grasp_core.frames import kept_angle
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
-from grasp_core.values import (
-    Contact,
-    ContactRegion,
-    FaceQuadruple,
-    Family,
-    ForceCone,
-    Grasp,
-    Method,
-    Witness,
-    four,
-)
+from grasp_core.settings import Family, Method
+from grasp_core.values import Contact, ContactRegion, FaceQuadruple, ForceCone, Grasp, Witness, four
 
 BALANCED = 1e-6
 """Largest wrench by which witness forces may miss balance, for normal parts that sum to one and an

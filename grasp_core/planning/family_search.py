@@ -34,8 +34,9 @@ from grasp_core.planning.certify import Candidate, Certified, certify_each, name
 from grasp_core.planning.quadruples import Blocks, ConedQuadruples, WideQuadruples
 from grasp_core.planning.reach import Reach
 from grasp_core.planning.result import MethodCounts, Tally
+from grasp_core.settings import Method
 from grasp_core.solvers.ties import coarse, graded
-from grasp_core.values import FaceQuadruple, Method, four
+from grasp_core.values import FaceQuadruple, four
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048
 """Fewest and most quadruples whose bounds are tightened together."""

@@ -24,9 +24,10 @@ from grasp_core.planning.parts import (
     search_undecided,
 )
 from grasp_core.planning.reach import Finger, Reach, reach
-from grasp_core.planning.request import FAMILIES, METHODS, PlanRequest
+from grasp_core.planning.request import FAMILIES, PlanRequest
 from grasp_core.planning.result import Outcomes
-from grasp_core.values import FINGERS, FaceQuadruple, Family, Method
+from grasp_core.settings import METHODS, Family, Method
+from grasp_core.values import FINGERS, FaceQuadruple
 
 Progress: TypeAlias = Callable[[int, int, int], None]
 """Called with (quadruples finished, all quadruples, grasps so far) after each quadruple tried."""

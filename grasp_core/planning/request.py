@@ -2,34 +2,24 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, get_args
+from typing import get_args
 
 from grasp_core.arrays import UNIT_SLACK
 from grasp_core.checked import (
     SMALLEST,
-    coefficient,
     instance,
     number,
-    one_of,
-    seed_of,
-    shown,
-    switch,
-    whole,
 )
 from grasp_core.errors import InputError
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.values import Family, Method
+from grasp_core.planning.settings import PlanSettings
+from grasp_core.settings import METHODS, Family, Method
 
 FAMILIES: tuple[Family, ...] = get_args(Family)
 """The three families of grasps in the paper, each with its construction."""
-METHODS: tuple[Method, ...] = get_args(Method)
-"""Everything that `families` may name: the three constructions and `free`."""
-ConeKind: TypeAlias = Literal["tilted", "normal"]
-RankBy: TypeAlias = Literal["radius", "friction-margin", "ferrari-canny", "payload", "diverse"]
-"""What makes one grasp better than another (see `plan`)."""
 ITS_RADIUS = ", the object's radius in m"
 FARTHEST_APPROACH = 1e3
 """Longest free line of a finger, in object radii."""
@@ -41,21 +31,10 @@ take some hundred megabytes."""
 
 
 @dataclass(frozen=True, slots=True)
-class PlanRequest:
-    """What is to be planned: the friction and the other keywords of `plan`."""
+class PlanRequest(PlanSettings):
+    """What is to be planned: the settings, and the fingers that must reach their contacts."""
 
-    friction: float
-    families: tuple[Method, ...]
-    theta_deg: float | None = None
-    cones: ConeKind = "tilted"
-    limit: int | None = None
-    rank_by: RankBy = "radius"
-    seed: int = 0
-    max_face_parts: int = 1
-    complete: bool = False
     finger: Finger | None = None
-    clearance: float = 0.0
-    share_faces: float | None = None
 
     @property
     def theta(self) -> float:
@@ -77,35 +56,26 @@ def methods_for(body: Polyhedron) -> tuple[Method, ...]:
 def check_request(body: Polyhedron, request: PlanRequest) -> None:
     """Refuse keywords out of range, and objects with too many faces for the request."""
     check_body(body)
-    coefficient(request.friction)
     if request.theta_deg is not None:
         widest = math.degrees(math.atan(request.friction))
         where = f", the angle of friction {request.friction}, or None"
         most = widest * (1.0 + UNIT_SLACK)
         number(request.theta_deg, "theta_deg", least=SMALLEST, most=most, where=where)
-    families: tuple[Any, ...] = request.families
-    if not families or any(family not in METHODS for family in families):
-        raise InputError(f"families must be among {', '.join(METHODS)}; got {shown(families)}")
+    if not request.families:
+        raise InputError(f"families must be among {', '.join(METHODS)}; got none")
     if request.complete and "free" not in request.families:
         raise InputError(
             "complete needs the free method, which decides all faces; add free to families"
         )
-    one_of(request.cones, get_args(ConeKind), "cones")
-    one_of(request.rank_by, get_args(RankBy), "rank_by")
-    if request.limit is not None:
-        whole(request.limit, "limit", least=1)
-    whole(request.max_face_parts, "max_face_parts", least=1)
-    seed_of(request.seed)
-    switch(request.complete, "complete")
     _check_lengths(body, request)
     _check_size(body, request)
 
 
 def _check_lengths(body: Polyhedron, request: PlanRequest) -> None:
-    number(request.clearance, "clearance", least=0.0, below=body.radius, where=ITS_RADIUS)
-    if request.share_faces is not None:
+    number(request.edge_clearance_m, "edge_clearance_m", below=body.radius, where=ITS_RADIUS)
+    if request.share_faces_m is not None:
         size, where = 2.0 * body.radius, ", the object's size, or None"
-        number(request.share_faces, "share_faces", least=0.0, below=size, where=where)
+        number(request.share_faces_m, "share_faces_m", below=size, where=where)
     if request.finger is not None:
         instance(request.finger, Finger, "finger", "gc.Finger(radius_m, approach_m)")
         radius, approach = request.finger.radius_m, request.finger.approach_m
@@ -125,7 +95,7 @@ def _check_size(body: Polyhedron, request: PlanRequest) -> None:
         "a limit (--limit)": request.limit is None,
         "families without the free method (--family)": "free" in request.families,
         "radius to rank by (--rank-by)": request.rank_by != "radius",
-        "no share_faces (--share-faces-m)": request.share_faces is not None,
+        "no --share-faces-m": request.share_faces_m is not None,
     }
     missing = [what for what, lacks in needed.items() if lacks]
     if faces > MAX_FACES and missing:

@@ -11,7 +11,8 @@ from grasp_core.grasp_tables import ById, chosen, data_frame
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.values import FaceQuadruple, Grasp, Method
+from grasp_core.settings import Method
+from grasp_core.values import FaceQuadruple, Grasp
 
 LONGEST_REASON = 160
 """Most characters of a reason in the `repr` of a plan, so that it takes two lines at most."""
@@ -100,7 +101,7 @@ class PlanCounts:
 
     faces: int
     quadruples: int
-    """Number of sets of four faces; with `share_faces` also of sets with two halves of a face."""
+    """Number of sets of four faces; with `share_faces_m` also of sets with two halves of a face."""
     spanning: int | None
     """Sets whose normals positively span at the least planned angle (P3); None where they were not
     counted, as above 200 faces."""

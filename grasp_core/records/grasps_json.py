@@ -17,15 +17,15 @@ from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import text_of
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.frames import radians_of
-from grasp_core.mesh_files.limits import MeshLimits
-from grasp_core.objects.build import MeshChoices
+from grasp_core.mesh_files.limits import MeshChoices, MeshLimits, PatchLimits
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
-from grasp_core.objects.surface import PatchLimits, Surface
+from grasp_core.objects.surface import Surface
 from grasp_core.planning.certify import check_witness, find_critical_frictions
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import MethodCounts, Moved, Outcomes, Plan, PlanCounts
 from grasp_core.provenance import versions
+from grasp_core.settings import extended
 from grasp_core.values import Contact, ContactRegion, ForceCone, Grasp, Witness, four
 
 if TYPE_CHECKING:
@@ -165,10 +165,11 @@ def grasps_from_json(text: str) -> Plan:
 
 def _body_of(record: "GraspsRecord") -> Polyhedron:
     mesh, patches = record.object.mesh, record.object.patches
-    choices = MeshChoices(
+    choices = extended(
+        MeshChoices,
+        RECORDED,
         faces="patches" if patches else "planar",
-        patches=PatchLimits(**patches.model_dump()) if patches else None,
-        limits=RECORDED,
+        patches=PatchLimits(**patches.model_dump()) if patches else PatchLimits(),
     )
     body = polyhedron_from_mesh(
         mesh.vertices_m,

@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from grasp_core.checked import LARGEST_FRICTION, MOST_SEED, SMALLEST
-from grasp_core.values import Family, Method, RegionKind
+from grasp_core.settings import Family, Method
+from grasp_core.values import RegionKind
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Triple = tuple[Finite, Finite, Finite]

@@ -20,10 +20,11 @@ from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import check_schema, complaint, object_of, shown
 from grasp_core.files.text_files import read_text, write_text
-from grasp_core.objects.build import MeshChoices
+from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.records.grasps_json import RECORDED, surface_of_record, surface_record
 from grasp_core.records.grasps_schema import SurfaceRecord
+from grasp_core.settings import extended
 from grasp_core.values import Grasp
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.simulation.setup import WEAKEST
@@ -36,7 +37,7 @@ Count = Annotated[int, Field(ge=0)]
 Size = Annotated[float, Field(ge=0.0)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Index = Annotated[int, Field(ge=0)]
-SCHEMA = 1
+SCHEMA = 2
 MARK = '"grasps_file"'
 
 
@@ -125,7 +126,7 @@ class RecordedPart:
             found = polyhedron_from_mesh(
                 self.vertices_m,
                 self.triangles,
-                MeshChoices(faces="planar", limits=RECORDED),
+                extended(MeshChoices, RECORDED, faces="planar"),
                 name=name,
                 known=surface_of_record(self.surface),
             )

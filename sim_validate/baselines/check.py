@@ -50,7 +50,7 @@ def measured(
     jobs = [Job(saved.body, grasp, saved.friction, how.agenda, how.setup) for grasp in chosen]
     executing = list[ExecutionJob]()
     if how.execution is not None:
-        settings = how.execution.settings_for(saved.body)
+        settings = how.execution.for_body(saved.body)
         executing = [
             ExecutionJob(saved.body, grasp, saved.friction, settings, enough=False)
             for grasp in chosen
@@ -112,9 +112,9 @@ def complete(found: Measured, now: Present) -> Baseline:
 def with_planned_fingers(how: How, before: Baseline, saved: Plan) -> How:
     """Replace the fingertips of the setup by those that the grasps are planned for now."""
     fingers = how.setup.fingers
-    if fingers.radius_m != before.planned_radius_m:
+    if fingers.fingertip_radius_m != before.planned_radius_m:
         return how
-    fingers = replace(fingers, radius_m=_planned_radius(saved))
+    fingers = replace(fingers, fingertip_radius_m=_planned_radius(saved))
     return replace(how, setup=replace(how.setup, fingers=fingers))
 
 

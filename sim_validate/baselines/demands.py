@@ -5,11 +5,20 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from grasp_core.checked import LARGEST_FRICTION, MOST_RANDOM_WRENCHES, MOST_TRIALS
+from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
-from grasp_core.settings import Range, Seed, Settings, for_users, named
+from grasp_core.settings import (
+    RandomWrenches,
+    Range,
+    Repeats,
+    Seed,
+    Settings,
+    Share,
+    for_users,
+    named,
+)
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines.explain import not_survived, unstable
@@ -18,7 +27,8 @@ from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.records.grasps import read_grasps
-from sim_validate.simulation.setup import Agenda, NamedWrench, Noise, Setup
+from sim_validate.simulation.settings import Noise
+from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
 from sim_validate.validation.validation import validate
 from sim_validate.validation.verdict import Verdict
 
@@ -125,20 +135,20 @@ class Demands(Settings):
     """
 
     wrenches: tuple[NamedWrench, ...] = ()
-    trials: Annotated[int, Range(least=0, most=MOST_TRIALS)] = 0
+    repeats: Repeats = 0
     noise: Noise = field(default_factory=Noise)
-    min_pass_rate: Annotated[float, Range(least=0.0, most=1.0)] = 0.0
+    min_pass_rate: Share = 0.0
     """Least share of the repeats with noise in which the grasp must hold."""
     min_margin: Annotated[float, Range(least=0.0, most=LARGEST_FRICTION)] = 0.0
     """Least difference between the friction and the critical one, both predicted and simulated."""
-    random_wrenches: Annotated[int, Range(least=0, most=MOST_RANDOM_WRENCHES)] = 0
+    random_wrenches: RandomWrenches = 0
     seed: Seed = 0
     setup: Setup = field(default_factory=Setup)
 
     def _check_together(self) -> None:
-        if self.min_pass_rate > 0.0 and not self.trials:
+        if self.min_pass_rate > 0.0 and not self.repeats:
             raise InputError(
-                "min_pass_rate is a share of repeats with noise: give their number as `trials`, too"
+                "min_pass_rate is a share of repeats with noise: give their number as `repeats`"
             )
 
 
@@ -152,7 +162,7 @@ def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:
     agenda = Agenda(
         random_wrenches=demands.random_wrenches,
         wrenches=tuple(demands.wrenches),
-        trials=demands.trials,
+        repeats=demands.repeats,
         noise=demands.noise,
         seed=demands.seed,
     )
@@ -189,7 +199,7 @@ def survival(
     if not isinstance(settings, ExecutionSettings):
         raise InputError(
             f"assert_survives: expected ExecutionSettings as `settings`, got {settings!r}; give "
-            "sim_validate.ExecutionSettings(mass_kg=...)"
+            "sim_validate.ExecutionSettings(...)"
         )
     case = case_of(given, friction, "assert_survives")
     found = executed_grasp(ExecutionJob(case.body, case.grasp, case.friction, settings))

@@ -8,22 +8,15 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import to_jsonable_python
 
-from grasp_core.checked import MOST_RANDOM_WRENCHES
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import complaint
 from grasp_core.planning.result import Plan
-from scenes.fingertips import FingerSettings
-from scenes.mjcf import Surface
-from sim_validate.execution.settings import TABLE, AskedExecution, execution_table
+from grasp_core.settings import as_table
+from scenes.settings import FingerSettings, Surface
+from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.records.setup_toml import setup_from_file, setup_from_tables, tables_of
-from sim_validate.simulation.setup import (
-    Agenda,
-    LimitSearch,
-    NamedWrench,
-    Noise,
-    Setup,
-    with_planned_radius,
-)
+from sim_validate.simulation.settings import LimitSearch, Noise
+from sim_validate.simulation.setup import Agenda, NamedWrench, Setup, with_planned_radius
 
 Count = Annotated[int, Field(ge=0)]
 
@@ -33,10 +26,10 @@ class _Settings(BaseModel):
 
     setup: dict[str, Any]
     surface: Surface
-    random_wrenches: Annotated[int, Field(ge=0, le=MOST_RANDOM_WRENCHES)]
+    random_wrenches: Count
     wrenches: dict[str, Annotated[list[float], Field(min_length=6, max_length=6)]]
     limits: LimitSearch
-    trials: Count
+    repeats: Count
     noise: dict[str, float]
     seed: Count
     execution: dict[str, Any] | None = None
@@ -48,7 +41,7 @@ class How:
 
     setup: Setup
     agenda: Agenda
-    execution: AskedExecution | None = None
+    execution: ExecutionSettings | None = None
 
 
 def settings_of(how: How) -> dict[str, Any]:
@@ -60,12 +53,12 @@ def settings_of(how: How) -> dict[str, Any]:
         "random_wrenches": agenda.random_wrenches,
         "wrenches": {each.name: each.wrench.tolist() for each in agenda.wrenches},
         "limits": agenda.limits,
-        "trials": agenda.trials,
+        "repeats": agenda.repeats,
         "noise": asdict(agenda.noise),
         "seed": agenda.seed,
     }
     if how.execution is not None:
-        settings[TABLE] = execution_table(how.execution)
+        settings["execution"] = as_table(how.execution)
     return to_jsonable_python(settings)
 
 
@@ -81,11 +74,13 @@ def of_settings(settings: Mapping[str, Any], path: str) -> How:
             random_wrenches=given.random_wrenches,
             wrenches=tuple(NamedWrench(name, w) for name, w in given.wrenches.items()),  # pyright: ignore[reportArgumentType] - an array is made of it
             limits=given.limits,
-            trials=given.trials,
+            repeats=given.repeats,
             noise=Noise.of_table(given.noise, "noise"),
             seed=given.seed,
         )
-        execution = None if given.execution is None else AskedExecution.of_table(given.execution)
+        execution = None
+        if given.execution is not None:
+            execution = ExecutionSettings.of_table(given.execution, "execution")
     return How(setup, agenda, execution)
 
 

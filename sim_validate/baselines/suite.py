@@ -9,10 +9,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
-from grasp_core.checked import MOST_RANDOM_WRENCHES, MOST_TRIALS
 from grasp_core.errors import InputError, about
 from grasp_core.planning.result import Plan
-from grasp_core.settings import CHOSEN, Range, Seed, Settings
+from grasp_core.settings import CHOSEN, RandomWrenches, Repeats, Seed, Settings
 from sim_validate.baselines.baseline import Baseline, check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import (
     Checked,
@@ -33,15 +32,16 @@ from sim_validate.baselines.part import (
     testable,
 )
 from sim_validate.baselines.settings import How, of_settings, setup_for
-from sim_validate.execution.settings import TABLE, AskedExecution
+from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.files.toml_tables import read_tables
 from sim_validate.records.grasps import read_grasps
 from sim_validate.records.wrenches import wrenches_from_file
-from sim_validate.simulation.setup import Agenda, LimitSearch, Noise
+from sim_validate.simulation.settings import LimitSearch, Noise
+from sim_validate.simulation.setup import Agenda
 
 ENDING = ".grasps.toml"
-DIRECT = ("limits", "random_wrenches", "trials", "seed")
-"""Settings of trials that the file gives by the same name as an agenda has."""
+GIVEN = ("limits", "random_wrenches", "repeats", "noise", "seed")
+"""Settings that replace those of the agenda of the baseline."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -58,13 +58,13 @@ class Suite(Settings):
     wrenches: Path | None = None
     limits: LimitSearch | None = None
     """How the largest multiple of each wrench is found in simulation."""
-    random_wrenches: Annotated[int, Range(least=0, most=MOST_RANDOM_WRENCHES)] | None = None
-    trials: Annotated[int, Range(least=0, most=MOST_TRIALS)] | None = None
+    random_wrenches: RandomWrenches | None = None
+    repeats: Repeats | None = None
     """Number of repeats with noise."""
     noise: Noise | None = None
     seed: Seed | None = None
     survives: bool = False
-    execution: AskedExecution | None = None
+    execution: ExecutionSettings | None = None
     changed_part: IfChanged = CARRY
     path: Annotated[Path, CHOSEN] = Path(ENDING)
     """The file itself."""
@@ -159,10 +159,10 @@ class Suite(Settings):
         execution = how.execution if self.execution is None else self.execution
         if self.survives and execution is None:
             raise InputError(
-                f"{self.path}: survives: expected a table [{TABLE}] too, with mass_kg or "
-                "density_kg_m3, but the file has none"
+                f"{self.path}: survives: expected a table [execution] too, which says how grasps "
+                "are executed, but the file has none"
             )
-        given: dict[str, Any] = {name: getattr(self, name) for name in (*DIRECT, "noise")}
+        given: dict[str, Any] = {name: getattr(self, name) for name in GIVEN}
         if self.wrenches is not None:
             given["wrenches"] = wrenches_from_file(self.wrenches)
         asked = {name: value for name, value in given.items() if value is not None}

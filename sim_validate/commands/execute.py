@@ -11,7 +11,7 @@ from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut, warn_of
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.objects import asked_grasps
-from sim_validate.commands.asked.trials import check_mass, execution_settings
+from sim_validate.commands.asked.trials import execution_settings
 from sim_validate.execution.jobs import ExecutionJob, executed
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (
@@ -49,16 +49,13 @@ SLIPS_MEAN = (
 
 def execute_file(command: command_flags.Execute, reporter: Reporter) -> int:
     """Execute the grasps of a file in simulation and report which of them survive."""
-    check_mass(command.executing.mass)
     chosen = asked_grasps(
         command.grasps, reporter, grasp=command.grasp, friction=command.friction,
         seed=command.seed, limit=command.limit,
     )  # fmt: skip
     if chosen is None:
         return Exit.NONE
-    settings = execution_settings(
-        chosen.body, chosen.seed, chosen.finger, command.executing, command.trials, command.down
-    )
+    settings = execution_settings(command.executing, chosen.body, chosen.seed, chosen.finger)
     physics = {} if command.setup is None else physics_from_file(command.setup)
     with alone_in(command.out):
         code, text = execute_grasps(
@@ -107,8 +104,8 @@ def _show(found: Sequence[ExecutedGrasp], settings: ExecutionSettings, reporter:
     if any(not trial.survived for each in found for trial in each.trials if trial.kind == "knock"):
         reporter.warn(
             f"a knock of {settings.impulse_n_s:g} N s would give a free object of "
-            f"{settings.mass_kg:g} kg {settings.impulse_n_s / settings.mass_kg:.3g} m/s; choose it "
-            "with --knock-n-s"
+            f"{settings.object_kg:g} kg {settings.impulse_n_s / settings.object_kg:.3g} m/s; "
+            "choose it with --knock-n-s"
         )
 
 
@@ -123,7 +120,7 @@ def _say_totals(
     totals = executions_summary(found)
     reporter.say(
         f"{totals['grasps_survived']} of {totals['grasps']} grasps survived every trial with "
-        f"{settings.mass_kg:g} kg; {totals['trials_survived']} of {totals['trials']} trials were "
+        f"{settings.object_kg:g} kg; {totals['trials_survived']} of {totals['trials']} trials were "
         f"survived; {totals['controls_let_go']} of {totals['controls']} negative controls let go "
         "(all should)"
     )

@@ -24,8 +24,9 @@ from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
-from scenes.fingertips import FingerSettings, fitting_radius
+from scenes.fingertips import fitting_radius
 from scenes.layout import arrange
+from scenes.settings import FingerSettings
 from sim_validate.datasets.config import quoted
 from sim_validate.datasets.meshes import mesh_path, stored_body
 from sim_validate.datasets.open_dataset import Row, Selection, select
@@ -131,7 +132,7 @@ def _lines(
     for row in rows:
         points, normals = _places(row)
         contacts = tuple(map(Contact, points, normals))
-        layout = arrange(body, contacts, friction, FingerSettings(radius_m=radius))
+        layout = arrange(body, contacts, friction, FingerSettings(fingertip_radius_m=radius))
         origin = points.mean(axis=0)
         touching = points - radius * normals - origin
         yield f"  {quoted(row['name'])}:\n"

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import record_of
+from grasp_core.mesh_files.limits import FaceKind, MeshChoices
 from grasp_core.mesh_files.reading import MeshFile, read_triangles
-from grasp_core.objects.build import DEFAULT_LIMITS, MeshChoices, content_hash
+from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
-from grasp_core.objects.surface import FaceKind
 from grasp_core.records.grasps_json import surface_of_record, surface_record
 from grasp_core.records.grasps_schema import SurfaceRecord
 from sim_validate.files.paths import path_inside
@@ -57,6 +57,6 @@ def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Pol
                 record = record_of(SurfaceRecord, said.removeprefix(SURFACE), "surface")
                 known = surface_of_record(record)
         return polyhedron_from_mesh(
-            mesh.vertices, mesh.triangles, MeshChoices(faces), name=name,
+            mesh.vertices, mesh.triangles, MeshChoices(faces=faces), name=name,
             source_sha256=hashlib.sha256(mesh.data).hexdigest(), known=known,
         )  # fmt: skip

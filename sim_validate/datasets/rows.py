@@ -215,8 +215,8 @@ class GraspRows:
         asked = self.unit.config.execution
         if asked is not None:
             more = () if self._figures is None else self._figures.asked.seeds
-            seeds = (asked.settings.seed, *more)
-            self.executions += execution_rows(name, executed, seeds, asked.settings.misplacements)
+            seeds = (asked.seed, *more)
+            self.executions += execution_rows(name, executed, seeds, asked.misplacements)
 
     def _of_executed(
         self, body: Polyhedron, contacts: Sequence[Contact], friction: float, executed: Executed

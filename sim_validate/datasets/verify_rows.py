@@ -37,7 +37,7 @@ from sim_validate.datasets.rows import GIVEN, NOT_TRIED, PLANNED
 from sim_validate.datasets.tables import KEYS
 from sim_validate.datasets.varied import RATIOS, VARIED
 from sim_validate.execution.execute import tip_radius
-from sim_validate.execution.settings import AskedExecution
+from sim_validate.execution.settings import ExecutionSettings
 
 SAME_MARGIN = 1e-6
 """Largest difference between a closure margin in a row and that of the contacts, relative to the
@@ -296,7 +296,7 @@ def _trial_faults(row: Row, trials: Sequence[Row]) -> Iterator[str]:
     )
 
 
-def _squeeze_faults(row: Row, body: Polyhedron, asked: AskedExecution) -> Iterator[str]:
+def _squeeze_faults(row: Row, body: Polyhedron, asked: ExecutionSettings) -> Iterator[str]:
     """Check the mass, and prove again that the squeeze carries what the row says."""
     yield from _proved(row, body, asked, "squeeze_n", "load_multiple")
     if row.get("least_squeeze_n") is not None:
@@ -306,12 +306,12 @@ def _squeeze_faults(row: Row, body: Polyhedron, asked: AskedExecution) -> Iterat
 
 
 def _proved(
-    row: Row, body: Polyhedron, asked: AskedExecution, squeeze: str, claim: str
+    row: Row, body: Polyhedron, asked: ExecutionSettings, squeeze: str, claim: str
 ) -> Iterator[str]:
     """Check that a squeeze carries a multiple of the weight, with pushes that are allowed."""
     count = row["contacts"]
     try:
-        settings = asked.settings_for(body)
+        settings = asked.for_body(body)
         if row.get("mass_ratio") is not None:
             settings = replace(settings, mass_kg=row["mass_kg"])
         points, normals = row["contact_points_m"][:count], row["contact_normals"][:count]
@@ -320,15 +320,16 @@ def _proved(
             body = seat(body, points, normals).body
         held = grip(
             body, contacts, row["friction"], row["squeeze_n"][:count],
-            stiffness=settings.stiffness_n_per_m, tip_radius_m=tip_radius(body, contacts, settings),
+            stiffness=settings.tip_stiffness_n_per_m,
+            tip_radius_m=tip_radius(body, contacts, settings),
         )  # fmt: skip
     except GraspError as error:
         yield f"the contacts cannot be squeezed as the row says ({error})"
         return
-    if not np.isclose(row["mass_kg"], settings.mass_kg, rtol=ROUNDING, atol=0.0):
-        yield f"mass_kg is {row['mass_kg']:.9g}, but by {CONFIG} it is {settings.mass_kg:.9g}"
+    if not np.isclose(row["mass_kg"], settings.object_kg, rtol=ROUNDING, atol=0.0):
+        yield f"mass_kg is {row['mass_kg']:.9g}, but by {CONFIG} it is {settings.object_kg:.9g}"
         return
-    survival = Survival.of(held, any_direction(settings.mass_kg))
+    survival = Survival.of(held, any_direction(settings.object_kg))
     reactions = survival.reactions(held.local_squeeze)
     multiple = row["load_multiple"] * (1.0 - ROUNDING)
     pushes = reactions.start[:, 0] + multiple * reactions.swing

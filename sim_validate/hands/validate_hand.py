@@ -18,8 +18,8 @@ from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.fingertips import FingerSettings
 from scenes.hands.hand_scene import HandScene, build_hand_scene, hand_physics, limited
+from scenes.settings import FingerSettings
 from sim_validate.hands.hand_controls import HandCase, HandControl, hand_controls
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.simulation.bench import Bench
@@ -143,11 +143,9 @@ def validate_hand(
     """
     agenda = Agenda() if agenda is None else instance(agenda, Agenda, "agenda")
     setup = hand_setup() if setup is None else instance(setup, Setup, "setup")
-    if setup.torsion_m:
-        raise InputError(
-            "setup.physics.torsion_m must be zero for a hand: levers of motors have no column for "
-            "the torque of a contact"
-        )
+    setup.physics.require_hard(
+        "for a hand", "levers of motors have no column for the torque of a contact"
+    )
     scene = build_hand_scene(hand, body, reach, friction, down=down, physics=setup.physics)
     contacts = stance_of(hand, reach).contacts
     if not force_closure(contacts, friction=friction).closed:

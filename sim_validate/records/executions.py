@@ -22,7 +22,7 @@ from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
-from scenes.physics import PhysicsSettings
+from scenes.settings import PhysicsSettings
 from sim_validate.execution.enough import Enough
 from sim_validate.execution.settings import ExecutionSettings, TrialKind
 from sim_validate.execution.trials import Skipped
@@ -35,7 +35,7 @@ from sim_validate.execution.verdict import (
 )
 from sim_validate.records.fields import Count, Finite, ObjectRecord, Positive, finite, object_record
 
-SCHEMA = 1
+SCHEMA = 2
 FEWEST_CONTACTS = 2
 Force = tuple[Finite, Finite, Finite]
 EXECUTIONS = "executions.json"
@@ -128,7 +128,7 @@ class ExecutionsSummary(TypedDict):
 class ExecutionsFile(TypedDict):
     """The content of `executions.json`; type checking holds its writer to it."""
 
-    schema: Literal[1]
+    schema: Literal[2]
     object: ObjectRecord
     friction: Positive
     complete: bool
@@ -347,7 +347,7 @@ def _execution(record: ExecutionRecord, settings: ExecutionSettings, where: Wher
     if radii is not None:
         radii = frozen(radii, (len(squeeze),), place([*where, "tip_radius_m"]))
     return Execution(
-        mass_kg=settings.mass_kg,
+        mass_kg=settings.object_kg,
         squeeze=frozen(squeeze, (None, 3), place([*where, "squeeze_n"])),
         load_multiple=multiple,
         trials=tuple(_value(ExecutionTrial, each) for each in record["trials"]),

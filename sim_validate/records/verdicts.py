@@ -16,7 +16,7 @@ from typing_extensions import TypedDict
 
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
-from grasp_core.checked import MOST_RANDOM_WRENCHES, path_of
+from grasp_core.checked import path_of
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import record_of, text_of
@@ -25,8 +25,7 @@ from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.settings import for_users
-from scenes.fingertips import FingerSettings
-from scenes.mjcf import Surface
+from scenes.settings import FingerSettings, Surface
 from sim_validate.records.fields import (
     Count,
     Finite,
@@ -41,7 +40,7 @@ from sim_validate.simulation.traces import LET_GO, HoldVerdict, Outcome
 from sim_validate.validation.controls import ControlVerdict
 from sim_validate.validation.verdict import Robustness, Verdict, WrenchVerdict
 
-SCHEMA = 1
+SCHEMA = 2
 
 
 class CheckRecord(TypedDict):
@@ -171,7 +170,7 @@ class SettingsRecord(TypedDict):
     grasp_size_m: Positive
     object_mass_kg: NotRequired[Finite]
     object_inertia_kg_m2: NotRequired[list[list[Finite]]]
-    random_wrenches: Annotated[int, Field(ge=0, le=MOST_RANDOM_WRENCHES)]
+    random_wrenches: Annotated[int, Field(ge=0, le=10_000)]
     limits: NotRequired[str]
     seed: Count
 
@@ -196,7 +195,7 @@ class VerdictRecord(TypedDict):
 class VerdictsFile(TypedDict):
     """The content of `verdicts.json`, as `validate` writes it."""
 
-    schema: Literal[1]
+    schema: Literal[2]
     object: ObjectRecord
     friction: Positive
     complete: bool
@@ -373,7 +372,7 @@ def _settings(verdict: Verdict) -> SettingsRecord:
         "drive": asdict(layout.drive),
         "surface": setup.surface,
         "grasp_size_m": layout.grasp_size_m,
-        "object_mass_kg": layout.mass_kg,
+        "object_mass_kg": layout.object_kg,
         "object_inertia_kg_m2": layout.inertia_kg_m2.tolist(),
         "random_wrenches": verdict.agenda.random_wrenches,
         "limits": verdict.agenda.limits,

@@ -8,6 +8,7 @@ from typing import cast
 
 import numpy as np
 
+from grasp_core.settings import as_table
 from scenes.drawing.pages import NOTHING, number
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (
@@ -21,10 +22,6 @@ from sim_validate.records.executions import Executions, executions_summary
 from sim_validate.reports.agreement import BAD, GOOD, QUIET, Record, said_of
 
 MILLI = 1e3
-OTHER_FLAGS = {
-    "stiffness_n_per_m": "tip-stiffness-n-per-m", "most_mm": "max-mm", "most_deg": "max-deg",
-}  # fmt: skip
-"""Flags of `graspproof execute` that are not named as their settings."""
 ALWAYS = ("mass_kg", "seed")
 """Settings whose usual value depends on the object or on the plan."""
 FAILED, LOST = "failed", "lost"
@@ -89,7 +86,7 @@ def described_executions(executions: Executions) -> str:
     counts = executions_summary(executions.grasps)
     lost = counts["grasps_without_squeeze"]
     said = (
-        f"Executed with {executions.settings.mass_kg:.4g} kg at friction "
+        f"Executed with {executions.settings.object_kg:.4g} kg at friction "
         f"{executions.friction:g}, {counts['grasps_survived']} of {counts['grasps']} grasps "
         f"survived every trial; {counts['controls_let_go']} of {counts['controls']} negative "
         "controls let go, as all should"
@@ -109,17 +106,8 @@ def described_executions(executions: Executions) -> str:
 def execution_settings(executions: Executions) -> Iterable[tuple[str, str]]:
     """Yield names and values of everything that the executions of a run were asked for."""
     yield "execution.friction", f"{executions.friction:g}"
-    for name, value in _flat(executions.settings).items():
+    for name, value in as_table(executions.settings).items():
         yield f"execution.{name}", str(value)
-
-
-def _flat(settings: ExecutionSettings) -> dict[str, object]:
-    """Return the settings by name, those of the hand in their place."""
-    found = dict[str, object]()
-    for name, value in asdict(settings).items():
-        inside = {f"hand.{each}": own for each, own in value.items()} if name == "hand" else {}
-        found |= inside or {name: value}
-    return found
 
 
 def execution_section(executions: Executions | None, found: ExecutedGrasp | None) -> Record | None:
@@ -153,11 +141,10 @@ def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
     """Write the shell command that executes a grasp again, with the same settings."""
     words = ["graspproof", "execute", path, "--grasp", grasp_id]
     words += ["--friction", repr(executions.friction)]
-    usual = _flat(ExecutionSettings(executions.settings.mass_kg).used)
-    for name, value in _flat(executions.settings).items():
+    usual = asdict(ExecutionSettings(executions.settings.object_kg).used)
+    for name, value in asdict(executions.settings).items():
         if name in ALWAYS or value != usual[name]:
-            own = name.removeprefix("hand.")
-            words += [f"--{OTHER_FLAGS.get(own, own.replace('_', '-'))}", *_words(value)]
+            words += [f"--{name.replace('_', '-')}", *_words(value)]
     return shlex.join(words)
 
 
@@ -173,13 +160,13 @@ def _words(value: object) -> list[str]:
 
 def _facts(executions: Executions, found: Execution | None) -> Iterable[tuple[str, str]]:
     settings = executions.settings
-    yield "Mass", f"{settings.mass_kg:.4g} kg, at friction {executions.friction:g}"
+    yield "Mass", f"{settings.object_kg:.4g} kg, at friction {executions.friction:g}"
     yield "Push of a finger", f"at most {settings.push_n:.4g} N"
-    tips = f"fingertips of {MILLI * settings.hand.tip_mass_kg:.4g} g"
+    tips = f"fingertips of {MILLI * settings.tip_mass_kg:.4g} g"
     if found is not None and found.tip_radius_m is not None:
         tips += f" and {MILLI * float(found.tip_radius_m.max()):.4g} mm radius"
-    yield "Springs", f"{settings.stiffness_n_per_m:.5g} N/m, {tips}"
-    yield "Counts as held", f"up to {settings.most_mm:g} mm and {settings.most_deg:g} deg"
+    yield "Springs", f"{settings.tip_stiffness_n_per_m:.5g} N/m, {tips}"
+    yield "Counts as held", f"up to {settings.max_mm:g} mm and {settings.max_deg:g} deg"
     if found is not None:
         sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(found.squeeze, axis=1))
         yield "Squeeze, finger by finger", f"{sizes} N"

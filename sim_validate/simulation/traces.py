@@ -18,7 +18,7 @@ from grasp_core.closure.contacts import normal_and_tangential
 from grasp_core.objects.on_faces import within
 from scenes.layout import Layout
 from sim_validate.simulation.bench import Health, Motion
-from sim_validate.simulation.schedules import HoldProtocol
+from sim_validate.simulation.settings import HoldProtocol
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,7 +15,8 @@ from grasp_core.values import Contact
 from scenes.mjcf import Scene
 from sim_validate.simulation.gate import Gate
 from sim_validate.simulation.limits import CriticalFriction, SimulatedLimit
-from sim_validate.simulation.setup import Agenda, Noise, Setup
+from sim_validate.simulation.settings import Noise
+from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.simulation.traces import LET_GO, HoldVerdict, Outcome, Trace
 from sim_validate.validation.controls import ControlVerdict
 

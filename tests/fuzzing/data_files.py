@@ -18,7 +18,9 @@ from scenes.example_objects import example_object
 from sim_validate.baselines.baseline import baseline_from_json, baseline_to_json
 from sim_validate.baselines.settings import of_settings
 from sim_validate.baselines.suite import suite_from_tables
+from sim_validate.cli.command_flags import Run
 from sim_validate.cli.config_file import flags_from
+from sim_validate.cli.flag_values import flags_of
 from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
 from sim_validate.datasets.given_contacts import given_from_json
 from sim_validate.datasets.manifest import (
@@ -253,7 +255,7 @@ gravity = [0.0, 0.0, 0.0]
 cone = "elliptic"
 autoreset = true
 [fingers]
-radius_m = 0.004
+fingertip_radius_m = 0.004
 approach = [0, 0, 1.0]
 [hold]
 hold_s = 0.5
@@ -303,9 +305,12 @@ FLAGS = b"""friction = 0.4
 families = ["pencil", "regulus"]
 json = true
 quiet = false
-weights = [[0, 0, 1.5], [1, 0, 0]]
-mesh_unit = "mm"
+weight-down = [[0, 0, 1.5], [1, 0, 0]]
+unit = "mm"
+[noise]
+shift = 0.02
 """
+KNOWN = {flag.name: flag for flag in flags_of(Run)}
 
 
 def _same_flags(data: bytes, found: list[str]) -> None:
@@ -350,6 +355,6 @@ TARGETS = (
            lambda data: config_from_settings(tables_of_toml(text_of(data))),
            lambda: [config_to_toml(DatasetConfig(objects=("wedge",))).encode()], _same_config,
            "toml"),
-    Target("flags", lambda data: flags_from(tables_of_toml(text_of(data))), lambda: [FLAGS],
+    Target("flags", lambda data: flags_from(tables_of_toml(text_of(data)), KNOWN), lambda: [FLAGS],
            _same_flags, "toml"),
 )  # fmt: skip

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.fingertips import FingerSettings
-from scenes.physics import PhysicsSettings
+from scenes.settings import FingerSettings, PhysicsSettings
 from scenes.tested import HandServos, Postures, Weld, fingertip_scene, hand_scene, planned_postures
 from sim_validate.dexgraspbench import hand_file
 from sim_validate.protocols.published import protocol

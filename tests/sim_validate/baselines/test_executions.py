@@ -18,7 +18,7 @@ from sim_validate.baselines.check import Checked, Measured, demanded
 from sim_validate.baselines.compare import Status, compare
 from sim_validate.baselines.settings import How, of_settings, settings_of
 from sim_validate.baselines.suite import suite_from_tables
-from sim_validate.execution.settings import AskedExecution
+from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     Execution,
@@ -76,12 +76,12 @@ def test_a_baseline_with_executions_is_the_same_when_it_is_read_again():
 
 
 def test_settings_of_executions_are_kept():
-    asked = AskedExecution.of_table({"density_kg_m3": 500.0, "trials": ["stop"]})
+    asked = ExecutionSettings(density_kg_m3=500.0, trials=("stop",))
     how = How(Setup(), Agenda(), asked)
     assert of_settings(settings_of(how), "b.json") == how
     assert "execution" not in settings_of(How(Setup(), Agenda()))
-    with pytest.raises(gc.InputError, match=r"b\.json: settings: execution: expected one of mass"):
-        of_settings(settings_of(how) | {"execution": {}}, "b.json")
+    with pytest.raises(gc.InputError, match=r"b\.json: settings: execution: no setting is named"):
+        of_settings(settings_of(how) | {"execution": {"weight": 1}}, "b.json")
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from grasp_core.quality.measures import MeasureName
 from sim_validate.cli.command_flags import Plan
 from sim_validate.main import main
 
-ASKED = ["plan", "tetrahedron", "--limit", "2", "--family", "concurrent", "--best"]
+ASKED = ["plan", "tetrahedron", "--limit", "2", "--families", "concurrent", "--best"]
 
 
 @pytest.fixture(scope="module")

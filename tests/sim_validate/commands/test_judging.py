@@ -48,7 +48,7 @@ def test_a_test_without_loads_has_a_margin_of_null(wedge_plan, capsys):
 
 def test_fingers_that_hardly_push_fail_and_the_command_says_why(wedge_plan, capsys):
     """The weight of a decagram of push is nothing beside one newton."""
-    words = ["--protocol", "dexgraspbench", "--max-normal-force", "0.01", "--limit", "1"]
+    words = ["--protocol", "dexgraspbench", "--max-normal-force-n", "0.01", "--limit", "1"]
     assert main(["validate", str(wedge_plan), *words]) == Exit.NEGATIVE
     found = capsys.readouterr()
     assert "failed" in found.out

@@ -17,7 +17,6 @@ from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.figures import execution_cells, execution_rows
 from sim_validate.datasets.tables import EXECUTED, EXECUTIONS, TABLES
 from sim_validate.datasets.verify import Sample, loose_difference, verify
-from sim_validate.execution.settings import AskedExecution
 from sim_validate.execution.verdict import ExecutedGrasp
 from tests.sim_validate.datasets.configs import rows_of
 from tests.sim_validate.datasets.engines import Here, silent
@@ -27,7 +26,7 @@ pytest.importorskip("pyarrow")
 SETTINGS = sv.ExecutionSettings(mass_kg=1.2, trials=("weight",))
 CONFIG = DatasetConfig(
     objects=("tetrahedron", "wedge"), families=("concurrent",), limit=1,
-    execution=AskedExecution(SETTINGS),
+    execution=SETTINGS,
 )  # fmt: skip
 
 

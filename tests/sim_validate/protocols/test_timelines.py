@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.fingertips import FingerSettings
+from scenes.settings import FingerSettings
 from scenes.tested import fingertip_scene
 from sim_validate.protocols.published import Step, protocol
 from sim_validate.protocols.runs import CHUNK, timeline

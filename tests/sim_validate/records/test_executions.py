@@ -59,7 +59,7 @@ def test_executions_are_a_table(tmp_path):
     for grasp in found[:2]:
         row = table.loc[grasp.id]
         assert row.least_predicted_loss == min(each.predicted_loss for each in grasp.trials)
-        assert row.payload_kg == grasp.execution.load_multiple * SETTINGS.mass_kg
+        assert row.payload_kg == grasp.execution.load_multiple * SETTINGS.object_kg
     assert np.isnan(table.iloc[2].payload_kg)
     assert table.iloc[2].least_predicted_loss == 0.0
 
@@ -115,11 +115,8 @@ BAD = {
         lambda d: d["executions"][0]["physics"].pop("tolerance"),
         r"executions\[0\]\.physics\.tolerance: missing; add it",
     ),
-    "hand": (
-        lambda d: d["settings"]["hand"].update(down=[0, 0, 0]),
-        r"settings\.hand\.down must be",
-    ),
-    "schema": (lambda d: d.update(schema=2), "schema: expected 1, got 2: a newer graspproof"),
+    "down": (lambda d: d["settings"].update(down=[0, 0, 0]), r"settings\.down must be"),
+    "schema": (lambda d: d.update(schema=3), "schema: expected 2, got 3: a newer graspproof"),
     "physics": (of_first(physics={"timestep": 1}), r"executions\[0\]\.physics\.timestep must be"),
     "reason": (of_first(reason="heavy"), r"executions\[0\]\.load_multiple: expected nothing"),
     "radii": (of_first(tip_radius_m=[0.004] * 3), r"executions\[0\]\.tip_radius_m must have"),

@@ -11,7 +11,7 @@ from scenes.mjcf import build_scene
 from sim_validate.simulation import schedules
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.limits import bisected, forces_just_above, released_friction
-from sim_validate.simulation.schedules import FrictionProtocol
+from sim_validate.simulation.settings import FrictionProtocol
 from sim_validate.simulation.setup import Setup
 from tests.marks import more
 from tests.sim_validate.rigs import grasps

@@ -8,13 +8,8 @@ import pytest
 import grasp_core as gc
 from sim_validate.simulation.early_ends import USABLE, WATCHED, EarlyEnds, Thresholds
 from sim_validate.simulation.limits import part
-from sim_validate.simulation.schedules import (
-    FrictionProtocol,
-    HoldProtocol,
-    Load,
-    hold,
-    release,
-)
+from sim_validate.simulation.schedules import Load, hold, release
+from sim_validate.simulation.settings import FrictionProtocol, HoldProtocol
 from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.traces import Outcome, judge
 from sim_validate.validation.controls import control_case, negative_controls

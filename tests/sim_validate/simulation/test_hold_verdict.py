@@ -5,7 +5,7 @@ import pytest
 
 import scenes
 from sim_validate.simulation.bench import Health
-from sim_validate.simulation.schedules import HoldProtocol
+from sim_validate.simulation.settings import HoldProtocol
 from sim_validate.simulation.traces import Outcome, Trace, judge
 from tests.sim_validate.rigs import grasps
 

@@ -3,12 +3,8 @@ import pytest
 
 from sim_validate.simulation import schedules
 from sim_validate.simulation.limits import OVERLOAD, part
-from sim_validate.simulation.schedules import (
-    FrictionProtocol,
-    HoldProtocol,
-    LimitProtocol,
-    Load,
-)
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.settings import FrictionProtocol, HoldProtocol, LimitProtocol
 from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
 
 SAMPLE_S, STILL = 0.01, Load(np.zeros(6), np.full((4, 3), 5.0))

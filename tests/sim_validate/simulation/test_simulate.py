@@ -11,7 +11,8 @@ from sim_validate.simulation import schedules
 from sim_validate.simulation.bench import CHUNK, Bench
 from sim_validate.simulation.limits import part
 from sim_validate.simulation.rig import squeezed
-from sim_validate.simulation.schedules import HoldProtocol, Load
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.settings import HoldProtocol
 from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.traces import Outcome, judge
 from tests.sim_validate.rigs import grasps, limiting_loads, rig_of

@@ -5,7 +5,8 @@ import pytest
 
 from sim_validate.simulation.bench import Health
 from sim_validate.simulation.limits import _onset, bisected_limits, ramped_limits
-from sim_validate.simulation.schedules import LimitProtocol, Load
+from sim_validate.simulation.schedules import Load
+from sim_validate.simulation.settings import LimitProtocol
 from sim_validate.simulation.setup import Setup
 from sim_validate.simulation.traces import Trace
 from tests.sim_validate.rigs import grasps, limiting_loads, rig_of

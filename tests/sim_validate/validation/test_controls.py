@@ -12,7 +12,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.families.regulus import LEAST_DEPTH
 from sim_validate.simulation import schedules
-from sim_validate.simulation.schedules import HoldProtocol
+from sim_validate.simulation.settings import HoldProtocol
 from sim_validate.simulation.setup import Agenda, Setup
 from sim_validate.validation.controls import Control, negative_controls, try_control
 from tests.grasp_core.families.printed_paper import printed_regulus
