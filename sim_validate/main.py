@@ -8,46 +8,69 @@ import sys
 import traceback
 from collections.abc import Sequence
 from pkgutil import resolve_name
-from typing import Any
+from typing import Any, get_args
 
 import tyro
 from tyro.conf import FlagCreatePairsOff
 
 from grasp_core.errors import GraspError, InputError
 from grasp_core.settings import SettingError
-from sim_validate.cli import baseline_flags, command_flags, dataset_flags, hand_flags
+from sim_validate.cli import baseline_flags, dataset_flags
 from sim_validate.cli.baseline_flags import Baseline
-from sim_validate.cli.command_flags import COMMANDS, Command
+from sim_validate.cli.command_flags import (
+    Analyze,
+    Doctor,
+    Execute,
+    Export,
+    Inspect,
+    Objects,
+    Plan,
+    Regions,
+    Replay,
+    Report,
+    Run,
+    Scene,
+    Transfer,
+    Validate,
+    View,
+)
 from sim_validate.cli.config_file import with_config
 from sim_validate.cli.dataset_flags import Dataset
 from sim_validate.cli.examples import examples_for
 from sim_validate.cli.exit_codes import Exit, FlagsError, exit_code, reason_of
 from sim_validate.cli.flag_groups import Spoken
+from sim_validate.cli.hand_flags import Hand, Reach
 
+Command = (
+    Run | Plan | Validate | Execute | Scene | Export | View | Report | Regions | Replay | Analyze
+    | Transfer | Reach | Hand | Dataset | Baseline | Inspect | Objects | Doctor
+)  # fmt: skip
+COMMANDS = {kind.__name__.lower(): kind for kind in get_args(Command)}
+"""The classes of flags, by the names of their commands."""
 ACTIONS: dict[type[Any], str] = {
-    command_flags.Run: "run:run_object",
-    command_flags.Plan: "plan:plan_file",
-    command_flags.Validate: "validate:validate_file",
-    command_flags.Execute: "execute:execute_file",
-    command_flags.Scene: "scene:write_scenes",
-    command_flags.Export: "scene:export_grasps",
-    command_flags.View: "view:view_grasp",
-    command_flags.Report: "view:report_folder",
-    command_flags.Regions: "regions:certify_file",
-    command_flags.Replay: "replay:replay_trial",
-    command_flags.Analyze: "analyze:analyze_file",
-    command_flags.Transfer: "transfer:transfer_file",
-    hand_flags.Reach: "reach:reach_file",
-    hand_flags.Hand: "hand:show_hand",
+    Run: "run:run_object",
+    Plan: "plan:plan_file",
+    Validate: "judging:judge_file",
+    Execute: "execute:execute_file",
+    Scene: "scene:write_scenes",
+    Export: "scene:export_grasps",
+    View: "view:view_grasp",
+    Report: "view:report_folder",
+    Regions: "regions:certify_file",
+    Replay: "replay:replay_trial",
+    Analyze: "analyze:analyze_file",
+    Transfer: "transfer:transfer_file",
+    Reach: "judging:judge_reach",
+    Hand: "hand:show_hand",
     dataset_flags.Build: "dataset:build_dataset",
     dataset_flags.Import: "dataset:import_dataset",
     dataset_flags.Verify: "dataset:verify_dataset",
     dataset_flags.Export: "dataset:export_dataset",
     baseline_flags.Record: "baseline:record_baseline",
     baseline_flags.Check: "baseline:check_baseline",
-    command_flags.Inspect: "objects:inspect_object",
-    command_flags.Objects: "objects:list_objects",
-    command_flags.Doctor: "doctor:check_installation",
+    Inspect: "objects:inspect_object",
+    Objects: "objects:list_objects",
+    Doctor: "doctor:check_installation",
 }
 """Module and function of each command. They are named as text, because planning must not wait until
 a simulator is imported."""

@@ -1,4 +1,4 @@
-"""Simulates one trial of a recorded verdict again, of a `verdicts.json` or of a row of a dataset.
+"""Simulates one trial of a recorded verdict again.
 
 Trials of a scene do not influence each other, so one by itself moves as it did among the others.
 It is simulated twice: until its answer is known, for the verdict as it was recorded, and to the
@@ -7,7 +7,6 @@ protocol's full length, to be looked at.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -17,18 +16,12 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, about
 from grasp_core.files.text_files import read_text
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.planning.given_contacts import seat
 from grasp_core.planning.result import Plan
 from grasp_core.settings import for_users
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import clashes
 from scenes.mjcf import Scene
-from sim_validate.datasets.manifest import MANIFEST
-from sim_validate.datasets.meshes import stored_body
-from sim_validate.datasets.open_dataset import select
-from sim_validate.datasets.rows import GIVEN, NOT_TRIED
-from sim_validate.datasets.varied import VARIED
-from sim_validate.records.grasps import NAMED, grasp_with_id, read_grasps, some
+from sim_validate.records.grasps import GRASPS, grasp_with_id, read_grasps, some
 from sim_validate.records.setup_toml import setup_from_tables
 from sim_validate.records.verdicts import verdicts_of
 from sim_validate.simulation.bench import Bench
@@ -45,7 +38,7 @@ from sim_validate.validation.controls import (
 )
 from sim_validate.validation.noise import OPEN, disturbed, for_repeats, noisy_case
 
-GRASPS, VERDICTS = "grasps.json", "verdicts.json"
+VERDICTS = "verdicts.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,14 +95,7 @@ class Replayed:
 
 
 def recorded_in(source: Path, wanted: Wanted) -> Recorded:
-    """Read a contact set from a `verdicts.json`, the folder of a run, or a dataset."""
-    if wanted.trial is not None and wanted.control is not None:
-        raise InputError(
-            "--trial chooses a repeat of the grasp with noise, --control a negative control: "
-            "give only one of them"
-        )
-    if source.is_dir() and (source / MANIFEST).is_file():
-        return _of_dataset(source, wanted)
+    """Read a contact set from a `verdicts.json`, or from the folder of a run."""
     path = source / VERDICTS if source.is_dir() else source
     with about(path):
         record = verdicts_of(read_text(path))
@@ -205,49 +191,6 @@ def _with_control(path: Path, found: Recorded, grasp: Grasp, name: str) -> Recor
         found, name=f"{grasp.id}:{name}", contacts=control.contacts, friction=control.friction,
         control=name, grasp=None,
     )  # fmt: skip
-
-
-def _of_dataset(folder: Path, wanted: Wanted) -> Recorded:
-    """Read a grasp or a negative control from the tables of a dataset."""
-    chosen = select(folder)
-    if wanted.grasp is None or wanted.trial is not None or wanted.grasps is not None:
-        raise InputError(
-            f"{folder} is a dataset: name a grasp with --grasp GRASP_ID, and give neither --trial "
-            "nor --grasps"
-        )
-    name = wanted.grasp if wanted.control is None else f"{wanted.grasp}:{wanted.control}"
-    row = next((row for row in chosen.rows("grasps") if row["grasp_id"] == name), None)
-    if row is None or row["outcome"] == NOT_TRIED:
-        there = some(row["grasp_id"] for row in islice(chosen.rows("grasps"), NAMED))
-        raise InputError(
-            f"{folder}: no simulated grasp is named {name}; the dataset has {there}, ..."
-        )
-    config = chosen.config()
-    contacts = [
-        Contact(point, normal)
-        for point, normal in zip(row["contact_points_m"], row["contact_normals"], strict=True)
-        if point[0] is not None
-    ]
-    object_id = row["object_id"]
-    objects = (each for each in chosen.rows("objects") if each["object_id"] == object_id)
-    source = next((each["source_name"] for each in objects), object_id)
-    body = stored_body(folder, object_id, source, config.faces)
-    if row["label"] in (GIVEN, VARIED):  # on curved surfaces given contacts have faces of their own
-        body = seat(body, row["contact_points_m"], row["contact_normals"]).body
-    return Recorded(
-        name=name,
-        body=body,
-        contacts=tuple(contacts),
-        friction=row["friction"],
-        setup=Setup(),
-        agenda=Agenda(random_wrenches=config.random_wrenches, seed=config.seed),
-        control=None if row["force_closed"] else str(row["label"]),
-        outcomes={
-            each["name"]: each["outcome"]
-            for each in chosen.rows("trials")
-            if each["grasp_id"] == name
-        },
-    )
 
 
 Loads: TypeAlias = Sequence[PlannedLoad | ControlLoad]

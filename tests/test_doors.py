@@ -10,8 +10,7 @@ from typing import get_args
 import pytest
 
 from sim_validate.cli import baseline_flags, dataset_flags
-from sim_validate.cli.command_flags import Command
-from sim_validate.main import ACTIONS
+from sim_validate.main import ACTIONS, Command
 
 ROOT = Path(__file__).parent.parent
 

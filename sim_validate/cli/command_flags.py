@@ -1,16 +1,14 @@
-"""The flags of every command: one class per command, one field per flag."""
+"""The flags of commands: one class per command, one field per flag."""
 
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from grasp_core.checked import BOUNDS, MOST_COUNT
 from grasp_core.settings import Ending, Range
-from sim_validate.cli.baseline_flags import Baseline
-from sim_validate.cli.dataset_flags import Dataset
 from sim_validate.cli.flag_groups import (
     UPRIGHT,
     Carrying,
@@ -39,7 +37,6 @@ from sim_validate.cli.flag_groups import (
     Trials,
     Wrench,
 )
-from sim_validate.cli.hand_flags import Hand, Reach
 from sim_validate.parallel.processes import available_cores
 
 PICTURES, CLIPS, PAGES = (".svg", ".png"), (".gif", ".webp"), (".html", ".htm")
@@ -346,13 +343,3 @@ class Doctor(Spoken):
 
     compile: bool = False
     """Compile all inner loops first, on two cores if there are two, as for an image."""
-
-
-Command = (
-    Run | Plan | Validate | Execute | Scene | Export | View | Report | Regions | Replay | Analyze
-    | Transfer | Reach | Hand | Dataset | Baseline | Inspect | Objects | Doctor
-)  # fmt: skip
-
-
-COMMANDS = {kind.__name__.lower(): kind for kind in get_args(Command)}
-"""The classes of flags, by the names of their commands."""

@@ -10,8 +10,8 @@ from grasp_core.planning.result import Plan
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut, warn_of
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands.asked.executions import check_mass, execution_settings
 from sim_validate.commands.asked.objects import asked_grasps
-from sim_validate.commands.asked.trials import check_mass, execution_settings
 from sim_validate.execution.jobs import ExecutionJob, executed
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (

@@ -9,8 +9,11 @@ from pathlib import Path
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.planning.result import Plan
+from sim_validate.cli import command_flags, hand_flags
 from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.commands.reach import reach_file
+from sim_validate.commands.validate import validate_file
 from sim_validate.files.result_folders import JUDGEMENTS, remove_results
 from sim_validate.parallel import processes
 from sim_validate.protocols.judgements_json import judgements_summary, judgements_to_json
@@ -21,8 +24,26 @@ COLUMNS = ("grasp", "test", "theirs", "ours", "margin", "moved mm", "deg")
 TOTALS = ("test", "grasps", "theirs passed", "ours held", "predicted", "theirs as ours")
 
 
+def judge_file(command: command_flags.Validate, reporter: Reporter) -> int:
+    """Judge the grasps of a file by the published tests that are named, or else by our own."""
+    by = partial(
+        judge_grasps, names=command.protocol, jobs=command.testing.jobs, folder=command.out,
+        reporter=reporter,
+    )  # fmt: skip
+    return validate_file(command, reporter, by if command.protocol else None)
+
+
+def judge_reach(command: hand_flags.Reach, reporter: Reporter) -> int:
+    """Look for poses of a hand in grasps, and judge them by the published tests that are named."""
+    by = partial(
+        judge_hands, names=command.protocol, jobs=command.jobs, folder=command.out,
+        reporter=reporter,
+    )  # fmt: skip
+    return reach_file(command, reporter, by if command.protocol else None)
+
+
 def judge_grasps(
-    saved: Plan, names: Sequence[str], setup: Setup, *, jobs: int, folder: Path | None,
+    saved: Plan, setup: Setup, *, names: Sequence[str], jobs: int, folder: Path | None,
     reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
     """Judge grasps by tests with four fingertips; return exit code and text of judgements.json."""
@@ -35,7 +56,7 @@ def judge_grasps(
 
 
 def judge_hands(
-    saved: Plan, hand: Hand, found: Sequence[HandReach], names: Sequence[str], *,
+    saved: Plan, hand: Hand, found: Sequence[HandReach], *, names: Sequence[str],
     jobs: int, folder: Path | None, reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
     """Judge the poses of a hand by tests; return the exit code and the text of judgements.json."""

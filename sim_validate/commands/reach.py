@@ -5,12 +5,13 @@ poses are written as records of DexGraspBench.
 """
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from functools import partial
 from operator import call
 from pathlib import Path
+from typing import TypeAlias
 
 from grasp_core.by_value import counted
 from grasp_core.errors import InputError, SolverError
@@ -26,7 +27,6 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit, FlagsError
 from sim_validate.commands.asked.objects import asked_grasps
 from sim_validate.commands.hand import asked_hand
-from sim_validate.commands.judging import judge_hands
 from sim_validate.dexgraspbench import dex_record, write_dex_object, write_dex_record
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
@@ -39,8 +39,8 @@ from sim_validate.hands.execute_hand import executed_by_hand, hand_execution_set
 from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict, validate_hand
 from sim_validate.parallel import processes
 from sim_validate.parallel.compiling import REACHING, compile_loops, must_compile
+from sim_validate.records.grasps import GRASPS
 from sim_validate.records.reaches import AskedRecord, HandTrials, reaches_summary, reaches_to_json
-from sim_validate.reports.run_folder import GRASPS
 from sim_validate.simulation.setup import Agenda
 
 ABSENT = "-"
@@ -51,7 +51,11 @@ HELD_COLUMNS = ("grasp", "weakest wrench N", "held", "controls let go")
 EXECUTED_COLUMNS = ("grasp", "survived", "least predicted loss", PAYLOAD, "controls let go")
 
 
-def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
+Judge: TypeAlias = Callable[[Plan, Hand, Sequence[HandReach]], tuple[Exit, str]]
+"""Judges a hand in its poses by another test; gives the exit code and the text of its results."""
+
+
+def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | None = None) -> int:
     """Look for a pose of a hand in each grasp of a file, and write what was found."""
     hand = with_motors(asked_hand(command), command)
     chosen = asked_grasps(
@@ -66,11 +70,8 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter) -> int:
         if command.dexgraspbench is not None:
             write_records(command.dexgraspbench, hand, chosen.body, found, reporter)
         judged = Exit.GOOD
-        if command.protocol:
-            judged, text = judge_hands(
-                chosen, hand, found, command.protocol, jobs=command.jobs,
-                folder=command.out, reporter=reporter,
-            )  # fmt: skip
+        if judge is not None:
+            judged, text = judge(chosen, hand, found)
     reporter.text(text)
     show_simulated(tried.verdicts, reporter)
     show_executed(tried.executions, reporter)

@@ -3,12 +3,15 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_text
 from scenes.drawing.clips import GraphicsError, write_trial_clip
 from scenes.mjcf import write_scene
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
+from sim_validate.datasets.manifest import MANIFEST
+from sim_validate.datasets.recorded import recorded_in_dataset
 from sim_validate.records.fields import finite
 from sim_validate.replaying import Recorded, Replayed, Wanted, recorded_in, replayed
 
@@ -20,7 +23,7 @@ MICRO = 1e6
 def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
     """Simulate a recorded trial again and compare its outcome with that in the file."""
     wanted = Wanted(command.grasp, command.control, command.trial, command.grasps)
-    recorded = recorded_in(command.source, wanted)
+    recorded = _recorded(command.source, wanted)
     found = replayed(recorded, command.wrench)
     said = recorded.outcome_of(found.name)
     _show(recorded, found, said, reporter)
@@ -28,6 +31,18 @@ def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
     record = _record(recorded, found, said) | {"files": [str(path) for path in files]}
     reporter.document(finite(record))
     return Exit.GOOD if found.hold.outcome.value == said else Exit.NEGATIVE
+
+
+def _recorded(source: Path, wanted: Wanted) -> Recorded:
+    """Read a contact set from a `verdicts.json`, the folder of a run, or a dataset."""
+    if wanted.trial is not None and wanted.control is not None:
+        raise InputError(
+            "--trial chooses a repeat of the grasp with noise, --control a negative control: "
+            "give only one of them"
+        )
+    if source.is_dir() and (source / MANIFEST).is_file():
+        return recorded_in_dataset(source, wanted)
+    return recorded_in(source, wanted)
 
 
 def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Reporter) -> None:

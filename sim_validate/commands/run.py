@@ -13,8 +13,9 @@ from sim_validate.cli import command_flags
 from sim_validate.cli.command_flags import Report
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit, reason_of
+from sim_validate.commands.asked.executions import check_executing, execution_of_run
 from sim_validate.commands.asked.objects import asked_finger, object_to_plan
-from sim_validate.commands.asked.trials import check_executing, execution_of_run, prepared
+from sim_validate.commands.asked.trials import prepared
 from sim_validate.commands.execute import execute_grasps
 from sim_validate.commands.plan import plan_object, say_counts, show_gains, with_regions
 from sim_validate.commands.validate import simulate_grasps

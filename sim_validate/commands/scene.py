@@ -20,7 +20,8 @@ from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit, FlagsError
 from sim_validate.cli.flag_groups import UPRIGHT, Mass, Tips
-from sim_validate.commands.asked.trials import check_mass, finger_settings, holding
+from sim_validate.commands.asked.executions import check_mass, holding
+from sim_validate.commands.asked.trials import finger_settings
 from sim_validate.execution.execute import chosen_squeeze, held_scene
 from sim_validate.files.result_folders import alone_in
 from sim_validate.records.grasps import grasp_with_id, read_grasps

@@ -24,10 +24,10 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.objects import asked_grasps, load_object
 from sim_validate.files.result_folders import alone_in, remove_results
+from sim_validate.records.grasps import GRASPS
 from sim_validate.records.transfers import TRANSFER, carried_to_json, transfer_to_json
 
 MM = 1e3
-GRASPS = "grasps.json"
 ABSENT = "-"
 COLUMNS = ("grasp", "status", "mm", "deg", "mu*", "now", "quality N", "now", "faces")
 """How far contacts moved and turned, what they reach, and faces under them that changed."""

@@ -1,8 +1,9 @@
 """Runs the command `validate`, which simulates grasps and writes verdicts on them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from sim_validate.cli.console import TABLE_ROWS, Reporter, finished, say_cut, wa
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.objects import asked_grasps
 from sim_validate.commands.asked.trials import prepared
-from sim_validate.commands.judging import judge_grasps
 from sim_validate.files.result_folders import alone_in, remove_results
 from sim_validate.files.writing import write_arrays
 from sim_validate.records.verdicts import summary, trace_arrays, verdicts_to_json
@@ -23,9 +23,14 @@ from sim_validate.simulation.traces import Outcome
 from sim_validate.validation.validation import Job, validated
 from sim_validate.validation.verdict import Verdict
 
+Judge: TypeAlias = Callable[[Plan, Setup], tuple[Exit, str]]
+"""Judges grasps by another test; gives the exit code and the text of its results."""
 
-def validate_file(command: command_flags.Validate, reporter: Reporter) -> int:
-    """Simulate the grasps of a file and report which of them hold."""
+
+def validate_file(
+    command: command_flags.Validate, reporter: Reporter, judge: Judge | None = None
+) -> int:
+    """Simulate the grasps of a file, or let another test judge them, and report which hold."""
     chosen = asked_grasps(
         command.grasps, reporter, friction=command.friction, seed=command.seed, limit=command.limit
     )
@@ -34,10 +39,8 @@ def validate_file(command: command_flags.Validate, reporter: Reporter) -> int:
     setup, agenda = prepared(command.testing, chosen.finger, chosen.seed, command.out)
     jobs, folder = command.testing.jobs, command.out
     with alone_in(folder):
-        if command.protocol:
-            code, text = judge_grasps(
-                chosen, command.protocol, setup, jobs=jobs, folder=folder, reporter=reporter
-            )
+        if judge is not None:
+            code, text = judge(chosen, setup)
         else:
             code, text = simulate_grasps(
                 chosen, setup, agenda, jobs=jobs, folder=folder, reporter=reporter

@@ -21,10 +21,10 @@ from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.files.result_folders import alone_in
-from sim_validate.records.grasps import grasp_with_id, read_grasps
+from sim_validate.records.grasps import GRASPS, grasp_with_id, read_grasps
 from sim_validate.reports.reached_grasps import held_in, why_not_held
 from sim_validate.reports.report import Report, write_report
-from sim_validate.reports.run_folder import GRASPS, folder_of, reaches_beside
+from sim_validate.reports.run_folder import folder_of, reaches_beside
 from sim_validate.simulation.setup import with_planned_radius
 
 COMING, RESTING = 60, 20

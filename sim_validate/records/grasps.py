@@ -9,6 +9,8 @@ from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import grasps_from_json
 from grasp_core.values import Grasp
 
+GRASPS = "grasps.json"
+"""Name of the file in a folder of results."""
 NAMED = 5
 """Largest number of names that a message lists."""
 

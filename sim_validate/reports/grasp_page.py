@@ -13,13 +13,14 @@ from grasp_core.values import Grasp
 from scenes.drawing.pages import NOTHING, number
 from scenes.drawing.turntable import Fact, as_text, grasp_data, grasp_facts
 from sim_validate.records.best import BestFile, shares_of_bound
+from sim_validate.records.grasps import GRASPS
 from sim_validate.records.verdicts import let_go
 from sim_validate.reports.agreement import BAD, GOOD, Record, as_predicted, wrench_size
 from sim_validate.reports.drawn_grasps import Drawn, certified, largest_push
 from sim_validate.reports.executed_grasps import execute_command, execution_section, said_of_both
 from sim_validate.reports.pages import page
 from sim_validate.reports.reached_grasps import held_in, reach_commands, reach_section
-from sim_validate.reports.run_folder import GRASPS, RunFolder
+from sim_validate.reports.run_folder import RunFolder
 
 MILLI, MICRO, PERCENT = 1e3, 1e6, 100.0
 ROTATED, MIRRORED = "rotated", "mirrored"

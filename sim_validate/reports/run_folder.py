@@ -16,7 +16,7 @@ from sim_validate.files.result_folders import BEST, JUDGEMENTS, REACHES
 from sim_validate.protocols.judgements_json import JudgementsFile
 from sim_validate.records.best import BestFile, best_of
 from sim_validate.records.executions import EXECUTIONS, Executions, load_executions
-from sim_validate.records.grasps import read_grasps
+from sim_validate.records.grasps import GRASPS, read_grasps
 from sim_validate.records.regions import REGIONS, RegionsFile, regions_file_of
 from sim_validate.records.verdicts import VerdictsFile, verdicts_of
 from sim_validate.reports.agreement import BAD, Record, said_of
@@ -24,7 +24,7 @@ from sim_validate.reports.agreement import BAD, Record, said_of
 if TYPE_CHECKING:
     from sim_validate.records.reaches import SavedReaches
 
-GRASPS, VERDICTS = "grasps.json", "verdicts.json"
+VERDICTS = "verdicts.json"
 Read = TypeVar("Read", VerdictsFile, RegionsFile, JudgementsFile, BestFile)
 
 

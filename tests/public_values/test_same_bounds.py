@@ -23,9 +23,9 @@ from sim_validate.cli import (
     flag_groups,
     hand_flags,
 )
-from sim_validate.cli.command_flags import Command
 from sim_validate.datasets.config import Learning
 from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.main import Command
 from sim_validate.simulation.setup import Noise
 from tests.sim_validate.rigs import grasps
 

@@ -16,7 +16,7 @@ from scenes.execution.held import HeldSettings
 from scenes.physics import PhysicsSettings
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
-from sim_validate.commands.asked.trials import execution_settings
+from sim_validate.commands.asked.executions import execution_settings
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import Skipped
 from sim_validate.execution.verdict import (
