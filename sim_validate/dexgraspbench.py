@@ -45,9 +45,9 @@ from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact
-from scenes.execution.held import rotations
-from scenes.mjcf_text import quaternion
-from scenes.tested import Postures
+from scenes.mujoco.held import rotations
+from scenes.mujoco.mjcf_text import quaternion
+from scenes.mujoco.tested import Postures
 
 FREE = 7
 """Numbers of a pose: position and quaternion."""

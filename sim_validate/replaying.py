@@ -19,8 +19,8 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.settings import for_users
 from grasp_core.values import Contact, Grasp
-from scenes.fingertips import clashes
-from scenes.mjcf import Scene
+from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.fingertips import clashes
 from sim_validate.records.grasps import GRASPS, grasp_with_id, read_grasps, some
 from sim_validate.records.setup_toml import setup_from_tables
 from sim_validate.records.verdicts import verdicts_of

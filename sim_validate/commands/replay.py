@@ -6,7 +6,7 @@ from pathlib import Path
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_text
 from scenes.drawing.clips import GraphicsError, write_trial_clip
-from scenes.mjcf import write_scene
+from scenes.mujoco.closure_scene import write_scene
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit

@@ -14,8 +14,8 @@ from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Grasp
 from scenes import exports
-from scenes.mjcf import build_scene
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.closure_scene import build_scene
+from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.cli import command_flags, flag_groups
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit, FlagsError

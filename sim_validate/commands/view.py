@@ -15,8 +15,8 @@ from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, has_display, write_clip
 from scenes.drawing.pictures import grasp_sheet
 from scenes.drawing.turntable import turntable_page
-from scenes.fingertips import FingerSettings
-from scenes.mjcf import Scene, build_scene
+from scenes.mujoco.closure_scene import Scene, build_scene
+from scenes.mujoco.fingertips import FingerSettings
 from sim_validate.cli import command_flags
 from sim_validate.cli.console import Reporter
 from sim_validate.cli.exit_codes import Exit

@@ -29,10 +29,10 @@ from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.execution.held import hinged, rotations
-from scenes.execution.held_mjcf import HeldScene, build_held_scene, held_physics
-from scenes.fingertips import fitting_radius
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.held import hinged, rotations
+from scenes.mujoco.held_mjcf import HeldScene, build_held_scene, held_physics
+from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.execution import paths
 from sim_validate.execution.bench import (
     HeldBench,

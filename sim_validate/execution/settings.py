@@ -17,7 +17,7 @@ from grasp_core.settings import (
     named,
     types,
 )
-from scenes.execution.held import HeldSettings
+from scenes.mujoco.held import HeldSettings
 
 TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misplaced"]
 """What a trial does: it turns gravity through all directions, lifts the object off a table, shakes

@@ -29,7 +29,7 @@ from grasp_core.provenance import versions
 from grasp_core.quality.wrench_limits import limit_of
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
-from scenes.hands.hand_scene import HandScene, build_hand_scene, limited
+from scenes.mujoco.hand_scene import HandScene, build_hand_scene, limited
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.gate import Gate
 from sim_validate.simulation.known_cases import Check

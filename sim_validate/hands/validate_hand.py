@@ -18,8 +18,8 @@ from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.fingertips import FingerSettings
-from scenes.hands.hand_scene import HandScene, build_hand_scene, hand_physics, limited
+from scenes.mujoco.fingertips import FingerSettings
+from scenes.mujoco.hand_scene import HandScene, build_hand_scene, hand_physics, limited
 from sim_validate.hands.hand_controls import HandCase, HandControl, hand_controls
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.simulation.bench import Bench

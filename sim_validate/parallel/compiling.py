@@ -72,7 +72,7 @@ def _best() -> None:
 
 
 def _clearance() -> None:
-    from scenes.execution.surface import touched_solids
+    from scenes.mujoco.surface import touched_solids
 
     body = example_object("l-bracket")
     touched_solids(body, body.vertices[:1], body.radius)

@@ -24,9 +24,9 @@ from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.values import Contact, Grasp
-from scenes.hands.hand_scene import build_hand_scene
-from scenes.mjcf import Scene
-from scenes.tested import HandServos, fingertip_scene, hand_scene, planned_postures
+from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.hand_scene import build_hand_scene
+from scenes.mujoco.tested import HandServos, fingertip_scene, hand_scene, planned_postures
 from sim_validate.dexgraspbench import RecordedReach, hand_file, recorded_postures
 from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.hand_gate import require_faithful_hands

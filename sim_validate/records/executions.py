@@ -22,7 +22,7 @@ from grasp_core.files.text_files import read_text
 from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.execution.enough import Enough
 from sim_validate.execution.settings import ExecutionSettings, TrialKind
 from sim_validate.execution.trials import Skipped

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from grasp_core.errors import InputError, about
 from grasp_core.settings import Settings, for_users, named
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.files.toml_tables import read_tables
 from sim_validate.simulation.setup import Setup
 

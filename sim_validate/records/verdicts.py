@@ -25,8 +25,8 @@ from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.settings import for_users
-from scenes.fingertips import FingerSettings
-from scenes.mjcf import Surface
+from scenes.mujoco.closure_scene import Surface
+from scenes.mujoco.fingertips import FingerSettings
 from sim_validate.records.fields import (
     Count,
     Finite,

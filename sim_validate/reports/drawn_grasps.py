@@ -20,7 +20,7 @@ from scenes.drawing.hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
 from scenes.drawing.sheets import svg_of
 from scenes.drawing.views import best_view
-from scenes.fingertips import FingerSettings
+from scenes.mujoco.fingertips import FingerSettings
 from sim_validate.execution.jobs import ExecutionJob, film, worth_seeing
 from sim_validate.files.result_folders import CLIPS, PICTURES
 from sim_validate.records.executions import EXECUTIONS, Executions

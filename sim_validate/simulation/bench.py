@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, cross, to_digits
 from grasp_core.errors import InputError
-from scenes.mjcf import Scene
-from scenes.silent_mujoco import batch, mujoco, unlogged
+from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.silent_mujoco import batch, mujoco, unlogged
 from sim_validate.simulation.schedules import Schedule
 
 STATE = ("time", "qpos", "qvel", "ctrl", "xfrc_applied")

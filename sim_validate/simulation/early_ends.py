@@ -54,7 +54,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.closure.contacts import cross_matrix
-from scenes.layout import Layout, grasp_size
+from scenes.mujoco.layout import Layout, grasp_size
 from sim_validate.simulation.bench import Mask
 from sim_validate.simulation.schedules import Schedule
 from sim_validate.simulation.traces import displaced, strayed

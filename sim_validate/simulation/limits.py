@@ -28,7 +28,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import NoForcesError, SolverError, UndecidedError
 from grasp_core.forces.contact_forces import even_forces
-from scenes.layout import SQUEEZE
+from scenes.mujoco.layout import SQUEEZE
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.rig import Rig, squeezed
 from sim_validate.simulation.schedules import FrictionProtocol, Load

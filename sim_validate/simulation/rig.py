@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.layout import Layout
+from scenes.mujoco.layout import Layout
 from sim_validate.simulation import schedules
 from sim_validate.simulation.bench import Bench, Motion
 from sim_validate.simulation.early_ends import EarlyEnds, Thresholds

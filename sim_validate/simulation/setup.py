@@ -17,9 +17,9 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.settings import CHOSEN, Range, Seed, Settings
 from grasp_core.values import Contact, Grasp
-from scenes.fingertips import FingerSettings
-from scenes.mjcf import Scene, Surface, build_scene
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.closure_scene import Scene, Surface, build_scene
+from scenes.mujoco.fingertips import FingerSettings
+from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.simulation.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
 
 AXIS_NAMES = tuple(

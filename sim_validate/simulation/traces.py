@@ -16,7 +16,7 @@ from grasp_core.arrays import Array, cross
 from grasp_core.by_value import ByValue
 from grasp_core.closure.contacts import normal_and_tangential
 from grasp_core.objects.on_faces import within
-from scenes.layout import Layout
+from scenes.mujoco.layout import Layout
 from sim_validate.simulation.bench import Health, Motion
 from sim_validate.simulation.schedules import HoldProtocol
 

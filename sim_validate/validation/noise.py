@@ -30,8 +30,8 @@ from grasp_core.errors import UndecidedError
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.fingertips import clashes
-from scenes.mjcf import Scene, to_text
+from scenes.mujoco.closure_scene import Scene, to_text
+from scenes.mujoco.fingertips import clashes
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.loads import PlannedLoad, loads_as_they_are
 from sim_validate.simulation.rig import Rig, squeezed

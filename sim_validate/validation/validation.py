@@ -21,7 +21,7 @@ from grasp_core.errors import InputError, UndecidedError
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
-from scenes.fingertips import clashes
+from scenes.mujoco.fingertips import clashes
 from sim_validate.parallel.processes import Shared, each, processes
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.gate import (

@@ -12,7 +12,7 @@ from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from grasp_core.notebooks import InNotebooks
 from grasp_core.values import Contact
-from scenes.mjcf import Scene
+from scenes.mujoco.closure_scene import Scene
 from sim_validate.simulation.gate import Gate
 from sim_validate.simulation.limits import CriticalFriction, SimulatedLimit
 from sim_validate.simulation.setup import Agenda, Noise, Setup

@@ -21,7 +21,7 @@ import scenes
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.closure.soft_contacts import contact_torsions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.parallel.processes import available_cores, each
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.limits import bisected_limits, part, ramped_limits, released_friction

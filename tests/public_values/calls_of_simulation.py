@@ -31,7 +31,7 @@ CALLS = [
         "surface": WORD,
     }),
     Call("scenes.write_scene", lambda: {"scene": scene(), "path": "no/such/folder/a.xml"},
-         succeeds_in="tests/scenes/test_mjcf.py"),
+         succeeds_in="tests/scenes/mujoco/test_closure_scene.py"),
     Call("scenes.export_grasps", lambda: {"plan": plan(), "path": "no/such/a.glb", "to": "gltf"}, {
         "path": PATH | {"unknown ending": "a.obj", "no ending": "a"},
         "to": WORD,

@@ -13,9 +13,9 @@ from grasp_core.hands.reach import HandReach
 from grasp_core.objects.surface import PatchLimits
 from grasp_core.settings import taken, types
 from scenes.example_objects import example_object
-from scenes.execution.held import HeldSettings
-from scenes.fingertips import FingerSettings
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.fingertips import FingerSettings
+from scenes.mujoco.held import HeldSettings
+from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.baselines.part import IfChanged
 from sim_validate.cli import (
     command_flags,

@@ -8,7 +8,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
-from scenes.mjcf import build_scene
+from scenes.mujoco.closure_scene import build_scene
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.rig import squeezed
 from sim_validate.simulation.schedules import Load

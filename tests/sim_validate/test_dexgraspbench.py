@@ -11,7 +11,7 @@ import grasp_core as gc
 from grasp_core.errors import InputError
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.reach import stance_of
-from scenes.mjcf_text import quaternion
+from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.dexgraspbench import (
     FREE,
     DexRecord,

@@ -5,7 +5,7 @@ from typing import cast
 
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from scenes.execution.held import HeldSettings
+from scenes.mujoco.held import HeldSettings
 from sim_validate.cli.command_flags import Run
 from sim_validate.cli.exit_codes import FlagsError
 from sim_validate.cli.flag_groups import (

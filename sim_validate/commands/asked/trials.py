@@ -4,8 +4,8 @@ from dataclasses import fields
 from pathlib import Path
 
 from grasp_core.planning.reach import Finger
-from scenes.fingertips import FingerSettings
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.fingertips import FingerSettings
+from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.cli import flag_groups
 from sim_validate.cli.exit_codes import FlagsError
 from sim_validate.records.setup_toml import setup_from_file

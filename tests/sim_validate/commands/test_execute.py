@@ -12,8 +12,8 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.errors import UnfaithfulError
-from scenes.execution.held import HeldSettings
-from scenes.fingertips import fitting_radius
+from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.held import HeldSettings
 from sim_validate.cli import command_flags
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.cli.flag_groups import DENSITY_KG_M3, TRIALS, UPRIGHT, Executing, Tips

@@ -9,8 +9,8 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.errors import InputError
-from scenes.mjcf_text import quaternion
-from scenes.tested import HandServos, hand_scene
+from scenes.mujoco.mjcf_text import quaternion
+from scenes.mujoco.tested import HandServos, hand_scene
 from sim_validate.dexgraspbench import (
     FREE,
     dex_record,

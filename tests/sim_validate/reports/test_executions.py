@@ -12,8 +12,8 @@ import pytest
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from scenes.execution.held import HeldSettings
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.held import HeldSettings
+from scenes.mujoco.physics import PhysicsSettings
 from sim_validate import main as commands
 from sim_validate.cli.exit_codes import Exit
 from sim_validate.commands.asked.executions import execution_settings

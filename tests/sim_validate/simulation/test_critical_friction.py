@@ -7,7 +7,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.mjcf import build_scene
+from scenes.mujoco.closure_scene import build_scene
 from sim_validate.simulation import schedules
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.limits import bisected, forces_just_above, released_friction

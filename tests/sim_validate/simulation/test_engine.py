@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.silent_mujoco import unlogged
+from scenes.mujoco.silent_mujoco import unlogged
 from sim_validate.simulation.bench import STATE, batch, compiled, state_parts, step
 
 FALLING = """<mujoco><option integrator="discrete"/><worldbody><body><freejoint/>

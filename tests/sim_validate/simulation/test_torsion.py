@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.records.setup_toml import setup_from_tables, tables_of
 from sim_validate.simulation.bench import Bench
 from sim_validate.simulation.gate import measured_gate, require_faithful

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import scenes
-from scenes.layout import TOUCH
-from scenes.mjcf_text import quaternion
+from scenes.mujoco.layout import TOUCH
+from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.simulation.bench import Health, Motion
 from sim_validate.simulation.traces import (
     displaced,

@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.fingertips import FingerSettings, clashes
+from scenes.mujoco.fingertips import FingerSettings, clashes
 from sim_validate.records.verdicts import trace_arrays, verdicts_to_json
 from sim_validate.simulation.setup import Agenda, NamedWrench, Setup
 from sim_validate.simulation.traces import Outcome

@@ -5,7 +5,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.simulation.gate import measured_gate, require_faithful, require_touch
 from sim_validate.simulation.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.simulation.setup import Setup

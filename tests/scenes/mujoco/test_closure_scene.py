@@ -6,8 +6,8 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from scenes.layout import SQUEEZE, TOUCH, arrange, grasp_size
-from scenes.physics import CHOSEN_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
+from scenes.mujoco.layout import SQUEEZE, TOUCH, arrange, grasp_size
+from scenes.mujoco.physics import CHOSEN_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
 
 OBJECTS = ("wedge", "icosahedron", "screwdriver")
 

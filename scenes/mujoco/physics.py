@@ -15,7 +15,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.checked import LARGEST
 from grasp_core.errors import InputError
 from grasp_core.settings import NotNegative, Quantity, Range, Settings
-from scenes.mjcf_text import COMPILER, Element, add_comment, add_element, element, printable
+from scenes.mujoco.mjcf_text import COMPILER, Element, add_comment, add_element, element, printable
 
 MOST_ITERATIONS = 10_000
 Iterations = Annotated[int, Range(least=1, most=MOST_ITERATIONS)]

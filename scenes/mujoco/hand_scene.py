@@ -3,7 +3,7 @@
 The palm is fixed in the world. Links, joints and fingertips are where the hand has them; each link
 is a body on a hinge, turned as in the pose, so that all hinges stand at zero. Fingertips are the
 balls that the analysis knows, and touch pads flush with the object's faces, as fingertips on slides
-do (see `scenes.mjcf`). Shapes of links pass through the object: the pose is known to be clear of
+do (see `closure_scene`). Shapes of links pass through the object: the pose is known to be clear of
 it, and trials move it by micrometres. A link whose mass is not known has a small one, which gravity
 does not pull.
 
@@ -42,12 +42,12 @@ from grasp_core.hands.reach import HandReach, Stance, direction, stance_of, unco
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
-from scenes.fingertips import FingerSettings
-from scenes.hands.chains_mjcf import Chains, add_hand
-from scenes.layout import SQUEEZE, Layout, arrange
-from scenes.mjcf import Scene, add_object, opened
-from scenes.mjcf_text import as_texts, document
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.chains_mjcf import Chains, add_hand
+from scenes.mujoco.closure_scene import Scene, add_object, opened
+from scenes.mujoco.fingertips import FingerSettings
+from scenes.mujoco.layout import SQUEEZE, Layout, arrange
+from scenes.mujoco.mjcf_text import as_texts, document
+from scenes.mujoco.physics import PhysicsSettings
 
 TOUCH = 3e-6
 """Depth of fingertips in their faces at the start, in grasp sizes: more than numbers of nine

@@ -26,7 +26,7 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.settings import Direction, Quantity, Range, Settings
-from scenes.execution.surface import touched_solids
+from scenes.mujoco.surface import touched_solids
 
 
 def rotations(quaternions: Array) -> Array:

@@ -20,9 +20,9 @@ from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.execution.held import HeldLayout, HeldSettings, held_layout
-from scenes.mjcf_text import Element, SceneText, add_element, document, quaternion
-from scenes.physics import PhysicsSettings, add_free_body, add_light, begin_scene
+from scenes.mujoco.held import HeldLayout, HeldSettings, held_layout
+from scenes.mujoco.mjcf_text import Element, SceneText, add_element, document, quaternion
+from scenes.mujoco.physics import PhysicsSettings, add_free_body, add_light, begin_scene
 
 PALM_ARMATURE = 1e7
 """Armature of the palm's joints, relative to what the palm carries."""

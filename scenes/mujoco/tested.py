@@ -2,10 +2,10 @@
 
 The object has the mass that the test states. The world frame is the object's frame moved to the
 centre of mass. Fingers touch the object's own surface, wherever they slide (see
-`scenes.execution.surface`). Gravity is off: the weight, and what a moving palm does to the object,
+`scenes.mujoco.surface`). Gravity is off: the weight, and what a moving palm does to the object,
 are forces on the object.
 
-Fingertips move on slides as in tests of closure (`scenes.mjcf`), but fingertips and object have
+Fingertips move on slides as in tests of closure (`closure_scene`), but fingertips and object have
 true masses, so servos are damped as a mass between them needs. A hand's palm is fixed in the world,
 and its links are light; or, where the test has it so, the hand is as heavy as it is, and its root
 is a free body on a weld to one that moves as told. A weld acts on a free body with the inverse mass
@@ -30,9 +30,7 @@ from grasp_core.hands.hand import PALM, Fingertip, Hand, HandFinger
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.execution.surface import touched_solids
-from scenes.fingertips import FingerSettings
-from scenes.hands.chains_mjcf import (
+from scenes.mujoco.chains_mjcf import (
     SHAPES,
     Chains,
     add_exclusions,
@@ -41,11 +39,13 @@ from scenes.hands.chains_mjcf import (
     hand_inertials,
     placed,
 )
-from scenes.hands.hand_scene import hand_layout
-from scenes.layout import SQUEEZE, arrange
-from scenes.mjcf import add_finger, add_servos
-from scenes.mjcf_text import Element, add_element, as_texts, document, quaternion
-from scenes.physics import PhysicsSettings, add_free_body, begin_scene
+from scenes.mujoco.closure_scene import add_finger, add_servos
+from scenes.mujoco.fingertips import FingerSettings
+from scenes.mujoco.hand_scene import hand_layout
+from scenes.mujoco.layout import SQUEEZE, arrange
+from scenes.mujoco.mjcf_text import Element, add_element, as_texts, document, quaternion
+from scenes.mujoco.physics import PhysicsSettings, add_free_body, begin_scene
+from scenes.mujoco.surface import touched_solids
 
 COMMENT = (
     "The test of another tool: the object has the mass that the test states, and no gravity. "

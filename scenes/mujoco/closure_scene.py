@@ -26,10 +26,10 @@ from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact, Grasp
-from scenes.fingertips import FingerSettings
-from scenes.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
-from scenes.mjcf_text import Element, SceneText, add_element, as_texts, document, quaternion
-from scenes.physics import PhysicsSettings, add_free_body, add_light, begin_scene
+from scenes.mujoco.fingertips import FingerSettings
+from scenes.mujoco.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
+from scenes.mujoco.mjcf_text import Element, SceneText, add_element, as_texts, document, quaternion
+from scenes.mujoco.physics import PhysicsSettings, add_free_body, add_light, begin_scene
 
 Surface = Literal["pads", "mesh"]
 """What fingertips touch: one pad (a small box) each, or the convex hull of the object's mesh."""

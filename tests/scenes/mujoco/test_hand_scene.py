@@ -8,7 +8,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
 from grasp_core.hands.kinematics import places
-from scenes.hands.hand_scene import squeezing
+from scenes.mujoco.hand_scene import squeezing
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
 WRITTEN = 2e-8

@@ -7,7 +7,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.errors import InputError
 from grasp_core.quality.motors import Motors
-from scenes.hands.held_hand import finger_springs
+from scenes.mujoco.held_hand import finger_springs
 from sim_validate.execution.bench import HeldBench
 from sim_validate.execution.paths import closing
 from tests.sim_validate.hands.executing import standing

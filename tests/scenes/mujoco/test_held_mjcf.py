@@ -10,7 +10,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.forces.contact_forces import even_forces
-from scenes.execution.held_mjcf import FINGERTIPS, PALM, TABLE, held_physics, palm_armature
+from scenes.mujoco.held_mjcf import FINGERTIPS, PALM, TABLE, held_physics, palm_armature
 
 OBJECTS = ("dodecahedron", "l-bracket")
 MASS = 0.4

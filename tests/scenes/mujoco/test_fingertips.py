@@ -6,9 +6,9 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from scenes import fingertips
-from scenes.fingertips import clashes, fitting_radius
-from scenes.layout import arrange
+from scenes.mujoco import fingertips
+from scenes.mujoco.fingertips import clashes, fitting_radius
+from scenes.mujoco.layout import arrange
 
 
 def sampled_clearance(body, center, rng, count=40_000):

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from scenes.mjcf_text import (
+from scenes.mujoco.mjcf_text import (
     add_comment,
     add_element,
     as_text,

@@ -25,7 +25,7 @@ from grasp_core.errors import UndecidedError
 from grasp_core.objects.on_faces import face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.fingertips import FingerSettings, fitting_radius
+from scenes.mujoco.fingertips import FingerSettings, fitting_radius
 
 RESPONSE_TIME_S = 0.07
 """Square root of mass x grasp size / largest normal force [s]. It gives 1 kg for 10 N and 5 cm,

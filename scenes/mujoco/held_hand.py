@@ -1,7 +1,7 @@
 """A scene in which a hand on a moving wrist holds an object of true mass, as MJCF text.
 
 Object, table and the moving body are those of other scenes of execution (see
-`scenes.execution.held_mjcf`). On that body stands the hand's palm, with its fingers as chains of
+`scenes.mujoco.held_mjcf`). On that body stands the hand's palm, with its fingers as chains of
 hinges; a servo on each has the motor's torque as its `forcerange`. Palm and links touch the object
 where it comes to them, but for the last links, whose fingertips do.
 
@@ -18,7 +18,7 @@ turn under it, is in `grasp_core.hands.hand_grips`. (1) needs joints that let th
 move in all directions. A stretched finger, or one with two joints, is rigid in some direction,
 which no grip of springs describes.
 
-Servos, inertia and dampers are chosen as for fingertips on springs (see `scenes.execution.held`)
+Servos, inertia and dampers are chosen as for fingertips on springs (see `scenes.mujoco.held`)
 at the root mean square l of the levers: k_q = K l^2, a = m_t l^2, c_q = c l^2. Motors have the
 torque limits that are left when they carry their links in any orientation (see `Motors`), so links
 weigh nothing in the scene.
@@ -39,8 +39,10 @@ from grasp_core.hands.kinematics import HandPlaces, places
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
-from scenes.execution.held import HeldLayout, HeldSettings, held_layout
-from scenes.execution.held_mjcf import (
+from scenes.mujoco.chains_mjcf import Chains, add_hand
+from scenes.mujoco.hand_scene import mean_lever, touching
+from scenes.mujoco.held import HeldLayout, HeldSettings, held_layout
+from scenes.mujoco.held_mjcf import (
     FINGERTIPS,
     HeldScene,
     add_palm,
@@ -48,10 +50,8 @@ from scenes.execution.held_mjcf import (
     held_physics,
     opened,
 )
-from scenes.hands.chains_mjcf import Chains, add_hand
-from scenes.hands.hand_scene import mean_lever, touching
-from scenes.mjcf_text import document
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.mjcf_text import document
+from scenes.mujoco.physics import PhysicsSettings
 
 EXECUTION = "an execution with the hand"
 STRETCHED = 0.02

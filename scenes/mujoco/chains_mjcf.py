@@ -20,7 +20,7 @@ import numpy as np
 from grasp_core.arrays import Array, to_digits
 from grasp_core.hands.hand import PALM, Hand, Link, LinkShape
 from grasp_core.hands.kinematics import rotation_about
-from scenes.mjcf_text import Element, add_element, quaternion
+from scenes.mujoco.mjcf_text import Element, add_element, quaternion
 
 DENSITY_KG_M3 = 1000.0
 """Density of links: the one that MuJoCo takes itself."""

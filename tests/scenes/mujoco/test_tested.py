@@ -7,9 +7,16 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.fingertips import FingerSettings
-from scenes.physics import PhysicsSettings
-from scenes.tested import HandServos, Postures, Weld, fingertip_scene, hand_scene, planned_postures
+from scenes.mujoco.fingertips import FingerSettings
+from scenes.mujoco.physics import PhysicsSettings
+from scenes.mujoco.tested import (
+    HandServos,
+    Postures,
+    Weld,
+    fingertip_scene,
+    hand_scene,
+    planned_postures,
+)
 from sim_validate.dexgraspbench import hand_file
 from sim_validate.protocols.published import protocol
 from tests.grasp_core.hands.gripping import FRICTION, plain_hand, reaches, scaled

@@ -45,7 +45,7 @@ def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, 
     middles = triangles.mean(axis=1)
     widest = float(np.linalg.norm(triangles - middles[:, None], axis=2).max())
     spatial: Any = importlib.import_module("scipy.spatial")
-    tree, kernel = spatial.KDTree(middles), compiled("scenes.execution.clearance_kernel")
+    tree, kernel = spatial.KDTree(middles), compiled("scenes.mujoco.clearance_kernel")
     found, thin, slack = list[Array](), THIN * body.radius, TOUCHING * body.radius
     for corners, inward in _flat_pieces(body):
         middle = corners.mean(axis=0)

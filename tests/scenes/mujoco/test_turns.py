@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scenes.execution.held import hinged, rotations
+from scenes.mujoco.held import hinged, rotations
 
 
 def turn_about(axis, angle):
