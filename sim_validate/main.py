@@ -15,9 +15,12 @@ from tyro.conf import FlagCreatePairsOff
 
 from grasp_core.errors import GraspError, InputError
 from grasp_core.settings import SettingError
-from sim_validate.cli import baseline_flags, dataset_flags
-from sim_validate.cli.baseline_flags import Baseline
-from sim_validate.cli.command_flags import (
+from sim_validate.baselines import flags as baseline_flags
+from sim_validate.baselines.flags import Baseline
+from sim_validate.datasets import flags as dataset_flags
+from sim_validate.datasets.flags import Dataset
+from sim_validate.hands.flags import Hand, Reach
+from sim_validate.kit.command_flags import (
     Analyze,
     Doctor,
     Execute,
@@ -34,12 +37,10 @@ from sim_validate.cli.command_flags import (
     Validate,
     View,
 )
-from sim_validate.cli.config_file import with_config
-from sim_validate.cli.dataset_flags import Dataset
-from sim_validate.cli.examples import examples_for
-from sim_validate.cli.exit_codes import Exit, FlagsError, exit_code, reason_of
-from sim_validate.cli.flag_groups import Spoken
-from sim_validate.cli.hand_flags import Hand, Reach
+from sim_validate.kit.config_file import with_config
+from sim_validate.kit.examples import examples_for
+from sim_validate.kit.exit_codes import Exit, FlagsError, exit_code, reason_of
+from sim_validate.kit.flag_groups import Spoken
 
 Command = (
     Run | Plan | Validate | Execute | Scene | Export | View | Report | Regions | Replay | Analyze
@@ -49,28 +50,28 @@ COMMANDS = {kind.__name__.lower(): kind for kind in get_args(Command)}
 """The classes of flags, by the names of their commands."""
 ACTIONS: dict[type[Any], str] = {
     Run: "run:run_object",
-    Plan: "plan:plan_file",
-    Validate: "judging:judge_file",
-    Execute: "execute:execute_file",
-    Scene: "scene:write_scenes",
-    Export: "scene:export_grasps",
-    View: "view:view_grasp",
-    Report: "view:report_folder",
-    Regions: "regions:certify_file",
-    Replay: "replay:replay_trial",
-    Analyze: "analyze:analyze_file",
-    Transfer: "transfer:transfer_file",
-    Reach: "judging:judge_reach",
-    Hand: "hand:show_hand",
-    dataset_flags.Build: "dataset:build_dataset",
-    dataset_flags.Import: "dataset:import_dataset",
-    dataset_flags.Verify: "dataset:verify_dataset",
-    dataset_flags.Export: "dataset:export_dataset",
-    baseline_flags.Record: "baseline:record_baseline",
-    baseline_flags.Check: "baseline:check_baseline",
-    Inspect: "objects:inspect_object",
-    Objects: "objects:list_objects",
-    Doctor: "doctor:check_installation",
+    Plan: "planning.plan:plan_file",
+    Validate: "protocols.command:judge_file",
+    Execute: "execution.command:execute_file",
+    Scene: "execution.scene_command:write_scenes",
+    Export: "execution.scene_command:export_grasps",
+    View: "report.command:view_grasp",
+    Report: "report.command:report_folder",
+    Regions: "planning.regions:certify_file",
+    Replay: "report.replay_command:replay_trial",
+    Analyze: "planning.analyze:analyze_file",
+    Transfer: "planning.transfer:transfer_file",
+    Reach: "protocols.command:judge_reach",
+    Hand: "hands.hand_command:show_hand",
+    dataset_flags.Build: "datasets.command:build_dataset",
+    dataset_flags.Import: "datasets.command:import_dataset",
+    dataset_flags.Verify: "datasets.command:verify_dataset",
+    dataset_flags.Export: "datasets.command:export_dataset",
+    baseline_flags.Record: "baselines.command:record_baseline",
+    baseline_flags.Check: "baselines.command:check_baseline",
+    Inspect: "planning.objects:inspect_object",
+    Objects: "planning.objects:list_objects",
+    Doctor: "closure.doctor_command:check_installation",
 }
 """Module and function of each command. They are named as text, because planning must not wait until
 a simulator is imported."""
@@ -115,16 +116,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def execute(command: Spoken) -> int:
     """Carry out a command and return its exit code."""
-    from sim_validate.cli.console import Reporter
+    from sim_validate.kit.console import Reporter
 
     speech = command.speech
     reporter = Reporter(speech.quiet, speech.verbose, speech.json)
-    return resolve_name(f"sim_validate.commands.{ACTIONS[type(command)]}")(command, reporter)
+    return resolve_name(f"sim_validate.{ACTIONS[type(command)]}")(command, reporter)
 
 
 def _dispatch(command: Spoken) -> int:
     try:
-        from sim_validate.parallel import interrupts
+        from sim_validate.kit import interrupts
 
         with interrupts.noted():
             code = execute(command)
@@ -142,7 +143,7 @@ def _dispatch(command: Spoken) -> int:
 
 
 def _complain(message: str, code: Exit) -> int:
-    from sim_validate.cli.console import printable
+    from sim_validate.kit.console import printable
 
     if sys.stderr is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
         sys.stderr.write(f"graspproof: {printable(message)}\n")
@@ -151,7 +152,7 @@ def _complain(message: str, code: Exit) -> int:
 
 def run_and_exit() -> None:
     """Run the `graspproof` command as a program, and exit with its exit code."""
-    from sim_validate.cli import streams
+    from sim_validate.kit import streams
 
     gc.set_threshold(COLLECTED_AFTER)
     streams.steady()

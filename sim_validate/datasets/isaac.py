@@ -32,7 +32,7 @@ from sim_validate.datasets.open_dataset import Row, Selection, select
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.rows import GIVEN
 from sim_validate.datasets.tables import SHORT, Name, SplitName
-from sim_validate.files.writing import whole_folder, write_lines
+from sim_validate.kit.writing import whole_folder, write_lines
 
 AXES = "xyz"
 HEAD = """\

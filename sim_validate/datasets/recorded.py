@@ -6,13 +6,13 @@ from pathlib import Path
 from grasp_core.errors import InputError
 from grasp_core.planning.given_contacts import seat
 from grasp_core.values import Contact
+from sim_validate.closure.replaying import Recorded, Wanted
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.rows import GIVEN, NOT_TRIED
 from sim_validate.datasets.varied import VARIED
-from sim_validate.records.grasps import NAMED, some
-from sim_validate.replaying import Recorded, Wanted
-from sim_validate.simulation.setup import Agenda, Setup
+from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.planning.grasps_json import NAMED, some
 
 
 def recorded_in_dataset(folder: Path, wanted: Wanted) -> Recorded:

@@ -19,9 +19,9 @@ from scenes.example_objects import example_object
 from scenes.mujoco.held import UPRIGHT, HeldSettings
 from scenes.mujoco.held_mjcf import HeldScene, build_held_scene
 from scenes.mujoco.physics import PhysicsSettings
+from sim_validate.engine.known_cases import Check, near, sized
 from sim_validate.execution.bench import HeldMotion
 from sim_validate.execution.paths import samples, smoother
-from sim_validate.simulation.known_cases import Check, near, sized
 
 DOWN = np.array(UPRIGHT)
 WEIGHT = GRAVITY_M_PER_S2 * DOWN

@@ -17,16 +17,13 @@ from scenes.mujoco.fingertips import FingerSettings
 from scenes.mujoco.held import HeldSettings
 from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.baselines.part import IfChanged
-from sim_validate.cli import (
-    command_flags,
-    dataset_flags,
-    flag_groups,
-    hand_flags,
-)
+from sim_validate.datasets import flags as dataset_flags
 from sim_validate.datasets.config import Learning
+from sim_validate.engine.setup import Noise
 from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.hands import flags as hand_flags
+from sim_validate.kit import command_flags, flag_groups
 from sim_validate.main import Command
-from sim_validate.simulation.setup import Noise
 from tests.sim_validate.rigs import grasps
 
 ENDS = {end for ends in BOUNDS.values() for end in ends.values()}

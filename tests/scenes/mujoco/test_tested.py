@@ -17,7 +17,7 @@ from scenes.mujoco.tested import (
     hand_scene,
     planned_postures,
 )
-from sim_validate.dexgraspbench import hand_file
+from sim_validate.hands.dexgraspbench import hand_file
 from sim_validate.protocols.published import protocol
 from tests.grasp_core.hands.gripping import FRICTION, plain_hand, reaches, scaled
 

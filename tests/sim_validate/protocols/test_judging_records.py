@@ -11,7 +11,7 @@ import grasp_core as gc
 from grasp_core.errors import InputError
 from scenes.mujoco.mjcf_text import quaternion
 from scenes.mujoco.tested import HandServos, hand_scene
-from sim_validate.dexgraspbench import (
+from sim_validate.hands.dexgraspbench import (
     FREE,
     dex_record,
     hand_file,
