@@ -13,10 +13,10 @@ from grasp_core.files.json_text import complaint
 from grasp_core.planning.result import Plan
 from grasp_core.settings import as_table
 from scenes.settings import FingerSettings, Surface
+from sim_validate.closure.setup_toml import setup_from_file, setup_from_tables, tables_of
+from sim_validate.engine.settings import LimitSearch, Noise
+from sim_validate.engine.setup import Agenda, NamedWrench, Setup, with_planned_radius
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.records.setup_toml import setup_from_file, setup_from_tables, tables_of
-from sim_validate.simulation.settings import LimitSearch, Noise
-from sim_validate.simulation.setup import Agenda, NamedWrench, Setup, with_planned_radius
 
 Count = Annotated[int, Field(ge=0)]
 

@@ -26,8 +26,8 @@ from grasp_core.settings import (
     as_table,
 )
 from sim_validate.datasets.tables import Tables, dataset_tables
+from sim_validate.engine.settings import LimitSearch
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.simulation.settings import LimitSearch
 
 EXECUTION = "execution"
 LEARNING = "learning"
@@ -196,7 +196,7 @@ class DatasetConfig(PlannedContent):
 
 def config_from_toml(path: Path) -> DatasetConfig:
     """Read a configuration from a file."""
-    from sim_validate.files.toml_tables import read_tables  # slow, and no flag needs it
+    from sim_validate.kit.toml_tables import read_tables  # slow, and no flag needs it
 
     given = read_tables(path)
     with about(path):

@@ -10,9 +10,9 @@ import grasp_core as gc
 from grasp_core.hands.named_hands import hand_names
 from grasp_core.settings import taken
 from scenes.settings import PhysicsSettings
-from sim_validate.cli.command_flags import COMMANDS
-from sim_validate.cli.flag_values import flags_of, parts_of
 from sim_validate.datasets.config import HandName
+from sim_validate.kit.flag_values import flags_of, parts_of
+from sim_validate.main import COMMANDS
 
 
 def refuses(kind, value):

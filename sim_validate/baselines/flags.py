@@ -1,0 +1,70 @@
+"""The flags of the commands about baselines; this module imports nothing that is slow to load."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg, subcommand
+
+from grasp_core.settings import Count, Seed, Settings
+from grasp_core.transferring.settings import IfChanged
+from sim_validate.engine.settings import ChosenTrials
+from sim_validate.kit.flag_groups import PLAIN, Jobs, Spoken
+from sim_validate.kit.processes import available_cores
+
+MeshFile = Annotated[Path | None, arg(help=(
+    "The mesh file that the grasps were planned from; if not given, a file with the object's name "
+    "beside them or the baseline."
+))]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Record(Spoken):
+    """Simulate grasps and write a baseline: a file that records how stable each grasp is."""
+
+    grasps: Positional[Path]
+    """The grasps.json with the grasps to simulate."""
+    out: Annotated[Path, arg(aliases=("-o",))]
+    """Path of the baseline to write."""
+    limit: Count | None = None
+    """Number of grasps to simulate, from the first; all of them if not given."""
+    setup: Path | None = None
+    """TOML file of simulation settings (see docs/files.md)."""
+    wrenches: Path | None = None
+    """JSON file of wrenches that each grasp must hold in full (see docs/files.md)."""
+    more: Annotated[ChosenTrials, PLAIN] = field(default_factory=ChosenTrials)
+    seed: Seed | None = None
+    """Seed of all random choices; if not given, the seed that the grasps were planned with."""
+    object: MeshFile = None
+    changed_part: IfChanged = field(default_factory=IfChanged)
+    jobs: Jobs = field(default_factory=available_cores)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Check(Spoken):
+    """Simulate the grasps of a baseline again, and report how each result has changed."""
+
+    baseline: Positional[Path]
+    """Path of the baseline to check."""
+    grasps: Path | None = None
+    """Use this grasps.json instead of the one that the baseline names."""
+    setup: Path | None = None
+    """TOML file of simulation settings to use instead of those in the baseline."""
+    strict: bool = False
+    """Fail also if a grasp has become better."""
+    bless: bool = False
+    """Write the new results over the baseline, even if grasps have become worse."""
+    object: MeshFile = None
+    changed_part: IfChanged = field(default_factory=IfChanged)
+    jobs: Jobs = field(default_factory=available_cores)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Baseline(Settings):
+    """Record simulation results of grasps, and notice later when their stability changes."""
+
+    action: Annotated[
+        Annotated[Record, subcommand("record", prefix_name=False)]
+        | Annotated[Check, subcommand("check", prefix_name=False)],
+        PLAIN,
+    ]

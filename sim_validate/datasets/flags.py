@@ -1,0 +1,97 @@
+"""The flags of the commands about datasets; this module imports nothing that is slow to load."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import Positional, subcommand
+
+from grasp_core.settings import Seed, Settings, Share
+from sim_validate.datasets.config import Content, Learning, PlannedContent
+from sim_validate.datasets.tables import SplitName
+from sim_validate.kit.flag_groups import PLAIN, Count, Positive, Spoken
+from sim_validate.kit.processes import available_cores
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Work(Settings):
+    """Where a dataset is computed, and how much time; no row depends on these."""
+
+    engine: Literal["local", "ray", "dask"] = "local"
+    """Where to compute: in processes of this machine, or on a Ray or Dask cluster."""
+    address: str | None = None
+    """Address of the Ray or Dask cluster; if not given, one is started on this machine."""
+    timeout_s: Positive = 3600.0
+    """Time after which an attempt at one object and friction is stopped; each gets two attempts
+    [s]."""
+    jobs: Count = field(default_factory=available_cores)
+    """Number of processes; results do not depend on it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Build(Spoken):
+    """Plan and simulate grasps of many objects and write tables; run it again to resume."""
+
+    objects: Positional[tuple[str, ...]]
+    """Mesh files, folders of mesh files, or names of built-in objects; or one TOML file with all
+    settings but --out (see docs/datasets.md)."""
+    out: Path
+    """Folder of the dataset."""
+    content: Annotated[PlannedContent, PLAIN] = field(default_factory=PlannedContent)
+    learning: Annotated[Learning, PLAIN] = field(default_factory=Learning)
+    work: Annotated[Work, PLAIN] = field(default_factory=Work)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Import(Spoken):
+    """Judge grasps made by another tool, simulate them, and write them as a dataset."""
+
+    contacts: Positional[Path]
+    """A contacts file of four contacts for each grasp (see docs/datasets.md)."""
+    object: Positional[str]
+    """The mesh file that the contacts are on, or the name of a built-in object."""
+    out: Path
+    """Folder of the dataset."""
+    outward: bool = False
+    """Read the file's normals as pointing out of the object, not into it."""
+    content: Annotated[Content, PLAIN] = field(default_factory=Content)
+    work: Annotated[Work, PLAIN] = field(default_factory=Work)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Verify(Spoken):
+    """Check files and rows of a dataset, prove force closure again, and redo a sample."""
+
+    dataset: Positional[Path]
+    """Folder of the dataset."""
+    share: Share = 0.01
+    """Share of all objects and frictions that is computed again, at least one; 0 for none."""
+    seed: Seed = 0
+    """Seed of the random choice of the sample that is computed again."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Export(Spoken):
+    """Write the grasps of a dataset that are in force closure for another program."""
+
+    dataset: Positional[Path]
+    """Folder of the dataset."""
+    out: Path
+    """Folder to write to; it must be empty or not exist."""
+    to: Literal["isaac"] = "isaac"
+    """Format: Isaac grasp files, one for each object at each friction."""
+    split: SplitName | None = None
+    """Export only the objects of this split; if not given, all objects."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Dataset(Settings):
+    """Build a dataset of grasps of many objects; check or export datasets."""
+
+    action: Annotated[
+        Annotated[Build, subcommand("build", prefix_name=False)]
+        | Annotated[Import, subcommand("import", prefix_name=False)]
+        | Annotated[Verify, subcommand("verify", prefix_name=False)]
+        | Annotated[Export, subcommand("export", prefix_name=False)],
+        PLAIN,
+    ]
