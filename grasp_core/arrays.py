@@ -9,14 +9,16 @@ arrays may hide entries. To check arrays of other types, convert them first,
 """
 
 import math
+from dataclasses import dataclass
 from numbers import Real
-from typing import Any, TypeAlias, TypeGuard, cast
+from typing import Annotated, Any, TypeAlias, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.checked import LARGEST_FRICTION, MOST_COUNT, shown
 from grasp_core.errors import InputError
+from grasp_core.kinds import UnfitError
 
 Array: TypeAlias = NDArray[np.float64]
 """Float array of any shape; the docstring of each value or argument gives its shape."""
@@ -65,6 +67,69 @@ def frozen(
         )
     array.setflags(write=False)
     return array
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The rule of a kind that a value is an array of a shape, copied and read-only.
+
+    Lengths that are None are free; those with the same letter in a class are the same.
+    """
+
+    shape: tuple[int | str | None, ...]
+    units: bool = False
+    """Whether vectors along the last axis have length one."""
+    whole: bool = False
+    """Whether entries are whole numbers from 0 up."""
+    least: float = -LARGEST_ENTRY
+    most: float = LARGEST_ENTRY
+
+    def __init__(self, *shape: int | str | None, **rules: Any) -> None:
+        object.__setattr__(self, "shape", shape)
+        for name, value in rules.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def _lengths(self) -> tuple[int | None, ...]:
+        return tuple(None if isinstance(n, str) else n for n in self.shape)
+
+    def take(self, value: Any) -> NDArray[Any]:
+        """Return a read-only copy of a value as an array of this shape."""
+        make = frozen_indices if self.whole else frozen_units if self.units else frozen
+        try:
+            array = make(value, self._lengths, "")
+        except InputError as error:
+            raise UnfitError(str(error).strip()) from None
+        self._check_ends(array)
+        return array
+
+    def exact(self, value: Any) -> NDArray[Any]:
+        """Return an array that is of this shape and type already."""
+        fits = is_indices if self.whole else are_units if self.units else is_array
+        if not fits(value, *self._lengths):
+            raise UnfitError
+        self._check_ends(value)
+        return value
+
+    def _check_ends(self, array: NDArray[Any]) -> None:
+        if array.size and not self.least <= array.min() <= array.max() <= self.most:
+            raise UnfitError(
+                f"must hold numbers from {self.least:g} to {self.most:g}, got "
+                f"{float(array.min()):.6g} to {float(array.max()):.6g}"
+            )
+
+    def __str__(self) -> str:
+        """Return the shape in words."""
+        lengths = ", ".join("any" if n is None else str(n) for n in self.shape)
+        entries = "whole numbers" if self.whole else "unit vectors" if self.units else "numbers"
+        return f"an array of {entries} of shape ({lengths}{',' * (len(self.shape) == 1)})"
+
+
+Point = Annotated[Array, Shape(3)]
+"""A point or a vector, (3,)."""
+UnitVector = Annotated[Array, Shape(3, units=True)]
+Wrench = Annotated[Array, Shape(6)]
+"""A force [N], then a torque [N m], (6,)."""
 
 
 def frozen_copy(values: Array) -> Array:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, get_args
 import numpy as np
 
 from grasp_core.arrays import Array, frozen, frozen_units
-from grasp_core.by_value import ByValue, counted, summary, vector
 from grasp_core.checked import LARGEST, instance, number, one_of, several, shown, text, whole
+from grasp_core.declared import ByValue, counted, summary, vector
 from grasp_core.errors import InputError
 from grasp_core.frames import poses_along
 

@@ -14,7 +14,8 @@ from typing import Annotated, Any, Literal
 from grasp_core.arrays import Array, Indices
 from grasp_core.checked import LARGEST
 from grasp_core.errors import InputError
-from grasp_core.settings import NotNegative, Quantity, Range, Settings
+from grasp_core.kinds import NotNegative, Quantity, Range
+from grasp_core.settings import Settings
 from scenes.mjcf_text import COMPILER, Element, add_comment, add_element, element, printable
 
 MOST_ITERATIONS = 10_000

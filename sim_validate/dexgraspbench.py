@@ -31,9 +31,9 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 
 from grasp_core.arrays import Array, frozen, real_array, to_digits
-from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import coefficient, instance, number, path_of, positive, text
 from grasp_core.closure.force_closure import force_closure
+from grasp_core.declared import ByValue, summary
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import shown, text_of
 from grasp_core.files.text_files import read_bytes, write_parts, write_text

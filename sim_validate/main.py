@@ -13,8 +13,8 @@ from typing import Any
 import tyro
 from tyro.conf import FlagCreatePairsOff
 
+from grasp_core.declared import FieldError
 from grasp_core.errors import GraspError, InputError
-from grasp_core.settings import SettingError
 from sim_validate.cli import baseline_flags, command_flags, dataset_flags, hand_flags
 from sim_validate.cli.baseline_flags import Baseline
 from sim_validate.cli.command_flags import COMMANDS, Command
@@ -83,7 +83,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as stop:
         sys.stdout.write(examples_for(arguments))
         return stop.code if isinstance(stop.code, int) else Exit.USAGE
-    except SettingError as error:
+    except FieldError as error:
         return _complain(f"--{error.name.replace('_', '-')} {error.fault}", Exit.USAGE)
     except KeyboardInterrupt:
         return _complain("interrupted", Exit.INTERRUPTED)

@@ -47,7 +47,6 @@ from grasp_core.arrays import (
     is_number,
     of_order_one,
 )
-from grasp_core.by_value import ByValue, trusted
 from grasp_core.closure import proofs, soft_closure, soft_contacts
 from grasp_core.closure.contacts import (
     contact_arrays,
@@ -60,6 +59,7 @@ from grasp_core.closure.contacts import (
 )
 from grasp_core.closure.decision import decide, decided_at_once
 from grasp_core.closure.soft_contacts import SoftContacts, are_torsions, contact_torsions
+from grasp_core.declared import ByValue, trusted
 from grasp_core.errors import UndecidedError
 from grasp_core.values import Contact, Grasp
 

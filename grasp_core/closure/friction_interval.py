@@ -31,7 +31,6 @@ from typing import TypeVar
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, are_units, cross, is_array, is_number
-from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contacts import (
     FEWEST,
@@ -41,6 +40,7 @@ from grasp_core.closure.contacts import (
     normal_and_tangential,
     unit_size,
 )
+from grasp_core.declared import ByValue
 
 Number = TypeVar("Number", int, Fraction)
 Exact = list[Fraction]

@@ -29,7 +29,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, are_frictions, frozen, is_a, is_array
-from grasp_core.by_value import ByValue
 from grasp_core.checked import one_of, positive, shown
 from grasp_core.closure.contacts import (
     WRENCH,
@@ -41,6 +40,7 @@ from grasp_core.closure.contacts import (
     in_frames,
 )
 from grasp_core.closure.soft_contacts import LOCAL, contact_torsions, torsion_lengths
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.solvers.ties import on_grid

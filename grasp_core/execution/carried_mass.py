@@ -87,10 +87,10 @@ from grasp_core.arrays import (
     is_number,
     of_order_one,
 )
-from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import LARGEST, SMALLEST, number
 from grasp_core.closure.contacts import WRENCH, contact_frames, in_frames
 from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.declared import ByValue, summary
 from grasp_core.execution.ball_in_hull import ball_in, nearest_facet, outward
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.quality.motors import Motors

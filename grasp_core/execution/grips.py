@@ -55,7 +55,6 @@ from grasp_core.arrays import (
     is_array,
     real_array,
 )
-from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, instance
 from grasp_core.closure.contacts import (
     FEWEST,
@@ -68,6 +67,7 @@ from grasp_core.closure.contacts import (
     listed_contacts,
     stacked,
 )
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron

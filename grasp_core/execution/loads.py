@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen, is_array
-from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, number, positive
 from grasp_core.closure.contacts import WRENCH
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 
 GRAVITY_M_PER_S2 = 9.80665

@@ -36,9 +36,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, is_a, is_indices, is_number, is_tuple_of
-from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import positive
 from grasp_core.closure.contacts import WRENCH
+from grasp_core.declared import ByValue, summary
 from grasp_core.errors import InputError
 from grasp_core.execution.ball_in_hull import ball_in, least_distance, nearest_facet, outward
 from grasp_core.execution.best_squeeze import searched

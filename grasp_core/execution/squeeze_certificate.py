@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array, is_a, is_array, is_indices, is_number
-from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST
 from grasp_core.closure.contacts import WRENCH
+from grasp_core.declared import ByValue
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet
 from grasp_core.execution.squeeze_rows import Cuts, Survival

@@ -40,8 +40,8 @@ from functools import cached_property
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, of_order_one
-from grasp_core.by_value import ByValue
 from grasp_core.closure.contacts import grasp_map, in_frames
+from grasp_core.declared import ByValue
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet
 from grasp_core.execution.worst_loads import Reactions

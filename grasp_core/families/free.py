@@ -58,11 +58,11 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, are_frictions, is_a, is_tuple_of
-from grasp_core.by_value import ByValue
 from grasp_core.closure.contacts import cross_matrix, grasp_map, normal_and_tangential
 from grasp_core.closure.force_closure import ClosureCertificate, certificates, force_closure
 from grasp_core.closure.lines import classify_lines
 from grasp_core.cones.pyramids import pyramid_facets
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.placements import Placement
 from grasp_core.geometry.polygons import clip

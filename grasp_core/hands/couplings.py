@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.by_value import ByValue
 from grasp_core.checked import number, text
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 
 LARGEST_RATIO, SMALLEST_RATIO, LARGEST_OFFSET = 100.0, 0.01, 100.0

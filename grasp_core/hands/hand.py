@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen, frozen_each, frozen_units
-from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import BOUNDS, instance, number, several, text
+from grasp_core.declared import ByValue, counted, summary
 from grasp_core.errors import InputError
 from grasp_core.hands.couplings import Coupling, Drives, drives
 

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices
-from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import (
     BOUNDS,
     coefficient,
@@ -32,6 +31,7 @@ from grasp_core.checked import (
     whole,
 )
 from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.declared import ByValue, summary
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import Fingertip, Hand

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from grasp_core.settings import Count, Settings
+from grasp_core.kinds import Count
+from grasp_core.settings import Settings
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, are_units, is_array, is_number
-from grasp_core.by_value import ByValue
+from grasp_core.declared import ByValue
 from grasp_core.geometry.polygons import (
     FEWEST_CORNERS,
     MOST_CORNERS,

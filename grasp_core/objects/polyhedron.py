@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices, rounded
-from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import (
     LARGEST,
     instance,
@@ -29,6 +28,7 @@ from grasp_core.checked import (
     shown,
     text,
 )
+from grasp_core.declared import ByValue, counted, summary
 from grasp_core.errors import InputError, about
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles

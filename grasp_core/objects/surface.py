@@ -12,9 +12,10 @@ from typing import Annotated, Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices, frozen_units
-from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import LARGEST, number, several, switch, text, whole
-from grasp_core.settings import Range, Settings
+from grasp_core.declared import ByValue, counted, summary
+from grasp_core.kinds import Range
+from grasp_core.settings import Settings
 from grasp_core.values import RIGHT_ANGLE
 
 FaceKind: TypeAlias = Literal["auto", "planar", "patches"]

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen_each, is_a
-from grasp_core.by_value import ByValue
 from grasp_core.checked import BOUNDS, LARGEST, coefficient, number, several, whole
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_planar

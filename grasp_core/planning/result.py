@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from textwrap import shorten
 from typing import Any, Protocol, TypeAlias
 
-from grasp_core.by_value import ByValue, counted, summary
+from grasp_core.declared import ByValue, counted, summary
 from grasp_core.grasp_tables import ById, chosen, data_frame
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron

@@ -43,9 +43,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, are_units, is_array, is_indices
-from grasp_core.by_value import ByValue
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.declared import ByValue
 
 LOST = 64.0 * float(np.finfo(np.float64).eps)
 """Error of a sum of six products, relative to the lengths of the two vectors: ten times what it

@@ -56,10 +56,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array, are_units, frozen, is_a, is_array, is_number
-from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, one_of
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import WrenchSet, force_rows, into_cones
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError, SolverError
 from grasp_core.quality.ferrari_canny import (
     CHECK_SLACK,

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen, frozen_each, is_array
-from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, instance
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 
 

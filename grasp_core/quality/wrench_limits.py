@@ -43,7 +43,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen, frozen_copy, is_array, is_number
-from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, positive
 from grasp_core.closure.contacts import (
     WRENCH,
@@ -55,6 +54,7 @@ from grasp_core.closure.contacts import (
 )
 from grasp_core.closure.soft_contacts import LOCAL, contact_torsions, torsion_lengths
 from grasp_core.closure.wrench_sets import WrenchSet, force_rows, with_torques
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError, SolverError
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.solvers.conic import ConicProgram, minimize

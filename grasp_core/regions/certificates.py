@@ -16,10 +16,10 @@ from grasp_core.arrays import (
     is_number,
     is_tuple_of,
 )
-from grasp_core.by_value import ByValue
 from grasp_core.checked import SMALLEST, instance, number, positive, several
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import (
     FEWEST_CORNERS,

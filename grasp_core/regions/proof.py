@@ -57,7 +57,7 @@ from grasp_core.arrays import (
     is_a,
     is_array,
 )
-from grasp_core.by_value import ByValue
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 
 TWIST = 6

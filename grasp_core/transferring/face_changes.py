@@ -44,8 +44,8 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.by_value import counted
 from grasp_core.checked import BOUNDS, instance, number
+from grasp_core.declared import counted
 from grasp_core.errors import InputError
 from grasp_core.objects.on_faces import ON_FACE
 from grasp_core.objects.polyhedron import Polyhedron

@@ -27,10 +27,10 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import coefficient, instance, several
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.declared import ByValue, counted, summary
 from grasp_core.errors import UndecidedError
 from grasp_core.families.free import of_general_type
 from grasp_core.families.placements import Placement

@@ -23,9 +23,10 @@ from grasp_core.closure.contacts import WRENCH, contact_frames, grasp_map
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip, check_grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from grasp_core.kinds import Direction, Quantity, Range
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.settings import Direction, Quantity, Range, Settings
+from grasp_core.settings import Settings
 from scenes.execution.surface import touched_solids
 
 

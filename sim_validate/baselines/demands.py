@@ -7,9 +7,10 @@ from typing import Annotated, Any
 
 from grasp_core.checked import LARGEST_FRICTION, MOST_RANDOM_WRENCHES, MOST_TRIALS
 from grasp_core.errors import InputError
+from grasp_core.kinds import Range, Seed
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
-from grasp_core.settings import Range, Seed, Settings, for_users, named
+from grasp_core.settings import Settings, for_users, named
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines.explain import not_survived, unstable

@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
-from grasp_core.by_value import counted
+from grasp_core.declared import counted
 from sim_validate.baselines.baseline import Baseline, Entry
 from sim_validate.baselines.check import Checked
 from sim_validate.baselines.compare import WORDS, Status

@@ -14,11 +14,12 @@ from typing import Annotated, Literal
 
 from grasp_core.errors import InputError, MeshError
 from grasp_core.files.text_files import read_bytes
+from grasp_core.kinds import NotNegative, Quantity, Range
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import RECORDED
-from grasp_core.settings import NotNegative, Quantity, Range, Settings
+from grasp_core.settings import Settings
 from grasp_core.transferring.changed_part import fitting_lengths, fitting_unit, load_changed_part
 from grasp_core.transferring.face_changes import (
     ANGLE_DEG,

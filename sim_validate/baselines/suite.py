@@ -11,8 +11,9 @@ from typing import Annotated, Any
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES, MOST_TRIALS
 from grasp_core.errors import InputError, about
+from grasp_core.kinds import Range, Seed
 from grasp_core.planning.result import Plan
-from grasp_core.settings import CHOSEN, Range, Seed, Settings
+from grasp_core.settings import CHOSEN, Settings
 from sim_validate.baselines.baseline import Baseline, check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import (
     Checked,

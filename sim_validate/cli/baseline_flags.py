@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 from tyro.conf import OmitArgPrefixes, Positional, arg, subcommand
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
-from grasp_core.settings import Range, Settings
+from grasp_core.kinds import Range
+from grasp_core.settings import Settings
 from sim_validate.cli.flag_groups import (
     Carrying,
     Count,

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, get_args
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from grasp_core.checked import BOUNDS, MOST_COUNT
-from grasp_core.settings import Ending, Range
+from grasp_core.kinds import Ending, Range
 from sim_validate.cli.baseline_flags import Baseline
 from sim_validate.cli.dataset_flags import Dataset
 from sim_validate.cli.flag_groups import (

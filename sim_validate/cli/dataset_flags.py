@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, subcommand
 
 from grasp_core.checked import MOST_RANDOM_WRENCHES
-from grasp_core.settings import Range, Settings
+from grasp_core.kinds import Range
+from grasp_core.settings import Settings
 from sim_validate.cli.flag_groups import Count, Friction, Lengths, Positive, Seed, Spoken
 from sim_validate.datasets.tables import SplitName
 from sim_validate.parallel.processes import available_cores

@@ -16,8 +16,9 @@ from grasp_core.checked import (
     MOST_RANDOM_WRENCHES,
     MOST_TRIALS,
 )
+from grasp_core.kinds import Count, Friction, Quantity, Range, Seed, Size
 from grasp_core.mesh_files import limits as mesh_limits
-from grasp_core.settings import Count, Friction, Quantity, Range, Seed, Settings, Size
+from grasp_core.settings import Settings
 from sim_validate.parallel.processes import available_cores
 
 USUAL_MESH = mesh_limits.MeshLimits()

@@ -10,7 +10,7 @@ from typing import Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 from grasp_core.checked import BOUNDS
-from grasp_core.settings import Range
+from grasp_core.kinds import Range
 from sim_validate.cli.flag_groups import (
     Count,
     Direction,

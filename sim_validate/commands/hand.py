@@ -2,7 +2,7 @@
 
 import math
 
-from grasp_core.by_value import counted
+from grasp_core.declared import counted
 from grasp_core.hands.couplings import Coupling
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.named_hands import HANDS

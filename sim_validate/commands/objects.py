@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from grasp_core.by_value import vector
 from grasp_core.cones.spanning import count_spanning
+from grasp_core.declared import vector
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face

@@ -12,7 +12,7 @@ from functools import partial
 from operator import call
 from pathlib import Path
 
-from grasp_core.by_value import counted
+from grasp_core.declared import counted
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.files.text_files import write_text

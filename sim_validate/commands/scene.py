@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from grasp_core.by_value import counted
+from grasp_core.declared import counted
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.files.text_files import write_text
 from grasp_core.planning.result import Plan

@@ -20,9 +20,10 @@ from grasp_core.checked import (
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import shown
 from grasp_core.hands.named_hands import hand_names, load_hand
+from grasp_core.kinds import Count, Friction, Quantity, Range
 from grasp_core.objects.surface import FaceKind
 from grasp_core.planning.request import METHODS, ConeKind
-from grasp_core.settings import Count, Friction, Quantity, Range, Settings
+from grasp_core.settings import Settings
 from grasp_core.values import Method
 from sim_validate.datasets.tables import Tables, dataset_tables
 from sim_validate.execution.settings import (

@@ -4,19 +4,12 @@ import math
 from dataclasses import asdict, dataclass, field, replace
 from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 
+from grasp_core.declared import FieldError, types
 from grasp_core.errors import InputError, about
 from grasp_core.execution.grips import STIFFNESS_N_PER_M
+from grasp_core.kinds import NotNegative, Quantity, Range, Seed
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.settings import (
-    NotNegative,
-    Quantity,
-    Range,
-    Seed,
-    SettingError,
-    Settings,
-    named,
-    types,
-)
+from grasp_core.settings import Settings, named
 from scenes.execution.held import HeldSettings
 
 TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misplaced"]
@@ -82,7 +75,7 @@ class ExecutionSettings(Settings):
 
     def _check_together(self) -> None:
         if not self.trials:
-            raise SettingError("trials", f"must name at least one of {', '.join(KINDS)}, got none")
+            raise FieldError("trials", f"must name at least one of {', '.join(KINDS)}, got none")
         object.__setattr__(self, "trials", tuple(kind for kind in KINDS if kind in self.trials))
         stopping = self.stop_from_m_per_s / self.stop_m_per_s2
         if stopping > LONGEST_S:

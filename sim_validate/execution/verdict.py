@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from grasp_core.arrays import Array
-from grasp_core.by_value import ByValue
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 from grasp_core.solvers.ties import first_best
 from scenes.physics import PhysicsSettings

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array, rounded, to_digits
-from grasp_core.by_value import ByValue
 from grasp_core.checked import SMALLEST
+from grasp_core.declared import ByValue
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import WrenchLimit, limit_of

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import instance
 from grasp_core.closure.force_closure import force_closure
+from grasp_core.declared import ByValue, summary
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of

@@ -15,9 +15,9 @@ from functools import partial
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import coefficient, instance, one_of
 from grasp_core.closure.force_closure import force_closure
+from grasp_core.declared import ByValue, summary
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.on_faces import check_body

@@ -13,8 +13,8 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.by_value import summary
 from grasp_core.checked import one_of
+from grasp_core.declared import summary
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.physics import PhysicsSettings
 from scenes.tested import Weld

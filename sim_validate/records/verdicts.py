@@ -15,9 +15,9 @@ from pydantic import ConfigDict, Field, with_config
 from typing_extensions import TypedDict
 
 from grasp_core.arrays import Array
-from grasp_core.by_value import ByValue
 from grasp_core.checked import MOST_RANDOM_WRENCHES, path_of
 from grasp_core.closure.contacts import contacts_sha256
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import record_of, text_of
 from grasp_core.files.text_files import read_text

@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from grasp_core.by_value import counted
+from grasp_core.declared import counted
 from grasp_core.hands.named_hands import HANDS
 from grasp_core.values import Grasp
 from scenes.drawing.hands import PosedHand, posed_hand

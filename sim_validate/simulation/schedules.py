@@ -24,7 +24,9 @@ from typing import Annotated
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.settings import Quantity, Range, SettingError, Settings
+from grasp_core.declared import FieldError
+from grasp_core.kinds import Quantity, Range
+from grasp_core.settings import Settings
 
 Duration = Annotated[float, Range(least=0.05, most=60.0)]
 Settling = Annotated[float, Range(least=1.0, most=100.0)]
@@ -34,7 +36,7 @@ Spans = tuple[Annotated[float, Range(above=0.0, below=1.0)], ...]
 
 def _check_spans(spans: Spans) -> None:
     if not spans or any(one >= two for one, two in pairwise(spans)):
-        raise SettingError("spans", f"must be one or more numbers in rising order, got {spans}")
+        raise FieldError("spans", f"must be one or more numbers in rising order, got {spans}")
 
 
 @dataclass(frozen=True, slots=True)

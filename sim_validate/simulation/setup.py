@@ -9,13 +9,14 @@ from typing import Annotated, Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, frozen, to_digits
-from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, MOST_RANDOM_WRENCHES, MOST_TRIALS, SMALLEST, text
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import shown
+from grasp_core.kinds import Range, Seed
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.settings import CHOSEN, Range, Seed, Settings
+from grasp_core.settings import CHOSEN, Settings
 from grasp_core.values import Contact, Grasp
 from scenes.fingertips import FingerSettings
 from scenes.mjcf import Scene, Surface, build_scene

@@ -13,8 +13,8 @@ from enum import StrEnum
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.by_value import ByValue
 from grasp_core.closure.contacts import normal_and_tangential
+from grasp_core.declared import ByValue
 from grasp_core.objects.on_faces import within
 from scenes.layout import Layout
 from sim_validate.simulation.bench import Health, Motion

@@ -17,10 +17,10 @@ from itertools import combinations
 import numpy as np
 
 from grasp_core.arrays import Array, cross, rounded, to_digits
-from grasp_core.by_value import ByValue
 from grasp_core.closure.contacts import stacked
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.declared import ByValue
 from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.forces.contact_forces import least_friction_forces
 from grasp_core.objects.polyhedron import Polyhedron

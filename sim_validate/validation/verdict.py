@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from grasp_core.arrays import Array
-from grasp_core.by_value import ByValue
+from grasp_core.declared import ByValue
 from grasp_core.notebooks import InNotebooks
 from grasp_core.values import Contact
 from scenes.mjcf import Scene

@@ -9,9 +9,10 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from grasp_core.checked import BOUNDS
+from grasp_core.declared import types
 from grasp_core.hands.reach import HandReach
+from grasp_core.kinds import takes
 from grasp_core.objects.surface import PatchLimits
-from grasp_core.settings import taken, types
 from scenes.example_objects import example_object
 from scenes.execution.held import HeldSettings
 from scenes.fingertips import FingerSettings
@@ -143,7 +144,7 @@ Settings = {
 def refuses(flags, field, value):
     """Whether the type of a flag refuses a value."""
     try:
-        taken(value, types(flags)[field])
+        takes(types(flags)[field])(value)
     except ValueError:
         return True
     return False

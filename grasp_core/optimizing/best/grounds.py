@@ -34,8 +34,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, frozen, frozen_indices, is_array, is_indices
-from grasp_core.by_value import ByValue
 from grasp_core.compiled import compiled
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face, unit_pieces
 from grasp_core.objects.polyhedron import Polyhedron

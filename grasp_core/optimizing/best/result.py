@@ -6,8 +6,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, is_a, is_number
-from grasp_core.by_value import ByValue
 from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.declared import ByValue
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.search import EXACT_GAP
 from grasp_core.optimizing.best.support_cuts import CutTree

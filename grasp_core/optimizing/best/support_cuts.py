@@ -76,9 +76,9 @@ from grasp_core.arrays import (
     is_indices,
     is_number,
 )
-from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.compiled import compiled
+from grasp_core.declared import ByValue
 from grasp_core.optimizing.best.grounds import Grounds, first_nodes, fitting
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS

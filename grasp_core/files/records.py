@@ -1,0 +1,252 @@
+"""Writes declared values as JSON and makes them of it, strictly, from their fields alone.
+
+A record is a frozen dataclass of `declared`: its fields are the keys of an object, in their order,
+and what reads a file back is the same class. Properties that are marked as `recorded` are written
+too; a file whose other fields say something else contradicts itself and is refused. In a kind,
+`Key("position_m")` names the key where it is not the field's name, `Null(math.inf)` the number that
+null stands for, and `UNRECORDED` a field that only lives in memory and has a default.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, fields
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from types import UnionType
+from typing import (
+    Annotated,
+    Any,
+    NamedTuple,
+    TypeVar,
+    Union,
+    cast,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from grasp_core.declared import Declared, FieldError, default_of, rules, types
+from grasp_core.errors import InputError
+from grasp_core.files.json_text import object_of, shown, text_of
+from grasp_core.kinds import Null, inside
+from grasp_core.settings import at, named, placed
+
+UNRECORDED = "unrecorded"
+"""Mark in the type of a field that no file holds."""
+SAME = 1e-9
+"""Largest relative difference of a number that a file says and that its other fields say."""
+Record = TypeVar("Record", bound=Declared)
+Convert = Callable[[Any], Any]
+Read = Callable[[Any, str], Any]
+"""A function of a value of JSON and of where it stands."""
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """The key of a field in files, where it is not the field's name."""
+
+    name: str
+
+
+class recorded(property):  # noqa: N801 - it is used as a decorator, as `property` is
+    """A property that files hold as well, for those who read them without this package."""
+
+
+class Entry(NamedTuple):
+    """How a field or a recorded property is written and read."""
+
+    name: str
+    key: str
+    kind: Any
+    default: Any
+    write: Convert
+    read: Read | None
+    """Makes values of JSON for the constructor; None if it takes them as they are."""
+
+
+class Entries(NamedTuple):
+    """How a record is written and read."""
+
+    fields: tuple[Entry, ...]
+    recorded: tuple[Entry, ...]
+
+
+@cache
+def entries(kind: type) -> Entries:
+    """Return how the fields and the recorded properties of a class are written and read."""
+    own: list[Entry] = []
+    defaults = {each.name: default_of(each) for each in fields(cast("Any", kind))}
+    for name, each in types(kind).items():
+        if UNRECORDED not in rules(each):
+            key = next((rule.name for rule in rules(each) if isinstance(rule, Key)), name)
+            own.append(Entry(name, key, each, defaults[name], writes(each), reads(each)))
+    members = {name: each for base in reversed(kind.__mro__) for name, each in vars(base).items()}
+    properties: list[Entry] = []
+    for name, each in members.items():
+        if isinstance(each, recorded):
+            said = get_type_hints(each.fget, include_extras=True)["return"]
+            properties.append(Entry(name, name, said, MISSING, writes(said), None))
+    return Entries(tuple(own), tuple(properties))
+
+
+def record_of(value: Declared) -> dict[str, Any]:
+    """Return a value as an object of JSON."""
+    own, properties = entries(type(value))
+    return {each.key: each.write(getattr(value, each.name)) for each in (*own, *properties)}
+
+
+def writes(kind: Any) -> Convert:
+    """Return the function that makes plain JSON of values of a kind."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return _finite if any(isinstance(rule, Null) for rule in parts[1:]) else writes(parts[0])
+    if origin in (Union, UnionType):
+        inner = writes(next(part for part in parts if part is not type(None)))
+        return lambda value: None if value is None else inner(value)
+    if origin is tuple:
+        return _items_written(parts)
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        one = writes(parts[1])
+        return lambda value: {name: one(each) for name, each in value.items()}
+    if isinstance(kind, type) and issubclass(kind, Declared):
+        return record_of
+    return _plain
+
+
+def _items_written(parts: tuple[Any, ...]) -> Convert:
+    each, endless = [writes(part) for part in parts if part is not Ellipsis], parts[-1] is Ellipsis
+    if all(write is _plain for write in each):
+        return lambda value: [_plain(item) for item in value]
+    return lambda value: [
+        write(item)
+        for write, item in zip(each * len(value) if endless else each, value, strict=True)
+    ]
+
+
+def _finite(value: Any) -> Any:
+    return value if math.isfinite(value) else None
+
+
+def _plain(value: Any) -> Any:
+    """Return arrays as lists, members of enumerations as their values, and paths as text."""
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, Path):
+        return str(value)
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def from_record(kind: type[Record], found: object, where: str = "") -> Record:
+    """Make a value of an object of JSON; `where` leads to it, such as 'verdicts[0]'.
+
+    A key that is unknown or missing, a value that the class refuses, and a recorded property that
+    the other fields contradict are errors that name the field.
+    """
+    own, properties = entries(kind)
+    given = named(found, [each.key for each in (*own, *properties)], where, "field")
+    for each in (*own, *properties):
+        if each.key not in given and each.default is MISSING:
+            raise InputError(f"{at(where, each.key)}: missing; add it")
+    taken: dict[str, Any] = {}
+    for each in own:
+        if each.key in given:
+            value = given[each.key]
+            read = each.read
+            taken[each.name] = value if read is None else read(value, at(where, each.key))
+    try:
+        made = kind(**taken)
+    except FieldError as error:
+        key = next((each.key for each in own if each.name == error.name), error.name)
+        raise FieldError(at(where, key), error.fault) from None
+    except InputError as error:
+        raise placed(error, where) from None
+    for each in properties:
+        ours = each.write(getattr(made, each.name))
+        if not _agree(given[each.key], ours):
+            raise InputError(
+                f"{at(where, each.key)}: {shown(given[each.key])} contradicts the other fields, "
+                f"which say {shown(ours)}; write the file again, or remove it"
+            )
+    return made
+
+
+def reads(kind: Any) -> Read | None:
+    """Return the function that makes values of a kind of JSON; None if nothing is to be made."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        null = next((rule for rule in parts[1:] if isinstance(rule, Null)), None)
+        if null is None:
+            return reads(parts[0])
+        return lambda value, _where: null.value if value is None else value
+    if origin in (Union, UnionType):
+        inner = reads(next(part for part in parts if part is not type(None)))
+        return inner and (lambda value, where: None if value is None else inner(value, where))
+    if origin is tuple:
+        return _items_read(parts)
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        return _values_read(parts[1])
+    own = inside(kind, Declared)
+    return own and (lambda value, where: from_record(own, value, where))
+
+
+def _items_read(parts: tuple[Any, ...]) -> Read | None:
+    """Read the items of a list; what is no list is left to the constructor to refuse."""
+    each, endless = [reads(part) for part in parts if part is not Ellipsis], parts[-1] is Ellipsis
+    if not any(each):
+        return None
+
+    def read(value: Any, where: str) -> Any:
+        if not isinstance(value, list):
+            return value
+        items = cast("list[Any]", value)
+        readers = each * len(items) if endless else each
+        return [
+            item if one is None else one(item, f"{where}[{place}]")
+            for place, (one, item) in enumerate(zip(readers, items, strict=False))
+        ] + items[len(readers) :]
+
+    return read
+
+
+def _values_read(kind: Any) -> Read | None:
+    one = reads(kind)
+    if one is None:
+        return None
+
+    def read(value: Any, where: str) -> Any:
+        if not isinstance(value, dict):
+            return value
+        table = cast("dict[str, Any]", value)
+        return {name: one(item, at(where, name)) for name, item in table.items()}
+
+    return read
+
+
+def _agree(said: Any, ours: Any) -> bool:
+    """Return whether a file and its other fields say the same: numbers up to rounding.
+
+    Of sentences only the number counts, which another version may word otherwise.
+    """
+    if isinstance(said, list) and isinstance(ours, list):
+        theirs, own = cast("list[Any]", said), cast("list[Any]", ours)
+        texts = all(isinstance(each, str) for each in (*theirs, *own))
+        return len(theirs) == len(own) and (texts or all(map(_agree, theirs, own)))
+    if isinstance(said, dict) and isinstance(ours, dict):
+        mine, its = cast("dict[str, Any]", said), cast("dict[str, Any]", ours)
+        return mine.keys() == its.keys() and all(_agree(mine[key], its[key]) for key in its)
+    if isinstance(said, float) and isinstance(ours, float | int):
+        return math.isclose(said, ours, rel_tol=SAME, abs_tol=SAME * SAME)
+    return type(cast("Any", said)) is type(ours) and said == ours
+
+
+def text_of_record(value: Declared, schema: int) -> str:
+    """Return the text of the file that holds a value; equal values give equal texts."""
+    return text_of({"schema": schema, **record_of(value)})
+
+
+def record_in(kind: type[Record], text: str, wanted: str, schema: int) -> Record:
+    """Read the text of the file `wanted` as a value of a class."""
+    found = object_of(text, wanted, schema=schema)
+    del found["schema"]
+    return from_record(kind, found)
