@@ -83,6 +83,9 @@ class Shape:
     """Whether entries are whole numbers from 0 up."""
     least: float = -LARGEST_ENTRY
     most: float = LARGEST_ENTRY
+    nan: bool = False
+    """Whether entries may be NaN, where a simulation diverged or a finger is missing; null in
+    files."""
 
     def __init__(self, *shape: int | str | None, **rules: Any) -> None:
         object.__setattr__(self, "shape", shape)
@@ -97,10 +100,20 @@ class Shape:
         """Return a read-only copy of a value as an array of this shape."""
         make = frozen_indices if self.whole else frozen_units if self.units else frozen
         try:
+            if self.nan:
+                return self._with_nan(value)
             array = make(value, self._lengths, "")
         except InputError as error:
             raise UnfitError(str(error).strip()) from None
         self._check_ends(array)
+        return array
+
+    def _with_nan(self, value: Any) -> Array:
+        """Return a copy whose entries may be NaN, for which lists have None."""
+        listed: Any = value.tolist() if hasattr(value, "tolist") else value
+        array = np.array(listed, dtype=np.float64) if _is_rows(listed) else real_array(value, "")
+        frozen(np.nan_to_num(array), self._lengths, "")
+        array.setflags(write=False)
         return array
 
     def exact(self, value: Any) -> NDArray[Any]:
@@ -123,6 +136,13 @@ class Shape:
         lengths = ", ".join("any" if n is None else str(n) for n in self.shape)
         entries = "whole numbers" if self.whole else "unit vectors" if self.units else "numbers"
         return f"an array of {entries} of shape ({lengths}{',' * (len(self.shape) == 1)})"
+
+
+def _is_rows(listed: Any) -> bool:
+    """Return whether lists hold only numbers, None and further such lists."""
+    if isinstance(listed, list | tuple):
+        return all(map(_is_rows, cast("list[Any]", listed)))
+    return listed is None or (is_a(listed, Real) and not is_a(listed, bool))
 
 
 Point = Annotated[Array, Shape(3)]

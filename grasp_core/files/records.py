@@ -4,14 +4,15 @@ A record is a frozen dataclass of `declared`: its fields are the keys of an obje
 and what reads a file back is the same class. Properties that are marked as `recorded` are written
 too; a file whose other fields say something else contradicts itself and is refused. In a kind,
 `Key("position_m")` names the key where it is not the field's name, `Null(math.inf)` the number that
-null stands for, and `UNRECORDED` a field that only lives in memory and has a default.
+null stands for, `UNRECORDED` a field that only lives in memory and has a default, and `FLAT` a
+field whose own fields stand in the object itself.
 """
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from enum import Enum
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import UnionType
 from typing import (
@@ -26,7 +27,7 @@ from typing import (
     get_type_hints,
 )
 
-from grasp_core.declared import Declared, FieldError, default_of, rules, types
+from grasp_core.declared import FieldError, default_of, rules, types
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import object_of, shown, text_of
 from grasp_core.kinds import Null, inside
@@ -34,9 +35,11 @@ from grasp_core.settings import at, named, placed
 
 UNRECORDED = "unrecorded"
 """Mark in the type of a field that no file holds."""
+FLAT = "flat"
+"""Mark in the type of a field that is a record, whose keys stand among those of the outer one."""
 SAME = 1e-9
 """Largest relative difference of a number that a file says and that its other fields say."""
-Record = TypeVar("Record", bound=Declared)
+Record = TypeVar("Record")
 Convert = Callable[[Any], Any]
 Read = Callable[[Any, str], Any]
 """A function of a value of JSON and of where it stands."""
@@ -63,6 +66,8 @@ class Entry(NamedTuple):
     write: Convert
     read: Read | None
     """Makes values of JSON for the constructor; None if it takes them as they are."""
+    flat: type | None
+    """The class whose keys stand among those of the outer record; None for other fields."""
 
 
 class Entries(NamedTuple):
@@ -78,28 +83,56 @@ def entries(kind: type) -> Entries:
     own: list[Entry] = []
     defaults = {each.name: default_of(each) for each in fields(cast("Any", kind))}
     for name, each in types(kind).items():
-        if UNRECORDED not in rules(each):
-            key = next((rule.name for rule in rules(each) if isinstance(rule, Key)), name)
-            own.append(Entry(name, key, each, defaults[name], writes(each), reads(each)))
-    members = {name: each for base in reversed(kind.__mro__) for name, each in vars(base).items()}
-    properties: list[Entry] = []
-    for name, each in members.items():
-        if isinstance(each, recorded):
-            said = get_type_hints(each.fget, include_extras=True)["return"]
-            properties.append(Entry(name, name, said, MISSING, writes(said), None))
+        marks = rules(each)
+        if UNRECORDED not in marks:
+            key = next((rule.name for rule in marks if isinstance(rule, Key)), name)
+            flat = inside_record(each) if FLAT in marks else None
+            own.append(Entry(name, key, each, defaults[name], writes(each), reads(each), flat))
+    properties = [
+        Entry(name, name, said, MISSING, writes(said), None, None)
+        for name, said in recorded_kinds(kind).items()
+    ]
     return Entries(tuple(own), tuple(properties))
 
 
-def record_of(value: Declared) -> dict[str, Any]:
+@cache
+def recorded_kinds(kind: type) -> Mapping[str, Any]:
+    """Return the kinds of a class's recorded properties, by name."""
+    members = {name: each for base in reversed(kind.__mro__) for name, each in vars(base).items()}
+    return {
+        name: get_type_hints(each.fget, include_extras=True)["return"]
+        for name, each in members.items() if isinstance(each, recorded)
+    }  # fmt: skip
+
+
+def keys(kind: type) -> tuple[str, ...]:
+    """Return the keys of the object that holds a value of a class."""
+    own, properties = entries(kind)
+    return tuple(
+        key for each in (*own, *properties)
+        for key in ([each.key] if each.flat is None else keys(each.flat))
+    )  # fmt: skip
+
+
+def record_of(value: object) -> dict[str, Any]:
     """Return a value as an object of JSON."""
     own, properties = entries(type(value))
-    return {each.key: each.write(getattr(value, each.name)) for each in (*own, *properties)}
+    found: dict[str, Any] = {}
+    for each in (*own, *properties):
+        plain = each.write(getattr(value, each.name))
+        if each.flat is None:
+            found[each.key] = plain
+        else:
+            found.update(plain)
+    return found
 
 
 def writes(kind: Any) -> Convert:
     """Return the function that makes plain JSON of values of a kind."""
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Annotated:
+        if any(getattr(rule, "nan", False) for rule in parts[1:]):
+            return _array
         return _finite if any(isinstance(rule, Null) for rule in parts[1:]) else writes(parts[0])
     if origin in (Union, UnionType):
         inner = writes(next(part for part in parts if part is not type(None)))
@@ -109,9 +142,13 @@ def writes(kind: Any) -> Convert:
     if isinstance(origin, type) and issubclass(origin, Mapping):
         one = writes(parts[1])
         return lambda value: {name: one(each) for name, each in value.items()}
-    if isinstance(kind, type) and issubclass(kind, Declared):
-        return record_of
-    return _plain
+    return _plain if inside_record(kind) is None else record_of
+
+
+def inside_record(kind: Any) -> type | None:
+    """Return the class of records of a kind, alone or beside None; None if there is none."""
+    found: type | None = inside(kind, object)
+    return found if is_dataclass(cast("Any", found)) else None
 
 
 def _items_written(parts: tuple[Any, ...]) -> Convert:
@@ -126,6 +163,15 @@ def _items_written(parts: tuple[Any, ...]) -> Convert:
 
 def _finite(value: Any) -> Any:
     return value if math.isfinite(value) else None
+
+
+def _array(value: Any) -> Any:
+    """Return an array as lists in which null stands for NaN."""
+    if value.dtype.kind != "f":
+        return value.tolist()
+    whole = value.astype(object)
+    whole[value != value] = None  # noqa: PLR0124 - only NaN differs from itself
+    return whole.tolist()
 
 
 def _plain(value: Any) -> Any:
@@ -144,16 +190,19 @@ def from_record(kind: type[Record], found: object, where: str = "") -> Record:
     the other fields contradict are errors that name the field.
     """
     own, properties = entries(kind)
-    given = named(found, [each.key for each in (*own, *properties)], where, "field")
-    for each in (*own, *properties):
-        if each.key not in given and each.default is MISSING:
-            raise InputError(f"{at(where, each.key)}: missing; add it")
+    given = named(found, keys(kind), where, "field")
     taken: dict[str, Any] = {}
-    for each in own:
-        if each.key in given:
-            value = given[each.key]
-            read = each.read
+    for each in (*own, *properties):
+        if each.flat is not None:
+            inner = {key: given[key] for key in keys(each.flat) if key in given}
+            taken[each.name] = from_record(each.flat, inner, where)
+        elif each.key not in given:
+            if each.default is MISSING:
+                raise InputError(f"{at(where, each.key)}: missing; add it")
+        else:
+            value, read = given[each.key], each.read
             taken[each.name] = value if read is None else read(value, at(where, each.key))
+    said = {each.name: taken.pop(each.name) for each in properties}
     try:
         made = kind(**taken)
     except FieldError as error:
@@ -163,9 +212,9 @@ def from_record(kind: type[Record], found: object, where: str = "") -> Record:
         raise placed(error, where) from None
     for each in properties:
         ours = each.write(getattr(made, each.name))
-        if not _agree(given[each.key], ours):
+        if not _agree(said[each.name], ours):
             raise InputError(
-                f"{at(where, each.key)}: {shown(given[each.key])} contradicts the other fields, "
+                f"{at(where, each.key)}: {shown(said[each.name])} contradicts the other fields, "
                 f"which say {shown(ours)}; write the file again, or remove it"
             )
     return made
@@ -186,8 +235,12 @@ def reads(kind: Any) -> Read | None:
         return _items_read(parts)
     if isinstance(origin, type) and issubclass(origin, Mapping):
         return _values_read(parts[1])
-    own = inside(kind, Declared)
-    return own and (lambda value, where: from_record(own, value, where))
+    own = inside_record(kind)
+    return None if own is None else partial(_record_read, own)
+
+
+def _record_read(kind: type, value: Any, where: str) -> Any:
+    return from_record(cast("type[Any]", kind), value, where)
 
 
 def _items_read(parts: tuple[Any, ...]) -> Read | None:
@@ -240,7 +293,7 @@ def _agree(said: Any, ours: Any) -> bool:
     return type(cast("Any", said)) is type(ours) and said == ours
 
 
-def text_of_record(value: Declared, schema: int) -> str:
+def text_of_record(value: object, schema: int) -> str:
     """Return the text of the file that holds a value; equal values give equal texts."""
     return text_of({"schema": schema, **record_of(value)})
 

@@ -1,0 +1,142 @@
+"""Shows figures of records: as cells of tables and pages, as columns, and with their meaning.
+
+A figure is a field or a recorded property whose kind carries `Shown`; its docstring is its meaning,
+and the end of its name its unit. Whoever shows records asks here which figures they have, so that a
+new figure appears everywhere at once.
+"""
+
+import ast
+import inspect
+import math
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from functools import cache
+from typing import Any, NamedTuple, cast
+
+from grasp_core.declared import rules
+from grasp_core.files.records import entries
+
+NONE = "-"
+"""What a cell shows where there is no figure."""
+UNITS = {
+    "m": "m", "m3": "m3", "rad": "rad", "deg": "deg", "s": "s", "n": "N", "nm": "N m", "kg": "kg",
+    "m_per_s": "m/s", "n_per_m": "N/m", "kg_m2": "kg m^2", "n_nm": "N, N m", "n_s": "N s",
+}  # fmt: skip
+"""Units by the ends of names; the longest end counts."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """How tables and pages show a figure."""
+
+    heading: str
+    """A few words above the column."""
+    form: str = ".4g"
+    """Format of a number."""
+    times: float = 1.0
+    """Factor on a number, such as 1e6 for micrometres."""
+
+
+class Figure(NamedTuple):
+    """A figure of a class of records."""
+
+    name: str
+    kind: Any
+    shown: Shown
+    meaning: str
+    path: tuple[str, ...]
+    """Attributes that lead to it; more than one where it stands in a flat part of the record."""
+
+    def of(self, record: Any) -> Any:
+        """Return the figure of a record."""
+        for name in self.path:
+            record = getattr(record, name)
+        return record
+
+    def cell(self, record: object) -> str:
+        """Write the figure of a record for people."""
+        return cell(self.of(record), self.shown)
+
+
+@cache
+def figures(kind: type) -> tuple[Figure, ...]:
+    """Return the figures that tables and pages show of a class, in the order of its entries."""
+    own, properties = entries(kind)
+    said = meanings(kind)
+    found: list[Figure] = []
+    for each in (*own, *properties):
+        if each.flat is not None:
+            found += [one._replace(path=(each.name, *one.path)) for one in figures(each.flat)]
+        for shown in (rule for rule in rules(each.kind) if isinstance(rule, Shown)):
+            found.append(Figure(each.name, each.kind, shown, said.get(each.name, ""), (each.name,)))
+    return tuple(found)
+
+
+def cell(value: Any, shown: Shown) -> str:
+    """Write a figure for people; of a sequence, the number of its items."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return NONE
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, Enum):
+        return str(value.value).replace("_", " ")
+    if isinstance(value, int | float):
+        return format(shown.times * value, shown.form)
+    return value if isinstance(value, str) else str(len(value))
+
+
+def table(records: Iterable[object], kind: type) -> tuple[Sequence[str], list[tuple[str, ...]]]:
+    """Return the headings and the rows of a table of records."""
+    listed = figures(kind)
+    rows = [tuple(figure.cell(record) for figure in listed) for record in records]
+    return [figure.shown.heading for figure in listed], rows
+
+
+def scalars(record: object) -> Mapping[str, Any]:
+    """Return the plain entries of a record by name: numbers, words, and numbers of texts."""
+    own, properties = entries(type(record))
+    found: dict[str, Any] = {}
+    for each in (*own, *properties):
+        value = getattr(record, each.name)
+        if isinstance(value, Enum):
+            found[each.name] = value.value
+        elif value is None or isinstance(value, str | bool | int | float):
+            found[each.name] = value
+        elif isinstance(value, tuple):
+            items = cast("tuple[Any, ...]", value)
+            if all(isinstance(item, str) for item in items):
+                found[each.name] = len(items)
+    return found
+
+
+@cache
+def meanings(kind: type) -> Mapping[str, str]:
+    """Return what the fields and recorded properties of a class mean: their docstrings."""
+    found: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        if base.__module__ != "builtins":
+            found |= _meanings_in(base)
+    return found
+
+
+def _meanings_in(kind: type) -> dict[str, str]:
+    (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
+    found: dict[str, str] = {}
+    statements = body.body if isinstance(body, ast.ClassDef) else []
+    for one, two in zip(statements, [*statements[1:], None], strict=True):
+        if isinstance(one, ast.FunctionDef):
+            found[one.name] = " ".join((ast.get_docstring(one) or "").split())
+        elif isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name):
+            text = two.value if isinstance(two, ast.Expr) else None
+            said = text.value if isinstance(text, ast.Constant) else ""
+            found[one.target.id] = " ".join(str(said).split())
+    return found
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a figure, by the end of its name; '' for a number without one."""
+    parts = name.split("_")
+    ends = ("_".join(parts[start:]) for start in range(1, len(parts)))
+    return next((UNITS[end] for end in ends if end in UNITS), "")
