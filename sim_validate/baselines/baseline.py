@@ -25,10 +25,10 @@ from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.records.grasps_json import RECORDED, surface_of_record, surface_record
 from grasp_core.records.grasps_schema import SurfaceRecord
 from grasp_core.values import Grasp
+from sim_validate.closure.verdict import Verdict
+from sim_validate.engine.setup import WEAKEST
+from sim_validate.engine.traces import Outcome
 from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.simulation.setup import WEAKEST
-from sim_validate.simulation.traces import Outcome
-from sim_validate.validation.verdict import Verdict
 
 DIGITS = 12
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)

@@ -12,7 +12,7 @@ from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import FaceKind
 from grasp_core.records.grasps_json import surface_of_record, surface_record
 from grasp_core.records.grasps_schema import SurfaceRecord
-from sim_validate.files.paths import path_inside
+from sim_validate.kit.paths import path_inside
 
 FOLDER = "meshes"
 SURFACE = "# surface "

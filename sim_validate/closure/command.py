@@ -1,0 +1,148 @@
+"""Runs the command `validate`, which simulates grasps and writes verdicts on them."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+
+from grasp_core.planning.result import Plan
+from grasp_core.values import Grasp
+from sim_validate.closure.asked_trials import prepared
+from sim_validate.closure.validate import Job, validated
+from sim_validate.closure.verdict import Verdict
+from sim_validate.closure.verdicts_json import summary, trace_arrays, verdicts_to_json
+from sim_validate.engine.gate import require_faithful
+from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.engine.traces import Outcome
+from sim_validate.kit import command_flags
+from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, say_cut, warn_of
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.result_folders import alone_in, remove_results
+from sim_validate.kit.writing import write_arrays
+from sim_validate.planning.asked_objects import asked_grasps
+
+Judge: TypeAlias = Callable[[Plan, Setup], tuple[Exit, str]]
+"""Judges grasps by another test; gives the exit code and the text of its results."""
+
+
+def validate_file(
+    command: command_flags.Validate, reporter: Reporter, judge: Judge | None = None
+) -> int:
+    """Simulate the grasps of a file, or let another test judge them, and report which hold."""
+    chosen = asked_grasps(
+        command.grasps, reporter, friction=command.friction, seed=command.seed, limit=command.limit
+    )
+    if chosen is None:
+        return Exit.NONE
+    setup, agenda = prepared(command.testing, chosen.finger, chosen.seed, command.out)
+    jobs, folder = command.testing.jobs, command.out
+    with alone_in(folder):
+        if judge is not None:
+            code, text = judge(chosen, setup)
+        else:
+            code, text = simulate_grasps(
+                chosen, setup, agenda, jobs=jobs, folder=folder, reporter=reporter
+            )
+    reporter.text(text)
+    return code
+
+
+def simulate_grasps(
+    saved: Plan, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None,
+    reporter: Reporter,
+) -> tuple[Exit, str]:  # fmt: skip
+    """Simulate grasps; return the exit code and the text of verdicts.json."""
+    gate = require_faithful(setup, saved.friction, saved.body.radius)
+    for check in gate.checks:
+        reporter.detail(str(check))
+    if folder:
+        remove_results(folder, "verdicts")
+    tasks = [Job(saved.body, g, saved.friction, agenda, setup) for g in saved.grasps]
+
+    def kept(verdict: Verdict) -> bool:
+        if folder and agenda.keep_traces:
+            write_arrays(folder / "traces" / f"{verdict.id}.npz", trace_arrays(verdict))
+        return verdict.held
+
+    results = reporter.counted("simulating", validated(tasks, jobs), len(tasks), "held", kept)
+    text_of = partial(verdicts_to_json, saved.body, saved.friction, gate=gate)
+    path = folder and folder / "verdicts.json"
+    verdicts, text = finished(results, len(tasks), text_of, path, reporter)
+    _show(saved.grasps, verdicts, setup, reporter)
+    good = all(verdict.good for verdict in verdicts)
+    return (Exit.GOOD if good else Exit.NEGATIVE), text
+
+
+def _show(
+    grasps: Sequence[Grasp], verdicts: Sequence[Verdict], setup: Setup, reporter: Reporter
+) -> None:
+    limited = bool(verdicts) and verdicts[0].agenda.limits != "none"
+    rows: list[tuple[str, ...]] = []
+    for grasp, verdict in zip(grasps[:TABLE_ROWS], verdicts, strict=False):
+        # the maximum is NaN if one is
+        worst = np.max([trial.hold.displacement_m for trial in verdict.wrenches])
+        let_go = sum(control.let_go for control in verdict.controls)
+        friction = verdict.critical_friction
+        rows.append(
+            (grasp.id, grasp.family, f"{friction.predicted:.4f}",
+             "-" if friction.simulated is None else f"{friction.simulated:.4f}",
+             *([_limit_range(verdict)] if limited else []),
+             verdict.outcome.value, f"{1e6 * worst:.2g}", f"{let_go} of {len(verdict.controls)}")
+        )  # fmt: skip
+    ends = ("outcome", "um moved", "controls let go")
+    columns = ("grasp", "family", "mu*", "in sim", *(["limits"] if limited else []), *ends)
+    reporter.table("verdicts", columns, rows)
+    say_cut(len(verdicts), reporter)
+    _show_robustness(verdicts, reporter)
+    totals = summary(verdicts)
+    reporter.say(
+        f"{totals['grasps_held']} of {totals['grasps']} grasps held all wrenches, at "
+        f"{100.0 * setup.hold.load_share:g} % of what they resist; {totals['controls_let_go']} of "
+        f"{totals['controls']} negative controls were let go (all should), "
+        f"{totals['controls_held']} held"
+    )
+    warn_of(_surprises(verdicts), "verdicts.json", reporter)
+    if not totals["controls"]:
+        reporter.warn("there were no negative controls: nothing shows that this test can fail")
+
+
+def _limit_range(verdict: Verdict) -> str:
+    shares = [trial.simulated_limit.share for trial in verdict.wrenches if trial.simulated_limit]
+    return f"{min(shares):.3f}-{max(shares):.3f}" if shares else "-"
+
+
+def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
+    rows: list[tuple[str, ...]] = []
+    for verdict in verdicts[:TABLE_ROWS]:
+        if (found := verdict.robustness) is None:
+            return
+        lower, upper = found.interval
+        count = len(found.trials)
+        failed = (trial for trial in found.trials if trial.outcome is not Outcome.HELD)
+        first = next((f"{one.number}: {one.wrench or one.outcome.value}" for one in failed), "")
+        rows.append(
+            (verdict.id, f"{found.held} of {count}", str(found.predicted),
+             f"{100.0 * lower:.3g} to {100.0 * upper:.3g} %", first)
+        )  # fmt: skip
+    columns = ("grasp", "held", "predicted", "95 % interval", "first not held")
+    reporter.table("repeats with noise", columns, rows)
+
+
+def _surprises(verdicts: Sequence[Verdict]) -> list[str]:
+    lines = list[str]()
+    for verdict in verdicts:
+        for trial in verdict.failures:
+            limit, ended = trial.predicted_limit, trial.hold.outcome.value
+            over = f" as predicted, the limit is {limit:.3g} of this" if limit < 1.0 else ""
+            lines.append(f"{verdict.id}: {trial.name}: {ended}{over}: {trial.hold.reason}")
+    lines += [f"{verdict.id}: {what}" for verdict in verdicts for what in verdict.mismatches]
+    lines += [
+        f"{verdict.id}: control {control.control.name}: {trial.name}: {trial.hold.outcome.value}"
+        for verdict in verdicts
+        for control in verdict.controls
+        for trial in control.tried
+        if not control.let_go
+    ]
+    return lines
