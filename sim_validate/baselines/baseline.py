@@ -258,7 +258,7 @@ def entry_of(
     weakest = next(trial for trial in verdict.wrenches if trial.name == WEAKEST)
     scaled = weakest.wrench / np.array([1.0] * 3 + [radius_m] * 3)
     predicted = weakest.predicted_limit * float(np.linalg.norm(scaled))
-    limit = weakest.simulated_limit
+    limit = weakest.let_go_at
     friction, repeats = verdict.critical_friction, verdict.robustness
     noisy = () if repeats is None else repeats.trials
     holds = [trial.hold for trial in verdict.wrenches]

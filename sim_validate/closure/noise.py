@@ -169,7 +169,7 @@ def noisy_trial(
     except UndecidedError as error:
         return NoisyTrial(number, None, Outcome.ERROR, "", str(error), ())
     if not certificate.closed:  # a negative control, which must let go
-        control = Control(OPEN, case.contacts, case.friction, certificate)
+        control = Control(OPEN, case.friction, certificate)
         verdict = try_control(body, control, Agenda(), setup)
         if verdict.held:
             wrong = ("contacts that are proved not force-closed held the object",)

@@ -98,14 +98,14 @@ class _Making:
             self.found.add_given(given, grasp, tried, seated, executed)
             self._vary(grasp, seated.body, tried, executed)
             return
-        control = Control(GIVEN, seated.contacts, friction, grasp)
+        control = Control(GIVEN, friction, grasp)
         verdict = try_control(seated.body, control, self.agenda, Setup())
         self.found.add_open(given, verdict, seated.moved_m)
 
     def _tried(self, grasp: Grasp, body: Polyhedron) -> Verdict:
         asked = self.unit.config.learning
         verdict = validated_with(body, grasp, self.unit.friction, self.agenda, asked)
-        if self.unit.config.scenes:
+        if self.unit.config.scenes and verdict.scene is not None:
             self.files[f"scenes/{self.found.name(grasp.id)}.xml"] = verdict.scene.xml
         return verdict
 

@@ -275,7 +275,6 @@ class GraspRows:
                 "failed_after_s": hold.failed_after_s,
             }
             if isinstance(trial, WrenchVerdict):
-                found, predicted = trial.simulated_limit, trial.predicted_limit
-                row["predicted_limit"] = predicted
-                row["simulated_limit"] = None if found is None else found.share * predicted
+                row["predicted_limit"] = trial.predicted_limit
+                row["simulated_limit"] = trial.simulated_limit
             self.trials.append(row)

@@ -273,12 +273,12 @@ class Varying:
                 )  # fmt: skip
                 yield Tried(each, alone, self._executed(each))
 
-    def _verdict(self, variant: Variant, gate: Gate) -> Verdict | ControlVerdict:
+    def _verdict(self, variant: Variant, gate: Gate | None) -> Verdict | ControlVerdict:
         seated, friction = variant.seated, variant.friction
         if isinstance(variant.proved, Grasp):
             agenda = replace(self.agenda, controls=False, critical_friction=False)
             return tested(seated.body, variant.proved, friction, gate, agenda, Setup())
-        control = Control(VARIED, seated.contacts, friction, variant.proved)
+        control = Control(VARIED, friction, variant.proved)
         return try_control(seated.body, control, self.agenda, Setup())
 
     def _executed(self, variant: Variant) -> Executed:

@@ -24,7 +24,7 @@ from sim_validate.execution.verdict import (
     losses_in_words,
 )
 from sim_validate.kit import command_flags
-from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, say_cut, warn_of
+from sim_validate.kit.console import TABLE_ROWS, Reporter, finished_text, say_cut, warn_of
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
@@ -82,7 +82,7 @@ def execute_grasps(
         "executing", executed(tasks, jobs), count, "survived", lambda each: each.survived
     )
     text_of = partial(executions_to_json, saved.body, saved.friction, settings)
-    found, text = finished(results, count, text_of, folder and folder / EXECUTIONS, reporter)
+    found, text = finished_text(results, count, text_of, folder and folder / EXECUTIONS, reporter)
     _show(found, settings, reporter)
     if not all(each.controls_let_go for each in found):
         return Exit.INTERNAL, text

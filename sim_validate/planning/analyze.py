@@ -11,7 +11,7 @@ from grasp_core.errors import about
 from grasp_core.files.text_files import read_text
 from grasp_core.records.contacts_json import ContactSet, Overrides, contact_sets_from_json
 from sim_validate.kit import command_flags
-from sim_validate.kit.console import TABLE_ROWS, Reporter, finished
+from sim_validate.kit.console import TABLE_ROWS, Reporter, finished_text
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.processes import each
 from sim_validate.planning.analysis_json import analyses_to_document, summary
@@ -50,7 +50,7 @@ def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
         reporter.document(analyses_to_document(source, question, done, complete=complete))
         return ""
 
-    analyses, _ = finished(results, len(sets), told, None, reporter)
+    analyses, _ = finished_text(results, len(sets), told, None, reporter)
     _show(analyses, reporter)
     good = all(found.outcome is Outcome.CLOSED for found in analyses)
     return Exit.GOOD if good else Exit.NEGATIVE

@@ -14,7 +14,7 @@ from sim_validate.engine.setup import Setup
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.reach_command import reach_file
 from sim_validate.kit import command_flags, processes
-from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, say_cut
+from sim_validate.kit.console import TABLE_ROWS, Reporter, finished_text, say_cut
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.result_folders import JUDGEMENTS, remove_results
 from sim_validate.protocols.judgements_json import judgements_summary, judgements_to_json
@@ -78,7 +78,9 @@ def _judged(
     found = processes.each(call, cases, jobs=jobs)
     results = reporter.counted("judging", found, len(cases), "passed", lambda one: one.theirs)
     text_of = partial(judgements_to_json, saved.body, saved.friction)
-    done, text = finished(results, len(cases), text_of, folder and folder / JUDGEMENTS, reporter)
+    done, text = finished_text(
+        results, len(cases), text_of, folder and folder / JUDGEMENTS, reporter
+    )
     if done:
         _show(done, reporter)
     return (Exit.GOOD if all(one.good for one in done) else Exit.NEGATIVE), text

@@ -22,6 +22,7 @@ from scenes.drawing.sheets import svg_of
 from scenes.drawing.views import best_view
 from scenes.mujoco.fingertips import FingerSettings
 from sim_validate.closure.replaying import Wanted, of_verdict, replayed
+from sim_validate.closure.verdict import Verdict
 from sim_validate.execution.executions_json import EXECUTIONS, Executions
 from sim_validate.execution.jobs import ExecutionJob, film, worth_seeing
 from sim_validate.kit.result_folders import CLIPS, PICTURES
@@ -39,7 +40,7 @@ class Task:
 
     saved: Plan
     friction: float
-    verdict: Record | None
+    verdict: Verdict | None
     regions: Record | None
     executions: Executions | None
     held: PosedHand | None
@@ -145,7 +146,7 @@ def draw(task: Task) -> Drawn:
     return _with_executed(task, task.executions, drawn) if task.clip and task.executions else drawn
 
 
-def _with_motion(task: Task, verdict: Record, drawn: Drawn) -> Drawn:
+def _with_motion(task: Task, verdict: Verdict, drawn: Drawn) -> Drawn:
     recorded = of_verdict(task.source, task.saved, verdict, Wanted(task.saved.grasps[0].id))
     found = replayed(recorded)
     size = found.scene.layout.grasp_size_m
@@ -185,8 +186,8 @@ def _with_executed(task: Task, executions: Executions, drawn: Drawn) -> Drawn:
     return replace(drawn, executed=tuple(filmed))
 
 
-def largest_push(verdict: Record | None) -> float:
+def largest_push(verdict: Verdict | None) -> float:
     """Look up the largest normal force that each finger may apply [N]."""
     if verdict is None:
         return FingerSettings().max_normal_force_n
-    return float(verdict["settings"]["fingers"]["max_normal_force_n"])
+    return verdict.setup.fingers.max_normal_force_n

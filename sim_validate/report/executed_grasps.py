@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 
 from scenes.drawing.pages import NOTHING, number
+from sim_validate.closure.verdict import Verdict
 from sim_validate.execution.executions_json import Executions, executions_summary
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (
@@ -50,7 +51,7 @@ def said_of_execution(found: ExecutedGrasp | None) -> tuple[str, str]:
 
 
 def said_of_both(
-    verdict: Record | None, executions: Executions | None, found: ExecutedGrasp | None
+    verdict: Verdict | None, executions: Executions | None, found: ExecutedGrasp | None
 ) -> tuple[str, str]:
     """Say in words how a grasp ended in the test of its closure and, if any was, in its execution.
 

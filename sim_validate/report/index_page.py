@@ -1,15 +1,18 @@
 """Writes the first page of a report: all runs, and the pictures of their grasps."""
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, cast
 
+from grasp_core.files.records import record_of
 from grasp_core.objects.symmetries import Copies, copies_of
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from scenes.drawing.pages import number
 from scenes.drawing.sheets import svg_of
-from sim_validate.closure.verdicts_json import let_go
+from sim_validate.closure.verdict import Verdict
 from sim_validate.planning.best_json import BestFile, shares_of_bound
 from sim_validate.report.agreement import (
     Record,
@@ -99,7 +102,7 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         agreements=found,
         fidelity=[svg_of(fidelity_panel(each)) for each in found] if verdicts else [],
         limits=bool(limits.pairs),
-        mismatches=[f"{each['id']}: {line}" for each in verdicts for line in each["mismatches"]],
+        mismatches=[f"{each.id}: {line}" for each in verdicts for line in each.mismatches],
         controls=_controls(verdicts),
         executions=[described_executions(each) for each in executed],
         judged=[
@@ -162,26 +165,23 @@ def _card(shown: Shown) -> dict[str, Any]:
     }
 
 
-def _weakest(verdict: Record) -> float | None:
+def _weakest(verdict: Verdict) -> float | None:
     """Find the smallest wrench limit of a grasp [N], with torques divided by the grasp's size."""
-    found = [
-        trial["predicted_limit"] * wrench_size(verdict, trial)
-        for trial in verdict["wrenches"]
-        if trial["predicted_limit"] is not None
-    ]
-    return min(found, default=None)
+    found = [trial.predicted_limit * wrench_size(verdict, trial) for trial in verdict.wrenches]
+    return min(filter(math.isfinite, found), default=None)
 
 
 def _described(run: RunFolder) -> dict[str, Any]:
-    counts = run.summary.get("summary")
+    tested = run.tested
     said = f"{len(run.saved.grasps) + run.left_out} grasps at friction {run.friction:g}"
-    if counts:
+    if tested is not None:
+        counts = tested.summary
         said += (
             f"; {counts['grasps_held']} of {counts['grasps']} held, "
             f"{counts['controls_let_go']} of {counts['controls']} negative controls were let go, "
             f"{counts['mismatches']} results contradict the analysis"
         )
-        said += "" if run.summary.get("complete", True) else "; the run was interrupted"
+        said += "" if tested.complete else "; the run was interrupted"
     said += "."
     said += f" {described_reaches(run.reaches)}" if run.reaches else ""
     if run.left_out:
@@ -189,13 +189,13 @@ def _described(run: RunFolder) -> dict[str, Any]:
             f" {len(run.saved.grasps)} are shown, those with problems among them; "
             "`graspproof report` draws all."
         )
-    gate = run.summary.get("gate", {}).get("checks", ())
+    gate = () if tested is None else tested.gate.checks
     return {
         "name": run.saved.body.name,
         "summary": " ".join([said, *run.saved.body.notes]),
         "about": list(_about(run)),
         "gate": gate,
-        "gate_passed": sum(check["least"] <= check["value"] <= check["largest"] for check in gate),
+        "gate_passed": sum(check.passed for check in gate),
     }
 
 
@@ -205,28 +205,31 @@ def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
     yield "content_sha256", body.content_sha256
     yield "friction", f"{run.friction:g}"
     yield "seed", str(run.saved.seed)
-    first = next(iter(run.verdicts.values()), None)
-    settings: Record = {} if first is None else first["settings"]
-    for table, values in settings.items():
-        if isinstance(values, dict):
-            for name, value in cast("Record", values).items():
-                yield f"{table}.{name}", str(value)
-        else:
-            yield table, str(values)
+    for first in islice(run.tested or (), 1):
+        asked = {"setup": first.setup, "agenda": first.agenda, "scale": first.scale}
+        yield from _lines({name: record_of(each) for name, each in asked.items()})
     if run.executions is not None:
         yield from execution_settings(run.executions)
     if run.reaches is not None:
         yield from reach_settings(run.reaches)
-    for name, version in (versions() if first is None else first["versions"]).items():
+    found = versions() if run.tested is None else run.tested.versions
+    for name, version in found.items():
         yield f"version of {name}", str(version)
 
 
-def _controls(verdicts: Sequence[Record]) -> list[dict[str, Any]]:
+def _lines(tables: Mapping[str, Any], where: str = "") -> Iterator[tuple[str, str]]:
+    """Yield each setting in tables inside each other with its place."""
+    for name, value in tables.items():
+        if isinstance(value, dict):
+            yield from _lines(cast("Mapping[str, Any]", value), f"{where}{name}.")
+        else:
+            yield f"{where}{name}", str(value)
+
+
+def _controls(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
     kinds = dict[str, dict[str, Any]]()
-    for verdict in verdicts:
-        for name, control in verdict["controls"].items():
-            plain = name.rstrip("0123456789").rstrip("_").replace("_", " ")
-            kind = kinds.setdefault(plain, {"name": plain, "let_go": 0, "held": 0, "undecided": 0})
-            gone = let_go(control)
-            kind["let_go" if gone else "held" if control["held"] else "undecided"] += 1
+    for control in (each for verdict in verdicts for each in verdict.controls):
+        plain = control.control.name.replace("_", " ")
+        kind = kinds.setdefault(plain, {"name": plain, "let_go": 0, "held": 0, "undecided": 0})
+        kind["let_go" if control.let_go else "held" if control.held else "undecided"] += 1
     return list(kinds.values())

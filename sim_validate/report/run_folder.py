@@ -11,7 +11,7 @@ from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.planning.result import Plan
-from sim_validate.closure.verdicts_json import VerdictsFile, verdicts_of
+from sim_validate.closure.verdict import Verdict, Verdicts, load_verdicts
 from sim_validate.execution.executions_json import EXECUTIONS, Executions, load_executions
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.kit.result_folders import BEST, JUDGEMENTS, REACHES
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from sim_validate.hands.reaches_json import SavedReaches
 
 VERDICTS = "verdicts.json"
-Read = TypeVar("Read", VerdictsFile, RegionsFile, JudgementsFile, BestFile)
+Read = TypeVar("Read", RegionsFile, JudgementsFile, BestFile)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,10 +36,8 @@ class RunFolder:
     saved: Plan
     friction: float
     """Friction at which the grasps were tested; if they were not, at which they were planned."""
-    verdicts: Mapping[str, Record]
-    """Verdicts by the ids of the grasps; empty if no grasp was tested."""
-    summary: Record
-    """All of `verdicts.json` but the verdicts; empty if the file does not exist."""
+    tested: Verdicts | None
+    """Verdicts on the grasps; None if no grasp was tested."""
     regions: Mapping[str, Record]
     regions_friction: float | None
     executions: Executions | None
@@ -71,6 +69,11 @@ class RunFolder:
         """Return what the execution of a grasp found; None if the grasp was not executed."""
         grasps = () if self.executions is None else self.executions.grasps
         return next((each for each in grasps if each.id == name), None)
+
+    @property
+    def verdicts(self) -> Mapping[str, Verdict]:
+        """Verdicts by the ids of the grasps; empty if no grasp was tested."""
+        return {each.id: each for each in self.tested or ()}
 
     @property
     def shaded(self) -> Mapping[str, Record]:
@@ -109,17 +112,15 @@ def runs_in(folder: Path) -> tuple[RunFolder, ...]:
 
 def _run(path: Path) -> RunFolder:
     saved = read_grasps(path / GRASPS)
-    tried = _read(path / VERDICTS, verdicts_of, saved)
+    tried = _tested(path / VERDICTS, saved)
     certified = _read(path / REGIONS, regions_file_of, saved)
     judgements_of = partial(record_of, JudgementsFile, wanted=JUDGEMENTS, schema=1)
-    verdicts: Sequence[Record] = [] if tried is None else tried["verdicts"]
     regions: Sequence[Record] = [] if certified is None else certified["grasps"]
     return RunFolder(
         path=path,
         saved=saved,
-        friction=saved.friction if tried is None else tried["friction"],
-        verdicts=_by_id(path / VERDICTS, verdicts, saved),
-        summary={} if tried is None else {key: tried[key] for key in tried if key != "verdicts"},
+        friction=saved.friction if tried is None else tried.friction,
+        tested=tried,
         regions=_by_id(path / REGIONS, regions, saved),
         regions_friction=None if certified is None else certified["friction"],
         executions=_executions(path / EXECUTIONS, saved),
@@ -161,6 +162,16 @@ def _check_contacts(path: Path, records: Sequence[Record], saved: Plan) -> None:
             f"{path}: the file has two records of one grasp; make {path.name} again with the "
             "command that wrote it"
         )
+
+
+def _tested(path: Path, saved: Plan) -> Verdicts | None:
+    if not path.is_file():
+        return None
+    found = load_verdicts(path)
+    _check_object(path, found.object_sha256, saved)
+    listed = [{"id": each.id, "contacts_sha256": each.contacts_sha256} for each in found]
+    _check_contacts(path, listed, saved)
+    return found
 
 
 def _executions(path: Path, saved: Plan) -> Executions | None:

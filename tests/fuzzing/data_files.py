@@ -19,7 +19,7 @@ from sim_validate.baselines.baseline import baseline_from_json, baseline_to_json
 from sim_validate.baselines.settings import of_settings
 from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.closure.setup_toml import setup_from_tables, tables_of
-from sim_validate.closure.verdicts_json import verdicts_of
+from sim_validate.closure.verdict import verdicts_of
 from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
 from sim_validate.datasets.given_contacts import given_from_json
 from sim_validate.datasets.manifest import (

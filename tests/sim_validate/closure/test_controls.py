@@ -113,7 +113,7 @@ def test_the_simulator_lets_go_of_what_the_printed_regulus_program_takes_for_gra
         contacts = tuple(map(gc.Contact, places, [piece.normal for piece in quad]))
         proof = gc.force_closure(contacts, friction=math.tan(theta))
         if not proof.closed:
-            control = Control("printed", contacts, math.tan(theta), proof)
+            control = Control("printed", math.tan(theta), proof)
             assert try_control(body, control, Agenda(), Setup()).let_go
             tested += 1
     assert tested >= 3

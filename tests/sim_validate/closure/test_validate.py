@@ -10,7 +10,7 @@ import scenes
 import sim_validate as sv
 from scenes.mujoco.fingertips import FingerSettings, clashes
 from sim_validate.closure.controls import negative_controls
-from sim_validate.closure.verdicts_json import trace_arrays, verdicts_to_json
+from sim_validate.closure.verdict import trace_arrays, verdicts_to_json
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
 from tests.marks import MORE, more
