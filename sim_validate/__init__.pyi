@@ -4,6 +4,7 @@ from sim_validate.closure.validate import (
 from sim_validate.closure.validate import validate as validate
 from sim_validate.closure.validate import validate_all as validate_all
 from sim_validate.closure.verdict import Verdict as Verdict
+from sim_validate.closure.verdict import Verdicts as Verdicts
 from sim_validate.closure.verdict import load_verdicts as load_verdicts
 from sim_validate.datasets.open_dataset import load_dataset as load_dataset
 from sim_validate.engine.schedules import HoldProtocol as HoldProtocol
