@@ -119,7 +119,7 @@ class Shape:
     def exact(self, value: Any) -> NDArray[Any]:
         """Return an array that is of this shape and type already."""
         fits = is_indices if self.whole else are_units if self.units else is_array
-        if not fits(value, *self._lengths):
+        if not fits(value, *self._lengths) or (self.whole and value.min(initial=0) < 0):
             raise UnfitError
         self._check_ends(value)
         return value
@@ -150,6 +150,15 @@ Point = Annotated[Array, Shape(3)]
 UnitVector = Annotated[Array, Shape(3, units=True)]
 Wrench = Annotated[Array, Shape(6)]
 """A force [N], then a torque [N m], (6,)."""
+Points = Annotated[Array, Shape("k", 3)]
+"""A point or a vector for each of k contacts, (k, 3)."""
+UnitVectors = Annotated[Array, Shape("k", 3, units=True)]
+Frictions = Annotated[Array, Shape("k", least=0.0, most=LARGEST_FRICTION)]
+"""A Coulomb coefficient for each of k contacts, (k,)."""
+Polygon = Annotated[Array, Shape(None, 3)]
+"""Any number of points in space, (n, 3) [m], such as the corners of a polygon in order."""
+Triangles = Annotated[Indices, Shape(None, 3, whole=True)]
+"""Places of the corners of triangles among points, (t, 3)."""
 
 
 def frozen_copy(values: Array) -> Array:
