@@ -16,9 +16,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError, NoForcesError, SolverError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2, LoadSet, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
+from grasp_core.kinds import OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from scenes.mujoco.held import HeldLayout
@@ -41,7 +43,7 @@ UP = 1.005
 
 
 @dataclass(frozen=True, slots=True)
-class Enough:
+class Enough(Declared):
     """The least push that is proved to carry what the trials ask, or the reason why none is."""
 
     load_multiple: float
@@ -51,11 +53,16 @@ class Enough:
     """Largest normal force of a finger, `push_n` of the settings [N]; None where none is enough."""
     stiffness_n_per_m: float | None = None
     """Stiffness of the fingertips for it: that which was used, or the least that is enough."""
-    predicted_loss: float | None = None
+    predicted_loss: OrInfinity | None = None
     """Least multiple of a trial's load at which the object is then lost, predicted."""
     reason: str | None = None
 
     def __post_init__(self) -> None:
+        if self.push_n is not None and self.predicted_loss is None:  # null in a file
+            object.__setattr__(self, "predicted_loss", math.inf)
+        Declared.__post_init__(self)
+
+    def _check_together(self) -> None:
         missing = (self.push_n, self.stiffness_n_per_m, self.predicted_loss).count(None)
         if missing != (0 if self.reason is None else 3):
             raise InputError(

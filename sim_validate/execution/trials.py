@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, to_digits
+from grasp_core.declared import Declared
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.geometry.nearest_points import nearest_on_surface
 from grasp_core.objects.polyhedron import Polyhedron
@@ -189,7 +190,7 @@ class Trial:
 
 
 @dataclass(frozen=True, slots=True)
-class Skipped:
+class Skipped(Declared):
     """A kind of trial that was asked for and left out, and why."""
 
     kind: TrialKind

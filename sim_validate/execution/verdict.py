@@ -3,11 +3,14 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
-from grasp_core.arrays import Array
-from grasp_core.declared import ByValue
+from grasp_core.arrays import Array, Shape
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
+from grasp_core.figures import Shown
+from grasp_core.files.records import Key, recorded
+from grasp_core.kinds import OrInfinity
 from grasp_core.solvers.ties import first_best
 from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.execution.enough import Enough
@@ -24,7 +27,7 @@ CLEAR_OF_SLIP = 1.05
 
 
 @dataclass(frozen=True, slots=True)
-class ExecutionTrial:
+class ExecutionTrial(Declared):
     """One trial of an execution, simulated and predicted."""
 
     kind: TrialKind
@@ -34,28 +37,28 @@ class ExecutionTrial:
     survived: bool
     """Whether the object was kept, and moved no farther than the settings allow."""
     fate: Fate
-    slip_m: float
+    slip_m: OrInfinity
     """Farthest that a point of contact slid on the object [m]; infinite where the simulator
     diverged, as the next two are."""
-    displacement_m: float
+    displacement_m: OrInfinity
     """Largest displacement of the centre of mass against the palm [m]."""
-    turn_rad: float
+    turn_rad: OrInfinity
     """Largest turn against the palm [rad]."""
-    predicted_first_slip: float
+    predicted_first_slip: OrInfinity
     """Multiple of the trial's load at which the first contact slips, predicted; for `misplaced`,
     that of the weight in the planned place."""
-    predicted_loss: float
+    predicted_loss: OrInfinity
     """Multiple of the trial's load at which the object is lost, predicted: it moves or turns
     farther than the settings allow, or nothing balances the load; for `misplaced`, that of the
     weight in the planned place."""
-    simulated_first_slip: float
+    simulated_first_slip: OrInfinity
     """Multiple of the trial's load at which the first contact slips, from the simulated contact
     forces: one or less if a contact slipped, else how far away slip stayed."""
     step_s: float
     """Length of the shortest steps that the simulator took: a loss with steps of the usual length
     counts only if short steps find it as well [s]."""
 
-    def __post_init__(self) -> None:
+    def _check_together(self) -> None:
         unknown = [math.isinf(each) for each in (self.slip_m, self.displacement_m, self.turn_rad)]
         if unknown != [self.fate == "diverged"] * 3:
             raise InputError(
@@ -73,21 +76,21 @@ class ExecutionTrial:
 
 
 @dataclass(frozen=True, slots=True)
-class ExecutionControl:
+class ExecutionControl(Declared):
     """A trial that must slip: the least load that does so, on a grip weaker than certified."""
 
     name: str
     """What is weaker than certified: friction, squeeze, or a finger that does not push."""
     let_go: bool
-    first_slip: float
+    first_slip: OrInfinity
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Execution(ByValue):
+class Execution(Declared):
     """The trials of one grasp, executed with one squeeze that was never replanned."""
 
     mass_kg: float
-    squeeze: Array
+    squeeze: Annotated[Array, Shape("k", 3), Key("squeeze_n")]
     """Contact forces at rest, on the object, (k, 3) [N]."""
     load_multiple: float
     """Multiple of the object's weight, in any direction, that the squeeze is certified for."""
@@ -97,7 +100,7 @@ class Execution(ByValue):
     """Kinds of trials that were asked for and left out, with the reasons."""
     physics: PhysicsSettings | None = None
     """Settings of the simulator, where they are known."""
-    tip_radius_m: Array | None = None
+    tip_radius_m: Annotated[Array, Shape("k")] | None = None
     """Radii of the fingertips that were used, (k,) [m], where they are known."""
     enough: Enough | None = None
     """The push, and stiffness, that would be enough for the trials; None where all were survived,
@@ -138,10 +141,10 @@ class Execution(ByValue):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ExecutedGrasp(ByValue):
+class ExecutedGrasp(Declared):
     """A grasp with what its execution found, or with the reason why no squeeze holds the object."""
 
-    id: str
+    id: Annotated[str, Shown("grasp")]
     family: str
     """Construction of the contacts; empty where a hand executed them."""
     contacts_sha256: str
@@ -153,8 +156,8 @@ class ExecutedGrasp(ByValue):
     enough: Enough | None = None
     """The push, and stiffness, that would be enough for the trials, as in `Execution.enough`."""
 
-    @property
-    def survived(self) -> bool:
+    @recorded
+    def survived(self) -> Annotated[bool, Shown("survived")]:
         """Whether the object survived every trial, of at least one."""
         return self.execution is not None and self.execution.survived
 
@@ -163,16 +166,21 @@ class ExecutedGrasp(ByValue):
         """The trials of the execution; empty where no squeeze holds the object."""
         return () if self.execution is None else self.execution.trials
 
-    @property
-    def least_predicted_loss(self) -> float:
+    @recorded
+    def least_predicted_loss(self) -> Annotated[OrInfinity, Shown("least predicted loss", ".3g")]:
         """Least multiple of a trial's load at which the object is lost, predicted.
 
         It is 0 where no squeeze holds the object, or no trial is possible.
         """
         return 0.0 if self.execution is None else self.execution.least_predicted_loss
 
-    @property
-    def controls_let_go(self) -> bool:
+    @recorded
+    def payload_kg(self) -> Annotated[float | None, Shown("squeeze's payload kg", ".3g")]:
+        """Largest mass that the squeeze is certified to carry slowly, in any direction [kg]."""
+        return None if self.execution is None else self.execution.payload_kg
+
+    @recorded
+    def controls_let_go(self) -> Annotated[bool, Shown("controls let go")]:
         """Whether every negative control slipped, as it must; True where there is none."""
         return self.execution is None or self.execution.controls_let_go
 
