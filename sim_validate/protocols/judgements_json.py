@@ -6,17 +6,18 @@ null: the margin of a test without loads is infinite.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
-from typing import Any, Literal, NotRequired, cast
+from typing import Annotated, Any, Literal, NotRequired, cast
 
-from pydantic import ConfigDict, with_config
+from pydantic import ConfigDict, Field, with_config
 from typing_extensions import TypedDict
 
 from grasp_core.files.json_text import text_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
-from sim_validate.hands.reaches_json import NotNegative
 from sim_validate.kit.fields import Count, ObjectRecord, Positive, finite, object_record
 from sim_validate.protocols.judging import Judgement
+
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
 class RunRecord(TypedDict):

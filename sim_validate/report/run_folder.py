@@ -22,7 +22,7 @@ from sim_validate.protocols.judgements_json import JudgementsFile
 from sim_validate.report.agreement import BAD, Record, said_of
 
 if TYPE_CHECKING:
-    from sim_validate.hands.reaches_json import SavedReaches
+    from sim_validate.hands.reaches import Reaches
 
 VERDICTS = "verdicts.json"
 Read = TypeVar("Read", RegionsFile, JudgementsFile, BestFile)
@@ -42,7 +42,7 @@ class RunFolder:
     regions_friction: float | None
     executions: Executions | None
     """Grasps as a robot executes them; None if the file does not exist."""
-    reaches: "SavedReaches | None" = None
+    reaches: "Reaches | None" = None
     judgements: Record | None = None
     possible: BestFile | None = None
     left_out: int = 0
@@ -130,16 +130,17 @@ def _run(path: Path) -> RunFolder:
     )
 
 
-def reaches_beside(grasps: Path, saved: Plan) -> "SavedReaches | None":
+def reaches_beside(grasps: Path, saved: Plan) -> "Reaches | None":
     """Read where a hand stands in grasps from the folder of their file."""
     path = grasps.with_name(REACHES)
     if not path.is_file():
         return None
-    from sim_validate.hands.reaches_json import read_reaches  # runs without a hand need none
+    from sim_validate.hands.reaches import Reaches  # runs without a hand need none
 
-    found, record = read_reaches(path)
-    _check_object(path, record["object"]["content_sha256"], saved)
-    _check_contacts(path, record["reaches"], saved)
+    found = Reaches.read(path)
+    _check_object(path, found.object.content_sha256, saved)
+    listed = [{"id": each.id, "contacts_sha256": each.contacts_sha256} for each in found]
+    _check_contacts(path, listed, saved)
     return found
 
 

@@ -32,7 +32,7 @@ from sim_validate.datasets.manifest import (
 from sim_validate.datasets.staging import UnitRecord
 from sim_validate.engine.setup import Setup
 from sim_validate.execution.executions_json import executions_from_json, executions_to_json
-from sim_validate.hands.reaches_json import reaches_from_json
+from sim_validate.hands.reaches import Reaches
 from sim_validate.kit.config_file import flags_from
 from sim_validate.kit.toml_tables import tables_of_toml
 from sim_validate.planning.regions_json import RegionsFile
@@ -332,7 +332,7 @@ TARGETS = (
            lambda: [executions_text().encode()], _same_executions, "json"),
     Target("regions", lambda data: record_of(RegionsFile, text_of(data), "regions.json", schema=1),
            lambda: [_json(REGIONS)], _same_record, "json"),
-    Target("reaches", lambda data: reaches_from_json(text_of(data)),
+    Target("reaches", lambda data: Reaches.of_text(text_of(data)),
            lambda: [reaches_text().encode()],
            lambda data, found: _same_record(data, found[1]), "json"),
     Target("baseline", _baseline, _baseline_seed, _same_baseline, "json"),
