@@ -20,6 +20,7 @@ from grasp_core.files.records import FLAT, UNRECORDED, RecordFile, recorded
 from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.kinds import Friction, Many, Measured, OrInfinity
 from grasp_core.notebooks import InNotebooks
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import Scene
@@ -285,6 +286,14 @@ class Verdicts(RecordFile, ById[Verdict]):
     """How the simulator did on cases with known answers."""
     verdicts: tuple[Verdict, ...]
     versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
+
+    @classmethod
+    def of(
+        cls, body: Polyhedron, friction: float, gate: Gate, verdicts: tuple[Verdict, ...], *,
+        complete: bool = True,
+    ) -> Self:  # fmt: skip
+        """Collect verdicts on the grasps of an object for a file."""
+        return cls(AboutObject.of(body), friction, complete, gate, verdicts)
 
     @property
     def object_sha256(self) -> str:
