@@ -192,9 +192,13 @@ class Verdict(Declared, InNotebooks):
 
     @recorded
     def displacement_m(self) -> Annotated[Measured, Shown("um moved", ".2g", MICRO)]:
-        """Largest displacement of the object in the trials that hold a wrench [m]."""
-        moved = [trial.hold.displacement_m for trial in self.wrenches]
-        return math.nan if any(map(math.isnan, moved)) else max(moved, default=0.0)
+        """Largest displacement of the object under any wrench, after friction was lowered [m]."""
+        return _largest([trial.hold.displacement_m for trial in self.wrenches])
+
+    @recorded
+    def start_displacement_m(self) -> Annotated[Measured, Shown("um when loaded", ".2g", MICRO)]:
+        """Largest one before that, at high friction: the fingers give way a little [m]."""
+        return _largest([trial.hold.start_displacement_m for trial in self.wrenches])
 
     @property
     def failures(self) -> tuple[WrenchVerdict, ...]:
@@ -242,6 +246,10 @@ class Verdict(Declared, InNotebooks):
 
         title = f"{self.id}: {self.outcome.value.replace('_', ' ')}"
         return card(placed(self.scene.layout), title, _rows(self))
+
+
+def _largest(values: Sequence[float]) -> float:
+    return math.nan if any(map(math.isnan, values)) else max(values, default=0.0)
 
 
 def _disagreement(friction: CriticalFriction) -> str:

@@ -66,8 +66,8 @@ def test_a_verdict_has_the_fields_that_users_rely_on(here, capsys):
     assert {
         "id", "contacts_sha256", "outcome", "held", "good", "mismatches", "critical_friction",
         "predicted_critical_friction", "simulated_critical_friction", "shares_found",
-        "displacement_m", "wrenches", "controls", "controls_let_go", "robustness", "contacts",
-        "friction", "setup", "agenda", "scale",
+        "displacement_m", "start_displacement_m", "wrenches", "controls", "controls_let_go",
+        "robustness", "contacts", "friction", "setup", "agenda", "scale",
     } == set(verdict)  # fmt: skip
     assert verdict["mismatches"] == []
     friction = verdict["critical_friction"]

@@ -101,8 +101,8 @@ def test_a_page_says_what_the_files_say(small_run, small_report):
         assert f"{1e3 * certified['disc_radius_m']:.3g} mm" in said
         assert certified["proof"]["file"] in said
         assert "held 2 of 2 times" in said
-        for field, name in (("displacement_m", "Object moved at most"),
-                            ("start_displacement_m", "While a load came, at most")):  # fmt: skip
+        for field, name in (("displacement_m", "um moved"),
+                            ("start_displacement_m", "um when loaded")):  # fmt: skip
             most = 1e6 * max(getattr(trial.hold, field) for trial in verdict.wrenches)
             place = page.said.index(name)
             assert float(page.said[place + 1].split()[0]) == pytest.approx(most, rel=0.06)
