@@ -10,18 +10,29 @@ from pathlib import Path
 from grasp_core.figures import described
 from grasp_core.settings import Settings
 from sim_validate.closure.verdict import Verdicts
+from sim_validate.hands.reaches import Reaches
 
 PAGE = Path(__file__).parent.parent / "docs" / "files.md"
-FILES = {kind.FILE: kind for kind in (Verdicts,)}
+FILES = {kind.FILE: kind for kind in (Verdicts, Reaches)}
 IN_FILES = re.compile(r"\b(None|NaN)\b")
 """What JSON lacks: files have null there."""
 MARKED = re.compile(r"(<!-- fields: ([^>]*?) -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
 
-def tables_of(kind: type) -> str:
-    """The tables of a file: its own keys, then those of each record inside it."""
-    said = []
-    for part in described(kind):
+def tables_of(file: str, known: dict[type, str]) -> str:
+    """The tables of a file: its own keys, then those of each record inside it.
+
+    A record that is `known` from a file before it is not described again.
+    """
+    said, elsewhere = [], ()
+    for part in described(FILES[file]):
+        if part.where.startswith(elsewhere):
+            continue
+        if part.kind in known:
+            said.append(f"`{part.where}` has the fields of {known[part.kind]}.\n")
+            elsewhere += (f"{part.where}.",)
+            continue
+        known[part.kind] = f"`{part.where}` in {file}"
         if issubclass(part.kind, Settings):
             said.append(
                 f"`{part.where}` holds the settings of `{part.kind.__name__}` by their names.\n"
@@ -36,8 +47,8 @@ def tables_of(kind: type) -> str:
 
 def page() -> str:
     """The text of the page with the tables as the classes say them."""
-    text = PAGE.read_text(encoding="utf-8")
-    return MARKED.sub(lambda found: found[1] + tables_of(FILES[found[2]]), text)
+    text, known = PAGE.read_text(encoding="utf-8"), {}
+    return MARKED.sub(lambda found: found[1] + tables_of(found[2], known), text)
 
 
 if __name__ == "__main__":

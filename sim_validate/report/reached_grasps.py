@@ -26,6 +26,8 @@ REASONS = {
 }
 """Words for what was in the way."""
 FINGERS = "that touch at the grasp's contacts, by finger of the grasp"
+SAID_ABOVE = ("grasp", "id")
+"""Figures that the page has in its title."""
 FLAGS = {"starts": "--starts", "seed": "--seed", "clearance_m": "--clearance-m"}
 """Flags of `graspproof reach` for what may be asked of a pose."""
 
@@ -138,7 +140,7 @@ def _facts(reaches: "Reaches", found: "ReachedGrasp") -> Iterable[Fact]:
 def _figures(record: object, part: str) -> Iterable[Fact]:
     """Yield the figures that a record has, but for the grasp that the page is about."""
     for each in figures(type(record)):
-        if each.shown.heading != "grasp" and each.of(record) is not None:
+        if each.name not in SAID_ABOVE and each.of(record) is not None:
             heading = f"{part}{each.shown.heading}"
             yield heading[:1].upper() + heading[1:], each.cell(record), each.meaning
 
