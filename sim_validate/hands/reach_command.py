@@ -116,7 +116,7 @@ def _reach(
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
     results, count = processes.each(job, saved.grasps, jobs=command.jobs), len(saved.grasps)
-    shown = reporter.counted("reaching", results, count, "good", lambda each: each.good)
+    shown = reporter.counted("reaching", results, count, "reached", lambda each: each.reach.reached)
     path = command.out and command.out / Reaches.FILE
     return finished(shown, count, partial(_collected, job), path, reporter)
 
