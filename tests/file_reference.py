@@ -24,7 +24,7 @@ def tables_of(file: str, known: dict[type, str]) -> str:
 
     A record that is `known` from a file before it is not described again.
     """
-    said, elsewhere = [], ()
+    said, elsewhere = list[str](), tuple[str, ...]()
     for part in described(FILES[file]):
         if part.where.startswith(elsewhere):
             continue
@@ -47,7 +47,7 @@ def tables_of(file: str, known: dict[type, str]) -> str:
 
 def page() -> str:
     """The text of the page with the tables as the classes say them."""
-    text, known = PAGE.read_text(encoding="utf-8"), {}
+    text, known = PAGE.read_text(encoding="utf-8"), dict[type, str]()
     return MARKED.sub(lambda found: found[1] + tables_of(found[2], known), text)
 
 
