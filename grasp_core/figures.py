@@ -20,6 +20,8 @@ from grasp_core.files.records import entries
 
 NONE = "-"
 """What a cell shows where there is no figure."""
+NEVER = "never"
+"""What a cell shows for an infinite number: what is counted never happens."""
 UNITS = {
     "m": "m", "m3": "m3", "rad": "rad", "deg": "deg", "s": "s", "n": "N", "nm": "N m", "kg": "kg",
     "m_per_s": "m/s", "n_per_m": "N/m", "kg_m2": "kg m^2", "n_nm": "N, N m", "n_s": "N s",
@@ -50,9 +52,9 @@ class Figure(NamedTuple):
     """Attributes that lead to it; more than one where it stands in a flat part of the record."""
 
     def of(self, record: Any) -> Any:
-        """Return the figure of a record."""
+        """Return the figure of a record; None where the record lacks the part that has it."""
         for name in self.path:
-            record = getattr(record, name)
+            record = None if record is None else getattr(record, name)
         return record
 
     def cell(self, record: object) -> str:
@@ -80,6 +82,8 @@ def cell(value: Any, shown: Shown) -> str:
         return NONE
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, float) and math.isinf(value):
+        return NEVER
     if isinstance(value, Enum):
         return str(value.value).replace("_", " ")
     if isinstance(value, int | float):
@@ -87,7 +91,7 @@ def cell(value: Any, shown: Shown) -> str:
     if isinstance(value, str):
         return value
     items: Sequence[Any] = value
-    numbers = all(isinstance(item, float) for item in items)
+    numbers = bool(items) and all(isinstance(item, float) for item in items)
     return " to ".join(cell(item, shown) for item in items) if numbers else str(len(items))
 
 
@@ -100,18 +104,23 @@ def table(records: Iterable[object], kind: type) -> tuple[Sequence[str], list[tu
 
 
 def scalars(record: object) -> Mapping[str, Any]:
-    """Return the plain entries of a record by name: numbers, words, and numbers of texts."""
+    """Return the plain entries of a record by name: numbers, words, and numbers of items.
+
+    Those of a flat part are among them, if the record has it.
+    """
     own, properties = entries(type(record))
     found: dict[str, Any] = {}
     for each in (*own, *properties):
         value = getattr(record, each.name)
-        if isinstance(value, Enum):
+        if each.flat is not None:
+            found |= {} if value is None else scalars(value)
+        elif isinstance(value, Enum):
             found[each.name] = value.value
         elif value is None or isinstance(value, str | bool | int | float):
             found[each.name] = value
         elif isinstance(value, tuple):
             items = cast("tuple[Any, ...]", value)
-            if all(isinstance(item, str) for item in items):
+            if not any(isinstance(item, int | float) for item in items):
                 found[each.name] = len(items)
     return found
 
