@@ -152,13 +152,16 @@ class Execution(Declared):
     """The trials of one grasp, executed with one squeeze that was never replanned."""
 
     mass_kg: Quantity
+    """Mass of the object [kg]."""
     squeeze: Annotated[Array, Shape("k", 3), Key("squeeze_n")]
     """Contact forces at rest, on the object, (k, 3) [N]."""
     load_multiple: Annotated[float, Shown("load", ".3g")]
     """Multiple of the object's weight, in any direction, that the squeeze is certified for; this
     less one is the acceleration [g] that the palm may slowly come to."""
     trials: tuple[ExecutionTrial, ...]
+    """How each trial ended."""
     controls: tuple[ExecutionControl, ...]
+    """How each negative control ended."""
     skipped: tuple[Skipped, ...]
     """Kinds of trials that were asked for and left out, with the reasons."""
     physics: PhysicsSettings | None = None
@@ -305,6 +308,7 @@ class Executions(RecordFile, ById[ExecutedGrasp]):
     settings: ExecutionSettings
     """How they were executed, with the impulse of a knock that was used."""
     grasps: Annotated[tuple[ExecutedGrasp, ...], Key("executions")]
+    """What the execution of each grasp found."""
     versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
 
     def _check_together(self) -> None:
