@@ -51,8 +51,8 @@ class ExecutionTrial(Declared):
     survived: Annotated[bool, Shown("survived")]
     """Whether the object was kept, and moved no farther than the settings allow."""
     fate: Annotated[Fate, Shown("fate")]
-    """What became of the object; if it was kept, and the trial was not survived, it moved or turned
-    too far."""
+    """What became of the object: `stuck`, `slipped`, `dropped` or `diverged`. If it was kept, and
+    the trial was not survived, it moved or turned too far."""
     slip_m: Annotated[OrInfinity, Shown("mm slid", ".3g", MILLI, UNKNOWN)]
     """Farthest that a point of contact slid on the object [m]; infinite where the simulator
     diverged, as the next two are."""
@@ -99,6 +99,7 @@ class ExecutionControl(Declared):
     name: Annotated[str, Shown("control")]
     """What is weaker than certified: friction, squeeze, or a finger that does not push."""
     let_go: Annotated[bool, Shown("let go")]
+    """Whether a contact slipped, as it must."""
     first_slip: Annotated[OrInfinity, Shown("first slip", MULTIPLE)]
     """Multiple of the load at which a contact slipped."""
 
@@ -125,6 +126,7 @@ class Enough(Declared):
     predicted_loss: OrInfinity | None = None
     """Least multiple of a trial's load at which the object is then lost, predicted."""
     reason: str | None = None
+    """Why no push is found to be enough; None where one is."""
 
     def _check_together(self) -> None:
         if self.push_n is not None and self.predicted_loss is None:
@@ -303,6 +305,7 @@ class Executions(RecordFile, ById[ExecutedGrasp]):
 
     object: AboutObject
     friction: Friction
+    """Coulomb coefficient that was simulated."""
     complete: bool
     """Whether every grasp that was asked for was executed."""
     settings: ExecutionSettings
