@@ -38,6 +38,8 @@ class Shown:
     """Format of a number."""
     times: float = 1.0
     """Factor on a number, such as 1e6 for micrometres."""
+    infinite: str = "never"
+    """What stands for an infinite number: most figures are multiples at which something happens."""
 
 
 class Figure(NamedTuple):
@@ -51,9 +53,9 @@ class Figure(NamedTuple):
     """Attributes that lead to it; more than one where it stands in a flat part of the record."""
 
     def of(self, record: Any) -> Any:
-        """Return the figure of a record."""
+        """Return the figure of a record; None where the record lacks the part that has it."""
         for name in self.path:
-            record = getattr(record, name)
+            record = None if record is None else getattr(record, name)
         return record
 
     def cell(self, record: object) -> str:
@@ -84,11 +86,11 @@ def cell(value: Any, shown: Shown) -> str:
     if isinstance(value, Enum):
         return str(value.value).replace("_", " ")
     if isinstance(value, int | float):
-        return format(shown.times * value, shown.form)
+        return shown.infinite if math.isinf(value) else format(shown.times * value, shown.form)
     if isinstance(value, str):
         return value
     items: Sequence[Any] = value
-    numbers = all(isinstance(item, float) for item in items)
+    numbers = bool(items) and all(isinstance(item, float) for item in items)
     return " to ".join(cell(item, shown) for item in items) if numbers else str(len(items))
 
 
@@ -101,18 +103,23 @@ def table(records: Iterable[object], kind: type) -> tuple[Sequence[str], list[tu
 
 
 def scalars(record: object) -> Mapping[str, Any]:
-    """Return the plain entries of a record by name: numbers, words, and numbers of texts."""
+    """Return the plain entries of a record by name: numbers, words, and numbers of items.
+
+    Those of a flat part are among them, if the record has it.
+    """
     own, properties = entries(type(record))
     found: dict[str, Any] = {}
     for each in (*own, *properties):
         value = getattr(record, each.name)
-        if isinstance(value, Enum):
+        if each.flat is not None:
+            found |= {} if value is None else scalars(value)
+        elif isinstance(value, Enum):
             found[each.name] = value.value
         elif value is None or isinstance(value, str | bool | int | float):
             found[each.name] = value
         elif isinstance(value, tuple):
             items = cast("tuple[Any, ...]", value)
-            if all(isinstance(item, str) for item in items):
+            if not any(isinstance(item, int | float) for item in items):
                 found[each.name] = len(items)
     return found
 

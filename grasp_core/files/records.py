@@ -5,7 +5,7 @@ and what reads a file back is the same class. Properties that are marked as `rec
 too; a file whose other fields say something else contradicts itself and is refused. In a kind,
 `Key("position_m")` names the key where it is not the field's name, `Null(math.inf)` the number that
 null stands for, `UNRECORDED` a field that only lives in memory and has a default, and `FLAT` a
-field whose own fields stand in the object itself.
+field whose own fields stand in the object itself; where it may be None, they are all absent then.
 """
 
 import math
@@ -72,6 +72,12 @@ class Entry(NamedTuple):
     flat: type | None
     """The class whose keys stand among those of the outer record; None for other fields."""
 
+    @property
+    def may_lack(self) -> bool:
+        """Whether the keys of a flat part may all be absent."""
+        kind = get_args(self.kind)[0] if get_origin(self.kind) is Annotated else self.kind
+        return type(None) in get_args(kind)
+
 
 class Entries(NamedTuple):
     """How a record is written and read."""
@@ -126,7 +132,7 @@ def record_of(value: object) -> dict[str, Any]:
         if each.flat is None:
             found[each.key] = plain
         else:
-            found.update(plain)
+            found.update(plain or {})
     return found
 
 
@@ -198,7 +204,8 @@ def from_record(kind: type[Record], found: object, where: str = "") -> Record:
     for each in (*own, *properties):
         if each.flat is not None:
             inner = {key: given[key] for key in keys(each.flat) if key in given}
-            taken[each.name] = from_record(each.flat, inner, where)
+            absent = each.may_lack and not inner
+            taken[each.name] = None if absent else from_record(each.flat, inner, where)
         elif each.key not in given:
             if each.default is MISSING:
                 raise InputError(f"{at(where, each.key)}: missing; add it")

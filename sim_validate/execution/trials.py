@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, to_digits
-from grasp_core.declared import Declared
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.geometry.nearest_points import nearest_on_surface
 from grasp_core.objects.polyhedron import Polyhedron
@@ -31,6 +30,7 @@ from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive, Pose, Table, joined
 from sim_validate.execution.settings import ExecutionSettings, TrialKind
+from sim_validate.execution.verdict import Skipped
 
 MET = 1e-7
 """Distance from the surface at which a fingertip has met it, in object radii."""
@@ -187,14 +187,6 @@ class Trial:
     """Whether the load keeps turning, so that small slips add up."""
     expected: Drive | None = None
     """What the prediction is for, if not for the drive itself."""
-
-
-@dataclass(frozen=True, slots=True)
-class Skipped(Declared):
-    """A kind of trial that was asked for and left out, and why."""
-
-    kind: TrialKind
-    reason: str
 
 
 def trials_of(
