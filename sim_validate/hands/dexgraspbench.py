@@ -227,8 +227,8 @@ def _record(found: Any) -> DexRecord:
 
 def _plain(found: Any) -> Any:
     """Return the numbers of an array, and a number for an array without axes."""
-    values = found.values if isinstance(found, _Numbers) else found
-    return values.item() if isinstance(values, np.ndarray) and values.size == 1 else values
+    values: Any = found.values if isinstance(found, _Numbers) else found
+    return values.item() if getattr(values, "size", None) == 1 else values
 
 
 def write_dex_record(record: DexRecord, path: str | Path) -> Path:
@@ -241,8 +241,9 @@ def write_dex_record(record: DexRecord, path: str | Path) -> Path:
         InputError: `record` is no record, or `path` no path.
     """
     instance(record, DexRecord, "record")
-    fields = {key: np.array(value) if isinstance(value, list) else value
-              for key, value in record_of(record).items()}  # fmt: skip
+    written: Mapping[str, Any] = record_of(record)
+    fields = {key: value if isinstance(value, str | float) else np.array(value)
+              for key, value in written.items()}  # fmt: skip
     held = io.BytesIO()
     np.save(held, np.array(fields, dtype=object), allow_pickle=True)
     return write_parts(path_of(path, "path"), [held.getvalue()])
