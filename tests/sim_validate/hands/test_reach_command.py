@@ -116,6 +116,7 @@ def test_a_simulated_hand_holds_and_its_grasps_are_ranked(bracket_plan, tmp_path
     code = main([*words, "--simulate", "--torque-limit-n-m", "0.35", "--out", str(tmp_path)])
     said = capsys.readouterr().out
     found = Reaches.read(tmp_path / REACHES)
+    assert found.text() == (tmp_path / REACHES).read_text()
     reached = [each for each in found if each.reach.reached]
     assert reached, said
     assert code == (Exit.GOOD if len(reached) == 2 else Exit.NEGATIVE)
@@ -180,6 +181,7 @@ def test_a_hand_executes_the_grasps_that_it_reaches(bracket_plan, tmp_path, caps
     said = capsys.readouterr().out
     found = Reaches.read(tmp_path / REACHES)
     assert found.complete
+    assert found.text() == (tmp_path / REACHES).read_text()
     reached = [each for each in found if each.reach.reached]
     assert reached, said
     for each in reached:
