@@ -49,7 +49,6 @@ ReachReason: TypeAlias = Literal["", "limit", "collision", "not found", "no clos
 overlapped, or neither; or, proved, no three contacts close for a hand with three fingers; empty
 where a pose was found."""
 OVERLAPS = {"self": "the hand itself", "object": "the object", "table": "the table"}
-MILLI = 1e3
 OBEYED = 1e-6
 """By how much a joint may be off the angle that follows from another: rounding of a file [rad]."""
 
@@ -68,9 +67,7 @@ class HandReach(Declared):
     """Reason why no pose was found, as a sentence; empty where one was found."""
     starts: Annotated[Number, Shown("starts")]
     """Number of starts that were tried."""
-    clearance_m: Annotated[
-        float, Range(**BOUNDS["hand_clearance_m"]), Shown("clearance mm", times=MILLI)
-    ]  # fmt: skip
+    clearance_m: Annotated[float, Range(**BOUNDS["hand_clearance_m"])]
     """Least distance that was asked for between all that must not touch [m]."""
     fingers: Annotated[Indices, Shape("k", whole=True)] | None = None
     """The hand's finger at each contact that is used, (k,)."""
@@ -133,7 +130,7 @@ class HandReach(Declared):
         return None if self.certificate is None else self.certificate.margin
 
     @recorded
-    def contacts_within_regions(self) -> Annotated[int | None, Shown("contacts within regions")]:
+    def contacts_within_regions(self) -> Annotated[int | None, Shown("within regions")]:
         """How many of the contacts are in the grasp's regions for them, or as planned."""
         return None if self.within_regions is None else sum(self.within_regions)
 
