@@ -13,31 +13,22 @@ The stance of a pose is what mechanics and scenes need of it, with balls for all
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias, get_args
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices
-from grasp_core.checked import (
-    BOUNDS,
-    coefficient,
-    instance,
-    number,
-    one_of,
-    seed_of,
-    switch,
-    text,
-    whole,
-)
+from grasp_core.arrays import Array, Indices, Point, Shape, frozen
+from grasp_core.checked import BOUNDS, coefficient, instance, number, seed_of, switch, whole
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.declared import ByValue, summary
+from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.opening import opened
 from grasp_core.hands.pose_search import Asked, contact_choices, find_pose
+from grasp_core.kinds import Number, Range
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import FINGERS, Contact, Grasp
@@ -52,7 +43,7 @@ OBEYED = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class HandReach(ByValue):
+class HandReach(Declared):
     """A pose in which a hand stands in a grasp, or why none was found."""
 
     hand: str
@@ -63,15 +54,15 @@ class HandReach(ByValue):
     """Why no pose was found; empty where one was."""
     explanation: str
     """Reason why no pose was found, as a sentence; empty where one was found."""
-    starts: int
+    starts: Number
     """Number of starts that were tried."""
-    clearance_m: float
+    clearance_m: Annotated[float, Range(**BOUNDS["hand_clearance_m"])]
     """Least distance that was asked for between all that must not touch [m]."""
-    fingers: Indices | None = None
+    fingers: Annotated[Indices, Shape("k", whole=True)] | None = None
     """The hand's finger at each contact that is used, (k,)."""
-    joints: Array | None = None
+    joints: Annotated[Array, Shape(None)] | None = None
     """Joint angles in the order of `Hand.joints`, (j,) [rad]."""
-    palm_pose: Array | None = None
+    palm_pose: Annotated[Array, Shape(POSE, POSE)] | None = None
     """Pose of the palm in the object's frame, (4, 4)."""
     contacts: tuple[Contact, ...] | None = None
     """Contacts that are reached, k of them, in the grasp's finger order."""
@@ -80,13 +71,13 @@ class HandReach(ByValue):
     within_regions: tuple[bool, ...] | None = None
     """Whether each is in the grasp's region for it, or at the planned contact; regions are proved
     for four contacts together, so that they promise nothing to three."""
-    pregrasp: Array | None = None
+    pregrasp: Annotated[Array, Shape(None)] | None = None
     """Joint angles at which the fingers are open and the hand is free, (j,) [rad]; None if none
     were found."""
-    approach: Array | None = None
+    approach: Point | None = None
     """Unit vector along which the palm moves in with open fingers, over 60 mm, in the object's
     frame, (3,); None if no straight way was found."""
-    used: Indices | None = None
+    used: Annotated[Indices, Shape("k", whole=True)] | None = None
     """Indices of the grasp's contacts at which fingers stand, (k,), rising: all four, or three for
     a hand with three fingers. All are taken to be used where `fingers` are given and this is
     not."""
@@ -95,22 +86,9 @@ class HandReach(ByValue):
     `no closure`."""
 
     def __post_init__(self) -> None:
-        for name in ("hand", "grasp", "explanation"):
-            text(getattr(self, name), name)
-        one_of(self.reason, get_args(ReachReason), "reason")
-        whole(self.starts, "starts")
-        number(self.clearance_m, "clearance_m", **BOUNDS["hand_clearance_m"])
-        if self.fingers is not None:
-            used = range(FINGERS) if self.used is None else self.used
-            kept = frozen_indices(used, (None,), "used")
-            fingers = frozen_indices(self.fingers, (len(kept),), "fingers")
-            object.__setattr__(self, "used", kept)
-            object.__setattr__(self, "fingers", fingers)
-        shapes = {"joints": (None,), "palm_pose": (POSE, POSE), "pregrasp": (None,),
-                  "approach": (3,)}  # fmt: skip
-        for name, shape in shapes.items():
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
+        if self.fingers is not None and self.used is None:
+            object.__setattr__(self, "used", range(FINGERS))
+        Declared.__post_init__(self)
 
     @property
     def reached(self) -> bool:

@@ -4,12 +4,21 @@ A field is named by its place, as `pieces[].normal` or `cover.forces`; of a tupl
 drawn. New fields of any dataclass are found by themselves.
 """
 
+import copy
 import dataclasses
 
 import numpy as np
 
 WORDS = ("l1", "linf", "point", "disc", "cone", "certified", "")
 NONSENSE = (None, "a", float("nan"), np.zeros((0, 3)), (), np.array([[None]]))
+
+
+def forged(value, **fields):
+    """A copy with other fields that no constructor has seen, and with all that it has kept."""
+    made = copy.copy(value)
+    for name, field in fields.items():
+        object.__setattr__(made, name, field)
+    return made
 
 
 def places(value, name=""):

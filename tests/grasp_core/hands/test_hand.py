@@ -56,7 +56,7 @@ def test_a_fingertip_that_is_a_block_is_covered_by_the_last_shape():
     assert replace(first, tip=tip).tip.core[1] == 1e-4
     with pytest.raises(InputError, match="last shape of the last link of finger f0 must cover"):
         replace(first, tip=replace(tip, corners=corners))
-    with pytest.raises(InputError, match="corners must be 2"):
+    with pytest.raises(InputError, match="at least 2, at most 200"):
         replace(tip, corners=corners[:1])
     with pytest.raises(InputError, match="rounding"):
         replace(tip, rounding=0.0)
