@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, cross
-from grasp_core.checked import positive, switch
+from grasp_core.checked import switch
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.errors import InputError
 from grasp_core.execution.carried_mass import GAP, CarryingHand, HandPayload, carried_mass
@@ -140,7 +140,6 @@ def hand_payload(
         SolverError: A program's answer failed its check.
     """
     check_body(body)
-    most = positive(max_push_n, "max_push_n")
     stance = stance_of(hand, reach)
     found, levers, limits = _joints(hand, stance)
     weights = GRAVITY_M_PER_S2 * _weights(hand, found)
@@ -150,4 +149,4 @@ def hand_payload(
     normals = np.array([contact.normal for contact in stance.contacts])
     mu = contact_frictions(friction, count)
     arms = points - body.center_of_mass
-    return carried_mass(CarryingHand(arms, normals, mu, most, motors, weights), gap)
+    return carried_mass(CarryingHand(arms, normals, mu, max_push_n, motors, weights), gap)

@@ -124,10 +124,11 @@ def motors_for(motors: Motors | None, contacts: int) -> Motors:
     """Check that motors are those of so many contacts; None gives a hand without joints."""
     if motors is None:
         return Motors(np.zeros((0, 3 * contacts)), np.zeros(0), np.zeros(0))
-    instance(motors, Motors, "motors", "gc.Motors.of makes one")
+    # a certificate's check takes them from anywhere
+    motors = replace(instance(motors, Motors, "motors", "gc.Motors.of makes one"))
     if not motors.are_for(contacts):
         raise InputError(
             f"motors must have levers with three columns for each of {contacts} contacts, "
             f"{3 * contacts} in all, got an array of shape {motors.levers.shape}"
         )
-    return replace(motors)  # a certificate's check takes them from anywhere
+    return motors
