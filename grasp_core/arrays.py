@@ -1,16 +1,14 @@
 """Checks arrays once when they are passed in, and fields of certificates whenever they are used.
 
 Arrays that users pass are copied and made read-only, or refused with an error. A certificate may
-come from anywhere, so its `verify` answers False to a bad field (`is_array` and the like), never an
-error. Its real arrays must be float64, and whole ones int64, as this package makes them: narrower
-types wrap or overflow in the sums of a check, unsigned ones in its differences, and subclasses of
-arrays may hide entries. To check arrays of other types, convert them first,
-`array.astype(np.float64)`.
+come from anywhere, so its `verify` answers False to a bad field (see `Declared.is_sound`), never an
+error. Its real arrays must be float64, and whole ones int64, as its constructor makes them:
+narrower types wrap or overflow in the sums of a check, unsigned ones in its differences, and
+subclasses of arrays may hide entries.
 """
 
 import math
 from dataclasses import dataclass
-from numbers import Real
 from typing import Annotated, Any, TypeAlias, TypeGuard, cast
 
 import numpy as np
@@ -18,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.checked import LARGEST_FRICTION, MOST_COUNT, shown
 from grasp_core.errors import InputError
-from grasp_core.kinds import UnfitError
+from grasp_core.kinds import Range, UnfitError
 
 Array: TypeAlias = NDArray[np.float64]
 """Float array of any shape; the docstring of each value or argument gives its shape."""
@@ -87,24 +85,29 @@ class Shape:
     """Whether entries may be NaN, where a simulation diverged or a finger is missing; null in
     files."""
 
+    _lengths: tuple[int | None, ...] = ()
+
     def __init__(self, *shape: int | str | None, **rules: Any) -> None:
-        object.__setattr__(self, "shape", shape)
-        for name, value in rules.items():
+        lengths = tuple(None if isinstance(n, str) else n for n in shape)
+        for name, value in {"shape": shape, "_lengths": lengths, **rules}.items():
             object.__setattr__(self, name, value)
 
-    @property
-    def _lengths(self) -> tuple[int | None, ...]:
-        return tuple(None if isinstance(n, str) else n for n in self.shape)
-
     def take(self, value: Any) -> NDArray[Any]:
-        """Return a read-only copy of a value as an array of this shape."""
-        make = frozen_indices if self.whole else frozen_units if self.units else frozen
-        try:
-            if self.nan:
-                return self._with_nan(value)
-            array = make(value, self._lengths, "")
-        except InputError as error:
-            raise UnfitError(str(error).strip()) from None
+        """Return a read-only copy of a value as an array of this shape.
+
+        An array that is read-only and owns its entries is kept as it is.
+        """
+        if self._fits(value):
+            array = value if value.base is None and not value.flags.writeable else np.array(value)
+            array.setflags(write=False)
+        else:
+            make = frozen_indices if self.whole else frozen_units if self.units else frozen
+            try:
+                if self.nan:
+                    return self._with_nan(value)
+                array = make(value, self._lengths, "")
+            except InputError as error:
+                raise UnfitError(str(error).strip()) from None
         self._check_ends(array)
         return array
 
@@ -118,14 +121,20 @@ class Shape:
 
     def exact(self, value: Any) -> NDArray[Any]:
         """Return an array that is of this shape and type already."""
-        fits = is_indices if self.whole else are_units if self.units else is_array
-        if not fits(value, *self._lengths) or (self.whole and value.min(initial=0) < 0):
+        if not self._fits(value):
             raise UnfitError
         self._check_ends(value)
         return value
 
+    def _fits(self, value: Any) -> bool:
+        if self.whole:
+            known = is_indices(value, *self._lengths)
+            return known and 0 <= value.min(initial=0) <= value.max(initial=0) <= MOST_COUNT
+        return (are_units if self.units else is_array)(value, *self._lengths)
+
     def _check_ends(self, array: NDArray[Any]) -> None:
-        if array.size and not self.least <= array.min() <= array.max() <= self.most:
+        free = self.least == -LARGEST_ENTRY and self.most == LARGEST_ENTRY
+        if not free and array.size and not self.least <= array.min() <= array.max() <= self.most:
             raise UnfitError(
                 f"must hold numbers from {self.least:g} to {self.most:g}, got "
                 f"{float(array.min()):.6g} to {float(array.max()):.6g}"
@@ -157,6 +166,10 @@ Frictions = Annotated[Array, Shape("k", least=0.0, most=LARGEST_FRICTION)]
 """A Coulomb coefficient for each of k contacts, (k,)."""
 Polygon = Annotated[Array, Shape(None, 3)]
 """Any number of points in space, (n, 3) [m], such as the corners of a polygon in order."""
+Figure = Annotated[float, Range(least=-LARGEST_ENTRY, most=LARGEST_ENTRY)]
+"""A number that a proof may square."""
+Amount = Annotated[float, Range(least=0.0, most=LARGEST_ENTRY)]
+"""How much there is of something, that a proof may square."""
 Triangles = Annotated[Indices, Shape(None, 3, whole=True)]
 """Places of the corners of triangles among points, (t, 3)."""
 
@@ -239,31 +252,11 @@ def rounded(value: float) -> float:
     return float(to_digits(np.array(value, dtype=np.float64)))
 
 
-def is_a(value: Any, kind: type) -> bool:
-    """Return whether a value is an instance of a class, whatever type is declared for it."""
-    return isinstance(value, kind)
-
-
-def is_tuple_of(value: Any, kind: type, count: int | None = None) -> bool:
-    """Return whether a value is a tuple of instances of a class, `count` of them if given."""
-    if not isinstance(value, tuple):
-        return False
-    things = cast("tuple[Any, ...]", value)
-    fits = count is None or len(things) == count
-    return fits and all(isinstance(thing, kind) for thing in things)
-
-
-def is_number(value: Any, *, least: float = -LARGEST_ENTRY, most: float = LARGEST_ENTRY) -> bool:
-    """Return whether a value is a single real number in a range, and not NaN."""
-    real = isinstance(value, Real) and not is_a(value, bool)
-    return real and least <= cast("float", value) <= most
-
-
 def is_array(value: Any, *shape: int | None) -> TypeGuard[Array]:
     """Return whether a value is a float64 array of finite numbers; None is any length."""
     if not _fits(value, np.float64, shape):
         return False
-    return bool((np.abs(cast("Array", value)) <= LARGEST_ENTRY).all())
+    return bool(np.abs(cast("Array", value)).max(initial=0.0) <= LARGEST_ENTRY)
 
 
 def is_indices(value: Any, *shape: int | None) -> TypeGuard[Indices]:
@@ -284,9 +277,10 @@ def _fits(value: Any, kind: type, shape: tuple[int | None, ...]) -> bool:
 
 def are_units(value: Any, *shape: int | None, slack: float = UNIT_SLACK) -> bool:
     """Return whether a value is an array of unit vectors along its last axis."""
-    return is_array(value, *shape) and bool(
-        (np.abs(np.linalg.norm(value, axis=-1) - 1.0) <= slack).all()
-    )
+    if not is_array(value, *shape):
+        return False
+    lengths = np.sqrt((value * value).sum(axis=-1))
+    return bool((np.abs(lengths - 1.0) <= slack).all())
 
 
 def are_frictions(value: Any, count: int) -> bool:

@@ -105,6 +105,10 @@ class Declared(ByValue):
             self._check_together()
         except (UnfitError, InputError, AttributeError):
             return False
+        return self._is_consistent()
+
+    def _is_consistent(self) -> bool:
+        """Return whether sound fields fit each other as proofs need, beyond `_check_together`."""
         return True
 
 

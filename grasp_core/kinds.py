@@ -144,7 +144,7 @@ def takes(kind: Any, *, exact: bool = False) -> Take:
         return _mapping(parts[1], exact)
     if isinstance(kind, type) and issubclass(kind, Enum):
         return _member(kind)
-    return PLAIN.get(kind) or _instance(origin or kind, exact)
+    return (EXACT if exact else PLAIN).get(kind) or _instance(origin or kind, exact)
 
 
 def _any(value: Any) -> Any:
@@ -179,7 +179,7 @@ def _narrowed(parts: tuple[Any, ...], exact: bool) -> Take:
     elif kind is float and rules:
         nothing = [rule.value for rule in rules if isinstance(rule, Null)]
         endless = any(isinstance(rule, Range) for rule in rules) or math.inf in nothing
-        inner = _numbers(endless=endless, nan=any(map(math.isnan, nothing)))
+        inner = _numbers(endless=endless, nan=any(map(math.isnan, nothing)), exact=exact)
     else:
         inner = takes(kind, exact=exact)
 
@@ -208,12 +208,13 @@ def _first_of(parts: tuple[Any, ...], exact: bool) -> Take:
     return take
 
 
-def _numbers(*, endless: bool, nan: bool = False) -> Take:
+def _numbers(*, endless: bool, nan: bool = False, exact: bool = False) -> Take:
     """Take real numbers as Python's floats; those that are not finite only if asked to."""
+    allowed = float | int if exact else Real  # narrower ones of numpy round what they are beside
 
     def take(value: Any) -> float:
         if type(value) is not float:
-            if isinstance(value, bool) or not isinstance(value, Real):
+            if isinstance(value, bool) or not isinstance(value, allowed):
                 raise UnfitError
             try:
                 value = float(value)
@@ -247,6 +248,10 @@ PLAIN: Mapping[Any, Take] = {
     Any: _any, float: _numbers(endless=False), int: _whole, Path: _path, type(None): _none,
     bool: _if(lambda value: isinstance(value, bool)),
     str: _if(lambda value: isinstance(value, str)),
+}  # fmt: skip
+EXACT: Mapping[Any, Take] = {
+    **PLAIN, float: _numbers(endless=False, exact=True),
+    int: _if(lambda value: isinstance(value, int) and not isinstance(value, bool)),
 }  # fmt: skip
 
 

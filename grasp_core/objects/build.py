@@ -15,14 +15,15 @@ Source: Eberly, "Polyhedral mass properties (revisited)", 2002.
 import hashlib
 import math
 from dataclasses import dataclass, replace
-from typing import Any, get_args
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, real_array
-from grasp_core.checked import instance, number, one_of
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError, MeshError, MeshRefusal
+from grasp_core.kinds import Range
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.polygons import check_corners, too_many
 from grasp_core.mesh_files.rounding import single_rounding
@@ -56,24 +57,15 @@ that is coarser than this, shapes and rounding cannot be told apart."""
 DEFAULT_LIMITS = MeshLimits()
 
 
-@dataclass(frozen=True, slots=True)
-class MeshChoices:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class MeshChoices(Declared):
     """How a mesh is taken; `load_polyhedron` explains the fields."""
 
     faces: FaceKind = "auto"
     patches: PatchLimits | None = None
-    flatness_m: float | None = None
+    flatness_m: Annotated[float, Range(least=0.0, most=LARGEST_EXTENT_M)] | None = None
     largest_part: bool = False
     limits: MeshLimits = DEFAULT_LIMITS
-
-    def __post_init__(self) -> None:
-        one_of(self.faces, get_args(FaceKind), "faces")
-        if self.patches is not None:
-            instance(self.patches, PatchLimits, "patches")
-        if self.flatness_m is not None:
-            number(self.flatness_m, "flatness_m", least=0.0, most=LARGEST_EXTENT_M)
-        instance(self.largest_part, bool, "largest_part")
-        instance(self.limits, MeshLimits, "limits")
 
 
 DEFAULT_CHOICES = MeshChoices()

@@ -42,7 +42,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Points, Shape, Wrench, frozen
+from grasp_core.arrays import Amount, Array, Figure, Points, Shape, Wrench, frozen
 from grasp_core.checked import LARGEST, SMALLEST, positive
 from grasp_core.closure.contacts import (
     WRENCH,
@@ -56,7 +56,6 @@ from grasp_core.closure.soft_contacts import LOCAL, contact_torsions, torsion_le
 from grasp_core.closure.wrench_sets import WrenchSet, force_rows, with_torques
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError
-from grasp_core.kinds import Range
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.solvers.ties import first_best, smallest_first
@@ -221,10 +220,10 @@ class WrenchLimit(Declared):
 
     wrench: Wrench
     """External wrench (force, torque), (6,) [N, N m], torque about the stated centre."""
-    limit: Annotated[float, Range(least=0.0)]
+    limit: Amount
     """Largest multiple of `wrench` that is resisted; `forces` prove it by balancing that multiple.
     """
-    upper: float
+    upper: Figure
     """Multiple above which the wrench is not resisted: the support of `facet`, in plain arithmetic.
     """
     forces: Points
