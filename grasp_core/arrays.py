@@ -151,7 +151,8 @@ def _is_rows(listed: Any) -> bool:
     """Return whether lists hold only numbers, None and further such lists."""
     if isinstance(listed, list | tuple):
         return all(map(_is_rows, cast("list[Any]", listed)))
-    return listed is None or (is_a(listed, Real) and not is_a(listed, bool))
+    number = type(listed) is not bool and isinstance(listed, int | float | np.number)
+    return listed is None or number
 
 
 Point = Annotated[Array, Shape(3)]
