@@ -11,10 +11,10 @@ from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices, frozen_units
-from grasp_core.checked import LARGEST, number, several, switch, text, whole
-from grasp_core.declared import ByValue, counted, summary
-from grasp_core.kinds import Range
+from grasp_core.arrays import Array, Indices, Shape, frozen, frozen_indices, frozen_units
+from grasp_core.checked import LARGEST, number, several
+from grasp_core.declared import ByValue, Declared, counted, summary
+from grasp_core.kinds import NotNegative, Number, Range
 from grasp_core.settings import Settings
 from grasp_core.values import RIGHT_ANGLE
 
@@ -84,39 +84,31 @@ MM = 1e3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Surface(ByValue):
+class Surface(Declared):
     """What is known of an object's triangles."""
 
     closed: bool = True
     """Whether the triangles, caps included, enclose a solid. Where they do not, the mass properties
     are those of the convex hull."""
-    caps: Indices = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    caps: Annotated[Indices, Shape(None, whole=True)] = field(
+        default_factory=lambda: np.empty(0, dtype=np.int64)
+    )
     """Indices of the triangles that close small holes, (c,); no finger may stand on them."""
-    holes: int = 0
+    holes: Number = 0
     """Number of holes that were closed."""
-    largest_hole_m: float = 0.0
+    largest_hole_m: NotNegative = 0.0
     """Largest distance between two corners of one closed hole [m]."""
-    volume_error: float = 0.0
+    volume_error: NotNegative = 0.0
     """Largest error of the volume if each closed hole was a half-sphere, as a share of it."""
-    dropped: float = 0.0
+    dropped: Annotated[float, Range(least=0.0, most=1.0)] = 0.0
     """Area of the parts that were left out, as a share of the whole."""
-    flatness_m: float = 0.0
+    flatness_m: NotNegative = 0.0
     """Distance from one plane that the rounding of the coordinates explains [m]; 0 where no more is
     known of them than that they are in double precision."""
     center_given: bool = False
     """Whether the centre of mass was given, and is not that of uniform density."""
     repairs: tuple[str, ...] = ()
     """What else was changed, in words."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "caps", frozen_indices(self.caps, (None,), "caps"))
-        whole(self.holes, "holes", least=0)
-        for name in ("closed", "center_given"):
-            switch(getattr(self, name), name)
-        for name in ("largest_hole_m", "volume_error", "flatness_m"):
-            number(getattr(self, name), name, least=0.0, most=LARGEST)
-        number(self.dropped, "dropped", least=0.0, most=1.0)
-        several(self.repairs, partial(text, name="repairs"), "repairs", "texts")
 
     @property
     def volume_source(self) -> Literal["surface", "capped surface", "convex hull"]:
